@@ -32,7 +32,7 @@ BODY = 0.2  # m: distance from a wall or a pillar's edge at contact
 PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the power law
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[no-untyped-def]
     """Returns the avoidance acceleration (fx, fy), m/s², of one of two discs whose radii add up to `radius`.
 
@@ -69,13 +69,13 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
     strength, horizon, radius = rules[AVOID_GROUP], rules[AVOID_TIME], rules[PERSON_RADIUS]
     reach, cap = rules[GROUP_RANGE], rules[AVOID_MAX]
     push[:] = 0.0
-    live = np.empty(len(status), np.int64)
+    live, place = np.empty(len(status), np.int64), np.empty(len(status))
     m = 0
     for g in range(len(status)):
-        live[m] = g
+        live[m], place[g] = g, status[g, MEAN_X]
         m += status[g, AVOIDED] > 0.0
     live = live[:m]
-    sort_by(status[:, MEAN_X], live)
+    sort_by(place, live)
     rows = np.empty((RADIUS + 1, m))  # columns COUNT … RADIUS of `status` as rows, groups sorted by x
     for s in range(m):
         for k in range(RADIUS + 1):
@@ -102,7 +102,7 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
             push[b, 1] -= (2.0 - share) * fy
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped-def]
     """Writes to `found` the groups s + 1 … last - 1 on collision course with group s; returns how many."""
     count, x, y = rows[COUNT], rows[MEAN_X], rows[MEAN_Y]
@@ -121,7 +121,7 @@ def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped
     return k
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-def]
     """Adds the forces between persons i and j to out (N, 2); (dx, dy) = position i - position j, d2 its square."""
     if tag[i, GROUP] == tag[j, GROUP]:
@@ -159,31 +159,32 @@ def _cells(state, reach):  # type: ignore[no-untyped-def]
     x.
     """
     n = len(state)
-    if n <= BRUTE:
-        return np.arange(n), np.array([0, n]), 1
-    x0, y0 = state[0, X], state[0, Y]
-    x1, y1 = x0, y0
+    x0, y0, x1, y1 = np.inf, np.inf, -np.inf, -np.inf
     for i in range(n):
         x0, x1 = min(x0, state[i, X]), max(x1, state[i, X])
         y0, y1 = min(y0, state[i, Y]), max(y1, state[i, Y])
-    cell = max(reach, sqrt((x1 - x0) * (y1 - y0) / (4.0 * n)), (x1 - x0) / 1000.0, (y1 - y0) / 1000.0)
-    nx, ny = int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1
+    cell, nx, ny = 1.0, 1, 1
+    if n > BRUTE:
+        cell = max(reach, sqrt((x1 - x0) * (y1 - y0) / (4.0 * n)), (x1 - x0) / 1000.0, (y1 - y0) / 1000.0)
+        nx, ny = int((x1 - x0) / cell) + 1, int((y1 - y0) / cell) + 1
     start = np.zeros(nx * ny + 1, np.int64)
     cells = np.empty(n, np.int64)
     for i in range(n):
-        cells[i] = int((state[i, Y] - y0) / cell) * nx + int((state[i, X] - x0) / cell)
+        cells[i] = int((state[i, Y] - y0) / cell) * nx + int((state[i, X] - x0) / cell) if n > BRUTE else 0
         start[cells[i] + 1] += 1
     for c in range(nx * ny):
         start[c + 1] += start[c]
-    fill = start[:-1].copy()
     order = np.empty(n, np.int64)
-    for i in range(n):
-        order[fill[cells[i]]] = i
-        fill[cells[i]] += 1
+    for i in range(n - 1, -1, -1):  # from the last place of each cell, which is the start of the next
+        start[cells[i] + 1] -= 1
+        order[start[cells[i] + 1]] = i
+    for c in range(nx * ny):
+        start[c] = start[c + 1]
+    start[nx * ny] = n
     return order, start, nx
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: ignore[no-untyped-def]
     """Appends to found[m:] the people first … last - 1 that may act on person s; returns the new length."""
     x, y, vx, vy = rows[X], rows[Y], rows[VX], rows[VY]
@@ -263,12 +264,14 @@ def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
 def avoid(state, tag, status, walls, pillars, rules, push, out):  # type: ignore[no-untyped-def]
     """Adds all avoidance accelerations to out (N, 2), and cuts each sum to Steering.max_acceleration.
 
-    state (N, 4), tag (N, 4), status (G, 12), walls (W, 4), pillars (P, 3): columns as in `forces`. rules (21,):
-    Steering.array(). push (G, 2): scratch.
+    state (N, 4), tag (N, 4), status (G, 12), walls (W, 4), pillars (P, 3): columns as in `forces`. walls: None if there
+    are neither walls nor pillars, so that nothing of them is compiled. rules (21,): Steering.array(). push (G, 2):
+    scratch.
     """
     _avoid_groups(status, rules, push)
     _pairs(state, tag, rules, out)
-    _walls(state, walls, pillars, rules, out)
+    if walls is not None:
+        _walls(state, walls, pillars, rules, out)
     cap = rules[MAX_ACCELERATION]
     for i in range(len(state)):
         # People in a queue do not take part in the avoidance of their group as a whole.

@@ -56,8 +56,6 @@ from sim.crowd.forces import (
     WANTED_VY,
     WAYPOINT,
     WIDTH,
-    GroupArrays,
-    PeopleArrays,
     X,
     Y,
 )
@@ -133,72 +131,72 @@ def _average(state, noise, tag, status):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _spread(state, place, tag, groups, status):  # type: ignore[no-untyped-def]
+def _spread(state, place, tag, route, kind, current, heading, status):  # type: ignore[no-untyped-def]
     """Raises RADIUS and MAX_OFF_PLACE of each group to the largest distance of a member, m."""
     for i in range(len(state)):
         g = tag[i, GROUP]
         dx, dy = state[i, X] - status[g, MEAN_X], state[i, Y] - status[g, MEAN_Y]
         status[g, RADIUS] = max(status[g, RADIUS], sqrt(dx * dx + dy * dy))
-        hx, hy = groups.heading[g, 0], groups.heading[g, 1]
+        hx, hy = heading[g, 0], heading[g, 1]
         mx, my = status[g, MEAN_X], status[g, MEAN_Y]
-        w = groups.current[g]
-        if groups.kind[g, w] == GATHER:
-            mx, my = groups.route[g, w, 0], groups.route[g, w, 1]
+        w = current[g]
+        if kind[g, w] == GATHER:
+            mx, my = route[g, w, 0], route[g, w, 1]
         dx = state[i, X] - mx - place[i, 0] * hx + place[i, 1] * hy
         dy = state[i, Y] - my - place[i, 0] * hy - place[i, 1] * hx
         status[g, MAX_OFF_PLACE] = max(status[g, MAX_OFF_PLACE], sqrt(dx * dx + dy * dy))
 
 
 @njit(cache=True)
-def _pass_doors(groups, people, status):  # type: ignore[no-untyped-def]
-    """Advances `groups.current` of each group at a door by one, once every member present has passed the door."""
+def _pass_doors(tag, kind, length, current, status):  # type: ignore[no-untyped-def]
+    """Advances `current` of each group at a door by one, once every member present has passed the door."""
     for g in range(len(status)):
-        groups.status[g, AVOIDED] = 1.0
-    for i in range(len(people.tag)):
-        g = people.tag[i, GROUP]
-        if groups.kind[g, groups.current[g]] == NARROW and people.tag[i, WAYPOINT] <= groups.current[g]:
-            groups.status[g, AVOIDED] = 0.0
+        status[g, AVOIDED] = 1.0
+    for i in range(len(tag)):
+        g = tag[i, GROUP]
+        if kind[g, current[g]] == NARROW and tag[i, WAYPOINT] <= current[g]:
+            status[g, AVOIDED] = 0.0
     for g in range(len(status)):
-        at_door = groups.length[g] > 0 and groups.kind[g, groups.current[g]] == NARROW
-        if status[g, COUNT] > 0.0 and at_door and groups.status[g, AVOIDED] > 0.0:
-            groups.current[g] += 1
+        at_door = length[g] > 0 and kind[g, current[g]] == NARROW
+        if status[g, COUNT] > 0.0 and at_door and status[g, AVOIDED] > 0.0:
+            current[g] += 1
 
 
 @njit(cache=True)
-def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
+def _lead_groups(route, kind, length, current, speed, heading, finish, arrived, status, dt, rules):  # type: ignore[no-untyped-def]
     """Advances each group on its way by dt (s), and sets its wanted velocity."""
     turn_time, slow_time = rules[TURN_TIME], rules[SLOW_TIME]
     gather, radius = rules[GATHER_RADIUS], rules[PASS_RADIUS]
     for g in range(len(status)):
-        if status[g, COUNT] == 0.0 or groups.length[g] == 0:
+        if status[g, COUNT] == 0.0 or length[g] == 0:
             continue
-        w, last = groups.current[g], groups.length[g] - 1
-        kind = groups.kind[g, w]
-        dx, dy = groups.route[g, w, 0] - status[g, MEAN_X], groups.route[g, w, 1] - status[g, MEAN_Y]
+        w, last = current[g], length[g] - 1
+        goal = kind[g, w]
+        dx, dy = route[g, w, 0] - status[g, MEAN_X], route[g, w, 1] - status[g, MEAN_Y]
         d = sqrt(dx * dx + dy * dy)
-        if (kind == PASS and d < radius + 0.3 * status[g, RADIUS]) or (
-            kind == GATHER and status[g, MAX_OFF_PLACE] < gather
+        if (goal == PASS and d < radius + 0.3 * status[g, RADIUS]) or (
+            goal == GATHER and status[g, MAX_OFF_PLACE] < gather
         ):
             if w < last:
-                groups.current[g] = w + 1
+                current[g] = w + 1
                 w += 1
-                kind = groups.kind[g, w]
-                dx, dy = groups.route[g, w, 0] - status[g, MEAN_X], groups.route[g, w, 1] - status[g, MEAN_Y]
+                goal = kind[g, w]
+                dx, dy = route[g, w, 0] - status[g, MEAN_X], route[g, w, 1] - status[g, MEAN_Y]
                 d = sqrt(dx * dx + dy * dy)
-            elif kind == GATHER:
-                groups.arrived[g] = True
-        pace = groups.speed[g]
-        if w == last and kind == END:
-            if groups.finish[g] == STAND:
+            elif goal == GATHER:
+                arrived[g] = True
+        pace = speed[g]
+        if w == last and goal == END:
+            if finish[g] == STAND:
                 # A group slows down before an end where it stands.
                 pace = min(pace, d / slow_time)
                 if d < ARRIVED:
-                    groups.arrived[g] = True
+                    arrived[g] = True
             elif d < radius:
-                groups.arrived[g] = True
-        if d > TURN_DISTANCE and kind != GATHER and not groups.arrived[g]:
-            _turn(groups.heading, g, dx / d, dy / d, dt / turn_time)
-        if groups.arrived[g] and groups.finish[g] == STAND:
+                arrived[g] = True
+        if d > TURN_DISTANCE and goal != GATHER and not arrived[g]:
+            _turn(heading, g, dx / d, dy / d, dt / turn_time)
+        if arrived[g] and finish[g] == STAND:
             # It drifts back to the end of its way.
             status[g, WANTED_VX], status[g, WANTED_VY] = dx / slow_time, dy / slow_time
             size = _length(status[g, WANTED_VX], status[g, WANTED_VY])
@@ -206,7 +204,7 @@ def _lead_groups(groups, status, dt, rules):  # type: ignore[no-untyped-def]
                 status[g, WANTED_VX] *= STANDING_SPEED / size
                 status[g, WANTED_VY] *= STANDING_SPEED / size
         else:
-            status[g, WANTED_VX], status[g, WANTED_VY] = pace * groups.heading[g, 0], pace * groups.heading[g, 1]
+            status[g, WANTED_VX], status[g, WANTED_VY] = pace * heading[g, 0], pace * heading[g, 1]
 
 
 @njit(cache=True)
@@ -221,42 +219,45 @@ def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _seek(people, groups, stairs, rules, out):  # type: ignore[no-untyped-def]
+def _seek(  # type: ignore[no-untyped-def]
+    state, place, target, pace, noise, wanted, tag,
+    route, kind, length, current, speed, heading, status, stairs, rules, out,
+):  # fmt: skip
     """Overwrites out (N, 2) with the acceleration of each person towards its goal."""
-    state, noise, status = people.calm, people.noise, groups.status
     relax, cohesion, alignment, haste = rules[RELAXATION], rules[COHESION_TIME], rules[ALIGNMENT], rules[HASTE]
     for i in range(len(state)):
-        g = people.tag[i, GROUP]
+        g = tag[i, GROUP]
         x, y, vx, vy = state[i, X], state[i, Y], state[i, VX], state[i, VY]
-        w = groups.current[g]
-        kind = groups.kind[g, w]
+        w = current[g]
+        goal = kind[g, w]
         align = 0.0
-        if people.tag[i, MODE] == TO_TARGET:
-            limit = people.pace[i]
-            tx, ty = (people.target[i, 0] - x) / TARGET_TIME, (people.target[i, 1] - y) / TARGET_TIME
-        elif kind == NARROW and groups.length[g] > 0:
-            limit = groups.speed[g]
-            tx, ty = _through_door(groups, people, i, g, x, y, limit)
+        if tag[i, MODE] == TO_TARGET:
+            limit = pace[i]
+            tx, ty = (target[i, 0] - x) / TARGET_TIME, (target[i, 1] - y) / TARGET_TIME
+        elif goal == NARROW and length[g] > 0:
+            limit = speed[g]
+            tx, ty = _through_door(route, current, tag, i, g, x, y, limit)
         else:
-            hx, hy = groups.heading[g, 0], groups.heading[g, 1]
-            ahead, left = people.place[i, 0], people.place[i, 1]
-            if kind != GATHER:
+            hx, hy = heading[g, 0], heading[g, 1]
+            ahead, left = place[i, 0], place[i, 1]
+            if goal != GATHER:
                 loose = min(1.0, _length(status[g, WANTED_VX], status[g, WANTED_VY]) / STANDING_SPEED)
                 ahead += loose * (noise[i, STRAY_AHEAD] - status[g, MEAN_AHEAD])
                 left += loose * (noise[i, STRAY_LEFT] - status[g, MEAN_LEFT])
             ox = ahead * hx - left * hy
             oy = ahead * hy + left * hx
-            if kind == GATHER:
-                limit = groups.speed[g]
-                tx = (groups.route[g, w, 0] + ox - x) / GATHER_TIME
-                ty = (groups.route[g, w, 1] + oy - y) / GATHER_TIME
+            if goal == GATHER:
+                limit = speed[g]
+                tx = (route[g, w, 0] + ox - x) / GATHER_TIME
+                ty = (route[g, w, 1] + oy - y) / GATHER_TIME
             else:
-                limit = groups.speed[g] * (1.0 + haste)
+                limit = speed[g] * (1.0 + haste)
                 tx = status[g, WANTED_VX] + (status[g, MEAN_X] + ox - x) / cohesion
                 ty = status[g, WANTED_VY] + (status[g, MEAN_Y] + oy - y) / cohesion
                 if status[g, COUNT] > 1.0:
                     align = alignment
-        limit *= _pace_on_stairs(x, y, stairs)
+        if stairs is not None:
+            limit *= _pace_on_stairs(x, y, stairs)
         size = sqrt(tx * tx + ty * ty)
         if size > limit:
             tx, ty = tx * limit / size, ty * limit / size
@@ -266,20 +267,20 @@ def _seek(people, groups, stairs, rules, out):  # type: ignore[no-untyped-def]
         # Fluctuations are smaller for people who hardly move.
         tx += share * (noise[i, WANDER_ALONG] * ex - noise[i, WANDER_LEFT] * ey)
         ty += share * (noise[i, WANDER_ALONG] * ey + noise[i, WANDER_LEFT] * ex)
-        people.wanted[i, 0], people.wanted[i, 1] = size * ex, size * ey
+        wanted[i, 0], wanted[i, 1] = size * ex, size * ey
         out[i, 0] = (tx - vx) / relax + align * (status[g, MEAN_VX] - vx)
         out[i, 1] = (ty - vy) / relax + align * (status[g, MEAN_VY] - vy)
 
 
 @njit(cache=True)
-def _through_door(groups, people, i, g, x, y, limit):  # type: ignore[no-untyped-def]
+def _through_door(route, current, tag, i, g, x, y, limit):  # type: ignore[no-untyped-def]
     """Returns the wanted velocity of person i at (x, y), whose group g is at a door."""
-    door = groups.current[g]
-    w = max(people.tag[i, WAYPOINT], door)
-    dx, dy = groups.route[g, w, 0] - x, groups.route[g, w, 1] - y
+    door = current[g]
+    w = max(tag[i, WAYPOINT], door)
+    dx, dy = route[g, w, 0] - x, route[g, w, 1] - y
     d = max(sqrt(dx * dx + dy * dy), TINY)
     if w == door and d < DOOR_DISTANCE:
-        people.tag[i, WAYPOINT] = door + 1
+        tag[i, WAYPOINT] = door + 1
     if w > door:
         limit *= DOOR_PACE
     return dx / d * limit, dy / d * limit
@@ -298,12 +299,11 @@ def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _mark_avoided(groups):  # type: ignore[no-untyped-def]
-    """Sets AVOIDED of groups.status to 1.0 if others avoid the group as a whole, else 0.0."""
-    status = groups.status
+def _mark_avoided(kind, current, status):  # type: ignore[no-untyped-def]
+    """Sets AVOIDED of `status` to 1.0 if others avoid the group as a whole, else 0.0."""
     for g in range(len(status)):
         together = status[g, COUNT] > 0.0 and status[g, RADIUS] <= LOOSE
-        status[g, AVOIDED] = 1.0 if together and groups.kind[g, groups.current[g]] != NARROW else 0.0
+        status[g, AVOIDED] = 1.0 if together and kind[g, current[g]] != NARROW else 0.0
 
 
 @njit(cache=True)
@@ -314,8 +314,8 @@ def drive(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Overwrites out (N, 2) with the accelerations towards goals, and advances the groups' ways by dt (s).
 
-    Returns False, with nothing written, if a state is not below 1e9. state (N, 4), stairs (S, 7): columns as in
-    `forces`. rules (21,): Steering.array(). The others are the fields of PeopleArrays and GroupArrays.
+    Returns False, with nothing written, if a state is not below 1e9. state (N, 4), stairs (S, 7), None without stairs:
+    columns as in `forces`. rules (21,): Steering.array(). The others are the fields of PeopleArrays and GroupArrays.
     """
     for i in range(len(state)):
         if not abs(state[i, X]) + abs(state[i, Y]) + abs(state[i, VX]) + abs(state[i, VY]) < 1e9:
@@ -323,13 +323,13 @@ def drive(  # type: ignore[no-untyped-def]
     for i in range(len(state)):
         calm[i, X], calm[i, Y] = state[i, X], state[i, Y]
         calm[i, VX], calm[i, VY] = state[i, VX] - gait[i, SWAY_X], state[i, VY] - gait[i, SWAY_Y]
-    # numba takes 3 µs to unpack a named tuple that is an argument.
-    people = PeopleArrays(place, target, pace, noise, gait, calm, wanted, tag)
-    groups = GroupArrays(route, kind, length, current, speed, heading, finish, arrived, status)
     _average(calm, noise, tag, status)
-    _spread(calm, place, tag, groups, status)
-    _pass_doors(groups, people, status)
-    _lead_groups(groups, status, dt, rules)
-    _seek(people, groups, stairs, rules, out)
-    _mark_avoided(groups)
+    _spread(calm, place, tag, route, kind, current, heading, status)
+    _pass_doors(tag, kind, length, current, status)
+    _lead_groups(route, kind, length, current, speed, heading, finish, arrived, status, dt, rules)
+    _seek(
+        calm, place, target, pace, noise, wanted, tag,
+        route, kind, length, current, speed, heading, status, stairs, rules, out,
+    )  # fmt: skip
+    _mark_avoided(kind, current, status)
     return True

@@ -60,10 +60,12 @@ def accelerate(
     from sim.crowd.forces_avoidance_kernels import avoid
     from sim.crowd.forces_goal_kernels import drive, sway
 
-    if not drive(state, *people, *groups, obstacles.stairs, dt, rules, out):
+    stairs = obstacles.stairs if len(obstacles.stairs) else None
+    if not drive(state, *people, *groups, stairs, dt, rules, out):
         return False
     sway(people.wanted, people.gait, dt, out)
-    avoid(people.calm, people.tag, groups.status, obstacles.walls, obstacles.pillars, rules, push, out)
+    walls = obstacles.walls if len(obstacles.walls) + len(obstacles.pillars) else None
+    avoid(people.calm, people.tag, groups.status, walls, obstacles.pillars, rules, push, out)
     return True
 
 

@@ -28,8 +28,10 @@ def convex_hulls(sets: Sequence[Array]) -> tuple[Array, ...]:
 
 
 @njit(cache=True)
-def _turns_left(a, b, c):  # type: ignore[no-untyped-def]
-    return (b[0] - a[0]) * (c[1] - a[1]) > (b[1] - a[1]) * (c[0] - a[0])
+def _turns_left(chain, n, x, y):  # type: ignore[no-untyped-def]
+    """Returns True if the way over the last two of n vertices to (x, y) turns left."""
+    ax, ay, bx, by = chain[n - 2, 0], chain[n - 2, 1], chain[n - 1, 0], chain[n - 1, 1]
+    return (bx - ax) * (y - ay) > (by - ay) * (x - ax)
 
 
 @njit(cache=True)
@@ -43,19 +45,19 @@ def monotone_chains(points, cuts):  # type: ignore[no-untyped-def]
     n = 0
     for g in range(len(cuts) - 1):
         first, last = cuts[g], cuts[g + 1]
-        if not np.isnan(points[first:last]).any():
-            start = n
-            for i in range(first, last):
-                while n - start > 1 and not _turns_left(out[n - 2], out[n - 1], points[i]):
-                    n -= 1
-                out[n] = points[i]
-                n += 1
-            start = n - 1
-            for i in range(last - 2, first - 1, -1):
-                while n - start > 1 and not _turns_left(out[n - 2], out[n - 1], points[i]):
-                    n -= 1
-                out[n] = points[i]
-                n += 1
+        known = True
+        for i in range(first, last):
+            known = known and not (np.isnan(points[i, 0]) or np.isnan(points[i, 1]))
+        if known:
+            for back in range(2):  # to the last point, and from the one before it back to the first
+                start = n - back
+                for k in range(back, last - first):
+                    i = last - 1 - k if back else first + k
+                    x, y = points[i, 0], points[i, 1]
+                    while n - start > 1 and not _turns_left(out, n, x, y):
+                        n -= 1
+                    out[n, 0], out[n, 1] = x, y
+                    n += 1
             n -= last > first + 1  # the chain ends with its first vertex: drop the repetition
         ends[g] = n
-    return out[:n].copy(), ends
+    return out[:n], ends

@@ -164,29 +164,6 @@ def _point_colour(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _mean_of_rays(  # type: ignore[no-untyped-def]
-    u, v, many, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, c, colour,
-    direct, plants,
-):  # fmt: skip
-    """Sets colour, direct and plants of the pixel (u, v) to the means over many x many rays spread over it.
-
-    Returns the surface of the last ray as `_point_colour` does. Arguments as of `paint_pixels`; c (3,): scratch.
-    """
-    share, surface = 1.0 / (many * many), 0
-    colour[v, u], direct[v, u], plants[v, u] = 0.0, 0.0, 0.0
-    for ray in range(many * many):
-        x, y = u + (ray % many + 0.5) / many, v + (ray // many + 0.5) / many
-        sunny, green, surface = _point_colour(
-            x, y, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, c
-        )  # fmt: skip
-        direct[v, u] += share * sunny
-        plants[v, u] += share * green
-        for k in range(3):
-            colour[v, u, k] += share * c[k]
-    return surface
-
-
-@njit(cache=True)
 def paint_pixels(  # type: ignore[no-untyped-def]
     rays, samples, scale, sun, shadow, penumbra, solids, size, style, palette, key, colour, direct, plants
 ):
@@ -199,26 +176,32 @@ def paint_pixels(  # type: ignore[no-untyped-def]
     height, width = direct.shape
     o, d, hit, more, c = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), np.empty((4, HIT_SLOTS)), np.empty(3)
     surface = np.empty((height, width), np.int64)
-    for v in range(height):
-        for u in range(width):
-            surface[v, u] = _mean_of_rays(
-                u, v, samples, rays, samples * scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d,
-                hit, more, c, colour, direct, plants,
-            )  # fmt: skip
-    if samples > 1:
-        return
-    for v in range(height):
-        for u in range(width):
-            here = surface[v, u]
-            if (
-                # Only edges need more rays: pixels that differ from a neighbour in surface or sunlight.
-                here == surface[max(v - 1, 0), u]
-                and here == surface[min(v + 1, height - 1), u]
-                and here == surface[v, max(u - 1, 0)]
-                and here == surface[v, min(u + 1, width - 1)]
-            ):
-                continue
-            _mean_of_rays(
-                u, v, 2, rays, scale, sun, shadow, penumbra, solids, size, style, palette, key, o, d, hit, more, c,
-                colour, direct, plants,
-            )  # fmt: skip
+    for turn in range(2 if samples == 1 else 1):
+        many = 2 if turn else samples
+        share = 1.0 / (many * many)
+        for v in range(height):
+            for u in range(width):
+                here = surface[v, u]
+                if (
+                    # Only edges need more rays: pixels that differ from a neighbour in surface or sunlight.
+                    turn == 1
+                    and here == surface[max(v - 1, 0), u]
+                    and here == surface[min(v + 1, height - 1), u]
+                    and here == surface[v, max(u - 1, 0)]
+                    and here == surface[v, min(u + 1, width - 1)]
+                ):
+                    continue
+                colour[v, u, 0], colour[v, u, 1], colour[v, u, 2] = 0.0, 0.0, 0.0
+                direct[v, u], plants[v, u] = 0.0, 0.0
+                for ray in range(many * many):
+                    x, y = u + (ray % many + 0.5) / many, v + (ray // many + 0.5) / many
+                    sunny, green, here = _point_colour(
+                        x, y, rays, samples * scale, sun, shadow, penumbra, solids, size, style, palette, key,
+                        o, d, hit, more, c,
+                    )  # fmt: skip
+                    direct[v, u] += share * sunny
+                    plants[v, u] += share * green
+                    for k in range(3):
+                        colour[v, u, k] += share * c[k]
+                if turn == 0:
+                    surface[v, u] = here

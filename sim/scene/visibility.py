@@ -67,9 +67,10 @@ def measure_visibility(
     behind = np.zeros((0, ROWS, COLUMNS), bool)
     if has_eye and len(solids.flights):
         behind = behind_stairs(box, centre, inverse, pos, eye, unproject, only_flights(solids.flights))
+    hides = has_eye and len(solids.walls) + len(solids.pillars) > 0
     visibility, truncation, visible_box = sample_visibility(
         frame_starts(frame), box, centre, inverse, occlusion_distance(camera, pos3, height), pos,
-        np.array(camera.image, dtype=float), has_eye, eye, unproject, solids, behind,
+        np.array(camera.image, dtype=float), eye, unproject, solids if hides else None, behind,
     )  # fmt: skip
     return BodyVisibility(box, visibility, truncation, visible_box)
 

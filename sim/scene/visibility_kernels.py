@@ -112,13 +112,13 @@ def visible_span(start, length, cells, low, high, first, last, limit):  # type: 
 
 
 @njit(cache=True)
-def _meets_any(d, eye, between, before, solids):  # type: ignore[no-untyped-def]
-    """Returns True if the ray eye + s d meets one of these walls or pillars."""
+def _meets_any(d, eye, between, n_walls, before, n_pillars, solids):  # type: ignore[no-untyped-def]
+    """Returns True if the ray eye + s d meets one of the first n_walls walls or n_pillars pillars that are listed."""
     hit = False
-    for w in between:
-        hit = hit or _meets_wall(d, eye, solids.walls[w], solids.wall_height)
-    for p in before:
-        hit = hit or _meets_pillar(d, eye, solids.pillars[p], solids.pillar_height)
+    for k in range(n_walls):
+        hit = hit or _meets_wall(d, eye, solids.walls[between[k]], solids.wall_height)
+    for k in range(n_pillars):
+        hit = hit or _meets_pillar(d, eye, solids.pillars[before[k]], solids.pillar_height)
     return hit
 
 
@@ -149,29 +149,35 @@ def behind_stairs(box, centre, inverse, pos, eye, unproject, stairs):  # type: i
 
 @njit(cache=True)
 def sample_visibility(  # type: ignore[no-untyped-def]
-    starts, box, centre, inverse, distance, pos, image_size, has_eye, eye, unproject, solids, behind
+    starts, box, centre, inverse, distance, pos, image_size, eye, unproject, solids, behind
 ):
     """Returns visibility (R,), truncation (R,) and visible boxes (R, 4) px of R people.
 
     starts (F + 1,): first row of each frame. box (R, 4) px. centre (R, 2, 2) px, inverse (R, 2, 3): of body and head.
-    distance (R,): occlusion order, nearest lowest. pos (R, 2) m: feet. has_eye: False for a camera from above, for
-    which solids hide nobody. unproject (3, 3): `raycast.unprojection`. behind: of `behind_stairs`; without rows if
-    there are no stairs.
+    distance (R,): occlusion order, nearest lowest. pos (R, 2) m: feet. unproject (3, 3): `raycast.unprojection`.
+    solids: None without walls and pillars that can hide somebody. behind: of `behind_stairs`; without rows if there are
+    no stairs.
     """
+    # numba leaves out the branches of solids if it is None: a third of what there is to compile.
     rows = len(box)
-    seen, cut, part = np.zeros(rows), np.ones(rows), np.empty((rows, 4))
-    part[:] = np.nan
+    seen, cut, part = np.empty(rows), np.empty(rows), np.empty((rows, 4))
     people = np.empty(rows, np.int64)
-    between, before = np.empty(len(solids.walls), np.int64), np.empty(len(solids.pillars), np.int64)
-    d, has_stairs = np.empty(3), len(behind) > 0
+    if solids is not None:
+        between, before, d = np.empty(len(solids.walls), np.int64), np.empty(len(solids.pillars), np.int64), np.empty(3)
+    has_stairs = len(behind) > 0
     for f in range(len(starts) - 1):
         for i in range(starts[f], starts[f + 1]):
             left, top, width, height = box[i, LEFT], box[i, TOP], box[i, WIDTH], box[i, HEIGHT]
+            seen[i], cut[i] = 0.0, 1.0
+            for k in range(4):
+                part[i, k] = np.nan
             if not (width > 0 and height > 0):
                 continue
             n = _nearer_people(i, starts[f], starts[f + 1], box, distance, people)
-            n_walls = _walls_between(pos[i, 0], pos[i, 1], eye, solids.walls, between) if has_eye else 0
-            n_pillars = _pillars_before(pos[i, 0], pos[i, 1], eye, solids.pillars, before) if has_eye else 0
+            n_walls = n_pillars = 0
+            if solids is not None:
+                n_walls = _walls_between(pos[i, 0], pos[i, 1], eye, solids.walls, between)
+                n_pillars = _pillars_before(pos[i, 0], pos[i, 1], eye, solids.pillars, before)
             whole = left >= 0 and top >= 0 and left + width <= image_size[0] and top + height <= image_size[1]
             # Most people are wholly in view with nothing before them.
             if whole and n + n_walls + n_pillars == 0 and not has_stairs:
@@ -199,9 +205,9 @@ def sample_visibility(  # type: ignore[no-untyped-def]
                         if _inside(centre, inverse, people[k], u, v):
                             hidden = True
                             break
-                    if not hidden and n_walls + n_pillars:
+                    if solids is not None and not hidden and n_walls + n_pillars > 0:
                         at_pixel(unproject, u, v, d)
-                        hidden = _meets_any(d, eye, between[:n_walls], before[:n_pillars], solids)
+                        hidden = _meets_any(d, eye, between, n_walls, before, n_pillars, solids)
                     hidden = hidden or (has_stairs and behind[i, r, c])
                     if not hidden:
                         visible += 1

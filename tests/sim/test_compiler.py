@@ -172,3 +172,27 @@ def test_a_kernel_is_compiled_anew_when_what_it_imports_changed(tmp_path, factor
     (tmp_path / "user.py").write_text(USER)
     assert printed(10, 1) == "20 0"
     assert printed(factor, term) == expected
+
+
+CALLER = """
+import gc, time
+from sim.compiler import clock, njit
+@njit(cache=True)
+def term(x, k):
+    return x + k
+@njit(cache=True)
+def caller(x):
+    return term(x, 1) + term(x, 2)
+print(caller(1), len(caller.overloads), len(term.overloads), term(1, 1), len(term.overloads), gc.isenabled())
+print(time.perf_counter() - clock() > 0.01)
+"""
+
+
+def test_a_kernel_called_by_kernels_alone_has_no_form_for_python(tmp_path):
+    """It gets one when Python calls it. Garbage is collected after compilation, and the clock leaves it out."""
+    (tmp_path / "caller.py").write_text(CALLER)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, str(tmp_path / "caller.py")]
+    for compiled_before in (False, True):
+        printed = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
+        assert printed == ["5", "1", "0", "2", "1", "True", str(not compiled_before)]

@@ -79,6 +79,8 @@ class ProgressMeter:
             what, item = (TextColumn(text, markup=False) for text in ("{task.description}", "{task.fields[item]}"))
             columns = (what, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), item)
             bar = Progress(*columns, console=Console(stderr=True), transient=True)
-            bar.add_task(self.what, completed=self.done, total=self.total, item=self.item)
+            compiler = sys.modules.get("sim.compiler")  # not imported here, as it imports numba
+            shown = "compiling, once" if compiler is not None and compiler.compiling.depth else self.item
+            bar.add_task(self.what, completed=self.done, total=self.total, item=shown)
             bar.start()
             self._bar = bar

@@ -1,4 +1,4 @@
-"""Kernels of tracking.detect.background: the class of each pixel, and adaptation of the model, in one pass each.
+"""Kernels of tracking.detect.background and ghosts: the class of each pixel, adaptation of the model, one pass each.
 
 Numpy twins: tests/reference_background.py. The module also defines the five classes (Gonzalez et al. 2006, sec. 3.2).
 
@@ -26,6 +26,9 @@ CHROMATICITY, LOWER, UPPER, DARK_BELOW, BRIGHT_ABOVE = range(5)
 
 CLIPPED = 255
 """Grey level at which the camera clips."""
+
+MEMORY = np.float32(30)
+"""Sightings after which the mean of a colour forgets the older ones, so that it follows slow changes."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -105,3 +108,25 @@ def adapt(
                 E[k, r, c] = max(E[k, r, c] + rate * d, np.float32(1.0))
                 if background:
                     V[k, r, c] = max(V[k, r, c] + rate * (d * d * g[k] * g[k] - V[k, r, c]), floor)
+
+
+@njit(cache=True, error_model="numpy")
+def watch(image: Image, gain: Floats, reach: Floats, colour: Floats, sightings: Floats) -> None:
+    """Update, in place, each pixel's mean colour since it last changed, and in how many pictures it has been seen.
+
+    image (H, W, 3) uint8; gain (3,): its brightness per channel. reach (3,): grey levels; a channel farther than this
+    from the mean is a change, and starts both anew. colour (3, H, W): at gain 1; sightings (H, W) float32.
+    """
+    one, k0, k1, k2 = np.float32(1.0), np.float32(1.0) / gain[0], np.float32(1.0) / gain[1], np.float32(1.0) / gain[2]
+    for r in range(image.shape[0]):
+        for c in range(image.shape[1]):
+            d0 = np.float32(image[r, c, 0]) * k0 - colour[0, r, c]
+            d1 = np.float32(image[r, c, 1]) * k1 - colour[1, r, c]
+            d2 = np.float32(image[r, c, 2]) * k2 - colour[2, r, c]
+            same = abs(d0) <= reach[0] and abs(d1) <= reach[1] and abs(d2) <= reach[2]
+            n = sightings[r, c] + one if same else one
+            sightings[r, c] = n
+            share = one / min(n, MEMORY)  # 1 after a change, so that the mean is then this colour
+            colour[0, r, c] += share * d0
+            colour[1, r, c] += share * d1
+            colour[2, r, c] += share * d2

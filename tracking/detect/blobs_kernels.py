@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sim.compiler import njit
 from sim.elementary_kernels import find_root
-from sim.types import Array, Bools, Ints
+from sim.types import Array, Bools, Image, Ints
 
 Labels = NDArray[np.int32]
 ROW, FIRST, END = range(3)
@@ -22,19 +22,27 @@ XX, XY, YY = range(3)
 """Columns of `spread`: variance of the columns, covariance, variance of the rows."""
 
 
-@njit(cache=True)
 def runs(mask: Bools) -> Labels:
     """Returns the runs (R, 3) int32 of a foreground mask (H, W) bool, in raster order; R = 0 for an empty mask.
 
     A run is a maximal sequence of foreground pixels in one row; its columns are row, first column, last column + 1.
+    """
+    pixels = mask.ravel().view(np.uint8)
+    pixels = pixels.copy() if pixels.ctypes.data % 8 else pixels
+    high, wide = mask.shape
+    found = np.empty((high * ((wide + 1) // 2), 3), np.int32)
+    n = find_runs(pixels, pixels[: len(pixels) // 8 * 8].view(np.uint64), wide, found)
+    return found[:n].copy()
+
+
+@njit(cache=True)
+def find_runs(pixels: Image, eights: NDArray[np.uint64], wide: int, found: Labels) -> int:
+    """Writes the runs of pixels (H wide,) to `found`, and returns how many; eights: the same bytes, eight at once.
+
     Eight background pixels at once are skipped in one step.
     """
-    high, wide = mask.shape
-    pixels = mask.ravel().view(np.uint8)
-    eights = pixels[: len(pixels) // 8 * 8].view(np.uint64)
-    found = np.empty((high * ((wide + 1) // 2), 3), np.int32)
     n = 0
-    for row in range(high):
+    for row in range(len(pixels) // max(wide, 1)):
         at, end = row * wide, (row + 1) * wide
         while at < end:
             if at % 8 == 0 and at // 8 < len(eights) and eights[at // 8] == 0:
@@ -47,7 +55,7 @@ def runs(mask: Bools) -> Labels:
                     at += 1
                 found[n, ROW], found[n, FIRST], found[n, END] = row, first - row * wide, at - row * wide
                 n += 1
-    return found[:n].copy()
+    return n
 
 
 @njit(cache=True)
@@ -58,10 +66,11 @@ def connect(runs: Labels) -> tuple[Ints, int]:
     runs (R, 3): row, first column, last column + 1, in raster order. Two runs are in one region if pixels of theirs are
     8 neighbours, directly or through other runs.
     """
-    parent = np.arange(len(runs))
+    parent = np.empty(len(runs), np.int64)
     above = 0
     for k in range(len(runs)):
-        row, first, end = runs[k]
+        parent[k] = k
+        row, first, end = runs[k, ROW], runs[k, FIRST], runs[k, END]
         while runs[above, ROW] < row - 1 or (runs[above, ROW] == row - 1 and runs[above, END] < first):
             above += 1
         other = above
@@ -88,7 +97,7 @@ def extents(runs: Labels, region: Ints, count: int) -> tuple[Ints, Ints]:
     """
     area, corners = np.zeros(count, np.int64), np.zeros((count, 4), np.int64)
     for k in range(len(runs)):
-        row, first, end = runs[k]
+        row, first, end = runs[k, ROW], runs[k, FIRST], runs[k, END]
         m = region[k]
         if area[m] == 0:
             corners[m, LEFT], corners[m, TOP] = first, row
@@ -108,24 +117,29 @@ def moments(runs: Labels, region: Ints, area: Ints) -> tuple[Array, Array]:
     """
     centre, spread = np.zeros((len(area), 2)), np.zeros((len(area), 3))
     for k in range(len(runs)):
-        row, first, end = runs[k]
         m = region[k]
         if m >= 0:
+            row, first, end = runs[k, ROW], runs[k, FIRST], runs[k, END]
             n = end - first
             centre[m, 0] += n * (first + end - 1) / 2
             centre[m, 1] += n * row
-    centre /= area.reshape(-1, 1)
+    for m in range(len(area)):
+        for d in range(2):
+            centre[m, d] = centre[m, d] / area[m] if area[m] else np.nan
     for k in range(len(runs)):
-        row, first, end = runs[k]
         m = region[k]
         if m >= 0:
+            row, first, end = runs[k, ROW], runs[k, FIRST], runs[k, END]
             y = row - centre[m, 1]
             xx, xy, yy = spread[m, XX], spread[m, XY], spread[m, YY]
             for column in range(first, end):
                 x = column - centre[m, 0]
                 xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
             spread[m, XX], spread[m, XY], spread[m, YY] = xx, xy, yy
-    return centre, spread / area.reshape(-1, 1)
+    for m in range(len(area)):
+        for d in range(3):
+            spread[m, d] = spread[m, d] / area[m] if area[m] else np.nan
+    return centre, spread
 
 
 @njit(cache=True)
@@ -137,4 +151,6 @@ def write_labels(runs: Labels, region: Ints, label: Labels) -> None:
     """
     for k in range(len(runs)):
         if region[k] >= 0:
-            label[runs[k, ROW], runs[k, FIRST] : runs[k, END]] = region[k] + 1
+            row, value = runs[k, ROW], region[k] + 1
+            for column in range(runs[k, FIRST], runs[k, END]):
+                label[row, column] = value

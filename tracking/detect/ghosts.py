@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 
 from sim.types import Bools, Image
-from tracking.detect import blobs, ghosts_kernels
+from tracking.detect import background_kernels, blobs
 from tracking.detect.background_kernels import Floats
 
 SIGHTING = 0.25  # s from one look at the pixels to the next. A walking person uncovers a pixel in about this time.
@@ -61,7 +61,7 @@ class Ghosts:
         self._frames += 1
         if self._frames % self._every:
             return None
-        ghosts_kernels.watch(image, gain, self.reach, self.colour, self.sightings)
+        background_kernels.watch(image, gain, self.reach, self.colour, self.sightings)
         still = self.sightings >= max(math.ceil(ghost_time / self._step) + 1, LEAST_SIGHTINGS)
         regions = blobs.find(mask & still, least)
         band = max(round(BAND_M * px_per_m), LEAST_BAND)

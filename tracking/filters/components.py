@@ -12,7 +12,7 @@ Ours: S is shrunk to (N S + n0 S0) / (N + n0), as one or two points have none. N
 covariance with 1/N, S0 a prior covariance and n0 the prior's weight. G_x is repeated until nothing changes, since the
 region of joined components may overlap one that none of them did. Points have weights (the share of a person that a
 pixel is). A component below a least weight is noise.
-Gennari & Hager do not say how they test for overlap: see ellipse_overlap_kernels.
+Gennari & Hager do not say how they test for overlap: see components_kernels.overlap.
 """
 
 from __future__ import annotations
@@ -23,8 +23,6 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.filters import components_kernels as kernels
-from tracking.filters import ellipse_overlap_kernels
-from tracking.filters.component_regions_kernels import WEIGHT, closure
 
 
 @dataclass(frozen=True)
@@ -51,11 +49,11 @@ def linked(points: Array, link: float) -> Ints:
 def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
     """Returns the group of each point (M,), numbered in order of first points; -1 for noise."""
     label, sums = kernels.components(points, weights, rule.link)
-    parts = np.flatnonzero(sums[:, WEIGHT] >= rule.least)
+    parts = np.flatnonzero(sums[:, kernels.WEIGHT] >= rule.least)
     group = np.full(len(sums), -1)
     if len(parts):
         # noise must not bridge two groups, so that only the heavy components are joined
-        joined = closure(sums[parts], rule.gate, rule.prior_entries, rule.strength)[0]
+        joined = kernels.closure(sums[parts], rule.gate, rule.prior_entries, rule.strength)[0]
         group[parts] = np.unique(joined, return_inverse=True)[1]
     return np.asarray(group[label])
 
@@ -69,4 +67,4 @@ def prefixes(points: Array, weights: Array, start: int, rule: Constraint) -> Boo
 
 def regions_overlap(mean: Array, covariance: Array, gate: float) -> Bools:
     """Returns flags (G, G): True where two regions (y - mean)' covariance^-1 (y - mean) <= gate overlap or touch."""
-    return ellipse_overlap_kernels.overlaps(np.ascontiguousarray(mean), gate * covariance)
+    return kernels.overlaps(np.ascontiguousarray(mean), gate * covariance)

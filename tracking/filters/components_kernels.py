@@ -1,20 +1,40 @@
-"""Kernels of tracking.filters.components: linked points by a grid of cells, and sets of points that grow by one.
+"""Kernels of tracking.filters.components: overlap of ellipses, regions of components, linked points.
 
-The diagonal of a cell is `link`, the largest distance of linked points, so that points of one cell are linked, and
-other points can be linked only from the 20 cells around. A new point is compared with the points of those cells that
-are not of its component yet and whose bounding box is near enough. At the first linked point the two components are
-joined, and so are their moments, the rows of `sums` (component_regions_kernels). Slow twins:
-tests/reference_components.py."""
+An ellipse is the set of points y with y' A^-1 y <= 1 about its centre. Its symmetric 2 x 2 matrix A is given by the
+entries xx, xy, yy, in the squared unit of the centres.
+
+A component's moments are a row of `sums` (K, 6): weight N, mean x, y, and N times the covariance xx, xy, yy. Its region
+is a row of `shape` (K, 5), an ellipse. Moments are joined without raw sums, in which precision would cancel.
+
+Points are linked by a grid of cells. The diagonal of a cell is `link`, the largest distance of linked points, so that
+points of one cell are linked, and other points can be linked only from the 20 cells around. A new point is compared
+with the points of those cells that are not of its component yet and whose bounding box is near enough. At the first
+linked point the two components are joined, and so are their moments.
+
+Slow twins: tests/reference_components.py. Loops stand in place of np.full, np.argsort and copies of slices, which take
+seconds to compile.
+"""
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
-from sim.compiler import njit
-from sim.elementary_kernels import find_root
+from sim.compiler import njit, shared_njit
+from sim.elementary_kernels import find_root, sort_by
 from sim.types import Array, Bools, Ints
-from tracking.filters.component_regions_kernels import WEIGHT, XX, XY, YY, X, Y, closure, fit, meet, pool, unset
 
+STEPS = 60
+"""Most bisections; two ellipses that are still undecided touch, and count as overlapping."""
+WEIGHT, X, Y, XX, XY, YY = range(6)
+"""Columns of `sums`."""
+MEAN_X, MEAN_Y, A_XX, A_XY, A_YY = range(5)
+"""Slots of `shape`: an ellipse (y - mean)' A^-1 (y - mean) <= 1."""
+FEW = 16
+"""Components of which all pairs are compared; more are sorted first."""
+SLACK, ROUNDING = 1 + 1e-6, 1e-15
+"""A region's box is larger by this factor, and by this share of its place, so that rounding excludes no pair."""
 AROUND = 20
 """Cells round a cell from which points can be linked with its points."""
 LOW_X, LOW_Y, HIGH_X, HIGH_Y = range(4)
@@ -23,6 +43,178 @@ VISITS, COMPONENTS = range(2)
 """Slots of `work`: cells and points compared so far; number of components."""
 FAR = 2.0**40
 """Cells from the first point beyond which a point is moved nearer, so that cell numbers fit in int64."""
+
+
+@njit(cache=True)
+def overlap(dx: float, dy: float, axx: float, axy: float, ayy: float, bxx: float, bxy: float, byy: float) -> bool:
+    """Returns True if the filled ellipses y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 have a common point."""
+    # Coordinates with B = I and A = diag(l1, l2). The ellipses are disjoint if and only if, for some s in (0, 1), f(s)
+    # = d' (A / (1 - s) + B / s)^-1 d = sum of s (1 - s) d_i^2 / (1 + s (l_i - 1)) > 1 (Gilitschenski & Hanebeck 2012).
+    l11 = sqrt(bxx)  # B = L L'
+    l21 = bxy / l11
+    l22 = sqrt(byy - l21 * l21)
+    u = dx / l11
+    v = (dy - l21 * u) / l22
+    cxx = axx / (l11 * l11)  # C = L^-1 A L^-T
+    cxy = (axy / l11 - l21 * cxx) / l22
+    cyy = (ayy - 2 * l21 * (axy / l11) + l21 * l21 * cxx) / (l22 * l22)
+    half, differ = (cxx + cyy) / 2, (cxx - cyy) / 2
+    root = sqrt(differ * differ + cxy * cxy)
+    large = half + root
+    small = (axx * ayy - axy * axy) / (bxx * byy - bxy * bxy) / large  # half - root would cancel
+    p, q = large - 1, small - 1
+    # Direction of the first eigenvector: (cxy, l1 - cxx) or (l1 - cyy, cxy), whichever is the longer.
+    ex, ey = (root + differ, cxy) if differ >= 0 else (cxy, root - differ)
+    length = sqrt(ex * ex + ey * ey)
+    # a circle: every direction is an eigenvector
+    if length == 0:
+        ex, ey, length = 1.0, 0.0, 1.0
+    a = (u * ex + v * ey) / length
+    b = (v * ex - u * ey) / length
+    a2, b2 = a * a, b * b
+    low, high = 0.0, 1.0
+    value_low, slope_low, value_high, slope_high = 0.0, a2 + b2, 0.0, -(a2 / (1 + p) + b2 / (1 + q))
+    for _ in range(STEPS):
+        # f is concave: the tangents at both ends of a bracket bound its maximum
+        if min(value_low + slope_low * (high - low), value_high - slope_high * (high - low)) <= 1:
+            return True
+        s = (low + high) / 2
+        m, n = 1 + s * p, 1 + s * q
+        value = s * (1 - s) * (a2 / m + b2 / n)
+        if value > 1:
+            return False
+        slope = a2 * (1 - 2 * s - s * s * p) / (m * m) + b2 * (1 - 2 * s - s * s * q) / (n * n)
+        if slope > 0:
+            low, value_low, slope_low = s, value, slope
+        else:
+            high, value_high, slope_high = s, value, slope
+    return True
+
+
+@njit(cache=True)
+def overlaps(mean: Array, shape: Array) -> Bools:
+    """Returns flags (G, G): True where two filled ellipses, centres mean (G, 2), matrices (G, 2, 2), overlap."""
+    count = len(mean)
+    found = np.ones((count, count), np.bool_)
+    for i in range(count):
+        for j in range(i):
+            a, b = shape[i], shape[j]
+            dx, dy = mean[j, 0] - mean[i, 0], mean[j, 1] - mean[i, 1]
+            found[i, j] = overlap(dx, dy, a[0, 0], a[0, 1], a[1, 1], b[0, 0], b[0, 1], b[1, 1])
+            found[j, i] = found[i, j]
+    return found
+
+
+@njit(cache=True)
+def pool(into: Array, other: Array) -> None:
+    """Changes the moments `into` (6,) of a set of points to those of its union with another set (3.1)."""
+    n = into[WEIGHT] + other[WEIGHT]
+    share = other[WEIGHT] / n
+    dx, dy = other[X] - into[X], other[Y] - into[Y]
+    w = into[WEIGHT] * share
+    into[WEIGHT] = n
+    into[X] += share * dx
+    into[Y] += share * dy
+    into[XX] += other[XX] + w * dx * dx
+    into[XY] += other[XY] + w * dx * dy
+    into[YY] += other[YY] + w * dy * dy
+
+
+@njit(cache=True)
+def fit(sums: Array, gate: float, prior: Array, strength: float, shape: Array) -> None:
+    """Writes a component's search region into `shape` (5,): `gate` times its covariance, shrunk to `prior` (3,)."""
+    shape[MEAN_X], shape[MEAN_Y] = sums[X], sums[Y]
+    scale = gate / (sums[WEIGHT] + strength)
+    shape[A_XX] = scale * (sums[XX] + strength * prior[0])
+    shape[A_XY] = scale * (sums[XY] + strength * prior[1])
+    shape[A_YY] = scale * (sums[YY] + strength * prior[2])
+
+
+@njit(cache=True)
+def meet(a: Array, b: Array) -> bool:
+    """Returns True if two search regions overlap; a, b (5,): written by `fit`."""
+    dx, dy = b[MEAN_X] - a[MEAN_X], b[MEAN_Y] - a[MEAN_Y]
+    # A cheap test of the bounding boxes first: most pairs are far apart.
+    far = 2 * SLACK  # (p + q)^2 <= 2 p^2 + 2 q^2 of the half widths p, q
+    if dx * dx > far * (a[A_XX] + b[A_XX]) or dy * dy > far * (a[A_YY] + b[A_YY]):
+        return False
+    return overlap(dx, dy, a[A_XX], a[A_XY], a[A_YY], b[A_XX], b[A_XY], b[A_YY])
+
+
+@njit(cache=True)
+def unset(count: int) -> Ints:
+    """Returns -1, `count` times."""
+    out = np.empty(count, np.int64)
+    for k in range(count):
+        out[k] = -1
+    return out
+
+
+@shared_njit(cache=True)
+def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[Ints, int]:
+    """Returns the first component that each of K is joined with (K,) (G_x, 3.1), and the number of pairs compared."""
+    k, compared = len(sums), 0
+    label, alive, order, tree = (
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+    )
+    pooled, shape = np.empty((k, 6)), np.empty((k, 5))
+    left, wide = np.empty(k), np.empty(k)  # of a region: least x, half of its width
+    fresh = np.empty(k, np.bool_)  # only pairs with a changed component are compared again
+    for i in range(k):
+        alive[i] = tree[i] = i
+        fresh[i] = True
+        for c in range(6):
+            pooled[i, c] = sums[i, c]
+    count = k
+    changed = k > 1
+    while changed:
+        for n in range(count):
+            order[n] = alive[n]
+            i = alive[n]
+            if fresh[i]:
+                fit(pooled[i], gate, prior, strength, shape[i])
+                wide[i] = SLACK * np.sqrt(shape[i, A_XX]) + ROUNDING * abs(shape[i, MEAN_X])
+                left[i] = shape[i, MEAN_X] - wide[i]
+        # Few are compared in all pairs; of many only those whose boxes overlap along x.
+        many = count > FEW
+        if many:
+            sort_by(left, order[:count])
+        for n in range(count):
+            for later in range(n + 1, count):
+                p, q = order[n], order[later]
+                if many and left[q] > left[p] + 2 * wide[p]:
+                    break
+                compared += 1
+                if (
+                    (fresh[p] or fresh[q])
+                    # pairs that are joined already need no test
+                    and find_root(tree, p) != find_root(tree, q)
+                    # in one order of arguments, so that rounding does not depend on who is first
+                    and meet(shape[max(p, q)], shape[min(p, q)])
+                ):
+                    i, j = find_root(tree, p), find_root(tree, q)
+                    tree[max(i, j)] = min(i, j)
+        kept = 0
+        for n in range(count):
+            fresh[alive[n]] = False
+        for n in range(count):
+            i = alive[n]
+            top = find_root(tree, i)
+            if top == i:
+                alive[kept] = i
+                kept += 1
+            else:
+                pool(pooled[top], pooled[i])
+                fresh[top] = True
+        # A joined region may overlap one that none of its parts did: repeat until nothing changes.
+        changed = 1 < kept < count
+        count = kept
+    for i in range(k):
+        label[i] = find_root(tree, i)
+    return label, compared
 
 
 @njit(cache=True)
@@ -134,7 +326,7 @@ def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
     work[COMPONENTS] -= 1
 
 
-@njit(cache=True)
+@shared_njit(cache=True)
 def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]:
     """Returns the component of each point (M,), numbered by first points, and the moments (K, 6) of the components."""
     m = len(points)

@@ -1,11 +1,72 @@
-"""Numba kernel of the belief: sums of tables."""
+"""Numba kernels of the belief, in the order of its steps: evidence of pairs, sums of tables, partition into groups.
+
+Evidence: exponential means over a pair's rows, and counts of common neighbours. Partition: average linkage in each
+step, with a memory of the step before.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sim.compiler import njit
-from sim.types import Array, Ints
+from sim.elementary_kernels import find_root
+from sim.types import Array, Bools, Ints
+
+
+@njit(cache=True)
+def add_to_means(
+    step: Ints, pair: Ints, values: Array, times: Array, total: Array, weight: Array, last: Ints, out: Array
+) -> None:
+    """Adds rows (R,) of values (R, V) to the means of their pairs, in order, and writes the means after each to out.
+
+    times (T,): in steps. total, weight (K, V, T), last (K,): state by pair. out (R, V, T): nan before the first number.
+    """
+    fade = np.empty(len(times))
+    for r in range(len(step)):
+        k = pair[r]
+        for n in range(len(times)):
+            # the age of all former rows, applied once for each time
+            fade[n] = np.exp(-(step[r] - last[k]) / times[n])
+        last[k] = step[r]
+        for v in range(values.shape[1]):
+            x = values[r, v]
+            known = not np.isnan(x)
+            for n in range(len(times)):
+                weight[k, v, n] = weight[k, v, n] * fade[n] + (1.0 if known else 0.0)
+                total[k, v, n] = total[k, v, n] * fade[n] + (x if known else 0.0)
+                out[r, v, n] = total[k, v, n] / weight[k, v, n] if weight[k, v, n] > 0 else np.nan
+
+
+@njit(cache=True)
+def common_neighbours(i: Ints, j: Ints, linked: Bools, rows: int) -> Array:
+    """Returns for each pair (i, j) (R,) of `rows` rows how many third rows are linked with both, (R,)."""
+    # neighbours of each row, one list after the other
+    start = np.zeros(rows + 1, np.int64)
+    for r in range(len(i)):
+        if linked[r]:
+            start[i[r] + 1] += 1
+            start[j[r] + 1] += 1
+    for r in range(rows):
+        start[r + 1] += start[r]
+    neighbour, end = np.empty(start[rows], np.int64), np.empty(rows, np.int64)
+    for r in range(rows):
+        end[r] = start[r]
+    for r in range(len(i)):
+        if linked[r]:
+            neighbour[end[i[r]]], neighbour[end[j[r]]] = j[r], i[r]
+            end[i[r]] += 1
+            end[j[r]] += 1
+    out, marked = np.zeros(len(i)), np.empty(rows, np.int64)
+    for r in range(rows):
+        marked[r] = -1
+    for r in range(len(i)):
+        if start[i[r]] < end[i[r]] and start[j[r]] < end[j[r]]:
+            for n in range(start[i[r]], end[i[r]]):
+                marked[neighbour[n]] = r
+            for n in range(start[j[r]], end[j[r]]):
+                if marked[neighbour[n]] == r:
+                    out[r] += 1
+    return out
 
 
 @njit(cache=True)
@@ -32,3 +93,126 @@ def table_sums(values: Array, mix: Array, bias: float, column: Ints, cut: Ints, 
                         if part > 0:
                             out[r] += mix[r, m] * part * (heights[m, k + 1] - heights[m, k])
     return out
+
+
+@njit(cache=True)
+def linked_groups(
+    cut: Ints, a: Ints, b: Ints, log_odds: Array, unseen: float, stay: float, come: float, label: Ints
+) -> None:
+    """Finds the groups of each of S steps by average linkage, with a memory of the step before.
+
+    cut (S + 1,): where the rows of each step begin in a, b, log_odds (R,). label (S, P): filled with the lowest member
+    of each person's group; -1, as given, where a person is alone.
+    """
+    # Only people whose log-odds are positive with somebody can be in a group: linkage runs in each connected component
+    # of these pairs alone, in a table of the component's size.
+    steps, people = label.shape
+    root, place, size = np.empty(people, np.int64), np.empty(people, np.int64), np.empty(people, np.int64)
+    start, node, member = np.empty(people, np.int64), np.empty(people, np.int64), np.empty(people, np.int64)
+    for p in range(people):
+        root[p], place[p] = p, -1
+    for s in range(steps):
+        before = label[max(s - 1, 0)]
+        rows = range(cut[s], cut[s + 1])
+        for r in rows:
+            if log_odds[r] + _memory(before, a[r], b[r], stay, come) > 0:
+                place[a[r]] = place[b[r]] = 0
+                i, j = find_root(root, a[r]), find_root(root, b[r])
+                root[max(i, j)] = min(i, j)
+        count = 0
+        for p in range(people):
+            if place[p] == 0:
+                node[count] = p
+                count += 1
+        for n in range(count):
+            p = node[n]
+            size[p], start[p] = 0, -1
+        total = 0
+        for n in range(count):
+            p = node[n]
+            i = find_root(root, p)
+            place[p] = size[i]
+            size[i] += 1
+        for n in range(count):
+            p = node[n]
+            if root[p] == p:
+                start[p] = total
+                total += size[p] * size[p]
+        table = np.empty(total)
+        for n in range(total):
+            table[n] = unseen
+        for r in rows:
+            i = find_root(root, a[r])
+            if place[a[r]] >= 0 and i == find_root(root, b[r]):
+                table[start[i] + place[a[r]] * size[i] + place[b[r]]] = log_odds[r]
+                table[start[i] + place[b[r]] * size[i] + place[a[r]]] = log_odds[r]
+        for k in range(count):
+            i = node[k]
+            if root[i] == i:
+                m = 0
+                for n in range(count):
+                    p = node[n]
+                    if find_root(root, p) == i:
+                        member[m] = p
+                        m += 1
+                x = np.empty((m, m))
+                for u in range(m):
+                    for v in range(m):
+                        x[u, v] = table[start[i] + u * m + v] + _memory(before, member[u], member[v], stay, come)
+                group = _average_linkage(x)
+                for u in range(m):
+                    alone = True
+                    for v in range(m):
+                        alone &= v == u or group[v] != group[u]
+                    if not alone:
+                        label[s, member[u]] = member[group[u]]
+        for n in range(count):
+            p = node[n]
+            root[p], place[p] = p, -1
+
+
+@njit(cache=True)
+def _memory(before: Ints, p: int, q: int, stay: float, come: float) -> float:
+    """Returns what is added to the log-odds of two people; before (P,): labels of the step before."""
+    return stay if before[p] >= 0 and before[p] == before[q] else -come
+
+
+@njit(cache=True)
+def _average_linkage(x: Array) -> Ints:
+    """Returns the group (M,) of each person, its lowest member; x (M, M): log-odds of pairs, changed in place."""
+    count = len(x)
+    size, group, best = np.empty(count), np.empty(count, np.int64), np.empty(count, np.int64)
+    for u in range(count):
+        size[u], group[u] = 1.0, u
+    for u in range(count):
+        best[u] = _best_partner(x, size, u)
+    while True:
+        u = -1
+        for p in range(count):
+            # each group remembers its best partner, so that most joins cost M operations
+            if size[p] > 0 and best[p] >= 0 and (u < 0 or x[p, best[p]] > x[u, best[u]]):
+                u = p
+        if u < 0 or x[u, best[u]] <= 0:
+            return group
+        u, v = min(u, best[u]), max(u, best[u])
+        for q in range(count):
+            if size[q] > 0 and q != u and q != v:
+                x[u, q] = x[q, u] = (size[u] * x[u, q] + size[v] * x[v, q]) / (size[u] + size[v])
+        size[u], size[v] = size[u] + size[v], 0.0
+        for q in range(count):
+            if group[q] == v:
+                group[q] = u
+            if size[q] > 0:
+                if q == u or best[q] == u or best[q] == v:
+                    best[q] = _best_partner(x, size, q)
+                elif best[q] >= 0 and x[q, u] > x[q, best[q]]:
+                    best[q] = u
+
+
+@njit(cache=True)
+def _best_partner(x: Array, size: Array, u: int) -> int:
+    found = -1
+    for q in range(len(x)):
+        if q != u and size[q] > 0 and (found < 0 or x[u, q] > x[u, found]):
+            found = q
+    return found

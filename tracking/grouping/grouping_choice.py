@@ -32,7 +32,7 @@ def groups_of_steps(
     step, a, b, log_odds (R,): one row per pair and step, step ascending. stay, come: added for pairs that were in one
     group in the step before, taken from all others.
     """
-    from tracking.grouping.linkage_kernels import linked_groups
+    from tracking.grouping.belief_kernels import linked_groups
 
     people = int(max(a.max(initial=0), b.max(initial=0))) + 1
     steps = int(step.max(initial=-1)) + 1

@@ -121,7 +121,7 @@ def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints) -> tuple[Array, A
 
     pos, vel (N, 2): m, m/s, one row per person and step. i, j (R,): all pairs within 4 m in some steps.
     """
-    from tracking.grouping.pair_evidence_kernels import common_neighbours
+    from tracking.grouping.belief_kernels import common_neighbours
 
     low = int(min(i.min(), j.min()))
     rows = slice(low, int(max(i.max(), j.max())) + 1)
@@ -184,7 +184,7 @@ class ExponentialMeans:
 
     def add(self, step: Ints, pair: Ints, values: Array) -> Array:
         """Adds rows, steps ascending, and returns the means of their pairs (R, V * T), times varying fastest."""
-        from tracking.grouping.pair_evidence_kernels import add_to_means
+        from tracking.grouping.belief_kernels import add_to_means
 
         out = np.empty((*values.shape, len(self.times)))
         add_to_means(step, pair, values, self.times / self.seconds, self.total, self.weight, self.last, out)

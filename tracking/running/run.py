@@ -10,7 +10,6 @@ Also here: the content of run.json: which tracker ran, with which config and see
 from __future__ import annotations
 
 import math
-import time
 import warnings
 from collections.abc import Callable, Mapping
 from collections.abc import Sequence as SequenceOf
@@ -206,6 +205,7 @@ def track(
         WorkError: The tracker raises an exception or returns wrong tracks, or an order of a simulated script was not
             fulfilled (mode "truth").
     """
+    from sim.compiler import clock
     from tracking.grouping.foot_points import can_stand, completed
     from tracking.grouping.grouped_tracks import late_groups, names_groups
     from tracking.grouping.plausibility import velocity_warning
@@ -217,14 +217,14 @@ def track(
     if weak is not None:
         warnings.warn(weak, UserWarning, stacklevel=2)
     prepared.reset(seed)
-    reported, spent, begun = [], 0.0, time.perf_counter()
+    reported, spent, begun = [], 0.0, clock()
     for frame in prepared.frames():
-        start = time.perf_counter()
+        start = clock()
         reported.append(prepared.step(frame))
-        spent += time.perf_counter() - start
+        spent += clock() - start
         if progress is not None:
             progress(frame.index)
-    whole = time.perf_counter() - begun
+    whole = clock() - begun
     scale, pixels = prepared.scale(reported), prepared.mode == "image"
     camera, scene = prepared.context.camera, prepared.context.scene
     tracks = completed(reported, sequence.fps, scale.px_per_m, rule, camera=camera, scene=scene, pixels=pixels)

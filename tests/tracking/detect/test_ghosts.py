@@ -9,7 +9,7 @@ from sim.types import Context
 from tests import painted
 from tests import reference_background as reference
 from tests.painted import TALL
-from tracking.detect import ghosts_kernels
+from tracking.detect import background_kernels
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.foreground import Foreground
 
@@ -85,8 +85,8 @@ def test_the_kernel_equals_its_twin():
     for k in range(40):
         noise = r.integers(-5, 6, still.shape) + 60 * (r.random((12, 15, 1)) < 0.03)
         image = (still + noise).astype(np.uint8)
-        ghosts_kernels.watch(image, gain, reach, colour, sightings)
+        background_kernels.watch(image, gain, reach, colour, sightings)
         twin = reference.watch(image, gain, reach, *twin)
         np.testing.assert_allclose(colour, twin[0], rtol=1e-4, err_msg=str(k))
         assert np.array_equal(sightings, twin[1])
-    assert sightings.max() > ghosts_kernels.MEMORY
+    assert sightings.max() > background_kernels.MEMORY

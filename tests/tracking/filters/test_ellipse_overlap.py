@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.reference_components import nearest
-from tracking.filters import ellipse_overlap_kernels
+from tracking.filters import components_kernels
 from tracking.filters.components import regions_overlap
 
 GATE = 9.21
@@ -24,7 +24,7 @@ def overlap(mean, covariance, other_mean, other_covariance, gate):
     found = np.zeros(len(mean), bool)
     for k in range(len(mean)):
         a, b, d = gate * covariance[k], gate * other_covariance[k], other_mean[k] - mean[k]
-        found[k] = ellipse_overlap_kernels.overlap(d[0], d[1], a[0, 0], a[0, 1], a[1, 1], b[0, 0], b[0, 1], b[1, 1])
+        found[k] = components_kernels.overlap(d[0], d[1], a[0, 0], a[0, 1], a[1, 1], b[0, 0], b[0, 1], b[1, 1])
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.filters.ellipse_overlap_kernels import overlap
+from tracking.filters.components_kernels import overlap
 from tracking.papers.stereo.group_life import separation
 
 

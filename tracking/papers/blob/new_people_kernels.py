@@ -107,7 +107,10 @@ def fit_new_people(
         alone = kernels.supports(foreground, cover, at, 1)
         kernels.paint_all(cover, at, -1)
         value = joint_support(foreground, cover, at) / person - count * support
-        if value > worth and alone.min() >= support:
+        least = np.inf
+        for k in range(count):
+            least = min(least, alone[k])
+        if value > worth and least >= support:
             best, worth = at, value
     kernels.paint_all(cover, best, 1)
     return best

@@ -192,8 +192,9 @@ def near_first(templates: Array) -> Ints:
 
     Equal feet keep their order (insertion sort).
     """
-    order = np.arange(len(templates))
-    for k in range(1, len(order)):
+    order = np.empty(len(templates), np.int64)
+    for k in range(len(order)):
+        order[k] = k
         while k > 0 and templates[order[k], FOOT] > templates[order[k - 1], FOOT]:
             order[k], order[k - 1] = order[k - 1], order[k]
             k -= 1
@@ -237,14 +238,17 @@ def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pi
     """
     stays = np.ones(len(templates), np.bool_)
     worth = piece_supports(foreground, cover, templates) if by_pieces else supports(foreground, cover, templates, 1)
-    while stays.any():
-        k = worth.argmin()
+    for _ in range(len(stays)):
+        k = 0
+        for other in range(1, len(stays)):
+            if worth[other] < worth[k]:
+                k = other
         if worth[k] >= least:
             break
         stays[k], worth[k] = False, np.inf
         paint(cover, templates[k], -1)
-        for other in np.flatnonzero(stays):
-            if boxes_touch(templates[k], templates[other]):
+        for other in range(len(stays)):
+            if stays[other] and boxes_touch(templates[k], templates[other]):
                 one = templates[other]
                 worth[other] = (
                     piece_support(foreground, cover, one) if by_pieces else support(foreground, cover, one, 1)

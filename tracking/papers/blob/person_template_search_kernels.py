@@ -64,8 +64,9 @@ def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: in
     found = np.zeros((n, n), np.int32)
     if high <= low or right <= left:
         return found
-    middle, edges = x + step * np.arange(-steps, steps + 1), (np.int32(left), np.int32(right))
-    begin, end = np.empty(n, np.int32), np.empty(n, np.int32)
+    middle, begin, end = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int32)
+    for j in range(n):
+        middle[j] = x + step * (j - steps)
     sums = row_sums(foreground[low:high, left:right], cover[low:high, left:right])
     for i in range(n):
         down = foot + (i - steps) * step
@@ -74,7 +75,7 @@ def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: in
             half = half_width(row, down, h, w)
             if half > 0:
                 for j in range(n):
-                    begin[j], end[j] = column_range_within(middle[j], half, *edges)
+                    begin[j], end[j] = column_range_within(middle[j], half, np.int32(left), np.int32(right))
                 for j in range(n):
                     found[i, j] += sums[row - low, end[j]] - sums[row - low, begin[j]]
     return found

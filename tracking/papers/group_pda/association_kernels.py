@@ -14,8 +14,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Bools, Ints
-from tracking.filters.component_regions_kernels import WEIGHT
-from tracking.filters.components_kernels import AROUND, cells, components, prefixes
+from tracking.filters.components_kernels import AROUND, WEIGHT, cells, components, prefixes, unset
 from tracking.papers.group_pda.association_mass_kernels import (
     ASSOCIATION,
     COUNT_SD,
@@ -56,13 +55,14 @@ def search(points: Array, x: Array, region: Array, gate: float) -> Array:
     x (G, 4): centroid x, y, velocity; region (G, 2, 2): covariance of each group's search region, in the squared unit
     of the points. The region is d^2 < gate.
     """
-    d2 = np.full((len(x), len(points)), np.inf)
+    d2 = np.empty((len(x), len(points)))
     for g in range(len(x)):
         xx, xy, yy = region[g, 0, 0], region[g, 0, 1], region[g, 1, 1]
         area = xx * yy - xy * xy
         reach_x, reach_y = np.sqrt(gate * xx), np.sqrt(gate * yy)
         for k in range(len(points)):
             dx, dy = points[k, 0] - x[g, 0], points[k, 1] - x[g, 1]
+            d2[g, k] = np.inf
             if abs(dx) <= reach_x and abs(dy) <= reach_y:
                 d = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / area
                 if d < gate:
@@ -76,15 +76,19 @@ def any_within(place: Array, points: Array, reach: float) -> Bools:
 
     Without points all are False. reach: above 0. The points of a place's cell and of the cells around it are compared.
     """
-    found, most = np.zeros(len(place), np.bool_), reach * reach
-    if len(points) == 0 or len(place) == 0:
+    m, found, most = len(points), np.zeros(len(place), np.bool_), reach * reach
+    if m == 0 or len(place) == 0:
         return found
-    cell, around = cells(np.concatenate((points, place)), reach * (1 + 1e-9))  # no point within reach is further away
-    head, after = np.full(len(around), -1), np.empty(len(points), np.int64)
-    for p in range(len(points)):
+    both = np.empty((m + len(place), 2))
+    for k in range(len(both)):
+        for axis in range(2):
+            both[k, axis] = points[k, axis] if k < m else place[k - m, axis]
+    cell, around = cells(both, reach * (1 + 1e-9))  # no point within reach is further away
+    head, after = unset(len(around)), unset(m)
+    for p in range(m):
         after[p], head[cell[p]] = head[cell[p]], p
     for k in range(len(place)):
-        c = cell[len(points) + k]
+        c = cell[m + k]
         for n in range(-1, AROUND):
             near = c if n < 0 else around[c, n]
             p = head[near] if near >= 0 else -1
@@ -124,11 +128,20 @@ def associate(
     report = np.zeros((groups, 6))
     for g in range(groups):
         order, start = _ordered_points(d2[g], log_ratio[g], owner, claimants, share, g, rules[ASSOCIATION])
-        if len(order) == 0:
+        n = len(order)
+        if n == 0:
             continue
-        mine, people = points[order], weights[order]
+        mine, people, ages, colour = np.empty((n, 2)), np.empty(n), np.empty(n), np.zeros(n)
+        others = 0.0  # people of other groups, expected
+        for k in range(n):
+            p = order[k]
+            mine[k, 0], mine[k, 1] = points[p, 0], points[p, 1]
+            people[k], ages[k] = weights[p], age[p]
+            if log_ratio.shape[1]:
+                colour[k] = log_ratio[g, p] * weights[p]
+            others += weights[p] * (1 - share[g, p])
         if rules[ASSOCIATION] == UNCONSTRAINED:
-            start = len(order)
+            start = n
             feasible = np.ones(1, np.bool_)
         else:
             prior = rules[PRIOR_XX : PRIOR_YY + 1]
@@ -136,20 +149,25 @@ def associate(
                 mine, people, start, rules[LINK], rules[GATE], prior, rules[PRIOR_WEIGHT], rules[LEAST_WEIGHT]
             )[0]
             if rules[ASSOCIATION] != PREFIXES:
-                feasible[:-1] = False
-        if not feasible.any():
-            if components(mine, people, rules[LINK])[1][:, WEIGHT].max() >= rules[LEAST_WEIGHT]:
-                state[g], chosen[g, order] = NULL, True
-            continue
-        colour = log_ratio[g][order] * people if log_ratio.shape[1] else np.zeros(len(order))
-        others = (people * (1 - share[g][order])).sum()  # people of other groups, expected
-        best = _estimate(
-            mine, people, age[order], colour, start, feasible, region[g], x[g], P[g], extent[g], size[g : g + 1],
-            rest[g] or others > rules[FREEZE_SHARE] * size[g], rules, report[g],
-        )  # fmt: skip
-        state[g] = MEASURED if best >= 0 else NOTHING
-        if best >= 0:
-            chosen[g, order[: start + best]] = True
+                for j in range(len(feasible) - 1):
+                    feasible[j] = False
+        taken, some = 0, False
+        for j in range(len(feasible)):
+            some = some or feasible[j]
+        if some:
+            best = _estimate(
+                mine, people, ages, colour, start, feasible, region[g], x[g], P[g], extent[g], size[g : g + 1],
+                rest[g] or others > rules[FREEZE_SHARE] * size[g], rules, report[g],
+            )  # fmt: skip
+            if best >= 0:
+                state[g], taken = MEASURED, start + best
+        else:
+            sums = components(mine, people, rules[LINK])[1]
+            for c in range(len(sums)):
+                if sums[c, WEIGHT] >= rules[LEAST_WEIGHT]:
+                    state[g], taken = NULL, n
+        for k in range(taken):
+            chosen[g, order[k]] = True
     return state, chosen, report
 
 
@@ -157,16 +175,19 @@ def associate(
 def _ordered_points(
     d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, share: Array, g: int, association: float
 ) -> tuple[Ints, int]:
-    order, distance = np.empty(len(d2), np.int64), d2.copy()
+    order, distance = np.empty(len(d2), np.int64), np.empty(len(d2))
     own = shared = 0
     for shares in (False, True):  # first the points that no other group claims
         for n in range(len(d2)):
             if not (d2[n] < np.inf or owner[n] == g) or (claimants[n] > 1) != shares:
                 continue
-            if association == NEAREST and shares and share[:, n].argmax() != g:
+            likeliest = 0
+            for other in range(len(share)):
+                if share[other, n] > share[likeliest, n]:
+                    likeliest = other
+            if association == NEAREST and shares and likeliest != g:
                 continue
-            if len(log_ratio):
-                distance[n] = d2[n] - 2 * log_ratio[n]
+            distance[n] = d2[n] - 2 * log_ratio[n] if len(log_ratio) else d2[n]
             order[own + shared] = n
             if shares:
                 shared += 1
@@ -184,14 +205,19 @@ def _estimate(
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
     seen, mean_age = running_ages(weights, age, start)
     S = np.empty((len(people), 3))
-    log_mass = np.empty(len(people))
-    log_mass[:] = -np.inf
-    unit = weights.mean()  # people that one point stands for: makes m_N a mass of numbers of points
+    log_mass, beta = np.empty(len(people)), np.empty(len(people))
+    unit = 0.0
+    for k in range(len(weights)):
+        unit += weights[k]
+    unit /= len(weights)  # people that one point stands for: makes m_N a mass of numbers of points
     evidence = np.zeros(len(colour) - start + 1)
     for k in range(start, len(colour)):
         evidence[k - start + 1] = evidence[k - start] + colour[k]
+    log_m_miss = log_miss(unit, start, region, size[0], rules)
+    top = log_m_miss
     width = rules[COUNT_SD] ** 2 + (rules[COUNT_SHARE] * size[0]) ** 2  # sigma_n^2
     for j in range(len(people)):
+        log_mass[j] = -np.inf
         if feasible[j] and people[j] > 0:
             fresh = seen[j] if seen[j] > 0 else people[j]
             R, a = centroid_noise(people[j], fresh, cov[j], extent, size[0], rules), mean_age[j]
@@ -200,12 +226,19 @@ def _estimate(
             S[j, 2] = P[1, 1] - 2 * a * P[1, 3] + a * a * P[3, 3] + R[2]
             m_d = log_density(mean[j, 0], mean[j, 1], S[j])
             log_mass[j] = m_d + log_count(people[j], size[0], width) + np.log(unit) + evidence[j]  # eq. 4.2, m_g = 1
-    log_m_miss = log_miss(weights, start, region, size[0], rules)
-    top = max(log_mass.max(), log_m_miss)
-    beta, miss = np.exp(log_mass - top), np.exp(log_m_miss - top)
-    total = beta.sum() + miss
-    beta, miss = beta / total, miss / total
-    best = int(np.argmax(beta))
+            top = max(top, log_mass[j])
+    total = 0.0
+    for j in range(len(beta)):
+        beta[j] = np.exp(log_mass[j] - top)
+        total += beta[j]
+    miss = np.exp(log_m_miss - top)
+    total, best, matched = total + miss, 0, 0.0
+    miss /= total
+    for j in range(len(beta)):
+        beta[j] /= total
+        matched += beta[j]
+        if beta[j] > beta[best]:
+            best = j
     report[INNOVATION_X], report[INNOVATION_Y] = mean[best, 0], mean[best, 1]
     report[MISS_MASS] = miss
     measured = np.zeros(len(beta))
@@ -216,8 +249,8 @@ def _estimate(
         report[S_XX + k] = S[best, k]
     _mix(measured, mean, mean_age, S, x, P)
     if not rest:
-        _adapt(beta, people, cov, extent, size, rules)
-    return best if beta.sum() > miss else -1
+        _adapt(beta, matched, people, cov, extent, size, rules)
+    return best if matched > miss else -1
 
 
 @njit(cache=True)
@@ -249,9 +282,8 @@ def _mix(beta: Array, mean: Array, age: Array, S: Array, x: Array, P: Array) -> 
 
 
 @njit(cache=True)
-def _adapt(beta: Array, people: Array, cov: Array, extent: Array, size: Array, rules: Array) -> None:
+def _adapt(beta: Array, total: float, people: Array, cov: Array, extent: Array, size: Array, rules: Array) -> None:
     target, count = np.zeros(3), 0.0
-    total = beta.sum()
     for j in range(len(beta)):
         if beta[j] > 0:
             n, share = people[j], beta[j]

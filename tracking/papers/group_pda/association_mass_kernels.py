@@ -141,11 +141,11 @@ def log_density(dx: float, dy: float, S: Array) -> float:
 
 
 @njit(cache=True)
-def log_miss(weights: Array, start: int, region: Array, size: float, rules: Array) -> float:
+def log_miss(unit: float, start: int, region: Array, size: float, rules: Array) -> float:
     """Returns the log mass of the miss hypothesis (ours): no point is the group's; -inf if MISS_PROB is 0 (no
     hypothesis).
 
-    The mass is the hypothesis' relative weight. weights (M,): people that each point stands for; start: number of
+    The mass is the hypothesis' relative weight. unit: people that one point stands for, a mean; start: number of
     unshared points; region (2, 2): covariance of the group's search region; size: its people. The points' centroid is
     uniform over the search region. The number of the unshared points, if there are any, is uniform up to twice the
     size.
@@ -154,5 +154,5 @@ def log_miss(weights: Array, start: int, region: Array, size: float, rules: Arra
         return -np.inf
     gate = rules[GATE] * rules[GATE_FACTOR]  # gamma; GATE is that of extents before their correction
     area = np.pi * gate * np.sqrt(max(region[0, 0] * region[1, 1] - region[0, 1] ** 2, 1e-300))
-    strangers = np.log(weights.mean() / (2 * size + 1)) if start > 0 else 0.0
+    strangers = np.log(unit / (2 * size + 1)) if start > 0 else 0.0
     return float(np.log(rules[MISS_PROB] / (1 - rules[MISS_PROB])) - np.log(area) + strangers)

@@ -191,7 +191,7 @@ class GroupPda:
         if detections is None:
             return None, np.zeros(0)
         self.plane = "image" if detections.plane == "image" else "ground"
-        return np.ascontiguousarray(detections.pos[:, :2]), np.ones(len(detections.pos))
+        return np.array(detections.pos[:, :2]), np.ones(len(detections.pos))
 
     def _outline(self, detections: Detections | None) -> Array:
         if self.pixels is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -15,8 +14,6 @@ from tracking.papers.joint.partition_kernels import APART, SCATTER, validity_of
 
 MOST_LISTED = 6
 """Largest group of which all divisions into two parts are tried."""
-TWO: Any = np.int64(2)
-"""Number of parts, of the type for which validity_of is compiled anyway."""
 
 
 @njit(cache=True)
@@ -37,7 +34,7 @@ def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: floa
     centre, scatter = np.empty((n, dims)), np.empty(n)
     energy, least = np.empty(len(sides)), np.inf
     for c in range(len(sides)):
-        energy[c] = sharpness * validity_of(own, sides[c], TWO, scales, centre, scatter)
+        energy[c] = sharpness * validity_of(own, sides[c], 2, scales, centre, scatter)
         least = min(least, energy[c])
     total = 0.0
     for c in range(len(sides)):

@@ -18,9 +18,9 @@ from tracking.filters.cell_list_kernels import nearest_places
 from tracking.papers.joint.division_kernels import divide
 from tracking.papers.joint.partition_kernels import clusters, same_row
 
-SIZE, X, Y, VX, VY, XX, XY, YY, SPREAD = range(9)
-"""Columns of moments (G, 9): number of people, mean place and velocity, covariance of the places shrunk to PRIOR, mean
-squared distance to the mean place."""
+X, Y, VX, VY, XX, XY, YY, SPREAD, SIZE = range(9)
+"""Columns of moments (G, 9): mean place and velocity, covariance of the places shrunk to PRIOR, mean squared distance
+to the mean place, number of people."""
 PRIOR = 0.35
 """Standard deviation per axis, m, to which covariances of places are shrunk."""
 PRIOR_WEIGHT = 1.0
@@ -103,7 +103,7 @@ def partition_features(early: Array, late: Array, label: Ints, features: Array, 
     first, second = np.empty((n, 9)), np.empty((n, 9))
     moments_of(early, cluster, count, first)
     moments_of(late, cluster, count, second)
-    nearest_places(first[:, X : Y + 1], count, nearest)
+    nearest_places(first, count, nearest)
     for g in range(count):
         features_of(first, second, g, nearest[g], features[g])
     return count
@@ -120,21 +120,21 @@ def event_probabilities(
     against None; they are turned into those of a step as hazards (ours). The prior N(|e|; mu, sigma) of sec. 4
     multiplies them: |e| is the size after the event, of a split the mean of the two parts. One person does not split.
     """
-    scores = np.array([weights[0, FEATURES], weights[1, FEATURES], 0.0])
+    merge, split, none = weights[0, FEATURES], weights[1, FEATURES], 0.0  # scores
     for k in range(FEATURES):
-        scores[0] += weights[0, k] * features[k]
-        scores[1] += weights[1, k] * features[k]
+        merge += weights[0, k] * features[k]
+        split += weights[1, k] * features[k]
     mean, spread = rules[SIZE_MEAN], rules[SIZE_STD]
-    scores[0] -= ((size + other - mean) / spread) ** 2 / 2
+    merge -= ((size + other - mean) / spread) ** 2 / 2
     if rules[SIZE_OF_ALL]:
-        scores[1] -= ((size / 2 - mean) / spread) ** 2 / 2
-        scores[2] -= ((size - mean) / spread) ** 2 / 2
+        split -= ((size / 2 - mean) / spread) ** 2 / 2
+        none -= ((size - mean) / spread) ** 2 / 2
     if other == 0:
-        scores[0] = -np.inf
+        merge = -np.inf
     if size < 2:
-        scores[1] = -np.inf
-    top = max(scores[0], scores[1], scores[2])
-    merge, split, none = math.exp(scores[0] - top), math.exp(scores[1] - top), math.exp(scores[2] - top)
+        split = -np.inf
+    top = max(merge, split, none)
+    merge, split, none = math.exp(merge - top), math.exp(split - top), math.exp(none - top)
     total = merge + split + none
     happening = merge + split
     if happening == 0:
@@ -172,11 +172,12 @@ def propose(
         count = 0
         for j in range(partitions):
             if j == 0 or not same_row(label[i, j], before):
-                before[:] = label[i, j]
+                for k in range(n):
+                    before[k] = label[i, j, k]
                 count = clusters(before, cluster, head)
                 moments_of(early[i], cluster, count, first)
                 moments_of(late[i], cluster, count, second)
-                nearest_places(first[:, X : Y + 1], count, nearest)
+                nearest_places(first, count, nearest)
                 for g in range(count):
                     h = nearest[g]
                     features_of(first, second, g, h, features)
@@ -191,7 +192,8 @@ def propose(
             if not happens:
                 continue
             sort_by(order, visits[:count])
-            for g in visits[:count]:
+            for at in range(count):
+                g = visits[at]
                 if changed[g]:
                     continue
                 h, u = nearest[g], uniforms[i, j, head[g], EVENT]

@@ -37,7 +37,9 @@ def canonical(label: Ints) -> None:
     n, most = len(label), 0
     for k in range(n):
         most = max(most, label[k])
-    head = np.full(most + 1, -1)
+    head = np.empty(most + 1, np.int64)
+    for name in range(most + 1):
+        head[name] = -1
     for k in range(n):
         name = label[k]
         label[k] = 0
@@ -110,13 +112,16 @@ def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre:
         worst[g] = scatter[g] / apart
     if count > FEW:
         _worst_near(centre, scatter[:count], scales, worst)
-        return float(worst.mean())
+    else:
+        for g in range(count):
+            for h in range(g):
+                ratio = _ratio(centre, scatter, g, h, s0)
+                worst[g] = max(worst[g], ratio)
+                worst[h] = max(worst[h], ratio)
+    total = 0.0
     for g in range(count):
-        for h in range(g):
-            ratio = _ratio(centre, scatter, g, h, s0)
-            worst[g] = max(worst[g], ratio)
-            worst[h] = max(worst[h], ratio)
-    return float(worst.mean())
+        total += worst[g]
+    return total / count
 
 
 @njit(cache=True)
@@ -129,7 +134,9 @@ def _ratio(centre, scatter, g, h, s0):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _worst_near(centre, scatter, scales, worst):  # type: ignore[no-untyped-def]
-    count, widest = len(scatter), scatter.max()
+    count, widest = len(scatter), 0.0
+    for g in range(count):
+        widest = max(widest, scatter[g])
     cells, near = cell_list(centre, count), np.empty(count, np.int64)
     for g in range(count):
         x, y = centre[g, 0], centre[g, 1]
@@ -210,7 +217,9 @@ def uniform_partitions(cumulated: Array, uniforms: Array, label: Ints) -> None:
     particles, partitions, n = label.shape
     for i in range(particles):
         for j in range(partitions):
-            boxes = 1 + np.searchsorted(cumulated, uniforms[i, j, n] * cumulated[-1], side="right")
+            boxes = 1
+            while boxes <= len(cumulated) and cumulated[boxes - 1] <= uniforms[i, j, n] * cumulated[-1]:
+                boxes += 1
             for k in range(n):
                 label[i, j, k] = 1 + int(uniforms[i, j, k] * boxes)
             canonical(label[i, j])
@@ -305,4 +314,5 @@ def best_sampled(gain: Array, label: Ints, out: Ints) -> None:
             if total > best:
                 best = total
                 clusters(label[i, j], cluster, head)
-                out[:] = cluster + 1
+                for k in range(n):
+                    out[k] = cluster[k] + 1

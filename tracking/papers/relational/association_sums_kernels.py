@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from sim.compiler import njit
-from sim.types import Array
+from sim.types import Array, Ints
 
 EXACT_BITS = 12
 """Largest number of columns of an exact sum; above it sums are propagated."""
@@ -170,12 +170,24 @@ def dense_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
         return propagated_sum(W, miss, spare, marginals)
     if m <= n:
         return exact_sum(W, miss, spare, marginals)
-    turned = np.empty((m, n))
-    log_sum = exact_sum(np.ascontiguousarray(W.T), spare, miss, turned)
+    turned, found = np.empty((m, n)), np.empty((m, n))
     for i in range(n):
         for j in range(m):
-            marginals[i, j] = turned[j, i]
+            turned[j, i] = W[i, j]
+    log_sum = exact_sum(turned, spare, miss, found)
+    for i in range(n):
+        for j in range(m):
+            marginals[i, j] = found[j, i]
     return log_sum
+
+
+@njit(cache=True)
+def chosen(values: Array, rows: Ints) -> Array:
+    """Returns values (N,) at rows (M,), (M,)."""
+    out = np.empty(len(rows))
+    for k in range(len(rows)):
+        out[k] = values[rows[k]]
+    return out
 
 
 @njit(cache=True)
@@ -255,7 +267,7 @@ def _component_sum(W, miss, spare, marginals, rows, columns):  # type: ignore[no
     for a in range(len(rows)):
         for b in range(len(columns)):
             block[a, b] = W[rows[a], columns[b]]
-    log_sum = dense_sum(block, miss[rows], spare[columns], found)
+    log_sum = dense_sum(block, chosen(miss, rows), chosen(spare, columns), found)
     for a in range(len(rows)):
         for b in range(len(columns)):
             marginals[rows[a], columns[b]] = found[a, b]

@@ -7,10 +7,13 @@ is hidden.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from sim.compiler import njit
 from sim.types import Array, Bools, Camera, Scene
-from tracking.papers.relational import occluder_kernels, particle_set_kernels
+from tracking.papers.relational import particle_set_kernels
 from tracking.papers.relational.particle_set import ParticleSet
 
 MIDDLE = 0.85  # Height of the middle of a body, m.
@@ -25,7 +28,7 @@ def hidden_share(pos: Array, weights: Array, camera: Camera | None, scene: Scene
         hidden |= _behind_pillar(pos, pillar, scene.pillar_height, camera.position)
     for wall in scene.walls:
         hidden |= _behind_wall(pos, wall, scene.wall_height, camera.position)
-    return particle_set_kernels.column_sums(weights, hidden)
+    return particle_set_kernels.column_sums(weights, hidden.astype(float))
 
 
 def _behind_pillar(pos: Array, pillar: Array, top: float, eye: Array) -> Bools:
@@ -58,7 +61,51 @@ def covered_by_people(particles: ParticleSet, camera: Camera | None, radius: flo
     """Returns the probabilities (K,) that each person is hidden behind another one, and that the feet are (ours)."""
     p, hidden, cut = particles, np.zeros(particles.people), np.zeros(particles.people)
     if camera is not None and camera.kind == "pinhole" and radius > 0:
-        mean = np.stack([particle_set_kernels.column_sums(p.weights, p.pos[..., d]) for d in range(2)], axis=1)
+        axes = np.ascontiguousarray(np.moveaxis(p.pos, 2, 0))
+        mean = np.stack([particle_set_kernels.column_sums(p.weights, places) for places in axes], axis=1)
         body = np.array([HEIGHT, radius, LEAST_VISIBLE])
-        occluder_kernels.cover(p.pos, p.weights, mean, p.existence, camera.position, body, hidden, cut)
+        cover(p.pos, p.weights, mean, p.existence, camera.position, body, hidden, cut)
     return hidden, cut
+
+
+@njit(cache=True)
+def cover(
+    pos: Array, weights: Array, mean: Array, exist: Array, eye: Array, body: Array, hidden: Array, cut: Array
+) -> None:
+    """Writes the probabilities (K,) that each person is hidden behind another one, and that the feet are.
+
+    pos (P, K, 2), m; weights (P, K): of the particles, sum 1 for each person; mean (K, 2): of the places, m; exist
+    (K,): probability that each person exists; eye (3,): the camera, m. body (3,): height and half the width, m; a
+    person is hidden if a smaller share of the body than the third number is visible.
+
+    Another person at the mean place covers the share 1 - d / (2 radius) of the body's width, d being the distance to
+    the line of sight, and the body's height up to where the line of sight over the other's head meets it.
+    """
+    particles, n, _ = pos.shape
+    height, radius, least = body[0], body[1], body[2]
+    for k in range(n):
+        for other in range(n):
+            to_x, to_y = mean[other, 0] - eye[0], mean[other, 1] - eye[1]
+            own_x, own_y = mean[k, 0] - eye[0], mean[k, 1] - eye[1]
+            own2 = own_x * own_x + own_y * own_y
+            if other == k or own2 == 0.0 or to_x * own_x + to_y * own_y > own2:
+                continue
+            low, behind = 0.0, 0.0
+            for p in range(particles):
+                x, y = pos[p, k, 0] - eye[0], pos[p, k, 1] - eye[1]
+                square = x * x + y * y
+                if square == 0.0:
+                    continue
+                along = (x * to_x + y * to_y) / square
+                if along <= 0.0 or along >= 1.0:
+                    continue
+                side = abs(x * to_y - y * to_x) / math.sqrt(square)
+                top = eye[2] - (eye[2] - height) / along
+                if side >= 2.0 * radius or top <= 0.0:
+                    continue
+                share = 1.0 - side / (2.0 * radius)
+                low += weights[p, k] * share
+                if 1.0 - share * min(top / height, 1.0) < least:
+                    behind += weights[p, k]
+            cut[k] = max(cut[k], exist[other] * low)
+            hidden[k] = max(hidden[k], exist[other] * behind)

@@ -125,11 +125,12 @@ class ParticleSet:
 
     def keep(self, slots: Bools) -> None:
         """Remove all slots but those where `slots` (K,) is True."""
-        self.weights, self.exist = self.weights[:, slots], self.exist[:, slots]
-        self.pos, self.vel = self.pos[:, slots], self.vel[:, slots]
+        # np.compress keeps arrays C-contiguous: kernels are compiled once more for another layout
+        self.weights, self.exist = np.compress(slots, self.weights, 1), np.compress(slots, self.exist, 1)
+        self.pos, self.vel = np.compress(slots, self.pos, 1), np.compress(slots, self.vel, 1)
         rows, number = slots[self.pairs].all(axis=1), np.cumsum(slots) - 1
         self.pairs, self.related = number[self.pairs[rows]], self.related[rows]
-        self.ancestor = self.ancestor[:, slots]
+        self.ancestor = np.compress(slots, self.ancestor, 1)
 
     def add(self, pos: Array, vel: Array, exist: float) -> None:
         """Add M slots with places pos (P, M, 2) and velocities vel (P, M, 2), the same existence in each particle, and

@@ -29,13 +29,16 @@ def column_sums(a: Array, b: Array) -> Array:
 
 
 @njit(cache=True)
-def pair_sums(a: Array, exist: Array, person: Ints, b: Array) -> Array:
-    """Returns the sums over particles of a exist b of each pair, (N,); a, exist (P, K), b (P, N); person (N,): of each
-    pair."""
-    out = np.zeros(len(person))
+def pair_sums(a: Array, exist: Array, pairs: Ints, b: Array) -> Array:
+    """Returns the sums over particles of a exist b of each pair, (N,).
+
+    a, exist (P, K); b (P, N); pairs (N, 2): person and detection.
+    """
+    out = np.zeros(len(pairs))
     for p in range(len(b)):
-        for n in range(len(person)):
-            out[n] += a[p, person[n]] * exist[p, person[n]] * b[p, n]
+        for n in range(len(pairs)):
+            k = pairs[n, 0]
+            out[n] += a[p, k] * exist[p, k] * b[p, n]
     return out
 
 
@@ -43,18 +46,16 @@ def pair_sums(a: Array, exist: Array, person: Ints, b: Array) -> Array:
 def weigh(weights: Array, logs: Array) -> None:
     """Multiply weights (P, K) by exp(logs), and divide them by their sums over the particles; logs (P, K) or (P, 1)."""
     particles, n = weights.shape
-    top, total = np.full(n, -np.inf), np.zeros(n)
-    own = np.arange(n) if logs.shape[1] == n else np.zeros(n, np.int64)
-    for p in range(particles):
-        for k in range(n):
-            top[k] = max(top[k], logs[p, own[k]])
-    for p in range(particles):
-        for k in range(n):
-            weights[p, k] *= math.exp(logs[p, own[k]] - top[k])
-            total[k] += weights[p, k]
-    for p in range(particles):
-        for k in range(n):
-            weights[p, k] /= total[k]
+    own = 1 if logs.shape[1] == n else 0
+    for k in range(n):
+        top, total = -np.inf, 0.0
+        for p in range(particles):
+            top = max(top, logs[p, own * k])
+        for p in range(particles):
+            weights[p, k] *= math.exp(logs[p, own * k] - top)
+            total += weights[p, k]
+        for p in range(particles):
+            weights[p, k] /= total
 
 
 @njit(cache=True)
@@ -95,11 +96,19 @@ def redraw_relations(pairs: Ints, related: Bools, people: Ints, chosen: Ints) ->
     """
     if len(pairs) == 0:
         return
-    start, rows = pairs_of_people(pairs, max(people.max(), pairs.max()) + 1)
+    last, particles = 0, related.shape[1]
     for column in range(len(people)):
-        for k in rows[start[people[column]] : start[people[column] + 1]]:
-            old = related[k].copy()
-            for p in range(len(old)):
+        last = max(last, people[column])
+    for k in range(len(pairs)):
+        last = max(last, pairs[k, 1])
+    start, rows = pairs_of_people(pairs, last + 1)
+    old = np.empty(particles, np.bool_)
+    for column in range(len(people)):
+        for row in range(start[people[column]], start[people[column] + 1]):
+            k = rows[row]
+            for p in range(particles):
+                old[p] = related[k, p]
+            for p in range(particles):
                 related[k, p] = old[chosen[p, column]]
 
 
@@ -111,25 +120,34 @@ def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, c
     and m/s; exist (P, K); weights (P, K), sum 1 for each person.
     """
     particles, n = exist.shape
-    state = np.empty(4)
-    for k in range(n):
-        for p in range(particles):
+    share = np.empty((particles, n))
+    for p in range(particles):  # in the order in which arrays lie in memory
+        for k in range(n):
             total[k] += weights[p, k] * exist[p, k]
-        alone = total[k] <= 0.0
-        whole = 1.0 if alone else total[k]
-        for p in range(particles):
-            w = (weights[p, k] if alone else weights[p, k] * exist[p, k]) / whole
+    for p in range(particles):
+        for k in range(n):
+            w = weights[p, k] * exist[p, k] / total[k] if total[k] > 0.0 else weights[p, k]
+            share[p, k] = w
             mean[k, 0] += w * pos[p, k, 0]
             mean[k, 1] += w * pos[p, k, 1]
             mean[k, 2] += w * vel[p, k, 0]
             mean[k, 3] += w * vel[p, k, 1]
-        for p in range(particles):
-            w = (weights[p, k] if alone else weights[p, k] * exist[p, k]) / whole
-            for d in range(2):
-                state[d], state[d + 2] = pos[p, k, d] - mean[k, d], vel[p, k, d] - mean[k, d + 2]
-            for a in range(4):
-                for b in range(a + 1):
-                    cov[k, a, b] += w * state[a] * state[b]
+    for p in range(particles):
+        for k in range(n):
+            w, out = share[p, k], cov[k]
+            x, y = pos[p, k, 0] - mean[k, 0], pos[p, k, 1] - mean[k, 1]
+            u, v = vel[p, k, 0] - mean[k, 2], vel[p, k, 1] - mean[k, 3]
+            out[0, 0] += w * x * x
+            out[1, 0] += w * y * x
+            out[1, 1] += w * y * y
+            out[2, 0] += w * u * x
+            out[2, 1] += w * u * y
+            out[2, 2] += w * u * u
+            out[3, 0] += w * v * x
+            out[3, 1] += w * v * y
+            out[3, 2] += w * v * u
+            out[3, 3] += w * v * v
+    for k in range(n):
         for a in range(4):
             for b in range(a):
                 cov[k, b, a] = cov[k, a, b]
@@ -143,9 +161,11 @@ def pairs_together(pairs: Ints, related: Bools, exist: Array, weights: Array, on
     one_weight: whether all columns are one weight, else a pair has the product. 0 for a pair that does not exist.
     """
     particles, n = exist.shape
-    out = np.eye(n)
+    out = np.zeros((n, n))
+    for k in range(n):
+        out[k, k] = 1.0
     for k in range(len(pairs)):
-        j, i = pairs[k]
+        j, i = pairs[k, 0], pairs[k, 1]
         both, same = 0.0, 0.0
         for p in range(particles):
             w = weights[p, i] * exist[p, i] * exist[p, j]

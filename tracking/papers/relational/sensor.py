@@ -82,7 +82,7 @@ def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, con
         particles.exist = np.minimum(measured + (1 - measured) * unseen, 1.0)
     found = np.zeros((people, count))
     found[person, pairs[:, 1]] = particle_set_kernels.pair_sums(
-        particles.weights, np.ones_like(particles.exist), person, marginals
+        particles.weights, np.ones_like(particles.exist), pairs, marginals
     )
     exist, seen = particles.existence, particle_set_kernels.column_sums(particles.weights, measured)
     seen = np.divide(seen, exist, out=np.zeros(people), where=exist > 0)
@@ -96,18 +96,22 @@ def _pairs(
     certain = config.outlier_share == 0
     share = np.zeros(particles.people) if certain else config.outlier_share + (1 - config.outlier_share) * sight.cut
     if config.certain_sensor:
-        pairs = np.argwhere(np.ones((particles.people, len(points)), bool))
+        pairs = _places_of(np.ones((particles.people, len(points)), bool))
         return pairs, sensor_kernels.densities(particles.pos, points, pairs, noise, wide, share, sight.eye, np.inf)
     displaced = WIDE_REACH * wide if config.outlier_share > 0 else 0.0
     reach = max(REACH * noise, displaced) ** 2
-    pairs = np.argwhere(sensor_kernels.near_detections(particles.pos, points, reach))
+    pairs = _places_of(sensor_kernels.near_detections(particles.pos, points, reach))
     density = sensor_kernels.densities(particles.pos, points, pairs, noise, wide, share, sight.eye, reach)
     person = pairs[:, 0]
-    mean = particle_set_kernels.pair_sums(particles.weights, particles.exist, person, density)
+    mean = particle_set_kernels.pair_sums(particles.weights, particles.exist, pairs, density)
     odds = mean * sight.detect[person] / config.clutter_density
     total = 1 - particles.existence * sight.detect + np.bincount(person, odds, particles.people)
     likely = odds > UNLIKELY * total[person]
-    return pairs[likely], density[:, likely]
+    return pairs[likely], np.compress(likely, density, 1)
+
+
+def _places_of(flags: Bools) -> Ints:
+    return np.ascontiguousarray(np.argwhere(flags))
 
 
 def _free(
@@ -115,6 +119,6 @@ def _free(
 ) -> Array:
     person = pairs[:, 0]
     mean = np.zeros((particles.people, count))
-    found = particle_set_kernels.pair_sums(particles.weights, particles.exist, person, density)
+    found = particle_set_kernels.pair_sums(particles.weights, particles.exist, pairs, density)
     mean[person, pairs[:, 1]] = found * detect[person] / config.clutter_density
     return sensor_kernels.free_detections(mean, np.maximum(1 - particles.existence * detect, 0.0))

@@ -9,7 +9,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Bools, Ints
-from tracking.papers.relational.association_sums_kernels import EXACT_BITS, free_messages, linked, sparse_sum
+from tracking.papers.relational.association_sums_kernels import EXACT_BITS, chosen, free_messages, linked, sparse_sum
 
 
 @njit(cache=True)
@@ -32,7 +32,7 @@ def densities(
     behind = 2.0 / (2.0 * math.pi * sd * wide)
     out = np.zeros((len(pos), len(pairs)))
     for n in range(len(pairs)):
-        k, j = pairs[n]
+        k, j = pairs[n, 0], pairs[n, 1]
         away_x, away_y = points[j, 0] - eye[0], points[j, 1] - eye[1]
         length = max(math.sqrt(away_x * away_x + away_y * away_y), 1e-9) if known else 1.0
         away_x, away_y = away_x / length, away_y / length
@@ -87,20 +87,22 @@ def _free_of_linked(W, miss, rows, columns, free):  # type: ignore[no-untyped-de
             block[a, b] = W[rows[a], columns[b]]
     found = np.empty((n, m))
     if min(n - 1, m) > EXACT_BITS:
-        messages = free_messages(block, miss[rows], spare)
+        messages = free_messages(block, chosen(miss, rows), spare)
         for a in range(n):
             for b in range(m):
                 free[rows[a], columns[b]] = messages[a, b]
         return
+    own = chosen(miss, rows)
     for a in range(n):
-        others = block.copy()
-        others[a] = 0.0
-        sparse_sum(others, miss[rows], spare, found)
+        for b in range(m):
+            block[a, b] = 0.0
+        sparse_sum(block, own, spare, found)
         for b in range(m):
             others_have = 0.0
             for other in range(n):
                 others_have += found[other, b]
             free[rows[a], columns[b]] = max(1.0 - others_have, 0.0)
+            block[a, b] = W[rows[a], columns[b]]
 
 
 @njit(cache=True)
@@ -123,7 +125,7 @@ def person_sums(
         for k in range(n):
             total[k] = 1.0 - exist[p, k] * detect[k]
         for c in range(len(pairs)):
-            k, j = pairs[c]
+            k, j = pairs[c, 0], pairs[c, 1]
             marginals[p, c] = exist[p, k] * detect[k] * density[p, c] * free[k, j] / clutter
             total[k] += marginals[p, c]
         for c in range(len(pairs)):
@@ -150,7 +152,7 @@ def particle_sums(
         spare[:] = 0.0
     for p in range(particles):
         for c in range(len(pairs)):
-            k, j = pairs[c]
+            k, j = pairs[c, 0], pairs[c, 1]
             W[k, j] = density[p, c] if clutter == 0.0 else exist[p, k] * detect[k] * density[p, c] / clutter
         if clutter > 0.0:
             for k in range(n):
@@ -209,19 +211,25 @@ def partner_factors(pairs: Ints, related: Bools, weights: Array, missed: Bools, 
     person has the posterior of the joint filter if the partner's is independent of it.
     """
     particles, n = logs.shape
-    if not missed.any():
+    some = False
+    for k in range(n):
+        some = some or missed[k]
+    if not some:
         return
-    own, level = logs.copy(), np.full(n, -np.inf)
+    own, level = np.empty((particles, n)), np.empty(n)
     for v in range(n):
-        top, mean = own[:, v].max(), 0.0
+        top, mean, level[v] = -np.inf, 0.0, -np.inf
+        for p in range(particles):
+            own[p, v] = logs[p, v]
+            top = max(top, own[p, v])
         if top == -np.inf:
             continue
         for p in range(particles):
             mean += weights[p, v] * math.exp(own[p, v] - top)
         level[v] = top + math.log(max(mean, 1e-300))
     for k in range(len(pairs)):
-        i, j = pairs[k]
-        for h, v in ((i, j), (j, i)):
+        for side in range(2):
+            h, v = pairs[k, side], pairs[k, 1 - side]
             if missed[h] and level[v] > -np.inf:
                 for p in range(particles):
                     if related[k, p]:

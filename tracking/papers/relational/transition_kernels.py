@@ -38,7 +38,8 @@ def _boxes(pos):  # type: ignore[no-untyped-def]
     box = np.empty((n, 4))
     for i in range(n):
         box[i, 0], box[i, 1], box[i, 2], box[i, 3] = np.inf, -np.inf, np.inf, -np.inf
-        for p in range(particles):
+    for p in range(particles):
+        for i in range(n):
             x, y = pos[p, i, 0], pos[p, i, 1]
             box[i, 0], box[i, 1] = min(box[i, 0], x), max(box[i, 1], x)
             box[i, 2], box[i, 3] = min(box[i, 2], y), max(box[i, 3], y)
@@ -71,13 +72,14 @@ def move(
             sums[i, 0], sums[i, 1], sums[i, 2] = exist[p, i] * vel[p, i, 0], exist[p, i] * vel[p, i, 1], exist[p, i]
             sums[i, 3], sums[i, 4], sums[i, 5], sums[i, 6] = shared[p, i, 0], shared[p, i, 1], 1.0, 0.0
         for k in range(len(pairs)):
-            i, j = pairs[k]
+            i, j = pairs[k, 0], pairs[k, 1]
             if related[k, p]:
                 dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
                 du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
                 distance = math.sqrt(max(dx * dx + dy * dy - spread[k, 0], 0.0))
                 w = belonging(distance, math.sqrt(max(du * du + dv * dv - spread[k, 1], 0.0)), alike)
-                for a, b in ((i, j), (j, i)):
+                for turn in range(2):
+                    a, b = (j, i) if turn else (i, j)
                     sums[a, 0] += w * exist[p, b] * vel[p, b, 0]
                     sums[a, 1] += w * exist[p, b] * vel[p, b, 1]
                     sums[a, 2] += w * exist[p, b]
@@ -124,7 +126,7 @@ def pair_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
     """
     particles, out = len(pos), np.zeros((len(pairs), 2))
     for k in range(len(pairs)):
-        i, j = pairs[k]
+        i, j = pairs[k, 0], pairs[k, 1]
         first, second = np.zeros(4), np.zeros(4)
         for p in range(particles):
             for d in range(2):
@@ -145,17 +147,15 @@ def near_pairs(pos: Array, rules: Array) -> Ints:
     NEGLIGIBLE are left out (ours).
     """
     n = pos.shape[1]
-    box, found = _boxes(pos), [(np.int64(0), np.int64(0)) for _ in range(0)]
+    box, found, count = _boxes(pos), np.empty((n * n, 2), np.int64), 0
     for j in range(n):
         for i in range(j):
             dx = max(box[i, 0] - box[j, 1], box[j, 0] - box[i, 1], 0.0)
             dy = max(box[i, 2] - box[j, 3], box[j, 2] - box[i, 3], 0.0)
             if belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules) >= NEGLIGIBLE:
-                found.append((np.int64(i), np.int64(j)))
-    out = np.empty((len(found), 2), np.int64)
-    for k in range(len(found)):
-        out[k, 0], out[k, 1] = found[k]
-    return out
+                found[count, 0], found[count, 1] = i, j
+                count += 1
+    return found[:count]
 
 
 @njit(cache=True)
@@ -164,12 +164,15 @@ def pairs_of_people(pairs: Ints, people: int) -> tuple[Ints, Ints]:
     order."""
     start, rows = np.zeros(people + 1, np.int64), np.empty(2 * len(pairs), np.int64)
     for k in range(len(pairs)):
-        for a in pairs[k]:
-            start[a + 1] += 1
-    start = np.cumsum(start)
-    end = start.copy()
+        for side in range(2):
+            start[pairs[k, side] + 1] += 1
+    end = np.empty(people, np.int64)
+    for a in range(people):
+        start[a + 1] += start[a]
+        end[a] = start[a]
     for k in range(len(pairs)):
-        for a in pairs[k]:
+        for side in range(2):
+            a = pairs[k, side]
             rows[end[a]] = k
             end[a] += 1
     return start, rows
@@ -194,10 +197,11 @@ def relate(
         for a in range(n):
             if uniforms[p, a, 0] >= change:
                 continue
-            for k in rows[start[a] : start[a + 1]]:
+            for row in range(start[a], start[a + 1]):
+                k = rows[row]
                 if math.isnan(odds[k]):
                     continue
-                i, j = pairs[k]
+                i, j = pairs[k, 0], pairs[k, 1]
                 dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
                 du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
                 lost = rules[DISTANCE] * math.sqrt(dx * dx + dy * dy) + rules[VELOCITY] * math.sqrt(du * du + dv * dv)
@@ -222,7 +226,7 @@ def join(
     some, ends = _neighbours(_boxes(pos), points, rules)
     near, groups, weight = np.zeros(n), np.empty(n, np.int64), np.empty(n)
     last, following = np.empty(n, np.int64), np.empty(n, np.int64)
-    found, count = np.empty((4 * n, 3), np.int64), 0
+    found, count = np.empty(16 * n, np.int64), 0  # of each relation the new person, the other one, the particle
     for p in range(particles):
         for i in range(old):
             following[i] = -1
@@ -231,17 +235,18 @@ def join(
             last[label[p, i]] = i
         begin = 0
         for m in range(len(points)):
-            new, neighbours, begin = old + m, some[begin : ends[m]], ends[m]
+            new, first, begin = old + m, begin, ends[m]
             label[p, new], last[new], following[new] = new, new, -1
             if uniforms[m, p] >= share:  # alone, whoever is near
                 continue
-            for i in neighbours:
+            for row in range(first, begin):
+                i = some[row]
                 dx, dy = pos[p, i, 0] - points[m, 0], pos[p, i, 1] - points[m, 1]
                 g = exist[p, i] * belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
                 near[label[p, i]] = max(near[label[p, i]], g)
             total, several = 0.0, 0
-            for i in neighbours:
-                g = label[p, i]
+            for row in range(first, begin):
+                g = label[p, some[row]]
                 if near[g] > 0:
                     total += near[g]
                     at = several
@@ -257,13 +262,21 @@ def join(
                     g = groups[k]
                     i, label[p, new] = g, g
                     while i >= 0:
-                        if count == len(found):
-                            found = np.concatenate((found, np.empty_like(found)))
-                        found[count] = m, i, p
-                        i, count = following[i], count + 1
+                        if count + 3 > len(found):
+                            found = _doubled(found)
+                        found[count], found[count + 1], found[count + 2] = m, i, p
+                        i, count = following[i], count + 3
                     following[last[g]] = last[g] = new
                     break
     return _relations(found[:count], len(points), n, particles)
+
+
+@njit(cache=True)
+def _doubled(values):  # type: ignore[no-untyped-def]
+    longer = np.empty(2 * len(values), np.int64)
+    for k in range(len(values)):
+        longer[k] = values[k]
+    return longer
 
 
 @njit(cache=True)
@@ -276,7 +289,7 @@ def _neighbours(box, points, rules):  # type: ignore[no-untyped-def]
             dy = max(box[i, 2] - points[m, 1], points[m, 1] - box[i, 3], 0.0)
             if belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules) >= FAR:
                 if count == len(some):
-                    some = np.concatenate((some, np.empty_like(some)))
+                    some = _doubled(some)
                 some[count] = i
                 count += 1
         ends[m] = count
@@ -285,26 +298,17 @@ def _neighbours(box, points, rules):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _relations(found: Ints, new: int, people: int, particles: int) -> tuple[Ints, Bools]:
-    ends = np.zeros(new + 1, np.int64)
-    for r in range(len(found)):
-        ends[found[r, 0] + 1] += 1
-    ends = np.cumsum(ends)
-    order, at = np.empty(len(found), np.int64), ends[:-1].copy()
-    for r in range(len(found)):
-        order[at[found[r, 0]]] = r
-        at[found[r, 0]] += 1
-    row, owner = np.full((new, people), -1, np.int32), np.full(people, -1, np.int64)
-    count = 0
+    row, count = np.zeros((new, people), np.int64), 0
+    for r in range(0, len(found), 3):
+        row[found[r], found[r + 1]] = 1
     for m in range(new):
-        for r in order[ends[m] : ends[m + 1]]:
-            owner[found[r, 1]] = m
-        for i in range(people - new + m):
-            if owner[i] == m:
+        for i in range(people):
+            if row[m, i]:
                 row[m, i] = count
                 count += 1
     pairs, related = np.empty((count, 2), np.int64), np.zeros((count, particles), np.bool_)
-    for r in range(len(found)):
-        m, i, p = found[r]
+    for r in range(0, len(found), 3):
+        m, i = found[r], found[r + 1]
         k = row[m, i]
-        pairs[k, 0], pairs[k, 1], related[k, p] = i, people - new + m, True
+        pairs[k, 0], pairs[k, 1], related[k, found[r + 2]] = i, people - new + m, True
     return pairs, related

@@ -15,7 +15,7 @@ The test (`separation`): Gilitschenski & Hanebeck, "A robust computational test 
 ellipsoids in fault-detection of Kalman filters", 2012: the ellipsoids y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 are
 disjoint if and only if f(s) = d' (A / (1 - s) + B / s)^-1 d > 1 for some s in (0, 1). f is concave. With B = L L', A' =
 L^-1 A L^-T = U diag(l) U' and e = U' L^-1 d: f(s) = sum of s (1 - s) e_k^2 / (1 - s + s l_k), with A and B exchanged
-where s and 1 - s are. Ellipses in the plane have kernels of their own: tracking.filters.ellipse_overlap_kernels.
+where s and 1 - s are. Ellipses in the plane have kernels of their own: tracking.filters.components_kernels.
 
 Splitting (ours: the paper has no split). A group splits if its points are two or more groups by eq. 12 for
 `split_time`, and if these would not all merge again at once by eq. 13. All parts are newborn from their points, with

@@ -10,14 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.geometry.polygons import footprint_hull
-from sim.geometry.polygons import area, convex_hull
+from sim.geometry.polygons import area, convex_hull, footprint_hull
 from sim.types import GroupEvent, Sequence
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page import page_rows
-from tracking.app.replay_page.page_rows import Bar, Link, bars, links
 from tracking.app.replay_page.page import page_data
-from tracking.app.replay_page.page_rows import NIL
+from tracking.app.replay_page.page_rows import NIL, Bar, Link, bars, links
 
 
 def column(values: list[int]) -> np.ndarray:
