@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, WorkError
 from sim import hashing
 from sim.io.files.atomic import lock_folder
 from sim.io.source import open_source

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from tests import reference_components as reference
+from tracking.filters import cell_list_kernels as cells
 from tracking.filters.components import Constraint, linked, partition, prefixes
 
 LINK = 1.5
