@@ -112,11 +112,10 @@ def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
 
     size = np.array(image_size if image_size is not None else image_size_of_boxes(truth.box), dtype=float)
     ellipses = inscribed_outlines(truth.box)
-    nothing = only_flights(np.zeros((0, 9)))
     seen, truncation, visible_box = sample_visibility(
         frame_starts(truth.frame), np.array(truth.box), np.ascontiguousarray(ellipses.centre),
         packed_inverse(ellipses.shape), -(truth.box[:, 1] + truth.box[:, 3]), np.zeros((len(truth.box), 2)), size,
-        False, np.zeros(3), np.eye(3), nothing, np.zeros((0, ROWS, COLUMNS), bool),
+        np.zeros(3), np.eye(3), None, np.zeros((0, ROWS, COLUMNS), bool),
     )  # fmt: skip
     labelled = bool((truth.visibility < 1).any())
     return truth.replace(
