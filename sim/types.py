@@ -103,7 +103,8 @@ class Tracks(Frozen):
     plane: "ground", "space" (m) or "image" (px). unit "person": rows are people, group (N,) is the id of each person's
     group, -1 for alone. unit "group": rows are groups, group == id. pos, vel (N, D): plane's unit, and per s. cov (N,
     2D, 2D): covariance of x, y, (z), vx, vy, (vz). box (N, 4): left, top, width, height in px, or None. score (N,): in
-    [0, 1], or empty. groups None, events (): derived for people, `derived` is then True. own_events: never derived."""
+    [0, 1], or empty. groups, events: None and () if the tracker of people leaves them to the grouping, which fills them
+    in and sets `derived`. own_events: kinds of events that the tracker reports itself; they are never filled in."""
 
     index: int
     t: float

@@ -166,15 +166,16 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Sets the parameters and tracks on, to the end or for `decision_every` frames.
 
-        Refused parameters are moved towards those that the episode began with. If the tracker refuses a config between
-        frames it keeps the one before. After the end the sequence is tracked anew with one action per episode; else the
-        reward is 0.
+        Parameters that contradict each other are moved towards those that the episode began with, until they are valid.
+        If the tracker refuses a config between two frames, it keeps the one before. A step after the end tracks the
+        sequence again with the new parameters if an episode has one action; with `decision_every` it does nothing.
 
         Args:
             action: (P,), clipped to [-1, 1].
 
         Returns:
-            Observation, gain of the objective, whether the sequence has ended, False, and the dict of `reset`.
+            Observation; reward, the objective of all frames so far less that before the step; whether the sequence has
+            ended; False; and the dict of `reset`.
 
         Raises:
             InputError: Before `reset`, for an action of another shape or not finite, or from the tracker.

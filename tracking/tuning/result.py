@@ -130,7 +130,7 @@ class TuningResult:
         importance: Share (0 to 1) of each parameter, by name, in the first goal's training values.
         comparisons: Of winner and defaults on the test scenes; () if the defaults won.
         taken_back: Names of parameters that the best trial changed and the winner does not.
-        validation: Values by goal of the defaults and of the winner on the validation scenes.
+        validation: Two tuples, of the defaults and of the winner: one value for each goal on the validation scenes.
         notes: Remarks for the reader.
         study: Name of the study.
         left_out: A line for each scene whose script did not come true.

@@ -386,7 +386,8 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
         length: Frames of a text; None: to the last frame in the file.
 
     Returns:
-        One Tracks per frame. An event belongs to the frame that reported it, else to `emitted`, else to its end.
+        One Tracks per frame, each with the events that the file puts there; without a frame, an event is in that of
+        its field `emitted`, else in its last frame.
 
     Raises:
         InputError: There are no tracks, or they are unfinished, damaged, invalid or mixed with those of another run.
