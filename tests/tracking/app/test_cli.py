@@ -60,6 +60,8 @@ def made(tmp_path_factory) -> Path:
     assert run([*line, str(folder / "seen"), "--seeds", "40000", "--set", "camera.image=[128,96]", *pair]) == 0
     for name, out in (("data", "tracks"), ("seen/flockscope-demo/scene-s40000", "tracks-seen")):
         assert run(["track", FAKE, str(folder / name), "--out", str(folder / out)]) == 0
+    rows = [{"name": f"s{k}", "objective": k / 4} for k in range(3)]
+    (folder / "scores.json").write_text(json.dumps({"sequences": rows}))
     return folder
 
 
@@ -114,6 +116,14 @@ COMMANDS = {
     "score": ("score {data} {tracks}", "score {data} {out}/nothing"),
     "score one": ("score {one} {tracks}/scene-s40000", "score {one} {tracks}/scene-s40001"),
     "score text": ("score {one} {tracks}/scene-s40000/tracks.mot.txt", "score {one} {one}/gt/groups.csv"),
+    "errors": ("errors {data} {tracks}", "errors {data} {out}/nothing"),
+    "stress": (
+        "stress " + FAKE + " --vary detection --suite {scene} --seeds 0:2 --start 2 --by HOTA --out {out}",
+        "stress " + FAKE + " --vary nothing --suite {scene} --out {out}/x",
+    ),
+    "compare": (
+        "compare {tracks}/../scores.json {tracks}/../scores.json", "compare {tracks}/../scores.json {out}/nothing.json",
+    ),
     "view": (
         "view {one} {tracks}/scene-s40000 --out {out}/page.html", "view {one} {out}/nothing --out {out}/page.html",
     ),

@@ -232,7 +232,7 @@ def test_vectorised(mode):
     envs = gymnasium.make_vec(ID, 2, vectorization_mode=mode, **made)
     try:
         seen, _ = envs.reset(seed=[1, 2])
-        assert seen.shape == (2, 30)
+        assert seen.shape == (2, 11)
         zero = np.zeros(envs.action_space.shape, np.float32)
         rewards = np.array([envs.step(zero)[1] for _ in range(2)])
     finally:

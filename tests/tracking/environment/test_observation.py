@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.types import Detections, Frame, Tracks
+from sim.types import Detections, Frame, GroupEvent, Groups, Tracks
 from tracking.environment import observation
 from tracking.environment.observation import NAMES, STATISTICS, Observer
 
@@ -50,15 +50,43 @@ def test_two_people():
     assert {key: seen[key] for key in expected} == pytest.approx(expected)
 
 
-def test_in_the_image_lengths_are_metres_and_unknown_without_a_scale():
-    places = [[100, 100], [300, 100]]
-    pairs = [(frame(k, places, "image"), tracks(k, places, (100, 0), plane="image")) for k in (1, 2)]
-    seen, blind = looked(pairs, 50.0), looked(pairs)
-    assert seen["speed"] == pytest.approx(2)
-    assert seen["crowding"] == pytest.approx(4)
-    assert seen["innovation"] == pytest.approx(0.2)
-    assert blind["speed"] == blind["crowding"] == blind["innovation"] == 0
-    assert blind["tracks"] == blind["detections"] == pytest.approx(2)
+def test_births_and_deaths_across_a_decision():
+    observer = Observer(FPS)
+    looked([(frame(1), tracks(1, walk(1, 3), ids=[4, 5, 6]))], observer=observer)
+    seen = looked([(frame(k), tracks(k, walk(k, 2), ids=[5, 7])) for k in (2, 3)], observer=observer)
+    assert seen["deaths"] == pytest.approx(2 / 0.2)
+    assert seen["births"] == pytest.approx(1 / 0.2)
+
+
+def test_in_the_image_speeds_are_metres_and_unknown_without_a_scale():
+    pairs = [(frame(1), tracks(1, [[100, 100], [300, 100]], (100, 0), plane="image"))]
+    assert looked(pairs, 50.0)["speed"] == pytest.approx(2)
+    assert looked(pairs)["speed"] == 0
+    assert looked(pairs)["tracks"] == pytest.approx(2)
+
+
+def test_groups_that_the_tracker_names():
+    grouped = tracks(1, walk(1, 4), group=[3, 3, -1, -1])
+    event = GroupEvent("merge", 1, 1, 1, (-1, -1), (3,), (0, 1), (0.0, 0.0))
+    seen = looked([(frame(1), grouped.replace(events=(event,)))])
+    assert (seen["grouped"], seen["group_size"]) == (0.5, pytest.approx(2))
+    assert seen["merges"] == pytest.approx(600)
+    assert seen["splits"] == 0
+
+
+def test_groups_as_wholes():
+    two = np.array([[0.0, 0.0], [9.0, 0.0]])
+    size, none = np.array([3.0, 1.0]), (np.zeros(0, np.int64),) * 2
+    groups = Groups(np.arange(2), none, two, two * 0, np.tile(np.eye(2), (2, 1, 1)), size, (np.zeros((0, 2)),) * 2)
+    seen = looked([(frame(1), tracks(1, two, (0, 0), group=[0, 1], groups=groups).replace(unit="group"))])
+    assert (seen["grouped"], seen["group_size"]) == (0.5, pytest.approx(2))
+
+
+def test_nothing_at_all():
+    observer = Observer(FPS)
+    assert not observer.statistics(float("nan")).any()
+    seen = looked([(frame(k), tracks(k, [])) for k in (1, 2, 3)])
+    assert {k for k, v in seen.items() if v} == {"time"}
 
 
 def test_bounds_and_kind():
