@@ -65,7 +65,7 @@ def _tuples(value: Any) -> Any:
 
 def input_error(error: ValidationError, table: Table, file: object, places: dict[KeyPath, str]) -> InputError:
     """Returns the error for the first problem that pydantic found, and says how many more there are."""
-    found = list(error.errors())
+    found = list(error.errors(include_url=False))
     # Unknown keys come first, because a misspelt key explains a missing one.
     first = min(found, key=lambda e: (e["type"] != "unknown_key", e["type"] == "too_short" and len(found) > 1))
     path = tuple(s for k, s in enumerate(first["loc"]) if s not in TAGS and not (k == 2 and first["loc"][0] == "event"))

@@ -41,7 +41,8 @@ class Model(BaseModel):
         known = {name: f.alias or name for name, f in cls.model_fields.items()}
         for key in table if isinstance(table, dict) else ():
             if key not in known and key not in known.values():
-                raise PydanticCustomError("unknown_key", "unknown", {"key": key, "known": list(known.values())})
+                shown = key.encode("utf-8", "backslashreplace").decode()  # pydantic refuses lone surrogates
+                raise PydanticCustomError("unknown_key", "unknown", {"key": shown, "known": list(known.values())})
         return table
 
 

@@ -153,7 +153,7 @@ def new_folder(target: Path, keep: Callable[[], bool]) -> Iterator[Path]:
         try:
             os.rename(partial, target)
         except OSError:
-            if not keep():
+            if not (target.exists() and keep()):
                 raise
 
 

@@ -56,7 +56,7 @@ def rename_or_die(source, target):
 
 rename_or_die.real = rename
 os.rename = rename_or_die
-sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate)
+sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate, observe=None)
 """
 
 

@@ -41,7 +41,7 @@ def simulate(scenario, seed, repeat, streams, stride):
             yield frame
     return replace(live, frames=frames)
 
-sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate)
+sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate, observe=None)
 from scenarios.loading.resolve import Entry
 from scenarios.schema.scenario import Scenario
 from sim.dataset.generate import generate

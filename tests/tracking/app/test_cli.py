@@ -191,7 +191,8 @@ class Calls:
     def _seen(self, frame, event: str, _: object) -> None:
         if event == "call" and frame.f_code.co_filename.startswith(OURS):
             self.count += 1
-            if self.count == self.stop:
+            # pydantic swallows what is raised while it asks which kind of value it writes (scenarios/schema)
+            if self.stop > 0 and self.count >= self.stop and "/schema/" not in frame.f_code.co_filename:
                 sys.setprofile(None)
                 signal.raise_signal(signal.SIGINT)
 
@@ -240,6 +241,8 @@ def is_whole(name: str, out: Path) -> bool:
         return all(json.loads(p.read_text()) for p in out.rglob("*.json")) and all(
             p.read_text().endswith("</svg>\n") for p in out.rglob("*.svg")
         )
+    if name == "stress":
+        return [p.name for p in out.rglob("*")] == ["episodes.jsonl"]
     if name not in ("generate", "generate pictures", "demo", "track", "view all"):
         return False
     sequences = [p.parent for p in out.rglob("scenario.toml")]
@@ -281,7 +284,7 @@ def test_interrupted_and_full_disk_while_writing(name, error, code, as_json, pla
     assert run(words(COMMANDS[name][0], place) + ["--json"] * as_json) == code
     monkeypatch.undo()
     check_output(capsys, code, as_json)
-    left = [] if name != "tune" else ["toy.journal", "toy.journal.locks"]
+    left = {"tune": ["toy.journal", "toy.journal.locks"], "stress": ["episodes.jsonl"]}.get(name, [])
     assert sorted(p.name for p in place.out.rglob("*")) == left
 
 
