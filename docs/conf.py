@@ -105,6 +105,13 @@ def observations() -> str:
     return import_module("tracking.environment.observation").table()
 
 
+def axes() -> str:
+    """Returns the table of the axes of difficulty."""
+    found = import_module("tracking.stress.axes").AXES.values()
+    rows = [f"| `{axis.name}` | {axis.easy:g} | {axis.hard:g} | {axis.about} |" for axis in found]
+    return table("axis", "easy", "hard", "value", rows=rows)
+
+
 def parameters(config: str) -> str:
     """Returns the table of the parameters of a config class, MODULE:CLASS."""
     module, _, name = config.partition(":")
@@ -174,6 +181,7 @@ PARTS: dict[str, Callable[..., str]] = {
         suites,
         scores,
         observations,
+        axes,
         parameters,
         constants,
         method,

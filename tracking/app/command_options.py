@@ -19,6 +19,7 @@ TOML = partial(option, metavar="FILE.toml", flag="--out")
 FILE = partial(option, flag="--out")
 NAMES = partial(ARGUMENT, "Scenarios, *.toml files or suites.", metavar="NAME…")
 SOURCE = partial(ARGUMENT, "Sequence or dataset: generated, MOT, video, BIWI, CAVIAR.", metavar="SOURCE")
+SIMILARITY = partial(option, "How true and tracked people are compared. Default: by the data.", None)
 TRACKS = partial(ARGUMENT, "Output of `track`, or MOT text.", None, metavar="TRACKS")
 FPS = partial(option, "Frames per second of a recording, in place of its own. Not for generated sequences.", None)
 SCALE = partial(option, "Pixels per metre of a recording without a camera.", None)
@@ -45,6 +46,7 @@ SEEDS = partial(option, "Seeds from A to B - 1, or one seed.", metavar="A:B")
 FIT_SEEDS = partial(option, "Seeds of the scenes to fit to.", "30000:30002", metavar="A:B")
 CHECK = partial(option, "Other seeds, to score the fit with.", None, metavar="A:B")
 Images = Literal["jpg", "png", "mp4"] | None
+Similarity = Literal["boxes", "ground", "image"] | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,8 +130,7 @@ class ScoreOptions:
     truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
     tracks: list[str] = ARGUMENT(
         "Output of `track`, MOT text, or a tracker class (file.py:Class); several are ranked.", metavar="TRACKS…")
-    similarity: Literal["boxes", "ground", "image"] | None = option(
-        "How true and tracked people are compared. Default: by the data.", None)
+    similarity: Similarity = SIMILARITY()
     group_match: Literal["hull", "members"] = option("How true and estimated groups are compared.", "hull")
     blocks: int = option("Intervals for a single recording, by N draws of blocks of frames.", 0, low=0, metavar="N")
     by: str | None = option(
@@ -149,8 +150,7 @@ class StressOptions:
 
     trackers: list[str] = ARGUMENT("Trackers to compare: names, file.py:Class or module:Class.", metavar="TRACKER…")
     vary: str = option(
-        "Axis: detection, clutter, noise, occlusion, people, gap, velocity-difference, frame-rate, camera-height, "
-        "tilt, light or contrast, or KEY; with =EASY:HARD its ends.", metavar="AXIS")
+        "Axis: a name such as detection, or a key of scenarios with its ends.", metavar="NAME|KEY=EASY:HARD")
     suite: list[str] = option("Scenario or suite. Can be given several times.", metavar="NAME", flag="--suite")
     seeds: str = option("Seeds that may be played, from A to B - 1.", "20000:20020", metavar="A:B")
     out: Path = OUT()
@@ -176,8 +176,7 @@ class ErrorsOptions:
     truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
     tracks: Path = ARGUMENT("Output of `track`, or MOT text.", metavar="TRACKS")
     limit: int = option("Number of errors to show, the dearest first; --json has all.", 20, low=0, metavar="N")
-    similarity: Literal["boxes", "ground", "image"] | None = option(
-        "How true and tracked people are compared. Default: by the data.", None)
+    similarity: Similarity = SIMILARITY()
     fps: float | None = FPS()
     px_per_m: float | None = SCALE()
     person_class: int | None = PERSON_CLASS()

@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from scenarios.errors import InputError
 from sim.types import Array, Bools, Ints, Sequence, Tracks
+from tracking.comparison import scorer_of
 from tracking.errors.causes import Cause, Facts, cause_of_ghost, cause_of_group, cause_of_person, facts
 from tracking.errors.groups import GroupError, group_errors
 from tracking.errors.people import PersonError, matched_people, person_errors
@@ -21,7 +23,7 @@ from tracking.errors.repairs import ComparedRun, scores
 from tracking.oracle import oracle
 from tracking.running.run import TrackingRun
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
-from tracking.scoring.evaluation import MatchedSides, Scorer
+from tracking.scoring.evaluation import MatchedSides
 from tracking.scoring.people_and_groups import Surface
 from tracking.scoring.people_comparison import Similarity
 from tracking.scoring.position_errors import REACH
@@ -89,10 +91,16 @@ class RunErrors:
 
 def errors_of_run(
     sequence: Sequence, run: TrackingRun, similarity: Similarity | None = None, costs: bool = True
-) -> RunErrors | None:
-    """Returns the errors of a run, by the input that it names; None without truth, or of a tracker of whole groups."""
-    if sequence.truth is None or any(t.unit == "group" for t in run):
-        return None
+) -> RunErrors:
+    """Returns the errors of a run, with the detections of the input that it names.
+
+    Raises InputError as `find_errors`, and for a tracker of whole groups.
+    """
+    if any(t.unit == "group" for t in run):
+        raise InputError(
+            file=sequence.name, got="a tracker of whole groups", expected="tracks of people",
+            remedy="score it with `flockscope score`",
+        )  # fmt: skip
     seen = oracle(sequence, run.info, similarity) if run.info.get("detections") is not None else None
     return find_errors(sequence, run, seen, similarity, costs)
 
@@ -103,12 +111,12 @@ def find_errors(
 ) -> RunErrors:  # fmt: skip
     """Returns the errors of a run of people; seen: tracks of true ids that show which people were detected.
 
-    Without costs, the costs and gains are not known, which is much quicker.
+    Without costs, the costs and gains are not known, which is much quicker. Raises InputError without labels, or if
+    they and the tracks cannot be compared.
     """
-    assert sequence.truth is not None, "errors need a truth"
-    scorer = Scorer(sequence.truth)
     given = [tracks] if seen is None else [tracks, seen]
-    compared = scorer.compare(given, similarity, None)
+    with scorer_of(sequence) as scorer:
+        compared = scorer.compare(given, similarity, None)
     run, of, place = _prepared(compared[0], None if seen is None else compared[1])
     matched = run.matched
     people = person_errors(matched)
@@ -181,9 +189,8 @@ def _groups(tracks: SequenceOf[Tracks], rows: FrameRows) -> Ints:
     """Returns the group of each tracked row, (S,), by the members that groups name."""
     group = np.full(len(rows), -1, np.int64)
     for t in tracks:
-        for id, members in (
-            zip(t.groups.id, t.groups.members, strict=True) if t.groups is not None and t.groups.members else ()
-        ):
+        named = t.groups is not None and len(t.groups.members) > 0
+        for id, members in zip(t.groups.id, t.groups.members, strict=True) if t.groups is not None and named else ():
             where = find_rows(rows, FrameRows(np.full(len(members), t.index), np.asarray(members)))
             group[where[where >= 0]] = id
     return group

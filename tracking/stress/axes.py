@@ -5,14 +5,15 @@ AXES has the named ones; any other key of a scenario that takes a number is an a
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scenarios.errors import InputError
-from scenarios.limits import is_number
 from scenarios.loading.toml_files import closest
 
-Settings = Callable[[float], list[str]]
+Settings = Callable[[float], list[str]]  # value: the settings of a scenario, as for --set
+NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?")
 
 
 @dataclass(frozen=True)
@@ -22,9 +23,9 @@ class Axis:
     name: str
     easy: float
     hard: float
-    settings: Settings  # value: the settings of a scenario, as for --set
+    settings: Settings
     whole: bool = False  # values are whole numbers
-    about: str = ""
+    about: str = ""  # what a value is
 
     def between(self, a: float, b: float) -> float | None:
         """Returns the value in the middle of two values, None if there is none."""
@@ -71,23 +72,15 @@ AXES = {
 def parse_axis(text: str) -> Axis:
     """Returns the axis of a text NAME, NAME=EASY:HARD or KEY=EASY:HARD."""
     name, equals, span = text.partition("=")
-    ends = [_number(part) for part in span.split(":")] if equals else []
-    known = AXES.get(name)
-    if (equals and (len(ends) != 2 or None in ends or ends[0] == ends[1])) or (not equals and known is None):
-        near = f"did you mean {closest(name, [*AXES])}?" if known is None and not equals else "write detection=1:0.5"
-        raise InputError(
-            place="--vary", got=repr(text), expected=f"one of {', '.join(AXES)}, or KEY=EASY:HARD", remedy=near
-        )  # fmt: skip
-    easy, hard = (known.easy, known.hard) if known is not None and not equals else (ends[0] or 0.0, ends[1] or 0.0)
+    known, expected = AXES.get(name), f"one of {', '.join(AXES)}, or KEY=EASY:HARD"
+    if not equals:
+        if known is None:
+            remedy = f"did you mean {closest(name, [*AXES])}?"
+            raise InputError(place="--vary", got=repr(text), expected=expected, remedy=remedy)
+        return known
+    ends = [float(part) for part in span.split(":") if NUMBER.fullmatch(part)]
+    if len(ends) != 2 or span.count(":") != 1 or ends[0] == ends[1]:
+        raise InputError(place="--vary", got=repr(text), expected=expected, remedy="write detection=1:0.5")
     if known is None:
-        whole = easy == int(easy) and hard == int(hard) and "." not in span
-        return Axis(name, easy, hard, _key(name), whole)
-    return Axis(name, easy, hard, known.settings, known.whole, known.about)
-
-
-def _number(text: str) -> float | None:
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if is_number(value, -1e9, 1e9) else None
+        return Axis(name, ends[0], ends[1], _key(name), whole="." not in span)
+    return replace(known, easy=ends[0], hard=ends[1])

@@ -10,6 +10,7 @@ the breaking point, as the curve between them is not known.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,8 +62,9 @@ def overtaking(way: Array, first: Array, second: Array, rng: np.random.Generator
     return _with_interval(way, first - second, lambda mean: mean, rng)
 
 
-def _with_interval(way: Array, scores: Array, height: object, rng: np.random.Generator) -> BreakingPoint:
-    assert callable(height)
+def _with_interval(
+    way: Array, scores: Array, height: Callable[[Array], Array], rng: np.random.Generator
+) -> BreakingPoint:
     at = crossing(way, height(curve(scores)))
     draws = rng.integers(0, len(scores), (DRAWS, len(scores)))
     found = np.sort([crossing(way, height(curve(scores[draw]))) for draw in draws])

@@ -10,7 +10,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
 
-from scenarios.errors import FlockscopeError, OrderError
+from scenarios.errors import FlockscopeError, InputError, OrderError, shortened
+from sim.io.files.atomic import write_file
 from sim.types import DetectionMode
 from tracking.environment.episodes import Source, SourceCache, play
 from tracking.running.time_limit import TimeLimited
@@ -109,12 +110,18 @@ class Store:
                 row = json.loads(line)
             except ValueError:  # the last line of a sweep that was killed
                 continue
+            if not isinstance(row, dict) or not row.keys() >= {"key", *Outcome.__dataclass_fields__}:
+                raise InputError(
+                    file=self.path, got=shortened(line, 80), expected="episodes of `flockscope stress`",
+                    remedy="move the file away, or choose another --out",
+                )  # fmt: skip
             self.known[row["key"]] = row
         if text and not text.endswith("\n"):
-            self.path.write_text("".join(json.dumps(row) + "\n" for row in self.known.values()), encoding="utf-8")
+            write_file(self.path, "".join(json.dumps(row) + "\n" for row in self.known.values()).encode())
 
     def add(self, row: dict[str, Any]) -> None:
         """Stores an episode."""
         self.known[row["key"]] = row
+        self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from scenarios.errors import InputError
 from sim.types import Groups, Sequence, Tracks
 from tests.hand_made import Scene, event, tracks, truth
-from tracking.errors.found import find_errors
+from tracking.app.commands.view import _errors
+from tracking.errors.found import errors_of_run, find_errors
 from tracking.errors.groups import GroupError
+from tracking.running.run import TrackingRun
 
 FRAMES = 60
 SPEED = 0.12  # m per frame
@@ -199,3 +202,25 @@ def test_causes_of_a_ghost(where: tuple[float, float], cause: str) -> None:
     (one,) = find_errors(Made(scenes).sequence(), run).errors
     assert one.error.kind == "ghost"
     assert one.cause.name == cause
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda t: t.replace(plane="image"), "place|positions"),
+        (lambda t: t.replace(unit="group"), "a tracker of whole groups"),
+    ],
+)
+def test_what_cannot_be_compared_is_an_error_of_one_line(spoil, words: str) -> None:
+    scenes = [scene(n) for n in range(FRAMES)]
+    run = TrackingRun(tuple(spoil(t) for t in tracks(scenes)), {})
+    with pytest.raises(InputError, match=words):
+        errors_of_run(Made(scenes).sequence(), run)
+
+
+def test_a_page_is_written_without_errors_that_cannot_be_found() -> None:
+    scenes = [scene(n) for n in range(FRAMES)]
+    run = TrackingRun(tuple(t.replace(plane="image") for t in tracks(scenes)), {})
+    with pytest.warns(UserWarning, match="made: the page shows no errors"):
+        assert _errors(Made(scenes).sequence(), run) == []
+    assert _errors(Made(scenes).sequence(), None) == []

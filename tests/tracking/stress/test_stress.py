@@ -136,3 +136,12 @@ def test_a_failed_episode_counts_as_zero_and_one_without_script_not(tmp_path: Pa
     made.values, made.seeds = [1.0], 3
     made._play()
     assert np.array_equal(made.scores("t")[:, 0], [0, np.nan, 1], equal_nan=True)
+
+
+@pytest.mark.parametrize("line", ["[1, 2]", '{"key": "a"}'])
+def test_a_file_of_somebody_else_is_refused_and_kept(line: str, tmp_path: Path) -> None:
+    path = tmp_path / "e.jsonl"
+    path.write_text(line)
+    with pytest.raises(InputError, match=r"e\.jsonl.*expected episodes of"):
+        Store(path)
+    assert path.read_text() == line

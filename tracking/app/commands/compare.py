@@ -22,7 +22,7 @@ from sim.io.files.atomic import write_file
 from sim.io.files.tables import json_document, read_json
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import empty_table, with_title
+from tracking.app.commands.score_tables import checked_key, empty_table, with_title
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import paired
 
@@ -35,16 +35,12 @@ Stored = dict[str, dict[str, Any]]  # by name of the sequence
 
 def compare(options: CompareOptions) -> CommandResult:
     """Compares stored scores with those of a baseline; exit code 1 if one of them is surely worse."""
-    for key in options.by:
-        if key not in CATALOGUE:
-            known = "docs/reference/metrics.md lists them"
-            raise InputError(place="--by", got=repr(key), expected="the key of a score", remedy=known)
+    keys = [checked_key(key) for key in options.by or ["objective"]]
     before, now = _read(options.baseline), _read(options.now)
     _require_same(options, before, now)
-    rows = [_row(key, before, now, options.tolerance) for key in options.by or ["objective"]]
+    rows = [_row(key, before, now, options.tolerance) for key in keys]
     if options.save is not None:
-        keys = (*HOW, *(row["score"] for row in rows))
-        kept = [{"name": name, **{k: row[k] for k in keys if k in row}} for name, row in now.items()]
+        kept = [{"name": name, **{k: row[k] for k in (*HOW, *keys) if k in row}} for name, row in now.items()]
         write_file(options.save, json_document({"sequences": kept}))
     worse = [row["score"] for row in rows if row["verdict"] == "regression"]
     data = {"sequences": len(before), "tolerance": options.tolerance, "scores": rows}

@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence as SequenceOf
 from typing import Any
 
-from scenarios.errors import InputError, printable
-from sim.io.formats.options import parse_box_scale
+from scenarios.errors import printable
+from sim.io.formats.options import BoxScale
 from sim.types import Sequence
 from tracking.app.command_options import ErrorsOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.commands.score import matched_tracks
 from tracking.app.commands.score_tables import empty_table, with_title
 from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import OpenedAs, over_sequences
-from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
+from tracking.app.stored_tracks import StoredTracks
 from tracking.errors.found import RunErrors, errors_of_run
 from tracking.errors.repairs import SHOWN
+from tracking.scoring.people_comparison import Similarity
 
-Job = tuple[StoredTracks, Any, Any]  # stored tracks, similarity, factor of boxes of texts
+Job = tuple[StoredTracks, Similarity | None, BoxScale | None]
 
 
 def errors(options: ErrorsOptions) -> CommandResult:
@@ -26,9 +28,8 @@ def errors(options: ErrorsOptions) -> CommandResult:
         options.truth, options.fps, options.px_per_m, images=False, person_class=options.person_class
     )  # fmt: skip
     sequences = source.open()
-    matched = match_tracks(sequences, find_tracks(options.tracks))
-    box_scale = None if options.box_scale is None else parse_box_scale(options.box_scale)
-    jobs: list[Job] = [(stored, options.similarity, box_scale) for _, stored in matched]
+    stored, box_scale = matched_tracks(sequences, options.tracks, options.box_scale)
+    jobs: list[Job] = [(one, options.similarity, box_scale) for one in stored]
     found: list[RunErrors] = []
     with ProgressMeter("errors", len(sequences)) as meter:
         for one in over_sequences(errors_of, sequences, jobs, source, options.workers):
@@ -54,20 +55,7 @@ def errors(options: ErrorsOptions) -> CommandResult:
 def errors_of(sequence: Sequence, job: Job) -> RunErrors:
     """Returns the errors of one stored run."""
     stored, similarity, box_scale = job
-    if sequence.truth is None:
-        raise InputError(
-            file=sequence.source.get("path"), got="no labels", expected="a labelled sequence",
-            remedy="errors are found by comparison with a truth",
-        )  # fmt: skip
-    run = stored.read(sequence, box_scale)
-    if any(t.unit == "group" for t in run):
-        raise InputError(
-            file=stored.path, got="a tracker of whole groups", expected="tracks of people",
-            remedy="score it with `flockscope score`",
-        )  # fmt: skip
-    found = errors_of_run(sequence, run, similarity)
-    assert found is not None, "labels and people are there"
-    return found
+    return errors_of_run(sequence, stored.read(sequence, box_scale), similarity)
 
 
 def _causes(found: SequenceOf[RunErrors]) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.options import parse_box_scale
+from sim.io.formats.options import BoxScale, parse_box_scale
 from sim.types import Array, Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
@@ -16,7 +16,7 @@ from tracking.app.commands.score_ranking import is_class, ranking, short_notes, 
 from tracking.app.commands.score_tables import Means, SequenceScores, tables
 from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequences
 from tracking.app.sequence_workers import OpenedAs
-from tracking.app.stored_tracks import find_tracks, match_tracks
+from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.comparison import check_blocks
 from tracking.scoring.catalogue import ALL, CATALOGUE
 from tracking.stats import mean_interval
@@ -44,16 +44,24 @@ def score(options: ScoreOptions) -> CommandResult:
 
 
 def _score_all(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) -> list[ScoredSequence]:
-    matched = match_tracks(sequences, find_tracks(Path(options.tracks[0])))
-    box_scale = None if options.box_scale is None else parse_box_scale(options.box_scale)
-    if box_scale is not None and all(stored.info for _, stored in matched):
+    found, box_scale = matched_tracks(sequences, Path(options.tracks[0]), options.box_scale)
+    how = (options.similarity, options.group_match, options.blocks)
+    jobs = [ScoringJob((stored,), *how, box_scale=box_scale) for stored in found]
+    return score_sequences(sequences, jobs, source, options.workers)
+
+
+def matched_tracks(
+    sequences: list[Sequence], tracks: Path, box_scale: str | None
+) -> tuple[list[StoredTracks], BoxScale | None]:
+    """Returns the stored tracks of each sequence, and the factors of --box-scale, which is for texts only."""
+    matched = match_tracks(sequences, find_tracks(tracks))
+    scale = None if box_scale is None else parse_box_scale(box_scale)
+    if scale is not None and all(stored.info for _, stored in matched):
         raise InputError(
             place="--box-scale", got="runs of `flockscope track`", expected="a text of another program",
             remedy="give --box-scale to `flockscope track`",
         )  # fmt: skip
-    how = (options.similarity, options.group_match, options.blocks)
-    jobs = [ScoringJob((stored,), *how, box_scale=box_scale) for _, stored in matched]
-    return score_sequences(sequences, jobs, source, options.workers)
+    return [stored for _, stored in matched], scale
 
 
 def _block_means(scored: ScoredSequence) -> Means:

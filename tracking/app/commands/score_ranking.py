@@ -29,6 +29,7 @@ from tracking.app.commands.score_tables import (
     TABLES,
     arrow,
     chance,
+    checked_key,
     empty_table,
     number,
     with_title,
@@ -131,11 +132,8 @@ def ranking(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) 
         raise InputError(
             place="--box-scale", got=counted(len(options.tracks), "run"), expected="one text", remedy="leave it out"
         )
-    if options.by is not None and (options.by not in CATALOGUE or CATALOGUE[options.by].better == "neither"):
-        raise InputError(
-            place="--by", got=options.by, expected="a score with a better direction, such as HOTA",
-            remedy="docs/reference/metrics.md lists them",
-        )  # fmt: skip
+    if options.by is not None:
+        checked_key(options.by)
     names = _names(options.tracks)
     runs = [[text] * len(sequences) if is_class(text) else _stored(text, sequences) for text in names.values()]
     how = (options.similarity, options.group_match, options.blocks)

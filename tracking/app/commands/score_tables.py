@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from scenarios.errors import counted, printable
+from scenarios.errors import InputError, counted, printable
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scores
 from tracking.stats import LEVEL
@@ -97,6 +97,16 @@ def _heading(key: str, rows: Sequence[SequenceScores]) -> str:
     short = key.removeprefix("group_").removesuffix("_core")
     named = f"{short} ({unit})" if CATALOGUE[key].unit == "m | px" else short
     return named + arrow(key).removeprefix(key)
+
+
+def checked_key(key: str, better: Sequence[str] = ("higher", "lower")) -> str:
+    """Returns the key of a score that was given with --by. Raises InputError for another, or of another direction."""
+    if key not in CATALOGUE or CATALOGUE[key].better not in better:
+        raise InputError(
+            place="--by", got=key, expected=f"a score of which {' or '.join(better)} is better, such as HOTA",
+            remedy="docs/reference/metrics.md lists them",
+        )  # fmt: skip
+    return key
 
 
 def empty_table() -> Any:

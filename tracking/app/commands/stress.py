@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import io
 from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError, counted, printable
+from scenarios.errors import counted, printable
 from sim.io.files.atomic import write_file
-from sim.io.files.tables import json_document
+from sim.io.files.tables import Column, json_document, table_bytes
 from sim.types import DetectionMode
 from tracking.app import option_parsing
 from tracking.app.command_options import StressOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import empty_table, with_title
+from tracking.app.commands.score_tables import checked_key, empty_table, with_title
 from tracking.app.progress import ProgressMeter
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval
@@ -29,18 +28,15 @@ LISTED = 5  # failed episodes that are listed
 
 def stress(options: StressOptions) -> CommandResult:
     """Plays the sweep, stores it, and returns the curves with their breaking points."""
-    if options.by not in CATALOGUE:
-        known = "docs/reference/metrics.md lists them"
-        raise InputError(place="--by", got=repr(options.by), expected="the key of a score", remedy=known)
+    by = checked_key(options.by, better=("higher",))
     trackers = {name: contender(name, options.step_timeout) for name in dict.fromkeys(options.trackers)}
     detects = all({"boxes", "points"} & {*tracker.needs} for tracker in trackers.values())
     detections: DetectionMode = options.detections or ("file" if detects else "image")
     seeds = tuple(option_parsing.seeds(options.seeds, "--seeds"))
-    settings = (*option_parsing.sensor_settings(options.sensor), *options.settings)
+    settings = (*option_parsing.sensor_settings(options.sensor), *option_parsing.scenario_settings(options.settings))
     budget = (options.episodes, options.minutes)
     axis, start = parse_axis(options.vary), min(len(seeds), options.start)
-    plan = Plan(tuple(options.suite), axis, seeds, start, options.by, options.share, detections, settings, *budget)
-    options.out.mkdir(parents=True, exist_ok=True)
+    plan = Plan(tuple(options.suite), axis, seeds, start, by, options.share, detections, settings, *budget)
     with ProgressMeter("stress", options.episodes or 0) as meter, job_player(options.workers, options.cluster) as play:
         sweep = Sweep(plan, trackers, play, Store(options.out / EPISODES), meter.step)
         sweep.run()
@@ -74,16 +70,15 @@ def _data(sweep: Sweep) -> dict[str, Any]:
 
 
 def _parquet(sweep: Sweep) -> bytes:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     rows = sweep.rows()
-    keys = ("tracker", "scenario", "seed", "value", "left_out", "failed")
-    columns = {key: [row[key] for row in rows] for key in keys}
-    columns |= {key: pa.array([row["scores"].get(key) for row in rows], pa.float64()) for key in CATALOGUE}
-    sink = io.BytesIO()
-    pq.write_table(pa.table(columns), sink, compression="zstd")
-    return sink.getvalue()
+    words = ("tracker", "scenario", "left_out", "failed")
+    columns = [Column(key, np.array([row[key] for row in rows], object)) for key in words]
+    columns += [Column(key, np.array([row[key] for row in rows])) for key in ("seed", "value")]
+    columns += [
+        Column(score.key, np.array([row["scores"].get(score.key, np.nan) for row in rows], float), score.unit)
+        for score in CATALOGUE.values()
+    ]
+    return table_bytes(columns, {"axis": sweep.plan.axis.name})
 
 
 def _tables(sweep: Sweep, data: dict[str, Any], options: StressOptions) -> Any:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError
 from sim.io.files.own_files import output_paths, refuse_foreign_file
@@ -16,6 +18,9 @@ from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.stored_tracks import find_tracks, match_tracks
 from tracking.running.run import TrackingRun
 
+if TYPE_CHECKING:
+    from tracking.errors.found import FoundError
+
 Step = Callable[[str], None]  # Reports that one picture of the named sequence is done.
 
 Write = Callable[[Sequence, Path, Step], None]  # Writes the file of one sequence.
@@ -25,19 +30,30 @@ def view(options: ViewOptions) -> CommandResult:
     """Writes a replay page for each sequence, with its tracks if they are given."""
     from tracking.app.replay_page.page import write_page
     from tracking.app.replay_page.video import page_video
-    from tracking.errors.found import errors_of_run
 
     sequences = _open(options)
     tracks_of = _tracks_reader(sequences, options.tracks)
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
         tracks = tracks_of(sequence)
-        found = None if tracks is None else errors_of_run(sequence, tracks, costs=False)
-        errors = [] if found is None else found.errors
-        write_page(sequence, tracks, path, video=page_video(sequence, path, options.video, step), errors=errors)
+        video, errors = page_video(sequence, path, options.video, step), _errors(sequence, tracks)
+        write_page(sequence, tracks, path, video=video, errors=errors)
 
     pictures = _picture_count(sequences) if options.video != "none" else 0
     return _write_each("view", sequences, options.out, ".html", write, pictures)
+
+
+def _errors(sequence: Sequence, tracks: TrackingRun | None) -> list[FoundError]:
+    """Returns the errors of people and groups that a page shows; a warning says why there are none of them."""
+    from tracking.errors.found import errors_of_run
+
+    if tracks is None or sequence.truth is None or any(t.unit == "group" for t in tracks):
+        return []
+    try:
+        return errors_of_run(sequence, tracks, costs=False).errors
+    except InputError as error:
+        warnings.warn(f"{sequence.name}: the page shows no errors: {error.got}", stacklevel=2)
+        return []
 
 
 def sheet(options: SheetOptions) -> CommandResult:
