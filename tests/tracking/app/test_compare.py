@@ -34,6 +34,8 @@ NOISE = np.array([0.02, -0.02, 0.01, -0.01, 0.015, -0.015])
         (0.1 + NOISE, "improvement", 0),
         (NOISE / 10, "no difference", 0),
         (10 * NOISE, "too noisy", 0),
+        (-0.05 + 10 * NOISE, "too noisy", 0),
+        (0.05 + 10 * NOISE, "too noisy", 0),
         (-0.005 + NOISE / 100, "no difference", 0),
     ],
 )

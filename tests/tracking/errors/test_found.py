@@ -85,11 +85,19 @@ def swapped(t, start):
     return changed(t, id=np.array([other.get(int(i), int(i)) for i in t.id]))
 
 
+def astray(t, person, start, end):
+    """The track of a person is somewhere else for a while, so that its id is in use in the gap."""
+    if not start <= t.index <= end:
+        return t
+    return changed(t, pos=np.where(t.id[:, None] == person, [30.0, 30.0], t.pos))
+
+
 FAULTS = {
     "late": (lambda t, k: lost(t, 5, 1, k), [("late", 1, 0)]),
     "miss": (lambda t, k: lost(t, 5, k, FRAMES), [("miss", 0, FRAMES)]),
     "lost": (lambda t, k: lost(t, 5, 1, FRAMES), [("miss", 1, FRAMES)]),
     "fragment": (lambda t, k: lost(t, 5, k, k + 8), [("fragment", 0, 8)]),
+    "track astray": (lambda t, k: astray(t, 5, k, k + 8), [("fragment", 0, 8), ("ghost", 0, 8)]),
     "switch": (lambda t, k: renamed(t, 5, 50, k), [("switch", 0, 0)]),
     "switch after a gap": (lambda t, k: lost(renamed(t, 5, 50, k), 5, k - 5, k - 1), [("switch", -5, 0)]),
     "swap": (swapped, [("switch", 0, 0), ("switch", 0, 0)]),
