@@ -219,16 +219,22 @@ class ReplayCommandOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class ViewOptions:
-    """Write a page that replays a sequence in the browser: truth, tracks, and pictures if it has any."""
+    """Write a page that replays a sequence in the browser: truth, tracks, and pictures if it has any.
+
+    For several sequences also a report on the tracks; two trackers on one sequence are shown beside each other."""
 
     source: Path = SOURCE()
-    tracks: Path | None = TRACKS()
+    tracks: list[str] = ARGUMENT(
+        "Output of `track`, MOT text, or a tracker class (file.py:Class).", [], metavar="TRACKS…")
     out: Path = FILE("Page to write; for several sequences, a folder.", metavar="FILE.html")
     video: Literal["auto", "inside", "beside", "none"] = option(
         "Pictures inside the page, beside it as FILE.view.mp4, or none. auto: beside from 12 MB on.", "auto")
+    by: str | None = option(
+        "The score that ranks in a report. Default: objective, or what all runs have of it.", None, metavar="SCORE")
     fps: float | None = FPS()
     px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
+    workers: int = PROCESSES()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,9 +34,9 @@ from tracking.app.commands.score_tables import (
     number,
     with_title,
 )
-from tracking.app.commands.scored_sequence import ScoringJob, score_sequences
+from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequences
 from tracking.app.sequence_workers import OpenedAs
-from tracking.app.stored_tracks import find_tracks, match_tracks
+from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.comparison import ComparedRuns, joined
 from tracking.ranking import Ranking, rank
 from tracking.scoring.catalogue import CATALOGUE
@@ -134,23 +134,29 @@ def ranking(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) 
         )
     if options.by is not None:
         checked_key(options.by)
-    names = _names(options.tracks)
-    runs = [[text] * len(sequences) if is_class(text) else _stored(text, sequences) for text in names.values()]
+    names = run_names(options.tracks)
+    runs = stored_runs(names, sequences)
     how = (options.similarity, options.group_match, options.blocks)
     jobs = [ScoringJob(sources, *how, oracles=True) for sources in zip(*runs, strict=True)]
     found = score_sequences(sequences, jobs, source, options.workers)
-    comparison = joined(list(names), [s.name for s in sequences], [one.compared for one in found])
-    notes = [*sparse_notes([one.scores[0] for one in found]), *dict.fromkeys(one.note for one in found if one.note)]
-    if options.blocks:
-        notes += short_notes(sequences[0], found[0].scores[0])
+    notes = short_notes(sequences[0], found[0].scores[0]) if options.blocks else []
+    every = ranked_runs(list(names), sequences, found, options.by, notes)
+    if options.csv is not None:
+        _write_csv(options.csv, every.comparison)
+    return CommandResult(_data(every), _text(every, options.all))
+
+
+def ranked_runs(
+    names: list[str], sequences: list[Sequence], found: list[ScoredSequence], by: str | None, notes: list[str]
+) -> RankedRuns:
+    """Returns the ranking of runs whose scores were found on each sequence."""
+    comparison = joined(names, [s.name for s in sequences], [one.compared for one in found])
+    every = [*sparse_notes([one.scores[0] for one in found]), *dict.fromkeys(one.note for one in found if one.note)]
     settings = run_differences({name: [one.infos[k] for one in found] for k, name in enumerate(names)})
     scenarios: dict[str, list[int]] = {}
     for k, sequence in enumerate(sequences):
         scenarios.setdefault(_scenario(sequence), []).append(k)
-    every = _ranked(comparison, options.by or usual_key(comparison), scenarios, settings, notes)
-    if options.csv is not None:
-        _write_csv(options.csv, comparison)
-    return CommandResult(_data(every), _text(every, options.all))
+    return _ranked(comparison, by or usual_key(comparison), scenarios, settings, [*every, *notes])
 
 
 def short_notes(sequence: Sequence, scores: Scores) -> list[str]:
@@ -176,7 +182,8 @@ def usual_key(comparison: ComparedRuns) -> str:
     return "group_F1" if people.any() and not people.all() else "objective"
 
 
-def _names(texts: list[str]) -> dict[str, str]:
+def run_names(texts: list[str]) -> dict[str, str]:
+    """Returns the texts that name runs, by a short name. Raises InputError if one is given twice."""
     short = [text.rpartition(":")[2] if is_class(text) else Path(text).name for text in texts]
     if len(set(texts)) < len(texts):
         twice = next(text for text in texts if texts.count(text) > 1)
@@ -189,8 +196,14 @@ def is_class(text: str) -> bool:
     return ":" in text and not Path(text).exists()
 
 
-def _stored(text: str, sequences: list[Sequence]) -> list[Any]:
-    return [stored for _, stored in match_tracks(sequences, find_tracks(Path(text)))]
+def stored_runs(names: Mapping[str, str], sequences: list[Sequence]) -> list[list[StoredTracks | str]]:
+    """Returns for each run its stored tracks of each sequence, or the text that names a tracker class."""
+    return [
+        [text] * len(sequences)
+        if is_class(text)
+        else [stored for _, stored in match_tracks(sequences, find_tracks(Path(text)))]
+        for text in names.values()
+    ]
 
 
 def _scenario(sequence: Sequence) -> str:

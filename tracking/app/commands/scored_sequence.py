@@ -70,7 +70,16 @@ def score_sequences(
 
 def score_sequence(sequence: Sequence, job: ScoringJob) -> ScoredSequence:
     """Returns the scores of all runs of one sequence, compared alike."""
-    runs = [_tracks(source, sequence, job.box_scale) for source in job.sources]
+    return score_runs(sequence, read_runs(sequence, job), job)
+
+
+def read_runs(sequence: Sequence, job: ScoringJob) -> list[TrackingRun]:
+    """Returns the runs of a job: stored tracks are read, tracker classes track."""
+    return [_tracks(source, sequence, job.box_scale) for source in job.sources]
+
+
+def score_runs(sequence: Sequence, runs: list[TrackingRun], job: ScoringJob) -> ScoredSequence:
+    """Returns the scores of the runs of a job."""
     for run in runs:
         if sequence.truth is not None:
             text = likely_misreading(sequence.truth, run, size=sequence.image_size, given="run" if run.info else "text")

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, counted
 from sim.io.files.own_files import output_paths, refuse_foreign_file
 from sim.io.source import open_source
 from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.commands.score_ranking import run_names, stored_runs
+from tracking.app.commands.score_tables import checked_key
+from tracking.app.commands.scored_sequence import ScoringJob, read_runs
 from tracking.app.progress import ProgressMeter, total_frames
+from tracking.app.sequence_workers import OpenedAs
 from tracking.app.stored_tracks import find_tracks, match_tracks
-from tracking.running.run import TrackingRun
 
-if TYPE_CHECKING:
-    from tracking.errors.found import FoundError
+INDEX = "index.html"  # the report in the folder of the pages
 
 Step = Callable[[str], None]  # Reports that one picture of the named sequence is done.
 
@@ -27,33 +27,58 @@ Write = Callable[[Sequence, Path, Step], None]  # Writes the file of one sequenc
 
 
 def view(options: ViewOptions) -> CommandResult:
-    """Writes a replay page for each sequence, with its tracks if they are given."""
-    from tracking.app.replay_page.page import write_page
-    from tracking.app.replay_page.video import page_video
+    """Writes a replay page for each sequence, with its tracks if they are given, and a report on several sequences."""
+    if options.by is not None:
+        checked_key(options.by)
+    sequences, names = _open(options), run_names(options.tracks)
+    if len(sequences) > 1 and len(names) > 1:
+        pages = CommandResult({"files": []})
+    elif len(names) <= 2:
+        pages = _pages(options, sequences, names)
+    else:
+        raise InputError(
+            place="TRACKS", got=counted(len(names), "run"), expected="one or two for a single sequence",
+            remedy="give two, or the whole dataset",
+        )  # fmt: skip
+    if len(sequences) == 1 or not names or any(sequence.truth is None for sequence in sequences):
+        return pages
+    return _report(options, sequences, names, pages)
 
-    sequences = _open(options)
-    tracks_of = _tracks_reader(sequences, options.tracks)
+
+def _pages(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str]) -> CommandResult:
+    from tracking.app.replay_page.page import Run, write_page
+    from tracking.app.replay_page.video import page_video
+    from tracking.app.report.moments import shown_errors
+
+    runs = dict(zip((s.name for s in sequences), zip(*stored_runs(names, sequences), strict=True), strict=False))
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
-        tracks = tracks_of(sequence)
-        video, errors = page_video(sequence, path, options.video, step), _errors(sequence, tracks)
-        write_page(sequence, tracks, path, video=video, errors=errors)
+        given = read_runs(sequence, ScoringJob(runs.get(sequence.name, ())))
+        shown = [Run(run, shown_errors(sequence, run).errors) for run in given]
+        first, other = (*shown, None, None)[:2]
+        video = page_video(sequence, path, options.video, step)
+        write_page(
+            sequence, None if first is None else first.tracks, path, video=video,
+            errors=() if first is None else first.errors, other=other,
+        )  # fmt: skip
 
     pictures = _picture_count(sequences) if options.video != "none" else 0
     return _write_each("view", sequences, options.out, ".html", write, pictures)
 
 
-def _errors(sequence: Sequence, tracks: TrackingRun | None) -> list[FoundError]:
-    """Returns the errors of people and groups that a page shows; a warning says why there are none of them."""
-    from tracking.errors.found import errors_of_run
+def _report(
+    options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str], pages: CommandResult
+) -> CommandResult:
+    """Writes index.html: the report on all runs, which links to the pages of the sequences, if there are any."""
+    from tracking.app.report.of_runs import report_of_runs
+    from tracking.app.report.page import check_packages, write_report
 
-    if tracks is None or sequence.truth is None or any(t.unit == "group" for t in tracks):
-        return []
-    try:
-        return errors_of_run(sequence, tracks, costs=False).errors
-    except InputError as error:
-        warnings.warn(f"{sequence.name}: the page shows no errors: {error.got}", stacklevel=2)
-        return []
+    check_packages()
+    index = options.out / INDEX
+    source = OpenedAs(options.source, options.fps, options.px_per_m, options.camera, images=False)
+    files = {sequence.name: path.name for sequence, path in zip(sequences, pages.data["files"], strict=False)}
+    write_report(report_of_runs(names, sequences, source, options.by, options.workers, files), index)
+    return CommandResult({"files": [index, *pages.data["files"]]}, f"{index}\n{pages.text}".rstrip())
 
 
 def sheet(options: SheetOptions) -> CommandResult:
@@ -72,10 +97,12 @@ def overlay(options: OverlayOptions) -> CommandResult:
     from tracking.app.pictures.overlay import write_overlay
 
     sequences = _open(options)
-    tracks_of = _tracks_reader(sequences, options.tracks)
+    tracks = options.tracks
+    stored = {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
-        write_overlay(sequence, tracks_of(sequence), path, options.truth, step)
+        found = stored.get(sequence.name)
+        write_overlay(sequence, None if found is None else found.read(sequence), path, options.truth, step)
 
     return _write_each("overlay", sequences, options.out, ".mp4", write, _picture_count(sequences))
 
@@ -84,16 +111,6 @@ def _open(options: ViewOptions | OverlayOptions) -> list[Sequence]:
     return open_source(
         options.source, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=True
     )  # fmt: skip
-
-
-def _tracks_reader(sequences: list[Sequence], tracks: Path | None) -> Callable[[Sequence], TrackingRun | None]:
-    stored = {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
-
-    def read(sequence: Sequence) -> TrackingRun | None:
-        found = stored.get(sequence.name)
-        return None if found is None else found.read(sequence)
-
-    return read
 
 
 def _picture_count(sequences: list[Sequence]) -> int | None:

@@ -32,7 +32,8 @@ function byFrame(frame, length) {
   return f => order.subarray(offset[f], offset[f + 1]);
 }
 
-function decodeSide(raw, name) {
+// One side of the page: the truth or the tracks of a tracker. word: what texts call it.
+function decodeSide(raw, name, word) {
   if (!raw) return null;
   const n = raw.x.length;
   const id = new Int32Array(n), frame = new Int32Array(n), first = new Int32Array(n);
@@ -49,7 +50,8 @@ function decodeSide(raw, name) {
   const events = raw.events.map(([kind, start, end, emitted, before, after, members, pos]) =>
     ({ kind, start, end, emitted, before, after, members, pos, side: name }));
   return {
-    name, n, id, frame, first, box, events,
+    name, word, n, id, frame, first, box, events,
+    tracked: name !== "truth", letter: name === "truth" ? "G" : "T",
     plane: raw.plane,
     x: decodeSums(raw.x, raw.scale),
     y: decodeSums(raw.y, raw.scale),
@@ -111,10 +113,12 @@ function groupsAt(side, frame) {
   return groups;
 }
 
-const truth = decodeSide(data.truth, "truth");
-const tracks = decodeSide(data.tracks, "tracks");
+const truth = decodeSide(data.truth, "truth", "true");
+const tracks = decodeSide(data.tracks, "tracks", data.other ? data.tracker : "tracked");
+const other = data.other && decodeSide(data.other.tracks, "other", data.other.tracker);
 const found = decodeDetections(data.detections);
-const sides = [truth, tracks].filter(Boolean);
+const sides = [truth, tracks, other].filter(Boolean);
+const sideOf = Object.fromEntries(sides.map(side => [side.name, side]));
 const hasPlan = Boolean(data.bounds);
 const hasImage = Boolean(data.image) &&
-  (Boolean(data.video) || sides.some(side => side.box || side.plane === "image") || Boolean(found && (found.box || found.plane === "image")));
+  (Boolean(data.video || data.background) || sides.some(side => side.box || side.plane === "image") || Boolean(found && (found.box || found.plane === "image")));

@@ -146,9 +146,17 @@ function prepareCanvas(canvas, aspect) {
   return [ctx, width, height];
 }
 
-// The sides of each pane: all in one pane, or one pane per side if two sides are shown side by side.
+// The sides of each pane: all in one pane, or one pane per side if two sides are shown side by side. Two trackers are
+// both shown with the truth.
 function splitPanes(shown, beside) {
-  return beside && shown.length === 2 ? shown.map(side => [side]) : [shown];
+  if (!beside || shown.length < 2) return [shown];
+  const runs = shown.filter(side => side.tracked);
+  return runs.length > 1 ? runs.map(run => [...shown.filter(side => !side.tracked), run]) : shown.map(side => [side]);
+}
+
+function paneTitle(parts, shown) {
+  if (parts.length < 2) return "";
+  return other ? shown[shown.length - 1].word : shown[0].name;
 }
 
 function inPane(ctx, x, y, width, height, title, draw) {

@@ -6,12 +6,19 @@ function drawImage(canvas, frame, options) {
   const [ctx, width, height] = prepareCanvas(canvas, imageHeight / imageWidth / parts.length);
   const w = width / parts.length, scale = w / imageWidth;
   parts.forEach((shown, k) => {
-    const title = parts.length > 1 ? shown[0].name : "";
+    const title = paneTitle(parts, shown);
     inPane(ctx, k * w, 0, w, height, title, () => {
-      const overPicture = Boolean(player) && options.video && player.draw(ctx, w, height);
+      const overPicture = options.video && (player ? player.draw(ctx, w, height) : drawBackground(ctx, w, height));
       imagePane({ ctx, width: w, height, scale, frame, options, overPicture, taken: [] }, shown);
     });
   });
+}
+
+// Draws the picture of the empty scene; returns false if there is none, or not yet.
+function drawBackground(ctx, width, height) {
+  if (!background || !background.naturalWidth) return false;
+  ctx.drawImage(background, 0, 0, width, height);
+  return true;
 }
 
 function imagePane(pane, shown) {
@@ -44,7 +51,7 @@ function boxOf(source, row, scale) {
 }
 
 function drawImageBoxes({ ctx, scale, frame, options, overPicture, taken }, side) {
-  const rows = side.rows(frame), tracked = side.name === "tracks";
+  const rows = side.rows(frame), { tracked } = side;
   const ids = options.ids && rows.length <= MANY;
   for (const row of rows) {
     const colour = rowColour(side, row, options.by), box = boxOf(side, row, scale);
@@ -84,7 +91,7 @@ function strokeBoxRim(ctx, box, colour) {
 }
 
 function drawImageHulls({ ctx, scale, frame, options, taken }, side) {
-  const tracked = side.name === "tracks";
+  const { tracked } = side;
   for (const [id, rows] of groupsAt(side, frame)) {
     const points = [];
     for (const row of rows) {
@@ -98,7 +105,7 @@ function drawImageHulls({ ctx, scale, frame, options, taken }, side) {
     if (!options.ids) continue;
     const x = points.reduce((a, p) => a + p[0], 0) / points.length;
     const y = tracked ? Math.max(...points.map(p => p[1])) + 24 : Math.min(...points.map(p => p[1])) - 18;
-    label(ctx, (tracked ? "T" : "G") + id, x, Math.max(y, 14), colourOf(id), true);
+    label(ctx, side.letter + id, x, Math.max(y, 14), colourOf(id), true);
     taken.push([x - 10, Math.max(y, 14) - 12, x + 10, Math.max(y, 14) + 2]);
   }
 }

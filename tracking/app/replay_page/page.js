@@ -1,19 +1,22 @@
 // The page: its state, its controls and keys, and the texts about the shown frame.
 
 const $ = id => document.getElementById(id);
-const state = { frame: 1, playing: false, speed: 1, clock: 0, then: 0 };
-const options = { truth: true, tracks: true, detections: false, hulls: true, ellipses: true, trails: true, ids: true, near: true, beside: false, video: true, by: "person" };
+const state = { frame: data.start, playing: false, speed: 1, clock: 0, then: 0 };
+const options = { truth: true, tracks: true, other: true, detections: false, hulls: true, ellipses: true, trails: true, ids: true, near: true, beside: Boolean(other), video: true, by: "person" };
 const player = makePlayer(data.video, onVideoChange);
+const wholes = sides.some(side => side.groupRows);
+const background = data.background && Object.assign(new Image(), { src: data.background, onload: () => show() });
 const TOGGLES = [
-  ["truth", "Truth", "t", truth], ["tracks", "Tracks", "k", tracks], ["beside", "Side by side", "b", truth && tracks],
+  ["truth", "Truth", "t", truth], ["tracks", other ? tracks.word : "Tracks", "k", tracks],
+  ["other", other && other.word, "o", other], ["beside", "Side by side", "b", sides.length > 1],
   ["detections", "Detections", "d", found], ["hulls", "Groups", "h", true],
-  ["ellipses", "Extents", "e", tracks && tracks.groupRows], ["trails", "Trails", "l", hasPlan || (tracks && tracks.groupRows)],
-  ["video", "Video", "v", player], ["ids", "Ids", "i", true], ["near", "Near strangers", "s", data.near.length],
+  ["ellipses", "Extents", "e", wholes], ["trails", "Trails", "l", hasPlan || wholes],
+  ["video", player ? "Video" : "Picture", "v", player || background], ["ids", "Ids", "i", true], ["near", "Near strangers", "s", data.near.length],
 ];
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const KEYS = [
   ["space", "play, pause"], ["← →", "one frame back, on"], ["shift ← →", "one second"], ["Home End", "first, last frame"],
-  ["n p", "next, previous event"], ["+ −", "faster, slower"], ["c", "colour by person or group"],
+  ["n p", "next, previous event"], ["+ −", "faster, slower"], ["c", "colour by person or group"], ["1 … 4", "plan: whole, larger; also the wheel"],
   ...TOGGLES.filter(toggle => toggle[3]).map(([, word, key]) => [key, word.toLowerCase()]), ["?", "this list"],
 ];
 if (data.errors.length) KEYS.push(["x z", "next, previous error"]);
@@ -21,13 +24,13 @@ const events = sides.flatMap(side => side.events).sort((a, b) => a.start - b.sta
 let line = null, eventButtons = [], errorButtons = [];
 
 function seekTo(frame) {
-  state.frame = Math.min(Math.max(Math.round(frame), 1), data.length);
+  state.frame = Math.min(Math.max(Math.round(frame), data.from), data.to);
   show();
 }
 
 function show() {
   const frame = state.frame;
-  $("stages").classList.toggle("beside", options.beside && options.truth && options.tracks);
+  $("stages").classList.toggle("beside", options.beside && sides.filter(side => options[side.name]).length > 1);
   if (hasPlan) drawPlan($("plan"), frame, options);
   showImage();
   if (line) line.move(frame);
@@ -59,23 +62,23 @@ function onVideoChange() {
   if (!state.playing || !player.canPlay) return showImage();
   state.frame = player.frame;
   show();
-  if (state.frame >= data.length) play(false);
+  if (state.frame >= data.to) play(false);
 }
 
 function showFacts(frame) {
   const rows = [["frame", `${frame} of ${data.length}, ${seconds(frame).toFixed(2)} s`]];
   for (const side of sides) {
-    if (!side.groupRows) rows.push([`${WORDS[side.name]} people`, side.rows(frame).length]);
+    if (!side.groupRows) rows.push([`${side.word} people`, side.rows(frame).length]);
     const groups = side.groupRows
       ? [...side.rows(frame)].map(row => groupWords(side, row))
       : [...groupsAt(side, frame)].map(([id, members]) =>
-        `${side.name === "tracks" ? "T" : "G"}${id} (${members.map(row => side.id[row]).join(", ")})`);
+        `${side.letter}${id} (${members.map(row => side.id[row]).join(", ")})`);
     const none = side === truth && data.unlabelled.some(([a, b]) => a <= frame && frame <= b) ? "not labelled" : "none";
-    rows.push([`${WORDS[side.name]} groups`, groups.join(" · ") || none]);
+    rows.push([`${side.word} groups`, groups.join(" · ") || none]);
   }
   if (found) rows.push(["detections", found.rows(frame).length]);
   const now = events.filter(event => event.start <= frame && frame <= Math.max(event.end, event.start + data.fps / 2));
-  rows.push(["now", now.map(event => `${WORDS[event.side]} ${event.kind}`).join(", ") || "–"]);
+  rows.push(["now", now.map(event => `${sideOf[event.side].word} ${event.kind}`).join(", ") || "–"]);
   $("facts").replaceChildren(...rows.flatMap(([key, value]) => [tag("dt", key), tag("dd", value)]));
   eventButtons.forEach((button, k) => button.setAttribute("aria-current", now.includes(events[k])));
   errorButtons.forEach((button, k) => {
@@ -95,9 +98,9 @@ function play(on) {
   $("play").querySelector("path").setAttribute("d", on ? "M3 2h4v12H3z M9 2h4v12H9z" : "M4 2v12l10-6z");
   $("play").setAttribute("aria-label", on ? "Pause" : "Play");
   if (!on) return player && player.pause();
-  if (state.frame >= data.length) {
+  if (state.frame >= data.to) {
     state.playing = false; // so that the video goes back as well
-    seekTo(1);
+    seekTo(data.from);
     state.playing = true;
   }
   if (videoShown() && player.canPlay) return player.play(state.speed);
@@ -112,7 +115,7 @@ function tick(now) {
   state.then = now;
   const frame = Math.floor(state.clock);
   if (frame !== state.frame) seekTo(frame);
-  if (state.frame >= data.length) play(false);
+  if (state.frame >= data.to) play(false);
   else requestAnimationFrame(tick);
 }
 
@@ -160,9 +163,11 @@ function onKey(event) {
   const inField = ["SELECT", "INPUT"].includes(event.target.tagName) && event.target.type !== "checkbox";
   const onButton = event.target.tagName === "BUTTON" || event.target.type === "checkbox";
   const one = event.shiftKey ? Math.max(Math.round(data.fps), 1) : 1;
+  const zooms = Object.fromEntries([1, 2, 4, 8].map((times, k) => [k + 1, () => { zoomTo(times); show(); }]));
   const actions = {
+    ...(hasPlan ? zooms : {}),
     " ": onButton ? null : () => play(!state.playing),
-    ArrowRight: () => step(one), ArrowLeft: () => step(-one), Home: () => jump(1), End: () => jump(data.length),
+    ArrowRight: () => step(one), ArrowLeft: () => step(-one), Home: () => jump(data.from), End: () => jump(data.to),
     n: () => toNext(events, 1), p: () => toNext(events, -1),
     x: () => toNext(data.errors, 1), z: () => toNext(data.errors, -1), "+": () => speed(1), "=": () => speed(1), "-": () => speed(-1),
     c: () => colourBy(options.by === "person" ? "group" : "person"), "?": () => $("help").showModal(),
@@ -177,7 +182,9 @@ function onKey(event) {
 function buildHead() {
   const about = [`${data.length} frames, ${data.fps} per second, ${seconds(data.length).toFixed(1)} s`];
   if (truth) about.push(`${new Set(truth.id).size} true people`);
-  if (tracks) about.push(`${new Set(tracks.id).size} ${tracks.groupRows ? "groups" : "people"} by ${data.tracker}`);
+  for (const side of [tracks, other]) if (side) {
+    about.push(`${new Set(side.id).size} ${side.groupRows ? "groups" : "people"} by ${side === other ? data.other.tracker : data.tracker}`);
+  }
   $("about").textContent = about.join(" · ");
   buildScores();
   $("plan-note").textContent = hasPlan && tracks && truth ? planNote() : "";
@@ -187,9 +194,9 @@ function buildHead() {
 }
 
 function planNote() {
-  const flat = [[truth, "true"], [tracks, "tracked"]].find(([side]) => side.plane === "image");
-  if (flat) return `${flat[1]} in the image only`;
-  return tracks.groupRows ? "true: bodies, solid · tracked: dashed"
+  const flat = sides.find(side => side.plane === "image");
+  if (flat) return `${flat.word} in the image only`;
+  return wholes ? "true: bodies, solid · tracked: dashed"
     : "true: bodies, solid, ids upright · tracked: rings, dashed, ids slanted";
 }
 
@@ -212,7 +219,8 @@ function buildScores() {
 }
 
 function buildControls() {
-  $("seek").max = data.length;
+  $("seek").min = data.from;
+  $("seek").max = data.to;
   for (const value of SPEEDS) $("speed").append(new Option(`${value}×`, value, value === 1, value === 1));
   for (const [name, word, key, there] of TOGGLES) {
     if (!there) continue;
@@ -233,7 +241,7 @@ function buildControls() {
     name.append(tag("kbd", key));
     return [name, tag("dd", word)];
   }));
-  eventButtons = list("events", events, event => `${seconds(event.start).toFixed(1)} s  ${WORDS[event.side]} ${eventWords(event)}`);
+  eventButtons = list("events", events, event => `${seconds(event.start).toFixed(1)} s  ${sideOf[event.side].word} ${eventWords(event)}`);
   $("errors-box").hidden = !data.errors.length;
   errorButtons = list("errors", data.errors, errorWords);
 }
@@ -263,7 +271,7 @@ function layOut() {
 }
 
 function listen() {
-  $("first").addEventListener("click", () => jump(1));
+  $("first").addEventListener("click", () => jump(data.from));
   $("back").addEventListener("click", () => step(-1));
   $("next").addEventListener("click", () => step(1));
   $("play").addEventListener("click", () => play(!state.playing));
@@ -272,6 +280,7 @@ function listen() {
     state.speed = Number($("speed").value);
     applySpeed();
   });
+  if (hasPlan) listenToZoom($("plan"), show);
   $("help-button").addEventListener("click", () => $("help").showModal());
   const drag = event => {
     if (!(event.buttons & 1)) return;

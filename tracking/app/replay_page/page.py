@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Mapping
 from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from sim.io.files.atomic import write_file
-from sim.types import Array, Camera, Scene, Sequence, Tracks, Truth
+from sim.types import Array, Camera, GroupEvent, Scene, Sequence, Tracks, Truth
 from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
 from tracking.app.replay_page.video import PageVideo
 from tracking.drawing.plan_view import plan_area
@@ -33,6 +34,14 @@ SCRIPTS = (
 )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Run:
+    """Tracks of a tracker on a page, and their errors."""
+
+    tracks: SequenceOf[Tracks] | None
+    errors: SequenceOf[FoundError] = ()
+
+
 def write_page(
     sequence: Sequence,
     tracks: SequenceOf[Tracks] | None,
@@ -41,57 +50,98 @@ def write_page(
     title: str | None = None,
     video: PageVideo | None = None,
     errors: SequenceOf[FoundError] = (),
+    other: Run | None = None,
 ) -> Path:
-    """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all."""
-    shown = page_data(sequence, tracks, scores, errors) | {"video": None if video is None else video.facts()}
-    data = json.dumps(shown, separators=(",", ":"), allow_nan=False)
-    page = (HERE / "page.html").read_text(encoding="utf-8")
-    parts = {
-        "TITLE": escape(title or sequence.name),
-        "STYLE": (HERE / "page.css").read_text(encoding="utf-8"),
-        "DATA": data.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029"),
-        "FILM": "" if video is None else video.content,
-        "SCRIPT": "\n".join((HERE / script).read_text(encoding="utf-8") for script in SCRIPTS),
-    }
-    pieces = page.split("@@")
-    text = "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
+    """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all.
+
+    other: of a second tracker, which is shown beside the first.
+    """
+    shown = page_data(sequence, Run(tracks, errors), other, scores)
+    shown |= {"video": None if video is None else video.facts()}
+    film = "" if video is None else video.content
+    text = page_html(title or sequence.name, script_json(shown), film)
     path = Path(out)
     write_file(path, text.encode("utf-8", "replace"))  # a title from a file's name may hold lone surrogates
     return path
 
 
+def page_html(title: str, data: str, film: str = "") -> str:
+    """Returns the page; data: a JSON object as text for a script element."""
+    parts = {
+        "TITLE": escape(title),
+        "STYLE": (HERE / "page.css").read_text(encoding="utf-8"),
+        "DATA": data,
+        "FILM": film,
+        "SCRIPT": "\n".join((HERE / script).read_text(encoding="utf-8") for script in SCRIPTS),
+    }
+    pieces = (HERE / "page.html").read_text(encoding="utf-8").split("@@")
+    return "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
+
+
+def script_json(value: Json) -> str:
+    """Returns a JSON object as text that may stand in a script element."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
 def page_data(
     sequence: Sequence,
-    tracks: SequenceOf[Tracks] | None,
+    run: Run,
+    other: Run | None = None,
     scores: Mapping[str, float] | None = None,
-    errors: SequenceOf[FoundError] = (),
+    span: tuple[int, int] | None = None,
+    start: int = 1,
 ) -> Json:
-    """Returns all that the page shows except the video, as a JSON object."""
+    """Returns all that the page shows except the video, as a JSON object.
+
+    span: first and last frame that are shown; start: the frame that is shown first.
+    """
     truth = sequence.truth
-    complete = None if tracks is None else grouped(tracks, sequence)
-    true = None if truth is None else rows_of_truth(truth)
-    tracked = None if complete is None else rows_of_tracks(complete)
+    true = None if truth is None else rows_of_truth(truth).within(span)
+    tracked, encoded = _encoded(run, sequence, span)
+    second, encoded_second = (None, None) if other is None else _encoded(other, sequence, span)
     detections = _detections(sequence)
-    both = [rows for rows in (true, tracked) if rows is not None]
+    both = [rows for rows in (true, tracked, second) if rows is not None]
+    length = _length(sequence, both, detections)
     return {
         "name": sequence.name,
-        "tracker": _tracker(tracks),
+        "tracker": _tracker(run.tracks),
         "fps": sequence.fps,
-        "length": _length(sequence, both, detections),
+        "length": length,
+        "from": 1 if span is None else span[0],
+        "to": length if span is None else span[1],
+        "start": start,
         "image": sequence.image_size or _image_size(both),
         "bounds": _bounds(sequence, both),
         "scene": scene_json(sequence.scene),
         "camera": camera_json(sequence.camera),
-        "truth": None if true is None or truth is None else encode_rows(true, truth.events or ()),
-        "tracks": None
-        if tracked is None or complete is None
-        else encode_rows(tracked, [e for t in complete for e in t.events]),
-        "detections": detections,
+        "truth": None if true is None or truth is None else encode_rows(true, _within(truth.events or (), span)),
+        "tracks": encoded,
+        "other": None if other is None else {"tracker": _tracker(other.tracks), "tracks": encoded_second},
+        "detections": detections if span is None else None,
+        "background": None,
         "unlabelled": _unlabelled(truth),
         "near": _near_strangers(truth),
         "scores": _scores(scores or {}),
-        "errors": [one.facts(sequence.fps) for one in errors],
+        "errors": [
+            {**one.facts(sequence.fps), "side": side}
+            for side, shown in (("tracks", run), ("other", other))
+            for one in (() if shown is None else shown.errors)
+            if span is None or (one.error.start <= span[1] and one.error.end >= span[0])
+        ],
     }
+
+
+def _encoded(run: Run, sequence: Sequence, span: tuple[int, int] | None) -> tuple[PageRows | None, Json | None]:
+    if run.tracks is None:
+        return None, None
+    complete = grouped(run.tracks, sequence)
+    rows = rows_of_tracks(complete).within(span)
+    return rows, encode_rows(rows, _within([e for t in complete for e in t.events], span))
+
+
+def _within(events: SequenceOf[GroupEvent], span: tuple[int, int] | None) -> list[GroupEvent]:
+    return [e for e in events if span is None or (e.start <= span[1] and e.end >= span[0])]
 
 
 def _scores(scores: Mapping[str, float]) -> list[list[str]]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from collections.abc import Sequence as SequenceOf
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -106,6 +106,11 @@ class PageGroupRows:
     size: Array  # (R,) estimated number of people
     speed: Array  # (R,) m/s or px/s
 
+    def kept(self, rows: Bools) -> PageGroupRows:
+        """Returns some of the rows."""
+        hull = tuple(polygon for polygon, kept in zip(self.hull, rows.tolist(), strict=True) if kept)
+        return PageGroupRows(hull, self.extent[rows], self.size[rows], self.speed[rows])
+
 
 @dataclass(frozen=True, eq=False)
 class PageRows:
@@ -120,6 +125,15 @@ class PageRows:
     box: Array  # (R, 4) left, top, width, height, px
     visibility: Array  # (R,) 0 to 1
     groups: PageGroupRows | None = None  # of rows that are groups
+
+    def within(self, span: tuple[int, int] | None) -> PageRows:
+        """Returns the rows of the frames from the first to the last of `span`, all without one."""
+        if span is None:
+            return self
+        kept = (self.frame >= span[0]) & (self.frame <= span[1])
+        arrays = {name: getattr(self, name)[kept] for name in ("frame", "id", "group", "pos", "angle", "box")}
+        groups = None if self.groups is None else self.groups.kept(kept)
+        return replace(self, **arrays, visibility=self.visibility[kept], groups=groups)
 
 
 def rows_of_truth(truth: Truth) -> PageRows:

@@ -2,6 +2,45 @@
 
 const BODY = { shoulder: 0.24, depth: 0.13, head: 0.1, footprint: 0.25, track: 0.36 };
 const MANY = 80;
+const zoom = { times: 1, centre: [0, 0], scale: 1, width: 1, height: 1 }; // the plan's, and the size of a pane in px
+
+// Zooms so that the place under a pixel of a pane stays there.
+function zoomBy(factor, px, py) {
+  const times = Math.min(Math.max(zoom.times * factor, 1), 20), u = px - zoom.width / 2, v = py - zoom.height / 2;
+  const next = (zoom.scale * times) / zoom.times;
+  zoom.centre = [zoom.centre[0] + u / zoom.scale - u / next, zoom.centre[1] - v / zoom.scale + v / next];
+  zoom.times = times;
+}
+
+// Zooms to the people of the shown error, or to all people of the frame.
+function zoomTo(times) {
+  const error = data.errors.find(error => error.start <= state.frame && state.frame <= error.end && error.people.length);
+  const shown = sides.filter(side => side.plane === "ground")[0];
+  if (!shown) return;
+  const rows = [...shown.rows(state.frame)].filter(row => !Number.isNaN(shown.x[row]));
+  const own = rows.filter(row => error && !shown.tracked && [...error.people, ...error.others].includes(shown.id[row]));
+  const mean = values => values.reduce((a, b) => a + b, 0) / values.length, use = own.length ? own : rows;
+  if (use.length) zoom.centre = [mean(use.map(row => shown.x[row])), mean(use.map(row => shown.y[row]))];
+  zoom.times = times;
+}
+
+function listenToZoom(canvas, show) {
+  const inPane = event => [event.offsetX % zoom.width, event.offsetY];
+  canvas.addEventListener("wheel", event => {
+    event.preventDefault();
+    zoomBy(event.deltaY < 0 ? 1.25 : 0.8, ...inPane(event));
+    show();
+  }, { passive: false });
+  canvas.addEventListener("pointermove", event => {
+    if (!(event.buttons & 1) || zoom.times === 1) return;
+    zoom.centre = [zoom.centre[0] - event.movementX / zoom.scale, zoom.centre[1] + event.movementY / zoom.scale];
+    show();
+  });
+  canvas.addEventListener("dblclick", event => {
+    zoomBy(zoom.times > 1 ? 0 : 3, ...inPane(event));
+    show();
+  });
+}
 
 function drawPlan(canvas, frame, options) {
   const [x0, y0, x1, y1] = data.bounds;
@@ -12,19 +51,21 @@ function drawPlan(canvas, frame, options) {
   const [ctx, width, height] = prepareCanvas(canvas, aspect);
   const w = width / parts.length;
   parts.forEach((shown, k) => {
-    const title = parts.length > 1 ? shown[0].name : "";
+    const title = paneTitle(parts, shown);
     inPane(ctx, k * w, 0, w, height, title, () => planPane(ctx, w, height, shown, frame, options));
   });
 }
 
 function planPane(ctx, width, height, shown, frame, options) {
   const [x0, y0, x1, y1] = data.bounds;
-  const scale = Math.min((width - 16) / (x1 - x0), (height - 16) / (y1 - y0));
-  const left = (width - (x1 - x0) * scale) / 2, top = (height - (y1 - y0) * scale) / 2;
-  const map = (x, y) => [left + (x - x0) * scale, top + (y1 - y) * scale];
+  const scale = zoom.times * Math.min((width - 16) / (x1 - x0), (height - 16) / (y1 - y0));
+  const [cx, cy] = zoom.times > 1 ? zoom.centre : [(x0 + x1) / 2, (y0 + y1) / 2];
+  const map = (x, y) => [width / 2 + (x - cx) * scale, height / 2 - (y - cy) * scale];
+  const reach = [width / scale / 2, height / scale / 2];
+  Object.assign(zoom, { scale, width, height, centre: [cx, cy] });
   ctx.fillStyle = theme.ground;
   ctx.fillRect(0, 0, width, height);
-  drawGrid(ctx, map, scale, [x0 - left / scale, y0 - top / scale, x1 + left / scale, y1 + top / scale]);
+  drawGrid(ctx, map, scale, [cx - reach[0], cy - reach[1], cx + reach[0], cy + reach[1]]);
   if (data.scene) drawScene(ctx, map, scale);
   const plan = { ctx, map, width, height, scale, frame, options, taken: [] };
   const people = shown.filter(side => !side.groupRows), wholeGroups = shown.filter(side => side.groupRows);
@@ -102,7 +143,7 @@ function positionOf(plan, side, row) {
 }
 
 function drawPlanHulls(plan, side) {
-  const { ctx, scale } = plan, tracked = side.name === "tracks";
+  const { ctx, scale } = plan, { tracked } = side;
   for (const [id, rows] of groupsAt(side, plan.frame)) {
     const points = rows.map(row => positionOf(plan, side, row)).filter(p => !Number.isNaN(p[0]));
     if (!points.length) continue;
@@ -111,14 +152,14 @@ function drawPlanHulls(plan, side) {
     if (!plan.options.ids) continue;
     const mid = points.reduce((a, p) => a + p[0], 0) / points.length;
     const edge = tracked ? Math.max(...points.map(p => p[1])) + 0.45 * scale + 15 : Math.min(...points.map(p => p[1])) - 0.35 * scale - 7;
-    label(ctx, (tracked ? "T" : "G") + id, mid, edge, colourOf(id), true);
+    label(ctx, side.letter + id, mid, edge, colourOf(id), true);
     plan.taken.push([mid - 10, edge - 12, mid + 10, edge + 2]);
   }
 }
 
 // Where each person or group of a side was during the last 3 s. map: x, y to px.
 function drawTrails(pane, side, map) {
-  const { ctx } = pane, reach = Math.round(3 * data.fps), tracked = side.name === "tracks";
+  const { ctx } = pane, reach = Math.round(3 * data.fps), { tracked } = side;
   ctx.lineCap = "round";
   ctx.lineWidth = tracked ? 1.4 : 2;
   ctx.setLineDash(tracked ? [3, 4] : []);
@@ -162,8 +203,8 @@ function drawPlanPeople(plan, side) {
     const at = positionOf(plan, side, row);
     if (Number.isNaN(at[0])) continue;
     const colour = rowColour(side, row, plan.options.by);
-    if (side.name === "truth") drawBody(plan, side, row, at, colour);
-    else drawRing(plan, side, row, at, colour);
+    if (side.tracked) drawRing(plan, side, row, at, colour);
+    else drawBody(plan, side, row, at, colour);
   }
 }
 
@@ -176,7 +217,7 @@ function drawPersonIds(plan, shown) {
   const seen = here.filter(([, , at]) => !Number.isNaN(at[0]));
   for (const [, , [u, v]] of seen) plan.taken.push([u - r, v - r, u + r, v + r]);
   for (const [side, row, [u, v]] of seen) {
-    const tracked = side.name === "tracks", sign = tracked ? -1 : 1;
+    const { tracked } = side, sign = tracked ? -1 : 1;
     const spots = half => LABEL_DIRECTIONS.map(([p, q]) => {
       const near = p && q ? 0.75 * r : r + 1;
       return [u + sign * p * (near + half[0]), v + sign * q * (near + half[1])];

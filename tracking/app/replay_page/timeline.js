@@ -11,7 +11,6 @@ const KINDS = {
   leave: { colour: 9, shape: "M0,-5 V5 M0,0 H-5", word: "leave" },
 };
 const GUTTER = 104, LANE = 15, BAR = 12;
-const WORDS = { truth: "true", tracks: "tracked" };
 
 function element(name, attributes, parent, text) {
   const node = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -24,7 +23,7 @@ function element(name, attributes, parent, text) {
 function eventWords(event) {
   const list = ids => {
     const alone = ids.filter(id => id < 0).length, named = ids.filter(id => id >= 0);
-    const groups = named.map(id => `${event.side === "tracks" ? "T" : "G"}${id}`);
+    const groups = named.map(id => sideOf[event.side].letter + id);
     return (alone ? [alone > 1 ? `${alone} alone` : "alone"] : []).concat(groups).join(" + ");
   };
   const ids = event.before.length || event.after.length ? ` ${list(event.before) || "–"} → ${list(event.after) || "–"}` : "";
@@ -40,12 +39,12 @@ function seconds(frame) {
 // Draws the timeline into `box`. Returns `move` (puts the playhead at a frame) and `frameAt` (the frame at an x in px).
 function timeline(box, width, seekTo) {
   const svg = element("svg", { role: "img", "aria-label": "Timeline of events and groups; seek with the slider or by clicking" });
-  const span = Math.max(width - GUTTER - 14, 50), last = Math.max(data.length - 1, 1);
-  const x = frame => GUTTER + ((frame - 1) / last) * span;
+  const span = Math.max(width - GUTTER - 14, 50), last = Math.max(data.to - data.from, 1);
+  const x = frame => GUTTER + ((frame - data.from) / last) * span;
   let y = drawAxis(svg, x, width);
   for (const [a, b] of data.unlabelled) drawUnlabelled(svg, x(a), x(b + 1));
   for (const side of sides) y = drawEvents(svg, side, x, y, seekTo);
-  if (data.errors.length) y = drawErrors(svg, x, y, seekTo);
+  for (const side of sides) if (side.tracked) y = drawErrors(svg, side, x, y, seekTo);
   for (const side of sides) y = drawGroupBars(svg, side, x, y, seekTo);
   svg.setAttribute("viewBox", `0 0 ${width} ${y + 4}`);
   svg.setAttribute("height", y + 4);
@@ -59,14 +58,14 @@ function timeline(box, width, seekTo) {
       head.setAttribute("x2", x(frame));
       knob.setAttribute("transform", `translate(${x(frame)} 0)`);
     },
-    frameAt: px => Math.min(Math.max(Math.round(1 + ((px - GUTTER) / span) * last), 1), data.length),
+    frameAt: px => Math.min(Math.max(Math.round(data.from + ((px - GUTTER) / span) * last), data.from), data.to),
   };
 }
 
 function drawAxis(svg, x, width) {
-  const total = seconds(data.length), steps = [0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600];
-  const step = steps.find(s => total / s <= Math.max((width - GUTTER) / 70, 2)) || 7200;
-  for (let t = 0; t <= total + 1e-9; t += step) {
+  const first = seconds(data.from), total = seconds(data.to), steps = [0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600];
+  const step = steps.find(s => (total - first) / s <= Math.max((width - GUTTER) / 70, 2)) || 7200;
+  for (let t = Math.ceil(first / step) * step; t <= total + 1e-9; t += step) {
     const u = x(1 + t * data.fps);
     element("text", { x: u, y: 10, "text-anchor": "middle", fill: theme.thing }, svg, `${t} s`);
     element("line", { x1: u, x2: u, y1: 14, y2: 20, stroke: theme.thing }, svg);
@@ -80,16 +79,18 @@ function drawUnlabelled(svg, from, to) {
 }
 
 function drawHeading(svg, y, text) {
-  element("text", { x: GUTTER - 10, y: y + 11, "text-anchor": "end" }, svg, text);
+  const [word, what] = text.split(/ (?=\S+$)/), most = 13 - what.length;
+  const short = word.length > most ? `${word.slice(0, most - 1)}…` : word;
+  element("title", {}, element("text", { x: GUTTER - 10, y: y + 11, "text-anchor": "end" }, svg, `${short} ${what}`), text);
 }
 
 // Markers that would overlap are put in different lanes.
 function drawEvents(svg, side, x, y, seekTo) {
-  drawHeading(svg, y, `${WORDS[side.name]} events`);
+  drawHeading(svg, y, `${side.word} events`);
   const ends = [];
   for (const event of side.events.slice().sort((a, b) => a.start - b.start)) {
     const u = x(event.start), kind = KINDS[event.kind] || KINDS.form;
-    const end = x(Math.min(Math.max(event.end, event.emitted || 0), data.length));
+    const end = x(Math.min(Math.max(event.end, event.emitted || 0), data.to));
     let lane = ends.findIndex(e => e < u - 12);
     if (lane < 0) lane = ends.length < 6 ? ends.length : 5;
     ends[lane] = u;
@@ -105,10 +106,11 @@ function drawEvents(svg, side, x, y, seekTo) {
 }
 
 // Errors that would overlap are put in different lanes; errors of groups are hollow.
-function drawErrors(svg, x, y, seekTo) {
-  drawHeading(svg, y, "errors");
-  const ends = [];
-  for (const error of data.errors) {
+function drawErrors(svg, side, x, y, seekTo) {
+  const errors = data.errors.filter(error => error.side === side.name), ends = [];
+  if (!errors.length) return y;
+  drawHeading(svg, y, `${side.word} errors`);
+  for (const error of errors) {
     const u = x(error.start), end = Math.max(x(error.end), u + 6);
     let lane = ends.findIndex(e => e < u - 2);
     if (lane < 0) lane = ends.length < 8 ? ends.length : 7;
@@ -122,12 +124,12 @@ function drawErrors(svg, x, y, seekTo) {
 
 function errorWords(error) {
   const time = `${seconds(error.start).toFixed(1)}–${seconds(error.end).toFixed(1)} s`;
-  return `${time}  ${error.kind}: ${error.who} (${error.detail || error.cause})`;
+  return `${time}  ${other ? `${sideOf[error.side].word}, ` : ""}${error.kind}: ${error.who} (${error.detail || error.cause})`;
 }
 
 function drawGroupBars(svg, side, x, y, seekTo) {
   if (!side.bars.length) return y;
-  drawHeading(svg, y, `${WORDS[side.name]} groups`);
+  drawHeading(svg, y, `${side.word} groups`);
   const middle = bar => y + 3 + bar.lane * (BAR + 5) + BAR / 2;
   const alive = (id, frame) => side.bars.find(bar => bar.id === id && bar.start - 1 <= frame && bar.end + 1 >= frame)
     || side.bars.filter(bar => bar.id === id).sort((p, q) => Math.abs(p.start - frame) - Math.abs(q.start - frame))[0];
@@ -140,9 +142,9 @@ function drawGroupBars(svg, side, x, y, seekTo) {
   for (const bar of side.bars) {
     const from = x(bar.start), wide = Math.max(x(bar.end + 1) - from, 3), colour = colourOf(bar.id);
     const group = element("g", { style: "cursor:pointer" }, svg);
-    const tracked = side.name === "tracks";
+    const { tracked } = side;
     element("rect", { x: from, y: middle(bar) - BAR / 2, width: wide, height: BAR, rx: 4, fill: colour, "fill-opacity": tracked ? (bar.size < 2 ? 0.12 : 0.35) : 0.9, stroke: colour, "stroke-dasharray": tracked ? "4 3" : "none" }, group);
-    const name = `${tracked ? "T" : "G"}${bar.id}`;
+    const name = side.letter + bar.id;
     if (wide > 8 * name.length + 6) element("text", { x: from + 5, y: middle(bar) + 4, "font-size": 11, "font-weight": 650, fill: tracked ? theme.ink : theme.halo, style: "pointer-events:none" }, group, name);
     element("title", {}, group, `${name}: ${seconds(bar.start).toFixed(1)} to ${seconds(bar.end).toFixed(1)} s, up to ${side.groupRows ? "≈" : ""}${bar.size} people`);
     group.addEventListener("dblclick", () => seekTo(bar.start));

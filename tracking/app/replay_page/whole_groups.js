@@ -124,7 +124,7 @@ function clampTo(x, w, width) {
 
 // The key to the marks of groups; empty unless the tracker reports groups without people.
 function wholeGroupsKey(box) {
-  if (!(tracks && tracks.groupRows)) return;
+  if (!wholes) return;
   const marks = [
     ["hull of its points", ctx => { polygonPath(ctx, [[3, 16], [10, 2], [36, 2], [45, 16]]); drawRegion(ctx, theme.ink, true); }],
     ["extent: holds 99 % of the group (d² ≤ 9.21)", ctx => {

@@ -14,7 +14,7 @@ from sim.geometry.polygons import area, convex_hull, footprint_hull
 from sim.types import GroupEvent, Sequence
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page import page_rows
-from tracking.app.replay_page.page import page_data
+from tracking.app.replay_page.page import Run, page_data
 from tracking.app.replay_page.page_rows import NIL, Bar, Link, bars, links
 
 
@@ -41,7 +41,7 @@ def rows_of(side: dict) -> dict[str, np.ndarray]:
 @pytest.mark.parametrize("plane", ["ground", "image"])
 def test_groups_come_back(sequence: Sequence, plane: str) -> None:
     answers = wholes(sequence, plane)
-    side = json.loads(json.dumps(page_data(sequence, answers)))["tracks"]
+    side = json.loads(json.dumps(page_data(sequence, Run(answers))))["tracks"]
     rows, unit = rows_of(side), 1 / side["scale"]
     assert side["plane"] == plane
     for t in (answers[0], answers[70], answers[-1]):
@@ -65,7 +65,7 @@ def test_groups_come_back(sequence: Sequence, plane: str) -> None:
 
 def test_bars_and_links_of_groups(sequence: Sequence) -> None:
     """Their sizes are those estimated; what merges and splits joins bars of both sides."""
-    data = page_data(sequence, wholes(sequence, "ground"))
+    data = page_data(sequence, Run(wholes(sequence, "ground")))
     assert {bar[0]: (*bar[1:3], bar[4]) for bar in data["tracks"]["bars"]} == {
         1: (1, 160, 5), 2: (1, 53, 2), 3: (114, 160, 2),
     }  # fmt: skip

@@ -15,7 +15,7 @@ from sim.io.store.truth_files import with_ground_height
 from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Scene, Sequence, Stairs
 from tests.groups_as_wholes import wholes
-from tracking.app.replay_page.page import camera_json, page_data, scene_json
+from tracking.app.replay_page.page import Run, camera_json, page_data, scene_json
 from tracking.drawing.layers import SIGMA_99, ellipse
 
 NODE = shutil.which("node")
@@ -43,7 +43,7 @@ def test_groups(sequence: Sequence, plane: str) -> None:
     shown = """[...tracks.rows(60)].map(row => [tracks.id[row], [tracks.x[row], tracks.y[row]],
         extentPoints(tracks, row, (x, y) => [x, y]), tracks.groupRows.hull[row], tracks.groupRows.speed[row],
         groupWords(tracks, row)])"""
-    rows = ran(page_data(sequence, answers), ("decode.js", "whole_groups.js"), shown)
+    rows = ran(page_data(sequence, Run(answers)), ("decode.js", "whole_groups.js"), shown)
     now, near = answers[59], {"atol": 0.05 if plane == "ground" else 3.0}
     assert [row[0] for row in rows] == now.id.tolist()
     for k, (_, at, around, hull, speed, words) in enumerate(rows):

@@ -1,0 +1,1 @@
+"""The report on several trackers: what it shows, its charts, and the page."""

@@ -1,0 +1,122 @@
+"""The worst moments of a report: which runs are shown, from which error on, and the data of their replays."""
+
+from __future__ import annotations
+
+import base64
+import warnings
+from collections.abc import Callable
+from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass
+
+import cv2
+
+from scenarios.errors import InputError
+from sim.types import Sequence
+from tracking.app.replay_page.page import Run, page_data, script_json
+from tracking.app.report.content import Moment
+from tracking.errors.found import FoundError, RunErrors, errors_of_run
+from tracking.running.run import TrackingRun
+
+MOST = 12  # moments in a report
+BYTES = 7_000_000  # of all their replays
+AROUND = 6.0  # s that a replay shows before and after an error
+LONGEST = 40.0  # s of a replay
+JPEG_QUALITY = 60
+CAUSE_WORDS = {"tracker": "no cause in the scene"}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A run of one sequence that may be shown."""
+
+    name: str
+    scenario: str
+    sequence: str
+    score: float
+    best: float  # the oracle's score
+    rival: str  # the best other tracker there, "" without one
+
+    @property
+    def shortfall(self) -> float:
+        """What the run lacks beside the oracle."""
+        return (1.0 if self.best != self.best else self.best) - self.score
+
+
+Runs = Callable[[Candidate], tuple[Sequence, TrackingRun, TrackingRun | None]]  # the sequence, its run, the rival's
+
+
+def chosen(candidates: SequenceOf[Candidate], most: int = MOST) -> list[Candidate]:
+    """Returns the runs that are shown, worst first: in turn each tracker's worst, of another scenario if it can be."""
+    waiting: dict[str, list[Candidate]] = {}
+    for one in sorted(candidates, key=lambda one: -one.shortfall):
+        waiting.setdefault(one.name, []).append(one)
+    shown: list[Candidate] = []
+    while len(shown) < most and any(waiting.values()):
+        for name, left in waiting.items():
+            if left and len(shown) < most:
+                seen = {one.scenario for one in shown if one.name == name}
+                new = next((one for one in left if one.scenario not in seen), left[0])
+                left.remove(new)
+                shown.append(new)
+    return sorted(shown, key=lambda one: -one.shortfall)
+
+
+def moments(candidates: SequenceOf[Candidate], runs: Runs) -> list[Moment]:
+    """Returns the worst moments with their replays, as far as these do not make the report too large."""
+    found, size = [], 0
+    for one in chosen(candidates):
+        moment, replay = _moment(one, *runs(one))
+        size += len(replay)
+        found.append(moment(replay if size <= BYTES else None))
+    return found
+
+
+def _moment(
+    one: Candidate, sequence: Sequence, run: TrackingRun, rival: TrackingRun | None
+) -> tuple[Callable[[str | None], Moment], str]:
+    errors = shown_errors(sequence, run, costs=True).errors
+    dearest = max(errors, key=lambda error: error.cost or 0.0, default=None)
+    length = sequence.length or len(run)
+    first, last = (1, length) if dearest is None else (dearest.error.start, dearest.error.end)
+    around, longest = round(AROUND * sequence.fps), round(LONGEST * sequence.fps)
+    low = max(first - around, 1)
+    span = low, min(last + around, low + longest, length)
+    start = max(first - round(sequence.fps), low)
+    other = None if rival is None else Run(rival, shown_errors(sequence, rival).errors)
+    data = page_data(sequence, Run(run, errors), other, span=span, start=start)
+    data["tracker"], data["background"], data["video"] = one.name, _background(sequence), None
+    if other is not None:
+        data["other"]["tracker"] = one.rival
+    kind, words = ("", "") if dearest is None else (dearest.error.kind, _words(dearest))
+
+    def moment(replay: str | None) -> Moment:
+        begins = (first - 1) / sequence.fps
+        return Moment(one.name, one.scenario, one.sequence, one.score, one.best, begins, kind, words, replay)
+
+    return moment, script_json(data)
+
+
+def _words(error: FoundError) -> str:
+    return (
+        f"{error.error.kind}: {error.who} ({error.cause.text or CAUSE_WORDS.get(error.cause.name, error.cause.name)})"
+    )
+
+
+def shown_errors(sequence: Sequence, run: TrackingRun | None, costs: bool = False) -> RunErrors:
+    """Returns the errors of a run; none, with a warning, where tracks and labels cannot be compared."""
+    if run is None or sequence.truth is None or any(t.unit == "group" for t in run):
+        return RunErrors([], {})
+    try:
+        return errors_of_run(sequence, run, costs=costs)
+    except InputError as error:
+        warnings.warn(f"{sequence.name}: the page shows no errors: {error.got}", stacklevel=2)
+        return RunErrors([], {})
+
+
+def _background(sequence: Sequence) -> str | None:
+    """Returns the picture of the empty scene as a data address; None without pictures."""
+    pictures = sequence.background() if sequence.has_images else None
+    if pictures is None or not len(pictures):
+        return None
+    _, jpeg = cv2.imencode(".jpg", pictures[-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return f"data:image/jpeg;base64,{base64.b64encode(jpeg.tobytes()).decode()}"

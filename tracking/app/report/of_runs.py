@@ -1,0 +1,149 @@
+"""The report on stored runs and tracker classes on the sequences of a source: `view DATASET TRACKS…`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenarios.errors import counted
+from sim.types import Sequence
+from tracking.app.commands.score_ranking import RankedRuns, rank_words, ranked_runs, stored_runs, verdict
+from tracking.app.commands.score_tables import SIMILARITY
+from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, read_runs, score_runs
+from tracking.app.progress import ProgressMeter
+from tracking.app.report.content import CauseBar, HeatCell, HeatMap, RankedRow, Report, Speed
+from tracking.app.report.moments import Candidate, moments, shown_errors
+from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.errors.found import RunErrors
+from tracking.running.run import TrackingRun
+
+GAINS = ("HOTA", "group_F1")
+
+
+@dataclass(frozen=True)
+class _Found:
+    scored: ScoredSequence
+    errors: list[RunErrors]  # of each run
+
+
+def report_of_runs(
+    names: Mapping[str, str],
+    sequences: list[Sequence],
+    source: OpenedAs,
+    by: str | None,
+    workers: int,
+    files: Mapping[str, str],
+) -> Report:
+    """Returns the report on runs, by name the text of the command line: stored tracks or a tracker class.
+
+    files: by sequence, the address of its page.
+    """
+    runs = stored_runs(names, sequences)
+    jobs = [ScoringJob(sources, oracles=True) for sources in zip(*runs, strict=True)]
+    found: list[_Found] = []
+    with ProgressMeter("report", len(sequences)) as meter:
+        for one in over_sequences(_find, sequences, jobs, source, workers):
+            meter.step(sequences[len(found)].name)
+            found.append(one)
+    ranked = ranked_runs(list(names), sequences, [one.scored for one in found], by, [])
+    candidates = list(_candidates(ranked, found))
+
+    def tracked(one: Candidate) -> tuple[Sequence, TrackingRun, TrackingRun | None]:
+        k = ranked.comparison.sequences.index(one.sequence)
+        wanted = [name for name in (one.name, one.rival) if name]
+        job = ScoringJob(tuple(jobs[k].sources[list(names).index(name)] for name in wanted))
+        run, *rival = read_runs(sequences[k], job)
+        return sequences[k], run, rival[0] if rival else None
+
+    c = ranked.comparison
+    return Report(
+        title=f"{counted(len(names), 'tracker')} on {counted(len(sequences), 'sequence')}",
+        about=f"People are compared by {SIMILARITY[c.similarity]}. The oracle has true ids on the same input.",
+        by=ranked.key, ranking=_ranking(ranked), ranking_words=[*verdict(c, ranked.key), *ranked.notes],
+        heat=_heat(ranked) if len(ranked.scenarios) > 1 else None,
+        causes=list(_causes(c.runs, found)),
+        causes_about="What the repair of the errors of one kind and cause adds, mean over the sequences.",
+        speeds=list(_speeds(ranked, found)), moments=moments(candidates, tracked),
+        sequences=[
+            (one.sequence, files[one.sequence], one.score)
+            for one in sorted(candidates, key=lambda one: one.score) if one.sequence in files
+        ],
+    )  # fmt: skip
+
+
+def _find(sequence: Sequence, job: ScoringJob) -> _Found:
+    runs = read_runs(sequence, job)
+    return _Found(score_runs(sequence, runs, job), [shown_errors(sequence, run, costs=True) for run in runs])
+
+
+def _ranking(ranked: RankedRuns) -> list[RankedRow]:
+    return [
+        RankedRow(row["run"], rank_words(row), row["mean"], row["low"], row["high"], _scores(row))
+        for row in ranked.table
+    ]
+
+
+def _scores(row: Mapping[str, object]) -> dict[str, float]:
+    return {key: value for key, value in row.items() if isinstance(value, float)}
+
+
+def _best(ranked: RankedRuns, name: str, k: int) -> float:
+    """Returns the score of the oracle of a run's input on sequence k, nan without one."""
+    c = ranked.comparison
+    rows = [c.oracles[given] for given in c.inputs[name] if given in c.oracles] or list(c.oracles.values())
+    known = [row[k] for row in rows]
+    return next((float(one[ranked.key]) for one in known if one is not None), math.nan)
+
+
+def _heat(ranked: RankedRuns) -> HeatMap:
+    c, names = ranked.comparison, [row["run"] for row in ranked.table if row["first"] is not None]
+    rows = {}
+    for scenario, places in ranked.scenarios.items():
+        cells = []
+        for name in names:
+            scores = np.array([c.scores[name][k][ranked.key] for k in places], float)
+            best = np.array([_best(ranked, name, k) for k in places])
+            score = float(scores.mean())
+            why = "" if math.isfinite(score) else "not scored"
+            cells.append(HeatCell(score, float(score / best.mean()) if best.mean() > 0 else math.nan, why))
+        rows[scenario] = cells
+    return HeatMap(f"{ranked.key} by scenario", tuple(names), rows)
+
+
+def _candidates(ranked: RankedRuns, found: SequenceOf[_Found]) -> Iterator[Candidate]:
+    c = ranked.comparison
+    scenario = {k: name for name, places in ranked.scenarios.items() for k in places}
+    for name in c.runs:
+        for k, sequence in enumerate(c.sequences):
+            score = c.scores[name][k][ranked.key]
+            others = {r: c.scores[r][k][ranked.key] for r in c.runs if r != name}
+            known = {r: value for r, value in others.items() if math.isfinite(value)}
+            rival = max(known, key=known.__getitem__, default="")
+            if math.isfinite(score):
+                yield Candidate(name, scenario[k], sequence, float(score), _best(ranked, name, k), rival)
+
+
+def _causes(names: SequenceOf[str], found: SequenceOf[_Found]) -> Iterator[CauseBar]:
+    for r, name in enumerate(names):
+        parts: dict[tuple[str, str], list[float]] = {}
+        for one in found:
+            for row in one.errors[r].causes:
+                total = parts.setdefault((row.kind, row.cause), [0, 0.0, *[0.0] * len(GAINS)])
+                gains = [row.gains[key] if math.isfinite(row.gains[key]) else 0.0 for key in GAINS]
+                for k, value in enumerate([row.errors, row.seconds, *(gain / len(found) for gain in gains)]):
+                    total[k] += value
+        for (kind, cause), (errors, seconds, *means) in sorted(parts.items(), key=lambda part: -sum(part[1][2:])):
+            yield CauseBar(name, kind, cause, int(errors), seconds, dict(zip(GAINS, means, strict=True)))
+
+
+def _speeds(ranked: RankedRuns, found: SequenceOf[_Found]) -> Iterator[Speed]:
+    rows = {row["run"]: row for row in ranked.table}
+    for r, name in enumerate(ranked.comparison.runs):
+        speeds = [speed for one in found if (speed := one.scored.infos[r].get("frames_per_second"))]
+        if speeds:
+            row = rows[name]
+            yield Speed(name, float(len(speeds) / np.sum(1 / np.array(speeds))), row["mean"], row["low"], row["high"])

@@ -1,0 +1,78 @@
+"""Writes a report: one HTML file that works offline, with charts and the replays of the worst moments inside."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scenarios.errors import InputError
+from sim.io.files.atomic import write_file
+from sim.io.files.own_files import GENERATOR, refuse_foreign_file
+from tracking.app.commands.score_tables import number
+from tracking.app.replay_page.page import page_html, script_json
+from tracking.app.report.content import Report
+from tracking.scoring.catalogue import CATALOGUE
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+HERE = Path(__file__).parent
+KEYS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")  # scores beside the one that ranks
+PARTS = {
+    "ranking": "Ranking", "heat": "Scenes", "curves": "Curves", "matrices": "Matrices", "moments": "Worst moments",
+    "causes": "Causes", "speeds": "Speed", "sequences": "Sequences", "failures": "Failures",
+}  # fmt: skip
+IDS = {"heat": "scenes", "speeds": "speed"}  # of the elements, where they differ
+
+
+def check_packages() -> None:
+    """Raises InputError if a package that reports need is not installed."""
+    try:
+        import bokeh  # noqa: F401
+        import jinja2  # noqa: F401
+    except ImportError as error:
+        raise InputError(
+            place="report.html", got=f"no package {error.name}", expected="the extra report",
+            remedy="pip install 'flockscope[report]'",
+        ) from None  # fmt: skip
+
+
+def write_report(report: Report, path: Path) -> None:
+    """Writes the report as one HTML file. Raises InputError if the file there is not ours, or without its packages."""
+    check_packages()
+    refuse_foreign_file(path)
+    write_file(path, report_html(report).encode("utf-8", "replace"))
+
+
+def report_html(report: Report) -> str:
+    """Returns the report as HTML."""
+    from markupsafe import Markup
+
+    from tracking.app.report.charts import cause_parts, charts, scripts
+
+    drawn = [(IDS.get(name, name), word) for name, word in PARTS.items() if getattr(report, name)]
+    keys = [key for key in KEYS if key != report.by and any(_known(row.scores, key) for row in report.ranking)]
+    replay = page_html("Replay", "@@DATA@@").replace("</script", "<\\/script")
+    found = _environment().get_template("report.html").render(
+        report=report, parts=drawn, generator=GENERATOR, ranking_keys=keys,
+        meanings={key: score.meaning for key, score in CATALOGUE.items()},
+        style=Markup((HERE / "report.css").read_text(encoding="utf-8")),
+        script=Markup((HERE / "report.js").read_text(encoding="utf-8")),
+        bokeh=Markup(scripts()), cause_parts=cause_parts(report.causes),
+        charts=Markup(script_json(charts(report))),
+        replay_page=Markup(replay),
+    )  # fmt: skip
+    return str(found)
+
+
+def _known(scores: object, key: str) -> bool:
+    return isinstance(scores, dict) and math.isfinite(scores.get(key, math.nan))
+
+
+def _environment() -> Environment:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    made = Environment(loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined)
+    made.filters["score"] = lambda value: number("HOTA", value)
+    return made
