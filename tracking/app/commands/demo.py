@@ -279,9 +279,9 @@ def _section(
 def _write_page(
     name: str, sequence: Sequence, run: TrackingRun, row: SequenceScores, page: Path, video: PageVideo | None
 ) -> None:
-    from tracking.app.replay_page.page import write_page
+    from tracking.app.replay_page.page import Run, write_page
 
-    write_page(sequence, run, page, row.scores, f"{name} on {sequence.name}", video)
+    write_page(sequence, Run(run), page, row.scores, f"{name} on {sequence.name}", video)
 
 
 def _line(title: str, rows: list[SequenceScores]) -> str:

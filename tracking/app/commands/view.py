@@ -50,17 +50,14 @@ def _pages(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, 
     from tracking.app.replay_page.video import page_video
     from tracking.app.report.moments import shown_errors
 
+    words = [*names] if len(names) > 1 else [""] * len(names)
     runs = dict(zip((s.name for s in sequences), zip(*stored_runs(names, sequences), strict=True), strict=False))
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
         given = read_runs(sequence, ScoringJob(runs.get(sequence.name, ())))
-        shown = [Run(run, shown_errors(sequence, run).errors) for run in given]
-        first, other = (*shown, None, None)[:2]
-        video = page_video(sequence, path, options.video, step)
-        write_page(
-            sequence, None if first is None else first.tracks, path, video=video,
-            errors=() if first is None else first.errors, other=other,
-        )  # fmt: skip
+        shown = [Run(run, shown_errors(sequence, run).errors, word) for word, run in zip(words, given, strict=True)]
+        first, other = shown[0] if shown else Run(), shown[1] if len(shown) > 1 else None
+        write_page(sequence, first, path, video=page_video(sequence, path, options.video, step), other=other)
 
     pictures = _picture_count(sequences) if options.video != "none" else 0
     return _write_each("view", sequences, options.out, ".html", write, pictures)

@@ -38,25 +38,25 @@ SCRIPTS = (
 class Run:
     """Tracks of a tracker on a page, and their errors."""
 
-    tracks: SequenceOf[Tracks] | None
+    tracks: SequenceOf[Tracks] | None = None
     errors: SequenceOf[FoundError] = ()
+    name: str = ""  # "": of the tracker
 
 
 def write_page(
     sequence: Sequence,
-    tracks: SequenceOf[Tracks] | None,
+    run: Run,
     out: str | Path,
     scores: Mapping[str, float] | None = None,
     title: str | None = None,
     video: PageVideo | None = None,
-    errors: SequenceOf[FoundError] = (),
     other: Run | None = None,
 ) -> Path:
     """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all.
 
     other: of a second tracker, which is shown beside the first.
     """
-    shown = page_data(sequence, Run(tracks, errors), other, scores)
+    shown = page_data(sequence, run, other, scores)
     shown |= {"video": None if video is None else video.facts()}
     film = "" if video is None else video.content
     text = page_html(title or sequence.name, script_json(shown), film)
@@ -105,7 +105,7 @@ def page_data(
     length = _length(sequence, both, detections)
     return {
         "name": sequence.name,
-        "tracker": _tracker(run.tracks),
+        "tracker": _tracker(run),
         "fps": sequence.fps,
         "length": length,
         "from": 1 if span is None else span[0],
@@ -117,7 +117,7 @@ def page_data(
         "camera": camera_json(sequence.camera),
         "truth": None if true is None or truth is None else encode_rows(true, _within(truth.events or (), span)),
         "tracks": encoded,
-        "other": None if other is None else {"tracker": _tracker(other.tracks), "tracks": encoded_second},
+        "other": None if other is None else {"tracker": _tracker(other), "tracks": encoded_second},
         "detections": detections if span is None else None,
         "background": None,
         "unlabelled": _unlabelled(truth),
@@ -154,9 +154,9 @@ def _scores(scores: Mapping[str, float]) -> list[list[str]]:
     return few + [[key, text, CATALOGUE[key].meaning, CATALOGUE[key].family] for key, text in known.items()]
 
 
-def _tracker(tracks: SequenceOf[Tracks] | None) -> str:
-    info: Mapping[str, Any] = getattr(tracks, "info", {})
-    return str(info.get("tracker", "the tracker"))
+def _tracker(run: Run) -> str:
+    info: Mapping[str, Any] = getattr(run.tracks, "info", {})
+    return run.name or str(info.get("tracker", "the tracker"))
 
 
 def _length(sequence: Sequence, both: list[PageRows], detections: Json | None) -> int:

@@ -82,11 +82,9 @@ def _moment(
     low = max(first - around, 1)
     span = low, min(last + around, low + longest, length)
     start = max(first - round(sequence.fps), low)
-    other = None if rival is None else Run(rival, shown_errors(sequence, rival).errors)
-    data = page_data(sequence, Run(run, errors), other, span=span, start=start)
-    data["tracker"], data["background"], data["video"] = one.name, _background(sequence), None
-    if other is not None:
-        data["other"]["tracker"] = one.rival
+    other = None if rival is None else Run(rival, shown_errors(sequence, rival).errors, one.rival)
+    data = page_data(sequence, Run(run, errors, one.name), other, span=span, start=start)
+    data["background"], data["video"] = _background(sequence), None
     kind, words = ("", "") if dearest is None else (dearest.error.kind, _words(dearest))
 
     def moment(replay: str | None) -> Moment:

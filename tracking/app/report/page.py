@@ -74,5 +74,6 @@ def _environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined)
+    made.globals["nan"] = math.nan
     made.filters["score"] = lambda value: number("HOTA", value)
     return made

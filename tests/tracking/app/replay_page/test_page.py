@@ -80,7 +80,7 @@ def test_detections_come_back(sequence: Sequence) -> None:
 
 def test_the_page_is_self_contained(sequence: Sequence, tracks: list[Tracks], tmp_path: Path) -> None:
     path = write_page(
-        sequence, tracks, tmp_path / "new" / "page.html", scores={"HOTA": 0.9, "FP": 7.0, "IDF1": float("nan")}
+        sequence, Run(tracks), tmp_path / "new" / "page.html", scores={"HOTA": 0.9, "FP": 7.0, "IDF1": float("nan")}
     )
     page = path.read_text()
     assert "@@" not in page
@@ -94,7 +94,7 @@ def test_the_page_is_self_contained(sequence: Sequence, tracks: list[Tracks], tm
 def test_names_cannot_break_out(sequence: Sequence, tmp_path: Path) -> None:
     name = '</script><script>alert("x")</script><!-- @@DATA@@ \u2028'
     odd = Sequence(name, 10.0, 160, sequence.frames, sequence.load_truth)
-    page = write_page(odd, None, tmp_path / "page.html", title=name).read_text()
+    page = write_page(odd, Run(), tmp_path / "page.html", title=name).read_text()
     assert page.count("<script") == page.count("</script>") == 3
     assert data_of(page)["name"] == name
     assert "<title>&lt;/script&gt;" in page

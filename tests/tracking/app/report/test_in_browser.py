@@ -1,0 +1,90 @@
+"""A report in a real browser: charts, filters, replays and keys work, and nothing is written to the console."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.browser import CHROMIUM, Page, browser
+from tracking.app.cli import run
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")]
+
+CLOCK = "document.querySelector('iframe').contentDocument?.getElementById('clock')?.value"
+CHOOSE = """{ const select = document.querySelector('select[data-field=name]');
+    select.value = 'Bad'; select.dispatchEvent(new Event('change')) }"""
+INK = "[...Bokeh.documents[0]._all_models.values()].find(m => m.type === 'LinearAxis').major_label_text_color"
+SHOWN = "[...document.querySelectorAll('#list li')].filter(item => !item.hidden).map(item => item.dataset.name)"
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The report on a good and a bad tracker."""
+    out = tmp_path_factory.mktemp("report")
+    (out / "bad.py").write_text(BAD, encoding="utf-8")
+    lines = [["generate", "merge", "--seeds", "0:2", "--streams", "left", "--out", f"{out}/data"]]
+    lines += [["track", "blob", f"{out}/data", "--detections", "file", "--out", f"{out}/good"]]
+    lines += [["view", f"{out}/data", f"{out}/good", f"{out}/bad.py:Bad", "--out", f"{out}/pages"]]
+    for line in lines:
+        assert run(line) == 0
+    return out / "pages" / "index.html"
+
+
+BAD = """import numpy as np
+from sim.types import Groups, Tracks
+
+class Bad:
+    needs = ("boxes", "points")
+
+    def reset(self, context, seed):
+        self.next = 0
+
+    def step(self, frame, detections):  # a new id for everybody, twice a second
+        n = len(detections.pos)
+        id, none = np.arange(n) + 100 * (frame.index // 3), np.full((n, 2), np.nan)
+        cov = np.tile(np.eye(4), (n, 1, 1))
+        return Tracks(frame.index, frame.t, detections.plane, "person", id, np.full(n, -1), detections.pos, none, cov,
+                      detections.box, np.ones(n), Groups.none())
+"""
+
+
+@pytest.fixture
+def page(report: Path, tmp_path: Path) -> Iterator[Page]:
+    """The report, opened."""
+    with browser(tmp_path) as opened:
+        opened.look(1300, 900)
+        opened.open(report)
+        opened.wait("Bokeh.documents.length === document.querySelectorAll('.chart').length")
+        yield opened
+
+
+def test_open_filter_replay(page: Page) -> None:
+    assert set(page.value(SHOWN)) == {"good", "Bad"}
+    page.value(CHOOSE)
+    assert set(page.value(SHOWN)) == {"Bad"}
+    page.value("[...document.querySelectorAll('#list li')].find(item => !item.hidden).querySelector('button').click()")
+    page.wait(CLOCK)
+    first = page.value(CLOCK)
+    page.press("x")
+    page.wait(f"{CLOCK} !== {first!r}")
+    error = page.value(CLOCK)
+    page.press(" ")
+    page.wait(f"{CLOCK} !== {error!r}")
+    panes = "document.querySelector('iframe').contentDocument.getElementById('stages').classList.contains('beside')"
+    assert page.value(panes), "two trackers side by side"
+    page.press("]")
+    page.wait(f"{CLOCK} && document.getElementById('which').textContent.startsWith('Bad')")
+    page.press("Escape")
+    page.wait("!document.getElementById('player').open")
+    assert page.messages == []
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_looks(page: Page, dark: bool) -> None:
+    """Text of charts has the contrast of text to the page; nothing is wider than a phone."""
+    page.look(390, 844, dark)
+    page.wait("document.documentElement.scrollWidth <= 390")
+    assert page.value(INK) == ("#c9d1d9" if dark else "#3b434b")
+    assert page.messages == []

@@ -1,0 +1,97 @@
+"""The report: what is chosen, what is left out, and that no text of a file becomes part of the page."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+
+import pytest
+
+from tracking.app.report import moments
+from tracking.app.report.content import (
+    CauseBar,
+    Curve,
+    Curves,
+    Failure,
+    HeatCell,
+    HeatMap,
+    Moment,
+    RankedRow,
+    Report,
+    Speed,
+)
+from tracking.app.report.moments import Candidate, chosen
+from tracking.app.report.page import report_html
+
+EVIL = "<img src=x onerror=alert(1)></script><script>alert(2)</script>"
+EMPTY = Report("Two trackers", "about", "HOTA", [])
+
+
+def full(name: str) -> Report:
+    """A report with all parts, in which trackers, scenes and errors have this name."""
+    cells = [HeatCell(0.5, 0.7), HeatCell(math.nan, math.nan, f"no scene, {name}")]
+    ends = [0.8, math.nan, 0.2], [1, math.nan, 0.4]
+    curve = Curve(name, [0.9, math.nan, 0.3], *ends, {"at": 0.6, "low": 0.5, "high": 1.0})
+    rows = [RankedRow("oracle", "", 0.9, math.nan, math.nan, {}), RankedRow(name, "1", 0.8, 0.7, 0.9, {"MOTA": 0.5})]
+    return Report(
+        name, name, "HOTA", rows, [name], HeatMap(name, (name, "b"), {name: cells}),
+        [Curves(name, name, [1, 0.8, 0.4], [curve], [name])], [HeatMap(name, ("1", "2"), {name: cells})],
+        [CauseBar(name, name, name, 2, 1.5, {"HOTA": 0.1, "group_F1": 0.2})], name,
+        [Speed(name, 100.0, 0.8, 0.7, 0.9)],
+        [Moment(name, name, name, 0.5, 0.9, 1.0, name, name, json.dumps({"name": "x"}))],
+        [Failure(name, name, name, name)], [(name, "page.html", 0.5)],
+    )  # fmt: skip
+
+
+def test_all_parts_stand_in_the_page() -> None:
+    page = report_html(full("blob"))
+    parts = ("ranking", "scenes", "curves", "matrices", "moments", "causes", "speed", "sequences", "failures")
+    assert [id for id in parts if f'<section id="{id}">' in page] == list(parts)
+    charts = json.loads(re.findall(r'id="charts">(.*?)</script>', page, re.DOTALL)[0])
+    assert list(charts) == ["chart-ranking", "chart-curves-0", "chart-causes", "chart-speed"]
+    assert all(f'id="{id}"' in page for id in charts)
+    assert "no scene, blob" in page, "an empty cell says why"
+
+
+def test_parts_without_content_are_left_out() -> None:
+    page = report_html(EMPTY)
+    assert "<section" not in page
+    assert "<nav" in page
+
+
+def test_text_is_escaped() -> None:
+    page = report_html(full(EVIL))
+    outside = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+    assert "<img" not in outside
+    assert "alert(2)</script>" not in page
+    assert page.count("<script") == report_html(full("blob")).count("<script")
+
+
+def test_the_page_loads_nothing() -> None:
+    page = re.sub(r"<script>.*?</script>", "", report_html(full("blob")), flags=re.DOTALL)
+    assert re.findall(r"(?:src|href)\s*=\s*[\"']?(?:https?:|//)", page) == []
+    assert "default-src 'none'" in page
+
+
+def candidate(name: str, scenario: str, score: float) -> Candidate:
+    return Candidate(name, scenario, f"{scenario}-s{score}", score, 0.9, "")
+
+
+def test_moments_are_shared_among_trackers_and_scenarios() -> None:
+    bad = [candidate("a", "merge", 0.1 + 0.01 * k) for k in range(8)] + [candidate("a", "split", 0.5)]
+    good = [candidate("b", "merge", 0.8)]
+    found = chosen([*bad, *good], most=3)
+    assert [(one.name, one.scenario) for one in found] == [("a", "merge"), ("a", "split"), ("b", "merge")]
+    assert len(chosen([*bad, *good])) == 10, "without other scenarios the same one again"
+
+
+def test_a_report_stays_small(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = Moment("a", "merge", "merge-s0", 0.5, 0.9, 0.0, "switch", "words", None)
+    monkeypatch.setattr(moments, "_moment", lambda *_: (lambda replay: replace(made, replay=replay), "x" * 3_000_000))
+    found = moments.moments([candidate("a", "merge", k / 10) for k in range(4)], lambda one: ())  # type: ignore[return-value]
+    assert [one.replay is None for one in found] == [False, False, True, True]
+    page = report_html(replace(EMPTY, moments=found))
+    assert page.count('id="moment-') == 2
+    assert page.count("disabled title=") == 2
