@@ -83,10 +83,15 @@ def _tables(names: list[str], fps: list[float], found: list[RunErrors], limit: i
         lost.add_column(name, justify="right")
     for row in _causes(found):
         lost.add_row(
-            row["kind"], row["cause"], str(row["errors"]), f"{row['seconds']:.1f}", *(f"{row[k]:+.3f}" for k in SHOWN)
+            row["kind"],
+            row["cause"],
+            str(row["errors"]),
+            f"{row['seconds']:.1f}",
+            *(_number(row[k], "+.3f") for k in SHOWN),
         )
-    lost.add_row("position", "", "", "", *(f"{_mean([run.left[k] for run in found]):+.3f}" for k in SHOWN))
-    now = "  ".join(f"{k} {_mean([run.scores[k] for run in found]):.3f}" for k in SHOWN)
+    left = {k: _mean([run.left[k] for run in found]) for k in SHOWN}
+    lost.add_row("position", "", "", "", *(_number(left[k], "+.3f") for k in SHOWN))
+    now = "  ".join(f"{k} {_number(_mean([run.scores[k] for run in found]), '.3f')}" for k in SHOWN)
     every = [(name, rate, error) for name, rate, run in zip(names, fps, found, strict=True) for error in run.errors]
     dearest = sorted(every, key=lambda item: -(item[2].cost or 0.0))[:limit]
     listed = empty_table()
@@ -97,10 +102,19 @@ def _tables(names: list[str], fps: list[float], found: list[RunErrors], limit: i
         facts = error.facts(rate)
         span = f"{facts['start']}–{facts['end']}"
         listed.add_row(
-            printable(name), span, facts["kind"], error.who, facts["detail"] or facts["cause"], f"{error.cost:.4f}"
+            printable(name),
+            span,
+            facts["kind"],
+            error.who,
+            facts["detail"] or facts["cause"],
+            _number(error.cost, ".4f"),
         )
     title = f"the {len(dearest)} dearest of {len(every)} errors; cost: HOTA, of groups group_F1"
     return Group(with_title(f"where the score is lost; now {now}", lost), with_title(title, listed))
+
+
+def _number(value: float | None, form: str) -> str:
+    return "–" if value is None or value != value else format(value, form)
 
 
 def _mean(values: list[float]) -> float:
