@@ -51,7 +51,7 @@ class GroupError:
     people: tuple[int, ...]  # ids of its people; of a false group, of the true people in it; of an event, its members
     others: tuple[int, ...] = ()  # ids of further true people in the estimated groups
     rows: tuple[int, ...] = ()  # tracked rows that belong together
-    alone: tuple[int, ...] = ()  # tracked rows in the estimated groups that belong to no group
+    alone: tuple[int, ...] = ()  # memberships, of the same estimated groups, of people who belong to no group there
     false: tuple[int, ...] = ()  # rows of estimated groups that should not be there
 
 
@@ -109,14 +109,14 @@ class Memberships:
         }
 
     @cached_property
-    def members(self) -> tuple[list[list[int]], list[list[int]]]:
-        """The true rows of each true group, and the tracked rows of each estimated group; -1: not among the people."""
-        both: tuple[list[list[int]], list[list[int]]] = ([], [])
-        for lists, side in zip(both, (self.true, self.est), strict=True):
-            lists += [[] for _ in range(len(side))]
-            for of, member in zip(side.of.tolist(), side.member.tolist(), strict=True):
-                lists[of].append(member)
-        return both
+    def true_members(self) -> list[list[int]]:
+        """The true rows of the people of each true group."""
+        return _split(self.true.of, self.true.member, len(self.true))
+
+    @cached_property
+    def members(self) -> list[list[int]]:
+        """The tracked rows of the members of each estimated group, -1 for one who is not among the people."""
+        return _split(self.est.of, self.est.member, len(self.est))
 
     @cached_property
     def states(self) -> list[str]:
@@ -124,35 +124,43 @@ class Memberships:
         return [self._state(i) for i in range(len(self.true))]
 
     def _state(self, i: int) -> str:
-        n = len(self.members[0][i])
+        n = len(self.true_members[i])
         if i in self.found:
             return DIVIDED if self._has_part_outside(i) else FOUND
-        if 2 * sum(self.track[row] >= 0 for row in self.members[0][i] if row >= 0) <= n:
+        if 2 * sum(self.track[row] >= 0 for row in self.true_members[i] if row >= 0) <= n:
             return UNSEEN
         j, common = max(self.parts[i].items(), key=lambda part: part[1], default=(-1, 0))
         if not common:
             return MISSED
         if 2 * common <= n:
             return DIVIDED
-        whole = (2 * self.parts[h].get(j, 0) > len(self.members[0][h]) for h in self._groups_in(j) if h != i)
+        whole = (2 * self.parts[h].get(j, 0) > len(self.true_members[h]) for h in self._groups_in(j) if h != i)
         return ENGULFED if any(whole) else STRANGERS
 
     def _has_part_outside(self, i: int) -> bool:
         """Returns True if members of a found group that are not in the one that finds it are most of another group."""
         if len(self.parts[i]) < 2:
             return False
-        finders, est = set(self.found.values()), self.members[1]
-        outside = {int(self.track[row]) for row in self.members[0][i] if row >= 0} - {*est[self.found[i]], -1}
+        finders, est = set(self.found.values()), self.members
+        outside = {int(self.track[row]) for row in self.true_members[i] if row >= 0} - {*est[self.found[i]], -1}
         return any(2 * len(outside.intersection(est[j])) > len(est[j]) for j in self.parts[i] if j not in finders)
 
     def _groups_in(self, j: int) -> set[int]:
         """Returns the rows of true groups with people in an estimated group."""
-        return set(self.true_group[self.persons(np.array(self.members[1][j], np.int64))].tolist()) - {-1}
+        return set(self.true_group[self.persons(np.array(self.members[j], np.int64))].tolist()) - {-1}
 
-    def belongs(self, row: int, j: int) -> bool:
-        """Returns True if the person in a tracked row of an estimated group is in a true group not found elsewhere."""
-        i = int(self.true_group[self.person[row]]) if row >= 0 and self.person[row] >= 0 else -1
-        return i >= 0 and self.found.get(i, j) == j
+    def astray(self, j: int) -> list[int]:
+        """Returns an estimated group's memberships of people in no true group, or in one that is found elsewhere."""
+        places = np.flatnonzero(self.est.of == j)
+        groups = self.true_group[self.persons(self.est.member[places])].tolist()
+        return [k for k, i in zip(places.tolist(), groups, strict=True) if i < 0 or self.found.get(i, j) != j]
+
+
+def _split(of: Ints, member: Ints, count: int) -> list[list[int]]:
+    lists: list[list[int]] = [[] for _ in range(count)]
+    for group, row in zip(of.tolist(), member.tolist(), strict=True):
+        lists[group].append(row)
+    return lists
 
 
 def group_f1(true: GroupRows, est: GroupRows, shared: SharedMembers) -> float:
@@ -181,14 +189,12 @@ def _errors_of_groups(of: Memberships) -> Iterator[GroupError]:
     for id, kind, stretch in _stretches(of.true.rows, list(enumerate(of.states))):
         if kind in (FOUND, UNSEEN):
             continue
-        rows = [int(of.track[row]) for i in stretch for row in of.members[0][i] if row >= 0 and of.track[row] >= 0]
-        beside = [(row, j) for i in stretch for j in of.parts[i] for row in of.members[1][j] if row >= 0]
-        mine = set(rows)
-        others = [row for row, _ in beside if row not in mine]
-        alone = [row for row, j in beside if row not in mine and not of.belongs(row, j)]
+        rows = [int(of.track[row]) for i in stretch for row in of.true_members[i] if row >= 0 and of.track[row] >= 0]
+        parts = [j for i in stretch for j in of.parts[i]]
         people = _ids(of, rows)
-        strangers = tuple(person for person in _ids(of, others) if person not in people)
-        yield GroupError(kind, *_span(of.true.rows, stretch), id, people, strangers, tuple(rows), tuple(alone))
+        others = tuple(id for id in _ids(of, (row for j in parts for row in of.members[j])) if id not in people)
+        alone = tuple(k for j in parts for k in of.astray(j))
+        yield GroupError(kind, *_span(of.true.rows, stretch), id, people, others, tuple(rows), alone)
 
 
 def _false_groups(of: Memberships) -> Iterator[GroupError]:
@@ -197,13 +203,13 @@ def _false_groups(of: Memberships) -> Iterator[GroupError]:
         explained |= set() if state == FOUND else set(of.parts[i])
     false = [(j, FALSE) for j in range(len(of.est)) if j not in explained]
     for _, kind, stretch in _stretches(of.est.rows, false):
-        people = _ids(of, (row for j in stretch for row in of.members[1][j] if row >= 0))
+        people = _ids(of, (row for j in stretch for row in of.members[j]))
         yield GroupError(kind, *_span(of.est.rows, stretch), None, people, false=tuple(stretch))
 
 
 def _ids(of: Memberships, rows: Iterable[int]) -> tuple[int, ...]:
     """Returns the ids of the true people of some tracked rows."""
-    return tuple(sorted({int(of.people.id[of.person[row]]) for row in rows if of.person[row] >= 0}))
+    return tuple(sorted({int(of.people.id[of.person[row]]) for row in rows if row >= 0 and of.person[row] >= 0}))
 
 
 def _span(rows: FrameRows, stretch: list[int]) -> tuple[int, int]:

@@ -19,7 +19,7 @@ from tracking.errors.people import NOBODY, MatchedPeople, PersonError
 from tracking.scoring.candidate_pairs import Pairs
 from tracking.scoring.evaluation import people_scores
 from tracking.scoring.group_scores import shared_members
-from tracking.scoring.people_and_groups import bare_groups
+from tracking.scoring.people_and_groups import GroupRows, bare_groups
 from tracking.scoring.rows import FrameRows
 
 SHOWN = ("HOTA", "IDF1", "group_F1")
@@ -123,35 +123,33 @@ def _segments(matched: MatchedPeople, rows: Ints, errors: list[PersonError]) -> 
 
 def _repaired_f1(of: Memberships, errors: Collection[GroupError], added: Ints, ghosts: Collection[int]) -> float:
     """Returns group_F1 after repairs; added (A,): true rows of added people, ghosts: tracked rows that go."""
-    est, tracked = of.est, len(of.person)
-    gone, loose = (
-        np.zeros(len(est), bool),
-        np.zeros(tracked + 1, bool),
-    )  # the last: a member who is not among the people
-    together: dict[int, list[int]] = {}  # by true group, the rows that are one group
+    est = of.est
+    gone, alone = np.zeros(len(est), bool), np.zeros(len(est.of), bool)
+    loose = np.zeros(len(of.person) + 1, bool)  # the last: a member who is not among the people
     loose[list(ghosts)] = True
+    together: dict[int, list[int]] = {}  # by true group, the rows that are one group
     for error in errors:
         gone[list(error.false)] = True
-        loose[[*error.rows, *error.alone]] = True
+        alone[list(error.alone)] = True
+        loose[list(error.rows)] = True
         for row in error.rows:
             together.setdefault(int(of.true_group[of.person[row]]), []).append(row)
     joined = _join_added(of, added, loose, together)
-    kept = ~(gone[est.of] | loose[est.member])
+    kept = ~(gone[est.of] | loose[est.member] | alone)
     new = [(len(est) + k, row) for k, rows in enumerate(together.values()) for row in rows]
     home, member = np.array([*joined, *new], np.int64).reshape(-1, 2).T
-    frame = np.concatenate([est.rows.frame, of.true.rows.frame[list(together)]])
-    none = np.zeros(len(together), np.int64)
-    every = replace(
-        bare_groups(
-            FrameRows(frame, np.concatenate([est.rows.id, none])), np.zeros((len(frame), 2)), (NO_HULL,) * len(frame)
-        ),
-        of=np.concatenate([est.of[kept], home]),
-        member=np.concatenate([est.member[kept], member]),
-    )
-    nobody_inside = np.append(est.count == 0, np.zeros(len(together), bool)) & ~np.append(gone, none > 0)
-    every = every.keep((every.count > 1) | nobody_inside)
-    person = np.concatenate([of.person, added, [NOBODY]])[every.member]
-    return group_f1(of.true, every, shared_members(of.true, every, person, len(of.people)))
+    home, member = np.append(est.of[kept], home), np.append(est.member[kept], member)
+    repaired = _groups_of(home, member, len(est) + len(together))
+    nobody_inside = np.append((est.count == 0) & ~gone, np.zeros(len(together), bool))
+    repaired = repaired.keep((repaired.count > 1) | nobody_inside)
+    person = np.concatenate([of.person, added, [NOBODY]])[repaired.member]
+    return group_f1(of.true, repaired, shared_members(of.true, repaired, person, len(of.people)))
+
+
+def _groups_of(home: Ints, member: Ints, count: int) -> GroupRows:
+    """Returns groups with these memberships, for counting: without frames, ids and places."""
+    none = np.zeros(count, np.int64)
+    return replace(bare_groups(FrameRows(none, none), np.zeros((count, 2)), (NO_HULL,) * count), of=home, member=member)
 
 
 def _join_added(of: Memberships, added: Ints, loose: Bools, together: dict[int, list[int]]) -> list[tuple[int, int]]:
@@ -167,7 +165,7 @@ def _join_added(of: Memberships, added: Ints, loose: Bools, together: dict[int, 
         i = int(of.true_group[row])
         if i == NOBODY:
             continue
-        mates = [int(of.track[m]) for m in of.members[0][i] if m >= 0 and of.track[m] >= 0]
+        mates = [int(of.track[m]) for m in of.true_members[i] if m >= 0 and of.track[m] >= 0]
         homes, counts = np.unique([home[j] for j in mates if home[j] >= 0 and not loose[j]], return_counts=True)
         if i not in together and len(homes) and of.states[i] != UNSEEN:
             joined.append((int(homes[np.argmax(counts)]), k))
