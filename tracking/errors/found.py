@@ -46,7 +46,7 @@ class FoundError:
         error = self.error
         if isinstance(error, GroupError):
             others = f" with {' '.join(map(str, error.others))}" if error.others else ""
-            return f"people {' '.join(map(str, error.people))}{others}"
+            return f"people {' '.join(map(str, error.people))}{others}" if error.people else "nobody"
         if error.person is None:
             return f"track {error.after}"
         ids = " → ".join(str(id) for id in dict.fromkeys((error.before, error.after)) if id is not None)

@@ -59,18 +59,20 @@ def errors_of(sequence: Sequence, job: Job) -> RunErrors:
 
 
 def _causes(found: SequenceOf[RunErrors]) -> list[dict[str, Any]]:
-    """Returns the gains by kind and cause, mean over sequences, the largest first."""
+    """Returns the gains by kind and cause, mean over the runs that have the score (nan: none), the largest first."""
+    known = {key: sum(run.scores[key] == run.scores[key] for run in found) for key in SHOWN}
     rows: dict[tuple[str, str], dict[str, Any]] = {}
     for run in found:
         for part in run.causes:
-            empty = {"kind": part.kind, "cause": part.cause, "errors": 0, "seconds": 0.0, **dict.fromkeys(SHOWN, 0.0)}
+            none = {key: 0.0 if known[key] else float("nan") for key in SHOWN}
+            empty = {"kind": part.kind, "cause": part.cause, "errors": 0, "seconds": 0.0, **none}
             row = rows.setdefault((part.kind, part.cause), empty)
             row["errors"] += part.errors
             row["seconds"] += part.seconds
             for key in SHOWN:
                 gain = part.gains[key]
-                row[key] += 0.0 if gain != gain else gain / len(found)
-    return sorted(rows.values(), key=lambda row: -(row["HOTA"] + row["group_F1"]))
+                row[key] += 0.0 if gain != gain else gain / known[key]
+    return sorted(rows.values(), key=lambda row: -sum(row[key] for key in ("HOTA", "group_F1") if known[key]))
 
 
 def _tables(names: list[str], fps: list[float], found: list[RunErrors], limit: int) -> Any:
