@@ -1,4 +1,5 @@
-"""Faults of people: a switch, a fragment, a lost person, a late confirmation, a ghost, each with its true cause.
+"""Faults of people: a switch, a fragment (also of a tracker from pixels when the light changes), a lost person, a late
+confirmation, a ghost, each with its true cause.
 
 The cause is that of the injection: the person was dropped while hidden, while cut by the edge, when the detector lost
 them, beside somebody, in a turn, or with nothing of this around (the tracker's own fault). Cases between two causes are
@@ -28,7 +29,7 @@ class Fault:
     expected: tuple[Span, ...]
     cause: str | None  # None: not unambiguous
     seen: Bools | None = None  # (T, P): who was detected; None: everybody
-    hulls: tuple[tuple[int, int, np.ndarray], ...] = ()  # of a tracker of whole groups
+    pixels: bool = False  # the tracker worked on pictures
 
 
 def _cause(of: FaultScene, p: int, gap: Ints, first: int, last: int) -> str | None:
@@ -97,6 +98,22 @@ def fragments(of: FaultScene) -> Iterator[Callable[[], Fault]]:
             yield lambda p=p, gap=rows[k : k + n]: _dropped(of, "fragment", p, gap, detected=False)
 
 
+def in_changing_light(of: FaultScene) -> Iterator[Callable[[], Fault]]:
+    """Yields gaps of a person whom a tracker from pixels loses when the light changes suddenly."""
+    n = of.frames(GAP)
+    for p, rows in _presences(of):
+        for switch in of.switches:
+            k = int(np.searchsorted(rows, switch))
+            if 1 < k < len(rows) - n - 1:
+                yield lambda p=p, gap=rows[k : k + n]: _lost_in_light(of, p, gap)
+
+
+def _lost_in_light(of: FaultScene, p: int, gap: Ints) -> Fault:
+    made = _dropped(of, "fragment", p, gap)
+    cause = "light" if made.cause in ("near", "turned", "tracker") else made.cause
+    return replace(made, cause=cause, pixels=True)
+
+
 def losses(of: FaultScene) -> Iterator[Callable[[], Fault]]:
     """Yields people who are lost for good."""
     for p, rows in _presences(of):
@@ -158,5 +175,6 @@ def _left(of: FaultScene, p: int, last: int, n: int) -> Fault:
 
 
 PEOPLE = {
-    "switch": switches, "fragment": fragments, "lost person": losses, "late confirmation": late, "ghost": ghosts,
+    "switch": switches, "fragment": fragments, "fragment in changing light": in_changing_light,
+    "lost person": losses, "late confirmation": late, "ghost": ghosts,
 }  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 from scenarios import load
 from sim import simulate
 from sim.geometry.polygons import footprint_hull
+from sim.render.weather import draw_illumination
 from sim.types import EVENT_KINDS, Array, Bools, Groups, Ints, Sequence, Tracks
 from tracking.grouping.foot_points import groups_of_people
 
@@ -38,6 +39,7 @@ class FaultScene:
     truncation: Array  # (T, P)
     group: Ints  # (T, P) -1 alone
     nearest: Array  # (T, P) m to the nearest other person, inf without
+    switches: tuple[int, ...]  # rows in which the light changes suddenly
     told: Told = field(init=False)
 
     def __post_init__(self) -> None:
@@ -69,17 +71,14 @@ class FaultScene:
         )  # fmt: skip
         return t.replace(groups=groups_of_people(t))
 
-    def wholes(self, label: Ints, hulls: tuple[tuple[int, int, Array], ...] = ()) -> list[Tracks]:
-        """Returns the groups of these labels (T, P) as a tracker of whole groups reports them, and further hulls.
+    def wholes(self, label: Ints) -> list[Tracks]:
+        """Returns the groups of these labels (T, P) as a tracker of whole groups reports them."""
+        return [self._hulls(k, label[k]) for k in range(len(label))]
 
-        hulls: frame from 1, id, polygon (V, 2).
-        """
-        return [self._hulls(k, label[k], [h for h in hulls if h[0] == k + 1]) for k in range(len(label))]
-
-    def _hulls(self, k: int, label: Ints, more: list[tuple[int, int, Array]]) -> Tracks:
+    def _hulls(self, k: int, label: Ints) -> Tracks:
         names = [int(g) for g in np.unique(label[self.there[k]]) if g >= 0]
-        hull = [*(footprint_hull(self.pos[k, self.there[k] & (label == g)]) for g in names), *(h[2] for h in more)]
-        id = np.array([*names, *(h[1] for h in more)], np.int64)
+        hull = [footprint_hull(self.pos[k, self.there[k] & (label == g)]) for g in names]
+        id = np.array(names, np.int64)
         n = len(id)
         pos = np.array([h.mean(axis=0) for h in hull]).reshape(n, 2)
         two, none = np.full((n, 2), np.nan), np.full((n, 2, 2), np.nan)
@@ -90,7 +89,8 @@ class FaultScene:
 
 def scene(name: str, seed: int, fps: float) -> FaultScene:
     """Returns a scenario of the catalogue as a scene, without pictures."""
-    sequence = simulate(load(name, [f"camera.fps={fps:g}"]), seed, streams=())
+    scenario = load(name, [f"camera.fps={fps:g}"])
+    sequence = simulate(scenario, seed, streams=())
     truth = sequence.truth
     assert truth is not None
     assert truth.pos is not None
@@ -112,6 +112,7 @@ def scene(name: str, seed: int, fps: float) -> FaultScene:
         sequence, truth.fps, people, there, pos, dense(truth.vel, np.nan), dense(truth.visibility, 1.0),
         dense(truth.truncation, 0.0), dense(truth.group, NOBODY).astype(np.int64),
         np.nan_to_num(distance, nan=np.inf).min(axis=2),
+        tuple(int(start * fps) for start, _, _ in draw_illumination(scenario.light, seed).switches),
     )  # fmt: skip
 
 
