@@ -5,7 +5,7 @@ A cause is a fact of the truth, not a proof. The first that holds is named:
     edge        the person is cut by the edge of the picture
     hidden      most of the body is hidden, for most of the gap
     undetected  the detector has no detection of the person, for most of the gap
-    light       the brightness changes by more than a tenth within a second around the error's start (input from pixels)
+    light       the brightness changes by more than a fifth within a second of the error's start (input from pixels)
     near        another person is nearer than 0.8 m
     turned      the person's direction turns by more than 60 degrees within a second
     left        a ghost of somebody who is gone
@@ -35,7 +35,7 @@ CONFIRMED = 0.5  # s: trackers wait so long before they report somebody
 AROUND = 1.0  # s before a switch in which causes are looked for
 DISPLACED, DOUBLE = 2.0, 1.0  # m
 APART, BESIDE = 2.0, 1.5  # m between nearest people
-LIGHT = 1.1  # ratio of the greatest to the least brightness
+LIGHT = 1.2  # ratio of the greatest to the least brightness
 
 
 @dataclass(frozen=True)
