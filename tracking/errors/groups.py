@@ -64,7 +64,7 @@ class Memberships:
     """
 
     true: GroupRows  # G groups, members are rows of true people
-    est: GroupRows  # H groups, members are rows of tracked people
+    est: GroupRows  # H groups, members are rows of tracked people; memberships are sorted by group
     people: FrameRows  # the R true people
     person: Ints  # (S,) true row of each tracked row, -1 none
     named: bool  # False if the tracker names no members
@@ -109,6 +109,11 @@ class Memberships:
         }
 
     @cached_property
+    def finders(self) -> set[int]:
+        """The rows of estimated groups that find a true one."""
+        return set(self.found.values())
+
+    @cached_property
     def true_members(self) -> list[list[int]]:
         """The true rows of the people of each true group."""
         return _split(self.true.of, self.true.member, len(self.true))
@@ -141,9 +146,9 @@ class Memberships:
         """Returns True if members of a found group that are not in the one that finds it are most of another group."""
         if len(self.parts[i]) < 2:
             return False
-        finders, est = set(self.found.values()), self.members
+        est = self.members
         outside = {int(self.track[row]) for row in self.true_members[i] if row >= 0} - {*est[self.found[i]], -1}
-        return any(2 * len(outside.intersection(est[j])) > len(est[j]) for j in self.parts[i] if j not in finders)
+        return any(2 * len(outside.intersection(est[j])) > len(est[j]) for j in self.parts[i] if j not in self.finders)
 
     def _groups_in(self, j: int) -> set[int]:
         """Returns the rows of true groups with people in an estimated group."""
@@ -151,9 +156,9 @@ class Memberships:
 
     def astray(self, j: int) -> list[int]:
         """Returns an estimated group's memberships of people in no true group, or in one that is found elsewhere."""
-        places = np.flatnonzero(self.est.of == j)
-        groups = self.true_group[self.persons(self.est.member[places])].tolist()
-        return [k for k, i in zip(places.tolist(), groups, strict=True) if i < 0 or self.found.get(i, j) != j]
+        first, after = np.searchsorted(self.est.of, (j, j + 1)).tolist()
+        groups = self.true_group[self.persons(self.est.member[first:after])].tolist()
+        return [k for k, i in enumerate(groups, first) if i < 0 or self.found.get(i, j) != j]
 
 
 def _split(of: Ints, member: Ints, count: int) -> list[list[int]]:
@@ -198,7 +203,7 @@ def _errors_of_groups(of: Memberships) -> Iterator[GroupError]:
 
 
 def _false_groups(of: Memberships) -> Iterator[GroupError]:
-    explained = set(of.found.values())
+    explained = set(of.finders)
     for i, state in enumerate(of.states):
         explained |= set() if state == FOUND else set(of.parts[i])
     false = [(j, FALSE) for j in range(len(of.est)) if j not in explained]

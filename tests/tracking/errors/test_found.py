@@ -280,6 +280,15 @@ def test_a_part_of_a_group_that_is_found_is_an_error() -> None:
     assert one.error.people == (1, 2, 3, 4, 5)
 
 
+def test_nothing_is_left_of_a_group_with_people_who_are_found_elsewhere() -> None:
+    people = {1: (0.0, 0.0), 2: (0.0, 0.9), **{k: (0.0, 0.9 * k) for k in range(11, 17)}}
+    scenes = [Scene(people, {1: ([1, 2], None), 2: (list(range(11, 17)), None)}) for _ in range(FRAMES)]
+    run = [regrouped(t, [1, 2, 15, 16], 8, 20, 29) for t in tracks(scenes)]
+    found = find_errors(Made(scenes).sequence(), run)
+    assert [one.error.kind for one in found.errors] == ["strangers joined"]
+    assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
+
+
 @pytest.mark.parametrize(("end", "kind"), [(49, "late split"), (60, "missed split")])
 def test_a_pair_that_parts_late_is_a_late_split(end: int, kind: str) -> None:
     people = {1: (0.0, 0.0), 2: (0.0, 0.9)}
