@@ -106,13 +106,12 @@ def measure(scenes: SequenceOf[FaultScene], fault: str, count: int, seed: int, w
     total: Counter[str] = Counter()
     for of in scenes:
         if whole:
-            before = find_errors(of.sequence, of.wholes(of.group), costs=False)
+            before = find_errors(of.sequence, of.clean_wholes, costs=False)
             runs = ((made, run, None) for made, run in islice(whole_cases(of, fault, count, seed), count))
         else:
-            clean = of.tracks(of.told)
-            before = find_errors(of.sequence, clean, costs=False)
+            before = find_errors(of.sequence, of.clean, costs=False)
             runs = (
-                (made, _run(of, made), clean if made.seen is None else of.tracks(of.told, made.seen))
+                (made, _run(of, made), of.clean if made.seen is None else of.tracks(of.told, made.seen))
                 for made in cases(of, fault, count, seed)
             )
         for made, run, seen in runs:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -50,12 +51,23 @@ class FaultScene:
         """Returns a duration in frames, at least 1."""
         return max(round(seconds * self.fps), 1)
 
+    @cached_property
+    def clean(self) -> list[Tracks]:
+        """The truth as tracks of people."""
+        return [self._frame(k, self.told, self.there[k]) for k in range(len(self.there))]
+
+    @cached_property
+    def clean_wholes(self) -> list[Tracks]:
+        """The truth as tracks of whole groups."""
+        return [self._hulls(k, self.group[k]) for k in range(len(self.there))]
+
     def tracks(self, told: Told, keep: Bools | None = None) -> list[Tracks]:
         """Returns the tracks of people; keep (T, P): those that are reported, None: all."""
-        length = len(self.there)
+        seen = told.id >= 0 if keep is None else (told.id >= 0) & keep
+        haunted = {ghost[0] - 1 for ghost in told.ghosts}
+        same = (np.where(seen, told.id, NOBODY) == self.told.id).all(axis=1) & (told.label == self.group).all(axis=1)
         return [
-            self._frame(k, told, told.id[k] >= 0 if keep is None else (told.id[k] >= 0) & keep[k])
-            for k in range(length)
+            self.clean[k] if same[k] and k not in haunted else self._frame(k, told, seen[k]) for k in range(len(seen))
         ]
 
     def _frame(self, k: int, told: Told, who: Bools) -> Tracks:
@@ -73,7 +85,8 @@ class FaultScene:
 
     def wholes(self, label: Ints) -> list[Tracks]:
         """Returns the groups of these labels (T, P) as a tracker of whole groups reports them."""
-        return [self._hulls(k, label[k]) for k in range(len(label))]
+        same = (label == self.group).all(axis=1)
+        return [self.clean_wholes[k] if same[k] else self._hulls(k, label[k]) for k in range(len(label))]
 
     def _hulls(self, k: int, label: Ints) -> Tracks:
         names = [int(g) for g in np.unique(label[self.there[k]]) if g >= 0]
