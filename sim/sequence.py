@@ -18,7 +18,19 @@ from sim.scene.camera_placement import place_camera
 from sim.streams import check_streams
 from sim.truth.label import bodies, label
 from sim.truth.order_fulfilment import check_orders
-from sim.types import BACKGROUNDS, OWN_BACKGROUND, Camera, Detections, Frame, Image, Motion, PixelTruth, Sequence, Truth
+from sim.types import (
+    BACKGROUNDS,
+    OWN_BACKGROUND,
+    Array,
+    Camera,
+    Detections,
+    Frame,
+    Image,
+    Motion,
+    PixelTruth,
+    Sequence,
+    Truth,
+)
 
 if TYPE_CHECKING:
     from scenarios.schema.scenario import ObservationSpec, Scenario
@@ -117,6 +129,11 @@ def observe(
             made = drawn(d.index)
             yield Frame(d.index, d.t, made.image, made.right, d)
 
+    def light() -> Array:
+        from sim.render.weather import brightness
+
+        return brightness(scenario.light, motion.seed, motion.repeat, kept.fps, len(kept.present))
+
     def truth() -> Truth:
         found = label(kept, camera)
         if check:
@@ -131,6 +148,7 @@ def observe(
         image_size=camera.image, camera=camera, scene=motion.scene, px_per_m=px_per_m_at_centre(camera),
         has_images=left, has_right=right, has_detections=True, load_people=named, source=source, bare=bare,
         load_background=None if renderer is None else background, load_pixels=None if renderer is None else pixels,
+        load_light=light,
     )  # fmt: skip
 
 

@@ -386,8 +386,8 @@ class Sequence:
     what the frames hold. image_size: (width, height) px, camera, scene: None if unknown. px_per_m: nan if unknown.
     Fields that load are functions, or None if there is nothing to load: load_truth() gives the Truth; load_background()
     pictures (K, H, W, 3) of a scene to train a background model; load_people() the person ids of each group that the
-    script names; load_pixels(index) the PixelTruth of frame `index`. source: where it comes from ("kind", "path",
-    "seed", …)."""
+    script names; load_pixels(index) the PixelTruth of frame `index`; load_light() the factor of brightness of each
+    frame, (length,), without clouds. source: where it comes from ("kind", "path", "seed", …)."""
 
     name: str
     fps: float
@@ -406,6 +406,7 @@ class Sequence:
     source: dict[str, Any] = field(default_factory=dict)
     bare: Callable[[], Iterator[Frame]] | None = None
     load_pixels: Callable[[int], PixelTruth] | None = None
+    load_light: Callable[[], Array] | None = None
 
     def __iter__(self) -> Iterator[Frame]:
         return self.frames()

@@ -14,7 +14,7 @@ correlation over all draws is exp(-r² / 2 length²) at distance r; likewise ove
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -142,6 +142,12 @@ def draw_illumination(light: Light, seed: int, repeat: int = 0) -> Illumination:
             raise _impossible(f"light.switch[{k}].gain", gain, "above 0")
         switches.append((at, at + switch.ramp, gain))
     return Illumination(sun, light.shadow, light.penumbra, drift, clouds, light.flicker, tuple(switches), seed, repeat)
+
+
+def brightness(light: Light, seed: int, repeat: int, fps: float, length: int) -> Array:
+    """Returns the factor of brightness of the frames 1 … length, (length,), clouds and flicker left out."""
+    steady = replace(draw_illumination(light, seed, repeat), flicker=0.0)
+    return np.array([steady.gain(k / fps, 0) for k in range(length)])
 
 
 def _impossible(place: str, got: float, expected: str) -> InputError:

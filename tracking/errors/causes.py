@@ -5,6 +5,7 @@ A cause is a fact of the truth, not a proof. The first that holds is named:
     edge        the person is cut by the edge of the picture
     hidden      most of the body is hidden, for most of the gap
     undetected  the detector has no detection of the person, for most of the gap
+    light       the brightness changes by more than a fifth within a second of the error's start (input from pixels)
     near        another person is nearer than 0.8 m
     turned      the person's direction turns by more than 60 degrees within a second
     left        a ghost of somebody who is gone
@@ -34,6 +35,7 @@ CONFIRMED = 0.5  # s: trackers wait so long before they report somebody
 AROUND = 1.0  # s before a switch in which causes are looked for
 DISPLACED, DOUBLE = 2.0, 1.0  # m
 APART, BESIDE = 2.0, 1.5  # m between nearest people
+LIGHT = 1.2  # ratio of the greatest to the least brightness
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ class Facts:
     truncation: Array | None  # (R,)
     box: Array | None  # (R, 4), px
     detected: Bools | None  # (R,): the detector has a detection of the person; None: not known
+    light: Array | None  # (length,): factor of brightness of each frame; None: not known, or not from pixels
     fps: float
 
     def rows(self, frame: int) -> Ints:
@@ -64,13 +67,23 @@ class Facts:
         low, high = np.searchsorted(self.frame, (frame, frame + 1))
         return np.arange(low, high)
 
+    def change_of_light(self, frame: int) -> Cause | None:
+        """Returns the change of brightness in the second before and after a frame as a cause, None if it is small."""
+        if self.light is None:
+            return None
+        near = self.light[max(frame - 1 - round(self.fps), 0) : frame + round(self.fps)]
+        ratio = float(near.max() / near.min())
+        return Cause("light", f"brightness changes by {ratio - 1:.0%}") if ratio > LIGHT else None
+
     def row(self, frame: int, id: int) -> int:
         """Returns the row of a person in a frame, -1 if not there."""
         found = self.rows(frame)[self.id[self.rows(frame)] == id]
         return int(found[0]) if len(found) else NOBODY
 
 
-def facts(truth: Truth, kept: Bools, pos: Array, metre: float, detected: Bools | None) -> Facts:
+def facts(
+    truth: Truth, kept: Bools, pos: Array, metre: float, detected: Bools | None, light: Array | None = None
+) -> Facts:
     """Returns the facts of the rows `kept` of a truth; pos (R, 2): where they are compared."""
 
     def of(values: Array | None) -> Array | None:
@@ -78,7 +91,7 @@ def facts(truth: Truth, kept: Bools, pos: Array, metre: float, detected: Bools |
 
     return Facts(
         truth.frame[kept], truth.id[kept], pos, metre, of(truth.vel), truth.visibility[kept], of(truth.truncation),
-        of(truth.box), detected, truth.fps,
+        of(truth.box), detected, light, truth.fps,
     )  # fmt: skip
 
 
@@ -95,6 +108,8 @@ def cause_of_person(error: PersonError, of: Facts) -> Cause:
             return Cause("hidden", f"hidden for {hidden.sum() / of.fps:.1f} s{_hidden_by(gap[hidden], of)}")
         if of.detected is not None and 2 * (unseen := ~of.detected[gap]).sum() >= len(gap):
             return Cause("undetected", f"not detected for {unseen.sum() / of.fps:.1f} s")
+    if (light := of.change_of_light(error.start)) is not None:
+        return light
     if error.kind == "late" and frames < CONFIRMED:
         return Cause("tracker")
     around = _around(error, of)
@@ -164,6 +179,8 @@ def cause_of_ghost(error: PersonError, matched: MatchedPeople, place: Array, of:
     owner = _owner(error, matched, of)
     if owner is not None and of.row(error.start, owner) == NOBODY:
         return Cause("left", f"person {owner} is gone")
+    if (light := of.change_of_light(error.start)) is not None:
+        return light
     if not nearest:
         return Cause("clutter")
     distance, who, free = sorted(nearest)[len(nearest) // 2]
@@ -186,7 +203,7 @@ def cause_of_group(error: GroupError, of: Facts) -> Cause:
     frame = (error.start + error.end) // 2
     rows = np.array([row for id in error.people if (row := of.row(frame, id)) != NOBODY], np.int64)
     if len(rows) < 2:
-        return Cause("tracker")
+        return of.change_of_light(error.start) or Cause("tracker")
     gaps = np.hypot(*(of.pos[rows][:, None] - of.pos[rows][None]).transpose(2, 0, 1)) / of.metre
     np.fill_diagonal(gaps, np.inf)
     if error.group is not None and gaps.min(axis=1).max() > APART:
@@ -196,6 +213,6 @@ def cause_of_group(error: GroupError, of: Facts) -> Cause:
         d = np.hypot(*(of.pos[rows][:, None] - of.pos[others][None]).transpose(2, 0, 1)).min() / of.metre
         if d < BESIDE:
             return Cause("beside", f"{d:.1f} m from others")
-    if error.group is None and gaps.min() < BESIDE:
+    if error.false and gaps.min() < BESIDE:
         return Cause("beside", f"{gaps.min():.1f} m apart")
-    return Cause("tracker")
+    return of.change_of_light(error.start) or Cause("tracker")

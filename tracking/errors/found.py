@@ -1,31 +1,33 @@
 """All errors of one run of one sequence, with cause and cost; where the score is lost, by cause.
 
 The *cost* of an error is what its repair alone adds to a score (HOTA for errors of people, group_F1 for those of
-groups). By cause, repairs are made one after the other, the one that adds most first, so that their gains and what is
-left (errors of position) add up to all that the run lacks.
+groups). By cause, repairs are made one after the other, first the part whose repair alone adds most, so that the gains
+and what is left (errors of position) add up to all that the run lacks. A tracker of whole groups has errors of groups
+only, and HOTA and IDF1 are unknown.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Array, Bools, Ints, Sequence, Tracks
+from sim.types import Array, Bools, Sequence, Tracks
 from tracking.comparison import scorer_of
 from tracking.errors.causes import Cause, Facts, cause_of_ghost, cause_of_group, cause_of_person, facts
-from tracking.errors.groups import GroupError, group_errors
+from tracking.errors.groups import LINEAGE, GroupError, Memberships, group_errors, wrong_lineages
 from tracking.errors.people import PersonError, matched_people, person_errors
-from tracking.errors.repairs import ComparedRun, scores
+from tracking.errors.repairs import ComparedPeople, ComparedRun, scores
 from tracking.oracle import oracle
 from tracking.running.run import TrackingRun
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.evaluation import MatchedSides
+from tracking.scoring.group_and_event_scores import TrackedGroups, compared_events, tracked_groups
 from tracking.scoring.people_and_groups import Surface
-from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.people_comparison import Similarity, from_pixels
 from tracking.scoring.position_errors import REACH
 from tracking.scoring.rows import FrameRows, find_rows
 
@@ -36,7 +38,7 @@ class FoundError:
 
     error: PersonError | GroupError
     cause: Cause
-    cost: float | None  # what its repair alone adds: HOTA, or group_F1 of errors of groups; None: not asked for
+    cost: float | None  # what its repair alone adds: HOTA, or group_F1 of errors of groups; None: lineage, or not asked
 
     @property
     def who(self) -> str:
@@ -44,7 +46,7 @@ class FoundError:
         error = self.error
         if isinstance(error, GroupError):
             others = f" with {' '.join(map(str, error.others))}" if error.others else ""
-            return f"people {' '.join(map(str, error.people))}{others}"
+            return f"people {' '.join(map(str, error.people))}{others}" if error.people else "nobody"
         if error.person is None:
             return f"track {error.after}"
         ids = " → ".join(str(id) for id in dict.fromkeys((error.before, error.after)) if id is not None)
@@ -85,54 +87,65 @@ class RunErrors:
 
     errors: list[FoundError]
     scores: dict[str, float]
-    causes: list[CauseRow] = field(default_factory=list)
-    left: dict[str, float] = field(default_factory=dict)  # what is missing after all repairs
+    causes: list[CauseRow]
+    left: dict[str, float]  # what is missing after all repairs
 
 
 def errors_of_run(
     sequence: Sequence, run: TrackingRun, similarity: Similarity | None = None, costs: bool = True
 ) -> RunErrors:
-    """Returns the errors of a run, with the detections of the input that it names.
-
-    Raises InputError as `find_errors`, and for a tracker of whole groups.
-    """
-    if any(t.unit == "group" for t in run):
-        raise InputError(
-            file=sequence.name, got="a tracker of whole groups", expected="tracks of people",
-            remedy="score it with `flockscope score`",
-        )  # fmt: skip
-    seen = oracle(sequence, run.info, similarity) if run.info.get("detections") is not None else None
-    return find_errors(sequence, run, seen, similarity, costs)
+    """Returns the errors of a run, with the detections of the input that it names; raises as `find_errors`."""
+    known = run.info.get("detections") is not None and not any(t.unit == "group" for t in run)
+    return find_errors(sequence, run, oracle(sequence, run.info, similarity) if known else None, similarity, costs)
 
 
 def find_errors(
     sequence: Sequence, tracks: SequenceOf[Tracks], seen: SequenceOf[Tracks] | None = None,
     similarity: Similarity | None = None, costs: bool = True,
 ) -> RunErrors:  # fmt: skip
-    """Returns the errors of a run of people; seen: tracks of true ids that show which people were detected.
+    """Returns the errors of a run; seen: tracks of true ids that show which people were detected.
 
-    Without costs, the costs and gains are not known, which is much quicker. Raises InputError without labels, or if
-    they and the tracks cannot be compared.
+    Without costs, those of single errors are None, which is much quicker. Raises InputError without labels, or if they
+    and the tracks cannot be compared.
     """
     given = [tracks] if seen is None else [tracks, seen]
     with scorer_of(sequence) as scorer:
         compared = scorer.compare(given, similarity, None)
-    run, of, place = _prepared(compared[0], None if seen is None else compared[1])
-    matched = run.matched
-    people = person_errors(matched)
-    groups = group_errors(run.memberships(), matched.pairs.true.id, compared[0].sides.truth.events or (), of.fps)
-    causes = [cause_of_ghost(e, matched, place, of) if e.person is None else cause_of_person(e, of) for e in people] + [
-        cause_of_group(e, of) for e in groups
-    ]
-    every: list[PersonError | GroupError] = [*people, *groups]
+    sides = compared[0].sides
+    tracked = tracked_groups(sides)
+    if not tracked.known:
+        raise InputError(
+            file=sequence.name, got="groups without members, and no scale of the image", expected="px_per_m",
+            remedy="state it with --px-per-m",
+        )  # fmt: skip
+    run, place = _compared_run(compared[0], tracked)
+    of = _facts(sequence, compared[0], None if seen is None else compared[1], from_pixels(tracks))
+    found = [FoundError(*one, None) for one in _with_causes(compared[0], tracked, run, place, of)]
     whole = scores(run)
-    worth = [_cost(run, error, whole) if costs else None for error in every]
-    found = [FoundError(*one) for one in zip(every, causes, worth, strict=True)]
+    if costs:
+        found = [FoundError(one.error, one.cause, _cost(run, one.error, whole)) for one in found]
     found.sort(key=lambda one: (one.error.start, one.error.end))
-    return RunErrors(found, whole, *(_by_cause(run, found, whole, of.fps) if costs else ([], {})))
+    return RunErrors(found, whole, *_by_cause(run, found, whole, of.fps))
 
 
-def _cost(run: ComparedRun, error: PersonError | GroupError, whole: dict[str, float]) -> float:
+def _with_causes(
+    compared: MatchedSides, tracked: TrackedGroups, run: ComparedRun, place: Array, of: Facts
+) -> list[tuple[PersonError | GroupError, Cause]]:
+    events, found = compared.sides.truth.events, list[tuple[PersonError | GroupError, Cause]]()
+    if run.people is not None:
+        matched = run.people.matched
+        for error in person_errors(matched):
+            ghost = error.person is None
+            found.append((error, cause_of_ghost(error, matched, place, of) if ghost else cause_of_person(error, of)))
+    groups = group_errors(run.groups, events or (), of.fps)
+    if events is not None and compared.groups is not None:
+        groups += wrong_lineages(compared_events(compared.sides, tracked))
+    return [*found, *((error, cause_of_group(error, of)) for error in groups)]
+
+
+def _cost(run: ComparedRun, error: PersonError | GroupError, whole: dict[str, float]) -> float | None:
+    if error.kind == LINEAGE:
+        return None
     key = "group_F1" if isinstance(error, GroupError) else "HOTA"
     return scores(run, [error], [key])[key] - whole[key]
 
@@ -140,30 +153,34 @@ def _cost(run: ComparedRun, error: PersonError | GroupError, whole: dict[str, fl
 def _by_cause(
     run: ComparedRun, found: list[FoundError], whole: dict[str, float], fps: float
 ) -> tuple[list[CauseRow], dict[str, float]]:
-    parts: dict[tuple[str, str], list[FoundError]] = {}
+    parts: dict[tuple[str, str], list[PersonError | GroupError]] = {}
     for one in found:
-        parts.setdefault((one.error.kind, one.cause.name), []).append(one)
-    order = sorted(parts, key=lambda key: -sum(one.cost or 0.0 for one in parts[key]))
-    rows, repaired, last = [], [], whole
-    for key in order:
-        repaired += [one.error for one in parts[key]]
-        now = scores(run, repaired)
-        frames = sum(one.error.end - one.error.start + 1 for one in parts[key])
+        parts.setdefault((one.error.kind, one.cause.name), []).append(one.error)
+    alone = {key: scores(run, errors) for key, errors in parts.items()}
+    rows, repaired, last = list[CauseRow](), list[PersonError | GroupError](), whole
+    for key in sorted(parts, key=lambda key: -np.nansum([alone[key]["HOTA"], alone[key]["group_F1"]])):
+        repaired += parts[key]
+        now = scores(run, repaired) if rows else alone[key]
+        frames = sum(error.end - error.start + 1 for error in parts[key])
         rows.append(CauseRow(*key, len(parts[key]), frames / fps, {k: now[k] - last[k] for k in now}))
         last = now
     return rows, {k: 1 - value for k, value in last.items()}
 
 
-def _prepared(compared: MatchedSides, seen: MatchedSides | None) -> tuple[ComparedRun, Facts, Array]:
-    """Returns the run as it is repaired, the facts of the truth, and the positions of tracked people (S, 2)."""
-    sides, pairs = compared.sides, compared.people
-    assert pairs is not None, "a tracker of whole groups reports no people"
-    boxes = compared.similarity == "boxes"
-    surface: Surface = "ground" if compared.similarity == "ground" else "image"
-    true_pos, pos = sides.true.positions_on(surface, "ground"), sides.est.positions_on(surface, sides.plane)
-    assert true_pos is not None
-    assert pos is not None
-    metre = 1.0 if surface == "ground" else sides.truth.px_per_m
+def _compared_run(compared: MatchedSides, tracked: TrackedGroups) -> tuple[ComparedRun, Array]:
+    """Returns the run as it is repaired, and the positions of tracked rows (S, 2)."""
+    sides = compared.sides
+    person = sides.mapping if tracked.named else np.arange(len(sides.true.rows))
+    true = (
+        tracked.counted.keep(np.zeros(len(tracked.counted), bool))
+        if compared.groups is None
+        else compared.groups.groups
+    )
+    groups = Memberships(true, tracked.counted, sides.true.rows, person, tracked.named)
+    true_pos, pos = _positions(compared)
+    if compared.people is None:
+        return ComparedRun(groups, None), pos
+    pairs, boxes = compared.people, compared.similarity == "boxes"
     true_place, place = (sides.true.box, sides.est.box) if boxes else (true_pos, pos)
     assert true_place is not None
     assert place is not None
@@ -172,25 +189,34 @@ def _prepared(compared: MatchedSides, seen: MatchedSides | None) -> tuple[Compar
         assert true_place is not None
         if boxes:
             return box_pairs(pairs.true, rows, true_place, places)
-        return point_pairs(pairs.true, rows, true_place, places, REACH * metre)
+        return point_pairs(pairs.true, rows, true_place, places, REACH * _metre(compared))
 
-    run = ComparedRun(
-        matched_people(pairs), true_place, place, sides.true.group, _groups(sides.tracks, sides.est.rows),
-        sides.mapping, sides.frames, compare,
-    )  # fmt: skip
-    detected: Bools | None = None
-    if seen is not None:
-        detected = find_rows(seen.sides.est.rows, sides.true.rows) >= 0
+    return ComparedRun(groups, ComparedPeople(matched_people(pairs), true_place, place, compare)), pos
+
+
+def _positions(compared: MatchedSides) -> tuple[Array, Array]:
+    """Returns the positions of true (R, 2) and tracked rows (S, 2) where they are compared."""
+    sides, surface = compared.sides, _surface(compared)
+    true, est = sides.true.positions_on(surface, "ground"), sides.est.positions_on(surface, sides.plane)
+    assert true is not None
+    assert est is not None
+    return true, est
+
+
+def _surface(compared: MatchedSides) -> Surface:
+    if compared.people is None:
+        return compared.sides.surface
+    return "ground" if compared.similarity == "ground" else "image"
+
+
+def _metre(compared: MatchedSides) -> float:
+    return 1.0 if _surface(compared) == "ground" else compared.sides.truth.px_per_m
+
+
+def _facts(sequence: Sequence, compared: MatchedSides, seen: MatchedSides | None, pixels: bool) -> Facts:
+    """Returns what is known of the true people and of the light."""
+    sides = compared.sides
+    detected: Bools | None = None if seen is None else find_rows(seen.sides.est.rows, sides.true.rows) >= 0
+    light = sequence.load_light() if pixels and sequence.load_light is not None else None
     kept = sides.inside[sides.truth.frame]
-    return run, facts(sides.truth, kept, true_pos, metre, detected), pos
-
-
-def _groups(tracks: SequenceOf[Tracks], rows: FrameRows) -> Ints:
-    """Returns the group of each tracked row, (S,), by the members that groups name."""
-    group = np.full(len(rows), -1, np.int64)
-    for t in tracks:
-        named = t.groups is not None and len(t.groups.members) > 0
-        for id, members in zip(t.groups.id, t.groups.members, strict=True) if t.groups is not None and named else ():
-            where = find_rows(rows, FrameRows(np.full(len(members), t.index), np.asarray(members)))
-            group[where[where >= 0]] = id
-    return group
+    return facts(sides.truth, kept, _positions(compared)[0], _metre(compared), detected, light)

@@ -1,7 +1,8 @@
-"""Errors of groups: which true groups are not found, from when to when and how; and groups of strangers.
+"""Errors of groups: which true groups are not found, from when to when and how; false groups; wrong lineages.
 
-A true group is found in a frame if an estimated group has more than half of the people of both (group_F1). A group
-that is not found is in one of these states; a stretch of frames in one state is an error:
+A true group is found in a frame if an estimated group has more than half of the people of both (group_F1). A tracker of
+whole groups names no people: in its groups are the true people inside the hull or at most 0.3 m from it, as in the
+scores. A true group is in one of these states; a stretch of frames in one state is an error:
 
     unseen            too few members are tracked: errors of people, not of the group
     missed group      its tracked members are in no group
@@ -9,187 +10,260 @@ that is not found is in one of these states; a stretch of frames in one state is
     engulfed group    most of it is in one group with most of another true group
     strangers joined  most of it is in one group with too many others
 
-A stretch that begins with a true merge is a *late merge*, or a *missed merge* if the group is not found before it ends;
-one that begins with a true split likewise. A missed group that begins with the group itself and is found later is a
-*late group*. A *false group* has no true group in part or whole.
+A group that is found is divided, too, if members outside are most of another estimated group. A stretch that begins
+with a true merge is a *late merge*, or a *missed merge* if the group is not found before it ends; one that begins with
+a true split likewise. A missed group that begins with the group itself and is found later is a *late group*. A *false
+group* finds no true group, and has nobody of a group that is not found.
+
+A *wrong lineage* is a merge or split that was reported (tracking.scoring.events: same kind, start and people), with
+other groups before or after than the true event has, as in lineage_accuracy. It lasts from the event to the report.
 """
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from sim.types import Bools, GroupEvent, Ints
+from sim.types import GroupEvent, Ints
+from tracking.scoring.events import HEADLINE, MatchedEvents, same_lineage
+from tracking.scoring.group_scores import SharedMembers, f1, group_of_person, groups_found, shared_members
+from tracking.scoring.people_and_groups import GroupRows
+from tracking.scoring.rows import FrameRows
 
 AT_THE_EVENT = 1.0  # s: a stretch that begins so soon after an event belongs to it
 JOINS, PARTS = ("merge", "form"), ("split", "dissolve")
-ALONE = -1
+FOUND, UNSEEN = "found", "unseen"
 MISSED, DIVIDED, ENGULFED, STRANGERS = "missed group", "divided group", "engulfed group", "strangers joined"
+FALSE, LINEAGE = "false group", "wrong lineage"
 
 
 @dataclass(frozen=True)
 class GroupError:
-    """One error of a true group, or a false group."""
+    """One error of a true group, a false group, or a wrong lineage."""
 
     kind: str
     start: int  # first frame
     end: int  # last frame
-    group: int | None  # id of the true group, None for a false one
-    people: tuple[int, ...]  # ids of its people; of a false group, of the true people in it
-    others: tuple[int, ...]  # ids of further true people in the estimated groups
-    rows: tuple[int, ...]  # tracked rows that belong together; () for a false group
-    alone: tuple[int, ...]  # tracked rows in the estimated groups that belong to no group
+    group: int | None  # id of the true group, None for a false one and a lineage
+    people: tuple[int, ...]  # ids of its people; of a false group, of the true people in it; of an event, its members
+    others: tuple[int, ...] = ()  # ids of further true people in the estimated groups
+    rows: tuple[int, ...] = ()  # tracked rows that belong together
+    alone: tuple[int, ...] = ()  # memberships, of the same estimated groups, of people who belong to no group there
+    false: tuple[int, ...] = ()  # rows of estimated groups that should not be there
 
 
 @dataclass(frozen=True, eq=False)
 class Memberships:
-    """Who is in which group in the labelled frames, on both sides; groups of one person count as none."""
+    """Who is in which group in the labelled frames, on both sides, as the scores of groups count them.
 
-    true: dict[int, dict[int, list[int]]]  # by frame, the true rows of each true group
-    est: dict[int, dict[int, list[int]]]  # by frame, the tracked rows of each estimated group
-    track: Ints  # (R,) tracked row of each true row, -1 none
+    The R rows of true and S rows of tracked people are those of all scored frames. Where the tracker names no members,
+    the true people stand for the tracked ones.
+    """
+
+    true: GroupRows  # G groups, members are rows of true people
+    est: GroupRows  # H groups, members are rows of tracked people; memberships are sorted by group
+    people: FrameRows  # the R true people
     person: Ints  # (S,) true row of each tracked row, -1 none
+    named: bool  # False if the tracker names no members
 
-    @property
-    def frames(self) -> list[int]:
-        """Labelled frames with a group on either side."""
-        return sorted({*self.true, *self.est})
+    def persons(self, member: Ints) -> Ints:
+        """Returns the true rows of tracked rows, -1 none."""
+        return np.append(self.person, -1)[member]
+
+    @cached_property
+    def track(self) -> Ints:
+        """The tracked row of each true row, (R,), -1 none."""
+        track = np.full(len(self.people), -1, np.int64)
+        track[self.person[self.person >= 0]] = np.flatnonzero(self.person >= 0)
+        return track
+
+    @cached_property
+    def true_group(self) -> Ints:
+        """The row of the true group of each true row, -1 for none and as last element, (R + 1,)."""
+        return group_of_person(self.true, len(self.people))
+
+    @cached_property
+    def shared(self) -> SharedMembers:
+        """The numbers of common people."""
+        return shared_members(self.true, self.est, self.persons(self.est.member), len(self.people))
+
+    @cached_property
+    def parts(self) -> list[dict[int, int]]:
+        """For each true group, the estimated groups with some of its people, and how many."""
+        parts: list[dict[int, int]] = [{} for _ in range(len(self.true))]
+        for key, count in zip(self.shared.key.tolist(), self.shared.count.tolist(), strict=True):
+            i, j = divmod(key, self.shared.width)
+            parts[i][j] = count
+        return parts
+
+    @cached_property
+    def found(self) -> dict[int, int]:
+        """The rows of true groups that are found, each with the most similar estimated group."""
+        n, m = self.true.count.tolist(), self.est.count.tolist()
+        return {
+            i: max(self.parts[i].items(), key=lambda part: part[1] / (n[i] + m[part[0]] - part[1]))[0]
+            for i in np.flatnonzero(groups_found(self.true, self.est, self.shared)).tolist()
+        }
+
+    @cached_property
+    def finders(self) -> set[int]:
+        """The rows of estimated groups that find a true one."""
+        return set(self.found.values())
+
+    @cached_property
+    def true_members(self) -> list[list[int]]:
+        """The true rows of the people of each true group."""
+        return _split(self.true.of, self.true.member, len(self.true))
+
+    @cached_property
+    def members(self) -> list[list[int]]:
+        """The tracked rows of the members of each estimated group, -1 for one who is not among the people."""
+        return _split(self.est.of, self.est.member, len(self.est))
+
+    @cached_property
+    def states(self) -> list[str]:
+        """The state of each true group, (G,)."""
+        return [self._state(i) for i in range(len(self.true))]
+
+    def _state(self, i: int) -> str:
+        n = len(self.true_members[i])
+        if i in self.found:
+            return DIVIDED if self._has_part_outside(i) else FOUND
+        if 2 * sum(self.track[row] >= 0 for row in self.true_members[i] if row >= 0) <= n:
+            return UNSEEN
+        j, common = max(self.parts[i].items(), key=lambda part: part[1], default=(-1, 0))
+        if not common:
+            return MISSED
+        if 2 * common <= n:
+            return DIVIDED
+        whole = (2 * self.parts[h].get(j, 0) > len(self.true_members[h]) for h in self._groups_in(j) if h != i)
+        return ENGULFED if any(whole) else STRANGERS
+
+    def _has_part_outside(self, i: int) -> bool:
+        """Returns True if members of a found group that are not in the one that finds it are most of another group."""
+        if len(self.parts[i]) < 2:
+            return False
+        est = self.members
+        outside = {int(self.track[row]) for row in self.true_members[i] if row >= 0} - {*est[self.found[i]], -1}
+        return any(2 * len(outside.intersection(est[j])) > len(est[j]) for j in self.parts[i] if j not in self.finders)
+
+    def _groups_in(self, j: int) -> set[int]:
+        """Returns the rows of true groups with people in an estimated group."""
+        return set(self.true_group[self.persons(np.array(self.members[j], np.int64))].tolist()) - {-1}
+
+    def astray(self, j: int) -> list[int]:
+        """Returns an estimated group's memberships of people in no true group, or in one that is found elsewhere."""
+        first, after = np.searchsorted(self.est.of, (j, j + 1)).tolist()
+        groups = self.true_group[self.persons(self.est.member[first:after])].tolist()
+        return [k for k, i in enumerate(groups, first) if i < 0 or self.found.get(i, j) != j]
 
 
-def memberships(
-    true: tuple[Ints, Ints], est: tuple[Ints, Ints], track: Ints, person: Ints, labelled: Bools
-) -> Memberships:
-    """Returns the memberships; true, est: frame and group of each row, group -1 alone; labelled by frame number."""
-    return Memberships(_by_frame(*true, labelled), _by_frame(*est, labelled), track, person)
+def _split(of: Ints, member: Ints, count: int) -> list[list[int]]:
+    lists: list[list[int]] = [[] for _ in range(count)]
+    for group, row in zip(of.tolist(), member.tolist(), strict=True):
+        lists[group].append(row)
+    return lists
 
 
-def _by_frame(frame: Ints, group: Ints, labelled: Bools) -> dict[int, dict[int, list[int]]]:
-    found: dict[int, dict[int, list[int]]] = {}
-    rows = np.flatnonzero((group != ALONE) & labelled[frame])
-    for row, f, g in zip(rows.tolist(), frame[rows].tolist(), group[rows].tolist(), strict=True):
-        found.setdefault(f, {}).setdefault(g, []).append(row)
-    several = {f: {g: rows for g, rows in groups.items() if len(rows) > 1} for f, groups in found.items()}
-    return {f: groups for f, groups in several.items() if groups}
-
-
-def group_f1(of: Memberships) -> float:
+def group_f1(true: GroupRows, est: GroupRows, shared: SharedMembers) -> float:
     """Returns 2 found / (true + estimated groups), nan without groups."""
-    count = sum(len(groups) for side in (of.true, of.est) for groups in side.values())
-    found = sum(state == "found" for frame in of.frames for _, state in states(of, frame))
-    return 2 * found / count if count else float("nan")
+    return f1(int(groups_found(true, est, shared).sum()), len(true), len(est))
 
 
-def states(of: Memberships, frame: int) -> Iterator[tuple[int, str]]:
-    """Yields each true group of a frame with its state."""
-    true, est = of.true.get(frame, {}), of.est.get(frame, {})
-    home = {row: e for e, rows in est.items() for row in rows}
-    inside = {g: Counter(home[j] for j in of.track[rows].tolist() if j in home) for g, rows in true.items()}
-    for g, rows in true.items():
-        seen = int((of.track[rows] >= 0).sum())
-        e, common = max(inside[g].items(), key=lambda item: item[1], default=(ALONE, 0))
-        if 3 * common > len(rows) + len(est.get(e, ())):
-            yield g, "found"
-        elif 2 * seen <= len(rows):
-            yield g, "unseen"
-        elif not common:
-            yield g, MISSED
-        elif 2 * common <= len(rows):
-            yield g, DIVIDED
-        else:
-            most = (h for h, counts in inside.items() if h != g and 2 * counts[e] > len(true[h]))
-            yield g, STRANGERS if next(most, None) is None else ENGULFED
-
-
-def group_errors(of: Memberships, ids: Ints, events: Sequence[GroupEvent], fps: float) -> list[GroupError]:
-    """Returns all errors of groups, by start; ids (R,): id of each true row; events: of the truth."""
-    found = [*_errors_of_groups(of, ids), *_false_groups(of, ids)]
+def group_errors(of: Memberships, events: Sequence[GroupEvent], fps: float) -> list[GroupError]:
+    """Returns all errors of groups in frames, by start; events: of the truth."""
+    found = [*_errors_of_groups(of), *_false_groups(of)]
     named = [_named(error, of, events, AT_THE_EVENT * fps) for error in found]
     return sorted(named, key=lambda error: (error.start, error.end, error.kind))
 
 
-def _errors_of_groups(of: Memberships, ids: Ints) -> Iterator[GroupError]:
-    by_group: dict[int, list[tuple[int, str]]] = {}
-    for frame in of.frames:
-        for g, state in states(of, frame):
-            by_group.setdefault(g, []).append((frame, state))
-    for g, over_time in by_group.items():
-        for kind, frames in _stretches(over_time):
-            if kind in ("found", "unseen"):
-                continue
-            members = [row for frame in frames for row in of.true[frame][g]]
-            rows = [j for j in of.track[members].tolist() if j >= 0]
-            others, alone = _others(of, frames, set(rows))
-            people = _ids(of, rows, ids)
-            beside = tuple(id for id in _ids(of, others, ids) if id not in people)
-            yield GroupError(kind, frames[0], frames[-1], g, people, beside, tuple(rows), tuple(alone))
+def wrong_lineages(matched: Iterable[MatchedEvents]) -> list[GroupError]:
+    """Returns the matched merges and splits whose lineage is known and wrong, by start."""
+    pairs = [pair for one in matched if one.kind in HEADLINE for pair in one.pairs]
+    return [
+        GroupError(LINEAGE, a.start, max(a.start, b.emitted or a.start), None, tuple(sorted(a.members.people)))
+        for a, b in sorted(pairs, key=lambda pair: pair[0].start)
+        if a.members is not None and a.has_lineage and not same_lineage(a, b)
+    ]
 
 
-def _ids(of: Memberships, rows: Iterable[int], ids: Ints) -> tuple[int, ...]:
+def _errors_of_groups(of: Memberships) -> Iterator[GroupError]:
+    for id, kind, stretch in _stretches(of.true.rows, list(enumerate(of.states))):
+        if kind in (FOUND, UNSEEN):
+            continue
+        rows = [int(of.track[row]) for i in stretch for row in of.true_members[i] if row >= 0 and of.track[row] >= 0]
+        parts = [j for i in stretch for j in of.parts[i]]
+        people = _ids(of, rows)
+        others = tuple(id for id in _ids(of, (row for j in parts for row in of.members[j])) if id not in people)
+        alone = tuple(k for j in parts for k in of.astray(j))
+        yield GroupError(kind, *_span(of.true.rows, stretch), id, people, others, tuple(rows), alone)
+
+
+def _false_groups(of: Memberships) -> Iterator[GroupError]:
+    explained = set(of.finders)
+    for i, state in enumerate(of.states):
+        explained |= set() if state == FOUND else set(of.parts[i])
+    false = [(j, FALSE) for j in range(len(of.est)) if j not in explained]
+    for _, kind, stretch in _stretches(of.est.rows, false):
+        people = _ids(of, (row for j in stretch for row in of.members[j]))
+        yield GroupError(kind, *_span(of.est.rows, stretch), None, people, false=tuple(stretch))
+
+
+def _ids(of: Memberships, rows: Iterable[int]) -> tuple[int, ...]:
     """Returns the ids of the true people of some tracked rows."""
-    return tuple(sorted({int(ids[of.person[j]]) for j in rows if of.person[j] >= 0}))
+    return tuple(sorted({int(of.people.id[of.person[row]]) for row in rows if row >= 0 and of.person[row] >= 0}))
 
 
-def _stretches(over_time: list[tuple[int, str]]) -> Iterator[tuple[str, list[int]]]:
-    frames: list[int] = []
-    for k, (frame, state) in enumerate(over_time):
-        frames.append(frame)
-        if k + 1 == len(over_time) or over_time[k + 1] != (frame + 1, state):
-            yield state, frames
-            frames = []
+def _span(rows: FrameRows, stretch: list[int]) -> tuple[int, int]:
+    return int(rows.frame[stretch[0]]), int(rows.frame[stretch[-1]])
 
 
-def _others(of: Memberships, frames: list[int], mine: set[int]) -> tuple[list[int], list[int]]:
-    """Returns the tracked rows of others in estimated groups with some of `mine`; and those that belong to no group."""
-    others, alone = [], []
-    for frame in frames:
-        grouped = _grouped(of, frame)
-        for rows in of.est.get(frame, {}).values():
-            if mine.intersection(rows):
-                others += [j for j in rows if j not in mine]
-                alone += [j for j in rows if j not in grouped]
-    return others, alone
-
-
-def _grouped(of: Memberships, frame: int) -> set[int]:
-    """Returns the tracked rows of a frame whose people are in a true group."""
-    return {j for rows in of.true.get(frame, {}).values() for j in of.track[rows].tolist()}
-
-
-def _false_groups(of: Memberships, ids: Ints) -> Iterator[GroupError]:
-    over_time: dict[int, list[tuple[int, str]]] = {}
-    for frame, groups in of.est.items():
-        grouped = _grouped(of, frame)
-        for e, rows in groups.items():
-            if not grouped.intersection(rows):
-                over_time.setdefault(e, []).append((frame, "false group"))
-    for e, frames_of in over_time.items():
-        for kind, frames in _stretches(frames_of):
-            rows = [j for frame in frames for j in of.est[frame][e]]
-            yield GroupError(kind, frames[0], frames[-1], None, _ids(of, rows, ids), (), (), tuple(rows))
+def _stretches(rows: FrameRows, states: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str, list[int]]]:
+    """Yields id, state and rows of each stretch of frames in which a group is in one state; states: by row."""
+    open_: dict[int, tuple[int, str, list[int]]] = {}
+    for row, state in states:
+        frame, id = int(rows.frame[row]), int(rows.id[row])
+        last = open_.get(id)
+        if last is None or (last[0] + 1, last[1]) != (frame, state):
+            if last is not None:
+                yield id, last[1], last[2]
+            last = frame, state, []
+        last[2].append(row)
+        open_[id] = frame, state, last[2]
+    for id, (_, state, stretch) in open_.items():
+        yield id, state, stretch
 
 
 def _named(error: GroupError, of: Memberships, events: Sequence[GroupEvent], reach: float) -> GroupError:
     """Returns the error with the name of the true event that it begins with, if there is one."""
-    if error.group is None:
-        return error
     for event in events:
-        ours = error.group in (*event.before, *event.after) or set(error.people) & set(event.members)
-        if not ours or not event.start - 1 <= error.start <= event.start + reach:
+        if not event.start - 1 <= error.start <= event.start + reach or not _concerns(event, error):
             continue
         if event.kind in JOINS and error.kind in (MISSED, DIVIDED):
             return replace(error, kind=f"{_when(error, of)} merge")
-        if event.kind in PARTS and error.kind in (ENGULFED, STRANGERS):
+        if event.kind in PARTS and error.kind in (ENGULFED, STRANGERS, FALSE):
             return replace(error, kind=f"{_when(error, of)} split")
-    first = min(frame for frame in of.true if error.group in of.true[frame])
+    if error.group is None:
+        return error
+    first = int(of.true.rows.frame[of.true.rows.id == error.group][0])
     late = error.kind == MISSED and error.start <= first + reach and _when(error, of) == "late"
     return replace(error, kind="late group") if late else error
 
 
+def _concerns(event: GroupEvent, error: GroupError) -> bool:
+    """Returns True if an event is about the true group, or about all people of the false one."""
+    if error.group is None:
+        return len(error.people) > 1 and set(error.people) <= set(event.members)
+    return error.group in (*event.before, *event.after) or bool(set(error.people) & set(event.members))
+
+
 def _when(error: GroupError, of: Memberships) -> str:
-    """Returns "late" if the group is found after the error, else "missed"."""
-    later = (frame for frame in of.frames if frame > error.end and error.group in of.true.get(frame, {}))
-    found = any(state == "found" for frame in later for g, state in states(of, frame) if g == error.group)
-    return "late" if found else "missed"
+    """Returns "late" if the group is found, or the false one gone, while its people are there; else "missed"."""
+    if error.group is None:
+        there = of.people.frame[np.isin(of.people.id, error.people)]
+        return "late" if there.max() > error.end else "missed"
+    later = np.flatnonzero((of.true.rows.id == error.group) & (of.true.rows.frame > error.end))
+    return "late" if any(of.states[i] == FOUND for i in later.tolist()) else "missed"

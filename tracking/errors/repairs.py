@@ -1,86 +1,74 @@
 """Repairs of errors: the stretch of an error is replaced by the truth, and the result is scored again.
 
 A gap of a person gets the true places, and a switch joins the tracks before and after it; a ghost goes; people of a
-wrong group get the true one. When all errors are repaired, only errors of position are left. Repaired tracks never take
-an id that is in use in the same frame, so that each of two people who swapped tracks is repaired alone.
+wrong group, or of a wrong hull, get the true one; a false group goes. When all errors are repaired, only errors of
+position are left. Repaired tracks never take an id that is in use in the same frame, so that each of two people who
+swapped tracks is repaired alone. A wrong lineage has no repair and no cost: none of these scores counts lineages.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.errors.groups import ALONE, GroupError, Memberships, group_f1, memberships, states
+from tracking.errors.groups import UNSEEN, GroupError, Memberships, group_f1
 from tracking.errors.people import NOBODY, MatchedPeople, PersonError
 from tracking.scoring.candidate_pairs import Pairs
 from tracking.scoring.evaluation import people_scores
+from tracking.scoring.group_scores import shared_members
+from tracking.scoring.people_and_groups import GroupRows, bare_groups
 from tracking.scoring.rows import FrameRows
 
 SHOWN = ("HOTA", "IDF1", "group_F1")
+NO_HULL = np.zeros((0, 2))
 
 
 @dataclass(frozen=True, eq=False)
-class ComparedRun:
-    """One run as it is compared with the truth: R true and S tracked people in frames, matched."""
+class ComparedPeople:
+    """R true and S tracked people in frames as they are compared."""
 
     matched: MatchedPeople
     true_place: Array  # (R, D): positions or boxes by which people are compared
     place: Array  # (S, D)
-    true_group: Ints  # (R,): group of each true row, -1 alone
-    group: Ints  # (S,): group of each tracked row, -1 alone
-    person: Ints  # (S,): true row that each tracked row stands for in groups, -1 none
-    labelled: Bools  # (length + 1,): frames with labelled groups
     pairs: Callable[[FrameRows, Array], Pairs]  # tracked rows and places: the candidate pairs with the truth
 
-    def memberships(self) -> Memberships:
-        """Returns who is in which group."""
-        true, est = self.matched.pairs.true, self.matched.pairs.est
-        sides = (true.frame, self.true_group), (est.frame, self.group)
-        return memberships(*sides, _inverse(self.person, len(true)), self.person, self.labelled)
 
-    @cached_property
-    def unseen(self) -> set[tuple[int, int]]:
-        """Frames and true groups of which too few members are tracked."""
-        of = self.memberships()
-        return {(frame, g) for frame in of.true for g, state in states(of, frame) if state == "unseen"}
+@dataclass(frozen=True, eq=False)
+class ComparedRun:
+    """One run as it is compared with the truth."""
 
-
-def _inverse(person: Ints, people: int) -> Ints:
-    track = np.full(people, NOBODY, np.int64)
-    track[person[person >= 0]] = np.flatnonzero(person >= 0)
-    return track
+    groups: Memberships
+    people: ComparedPeople | None  # None for a tracker of whole groups
 
 
 def scores(
     run: ComparedRun, errors: Collection[PersonError | GroupError] = (), keys: Collection[str] = SHOWN
 ) -> dict[str, float]:
-    """Returns HOTA, IDF1 and group_F1 of a run after the repair of some errors, or some of these scores."""
-    people = [error for error in errors if isinstance(error, PersonError)]
-    label, kept, new = _labels(run.matched, people)
-    group = run.group.copy()
-    for error in errors:
-        if isinstance(error, GroupError):
-            group[list(error.alone)] = ALONE
-            group[list(error.rows)] = ALONE if error.group is None else _fresh(run.group) + error.group
-    true, est = run.matched.pairs.true, run.matched.pairs.est
-    rows = np.array(list(new), np.int64)
+    """Returns HOTA, IDF1 and group_F1 of a run after the repair of some errors, or some of these; nan: unknown."""
+    found, added = dict.fromkeys(SHOWN, float("nan")), np.zeros(0, np.int64)
+    if run.people is not None:
+        label, kept, new = _labels(run.people.matched, [error for error in errors if isinstance(error, PersonError)])
+        added = np.array(list(new), np.int64)
+        if {"HOTA", "IDF1"} & set(keys):
+            found |= _scores_of_people(run.people, label, kept, new)
+    if "group_F1" in keys:
+        of_groups = [error for error in errors if isinstance(error, GroupError)]
+        ghosts = [row for e in errors if isinstance(e, PersonError) and e.person is None for row in e.rows]
+        changed = (added, ghosts) if run.groups.named else (added[:0], [])  # who is in a hull does not depend on tracks
+        found["group_F1"] = _repaired_f1(run.groups, of_groups, *changed)
+    return {key: found[key] for key in keys}
+
+
+def _scores_of_people(people: ComparedPeople, label: Ints, kept: Bools, new: dict[int, int]) -> dict[str, float]:
+    true, est, rows = people.matched.pairs.true, people.matched.pairs.est, np.array(list(new), np.int64)
     frame = np.concatenate([est.frame[kept], true.frame[rows]])
     order = np.argsort(frame, kind="stable")
     id = np.concatenate([label[kept], np.array(list(new.values()), np.int64)])[order]
-    place = np.concatenate([run.place[kept], run.true_place[rows]])[order]
-    found: dict[str, float] = {}
-    if {"HOTA", "IDF1"} & set(keys):
-        found = people_scores(run.pairs(FrameRows(frame[order], id), place))
-    if "group_F1" in keys:
-        added = _groups_of_added(run, group, rows)
-        person, groups = (np.concatenate([a[kept], b])[order] for a, b in ((run.person, rows), (group, added)))
-        sides = (true.frame, run.true_group), (frame[order], groups)
-        found["group_F1"] = group_f1(memberships(*sides, _inverse(person, len(true)), person, run.labelled))
-    return {key: found[key] for key in keys}
+    place = np.concatenate([people.place[kept], people.true_place[rows]])[order]
+    return people_scores(people.pairs(FrameRows(frame[order], id), place))
 
 
 def _fresh(values: Ints) -> int:
@@ -133,24 +121,57 @@ def _segments(matched: MatchedPeople, rows: Ints, errors: list[PersonError]) -> 
     return segments
 
 
-def _groups_of_added(run: ComparedRun, group: Ints, rows: Ints) -> Ints:
-    """Returns the group of added true people: that of most tracked mates.
+def _repaired_f1(of: Memberships, errors: Collection[GroupError], added: Ints, ghosts: Collection[int]) -> float:
+    """Returns group_F1 after repairs; added (A,): true rows of added people, ghosts: tracked rows that go."""
+    est = of.est
+    gone, alone = np.zeros(len(est), bool), np.zeros(len(est.of), bool)
+    loose = np.zeros(len(of.person) + 1, bool)  # the last: a member who is not among the people
+    loose[list(ghosts)] = True
+    together: dict[int, list[int]] = {}  # by true group, the rows that are one group
+    for error in errors:
+        gone[list(error.false)] = True
+        alone[list(error.alone)] = True
+        loose[list(error.rows)] = True
+        for row in error.rows:
+            together.setdefault(int(of.true_group[of.person[row]]), []).append(row)
+    joined = _join_added(of, added, loose, together)
+    kept = ~(gone[est.of] | loose[est.member] | alone)
+    new = [(len(est) + k, row) for k, rows in enumerate(together.values()) for row in rows]
+    home, member = np.array([*joined, *new], np.int64).reshape(-1, 2).T
+    home, member = np.append(est.of[kept], home), np.append(est.member[kept], member)
+    repaired = _groups_of(home, member, len(est) + len(together))
+    nobody_inside = np.append((est.count == 0) & ~gone, np.zeros(len(together), bool))
+    repaired = repaired.keep((repaired.count > 1) | nobody_inside)
+    person = np.concatenate([of.person, added, [NOBODY]])[repaired.member]
+    return group_f1(of.true, repaired, shared_members(of.true, repaired, person, len(of.people)))
 
-    Where too few mates were tracked for the group to be found, or these have no group, all of them get the true one.
+
+def _groups_of(home: Ints, member: Ints, count: int) -> GroupRows:
+    """Returns groups with these memberships, for counting: without frames, ids and places."""
+    none = np.zeros(count, np.int64)
+    return replace(bare_groups(FrameRows(none, none), np.zeros((count, 2)), (NO_HULL,) * count), of=home, member=member)
+
+
+def _join_added(of: Memberships, added: Ints, loose: Bools, together: dict[int, list[int]]) -> list[tuple[int, int]]:
+    """Returns the estimated group that each added person joins, as pairs of rows: that of most tracked mates.
+
+    Where too few mates were tracked for the group to be found, or these have no group, all of them get the true one:
+    `loose` and `together` are changed.
     """
-    true, found = run.matched.pairs.true, np.full(len(rows), ALONE, np.int64)
-    rows_of = _inverse(run.person, len(true))
-    for k, row in enumerate(rows.tolist()):
-        mine = int(run.true_group[row])
-        if mine == ALONE:
+    home = np.full(len(of.person) + 1, NOBODY, np.int64)
+    home[of.est.member] = of.est.of
+    joined = []
+    for k, row in enumerate(added.tolist(), len(of.person)):
+        i = int(of.true_group[row])
+        if i == NOBODY:
             continue
-        first, after = np.searchsorted(true.frame, (true.frame[row], true.frame[row] + 1))
-        mates = np.arange(first, after)[run.true_group[first:after] == mine]
-        tracked = rows_of[mates]
-        tracked = tracked[tracked != NOBODY]
-        labels, counts = np.unique(group[tracked][group[tracked] != ALONE], return_counts=True)
-        if len(labels) and (int(true.frame[row]), mine) not in run.unseen:
-            found[k] = labels[np.argmax(counts)]
-        else:
-            group[tracked] = found[k] = _fresh(run.group) + mine
-    return found
+        mates = [int(of.track[m]) for m in of.true_members[i] if m >= 0 and of.track[m] >= 0]
+        homes, counts = np.unique([home[j] for j in mates if home[j] >= 0 and not loose[j]], return_counts=True)
+        if i not in together and len(homes) and of.states[i] != UNSEEN:
+            joined.append((int(homes[np.argmax(counts)]), k))
+            continue
+        if i not in together:
+            loose[mates] = True
+            together[i] = mates
+        together[i].append(k)
+    return joined

@@ -26,7 +26,7 @@ from sim.io.store.camera_files import camera_document, read_camera, read_scene, 
 from sim.io.store.group_files import read_script
 from sim.io.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
 from sim.streams import check_streams
-from sim.types import BACKGROUNDS, OWN_BACKGROUND, Detections, Frame, Image, Sequence, Truth
+from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, Image, Sequence, Truth
 
 
 def write_sequence(
@@ -194,6 +194,7 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         },
         bare=bare if left or right else None,
         load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,
+        load_light=lambda: _light(folder, manifest),
     )  # fmt: skip
 
 
@@ -210,6 +211,16 @@ def _background(
     if "background" not in pictures.streams:
         return None, {}
     return (lambda: np.stack(list(pictures.all("background", BACKGROUNDS)))), {"background": OWN_BACKGROUND}
+
+
+def _light(folder: Path, manifest: dict[str, Any]) -> Array:
+    # Drawn again from the stored scenario; imported here, as few readers need it.
+    from scenarios.loading.toml_files import parse
+    from scenarios.schema.scenario import Light
+    from sim.render.weather import brightness
+
+    light, about = Light.model_validate(parse(folder / "scenario.toml")["light"]), manifest["sequence"]
+    return brightness(light, manifest["seed"], manifest["repeat"], about["fps"], about["length"])
 
 
 def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.types import Groups, Sequence, Tracks
+from sim.types import GroupEvent, Groups, Sequence, Tracks
 from tests.hand_made import Scene, event, tracks, truth
 from tracking.app.commands.view import _errors
 from tracking.errors.found import errors_of_run, find_errors
 from tracking.errors.groups import GroupError
 from tracking.running.run import TrackingRun
+from tracking.scoring.evaluation import evaluate
 
 FRAMES = 60
 SPEED = 0.12  # m per frame
@@ -216,14 +217,127 @@ def test_causes_of_a_ghost(where: tuple[float, float], cause: str) -> None:
     ("spoil", "words"),
     [
         (lambda t: t.replace(plane="image"), "place|positions"),
-        (lambda t: t.replace(unit="group"), "a tracker of whole groups"),
+        (lambda t: t.replace(plane="image", unit="group"), "no scale of the image"),
     ],
 )
 def test_what_cannot_be_compared_is_an_error_of_one_line(spoil, words: str) -> None:
     scenes = [scene(n) for n in range(FRAMES)]
     run = TrackingRun(tuple(spoil(t) for t in tracks(scenes)), {})
     with pytest.raises(InputError, match=words):
-        errors_of_run(Made(scenes).sequence(), run)
+        errors_of_run(Made(scenes).sequence(px_per_m=np.nan), run)
+
+
+def hulls(scenes: list[Scene], start: int, end: int, groups: dict[int, tuple[list[int], object]]) -> list[Tracks]:
+    """A tracker of whole groups that reports other groups in some frames."""
+    told = [Scene(s.people, groups) if start <= k <= end else s for k, s in enumerate(scenes, 1)]
+    return tracks(told, unit="group")
+
+
+@pytest.mark.parametrize("k", range(12, 42, 6))
+@pytest.mark.parametrize(
+    ("groups", "kinds"),
+    [
+        ({1: ([1, 2], None)}, ["missed group"]),
+        ({7: ([1, 2, 3, 4], None)}, ["engulfed group"] * 2),
+        ({1: ([1, 2], None), 2: ([3, 4], None), 7: ([], (90, 90, 92, 92))}, ["false group"]),
+        ({1: ([1, 2], None), 2: ([3, 4], None), 7: ([1, 2], None)}, ["false group"]),
+        ({2: ([3, 4], None), 7: ([1, 2, 5, 6], None)}, ["strangers joined"]),
+    ],
+    ids=["missed", "engulfed", "nobody", "double", "strangers"],
+)
+def test_errors_of_a_tracker_of_whole_groups(groups, kinds: list[str], k: int) -> None:
+    scenes = [Scene({**scene(n).people, 5: (SPEED * n, 2.0), 6: (SPEED * n, -1.5)}, scene(n).given) for n in range(60)]
+    run, sequence = hulls(scenes, k, k + 9, groups), Made(scenes).sequence()
+    found = find_errors(sequence, run)
+    assert [(one.error.kind, one.error.start, one.error.end) for one in found.errors] == [(x, k, k + 9) for x in kinds]
+    assert all(one.cost > 0 for one in found.errors)
+    assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
+    assert np.isnan([found.scores["HOTA"], found.left["IDF1"]]).all()
+    assert found.scores["group_F1"] == pytest.approx(evaluate(sequence.truth, run)["group_F1"])
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "groups", "kinds"),
+    [
+        (20, 29, {1: ([1, 2], None), 2: ([3, 4], None)}, ["late merge"]),
+        (40, 60, {3: ([1, 2, 3, 4], None)}, ["missed split", "missed split"]),
+    ],
+)
+def test_merges_and_splits_of_whole_groups(start: int, end: int, groups, kinds: list[str]) -> None:
+    far = [Scene({i: (x, 3 * y) for i, (x, y) in meeting(n).people.items()}, meeting(n).given) for n in range(FRAMES)]
+    events = (event("merge", 20, [1, 2, 3, 4]), event("split", 40, [1, 2, 3, 4]))
+    found = find_errors(Made(far).sequence(events=events), hulls(far, start, end, groups))
+    assert [one.error.kind for one in found.errors] == kinds
+    assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
+
+
+def test_a_part_of_a_group_that_is_found_is_an_error() -> None:
+    people = {k: (0.0, 0.8 * k) for k in range(1, 6)}
+    scenes = [Scene(people, {1: ([1, 2, 3, 4, 5], None)}) for _ in range(FRAMES)]
+    run = [regrouped(t, [4, 5], 8, 20, 29) for t in tracks(scenes)]
+    (one,) = find_errors(Made(scenes).sequence(), run).errors
+    assert (one.error.kind, one.error.start, one.error.end) == ("divided group", 20, 29)
+    assert one.error.people == (1, 2, 3, 4, 5)
+
+
+def test_nothing_is_left_of_a_group_with_people_who_are_found_elsewhere() -> None:
+    people = {1: (0.0, 0.0), 2: (0.0, 0.9), **{k: (0.0, 0.9 * k) for k in range(11, 17)}}
+    scenes = [Scene(people, {1: ([1, 2], None), 2: (list(range(11, 17)), None)}) for _ in range(FRAMES)]
+    run = [regrouped(t, [1, 2, 15, 16], 8, 20, 29) for t in tracks(scenes)]
+    found = find_errors(Made(scenes).sequence(), run)
+    assert [one.error.kind for one in found.errors] == ["strangers joined"]
+    assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("end", "kind"), [(49, "late split"), (60, "missed split")])
+def test_a_pair_that_parts_late_is_a_late_split(end: int, kind: str) -> None:
+    people = {1: (0.0, 0.0), 2: (0.0, 0.9)}
+    scenes = [Scene(people, {1: ([1, 2], None)} if n < 39 else {}) for n in range(FRAMES)]
+    run = [regrouped(t, [1, 2], 1, 40, end) for t in tracks(scenes)]
+    (one,) = find_errors(Made(scenes).sequence(events=(event("dissolve", 40, [1, 2]),)), run).errors
+    assert (one.error.kind, one.error.start, one.error.end) == (kind, 40, end)
+
+
+@pytest.mark.parametrize(("more", "kinds"), [([], []), ([5], ["wrong lineage"])])
+@pytest.mark.parametrize("unit", ["person", "group"])
+def test_wrong_lineage(unit: str, more: list[int], kinds: list[str]) -> None:
+    """The merge is reported with a further parent: person 5, or of whole groups an empty one."""
+    scenes = [Scene({**meeting(n).people, 5: (0.1 * n, 12.0)}, meeting(n).given) for n in range(FRAMES)]
+    true = event("merge", 20, [1, 2, 3, 4], pos=(2.0, 1.35))
+    members = (1, 2, 3, 4, *more) if unit == "person" else ()
+    told = GroupEvent("merge", 20, 20, 22, (1, 2, *more), (3,), members, (2.0, 1.35))
+    run = [t.replace(own_events=("merge", "split")) for t in tracks(scenes, [told], unit=unit)]
+    found = find_errors(Made(scenes).sequence(events=(true,)), run)
+    assert [one.error.kind for one in found.errors] == kinds
+    for one in found.errors:
+        assert (one.error.start, one.error.end, one.error.people) == (20, 22, (1, 2, 3, 4))
+        assert one.cost is None
+
+
+@pytest.mark.parametrize(
+    ("mode", "change", "cause"),
+    [("image", 1.5, "light"), ("image", 1.05, "tracker"), ("file", 1.5, "tracker")],
+)
+def test_a_change_of_the_light_is_a_cause_of_errors_from_pixels(mode: str, change: float, cause: str) -> None:
+    scenes = [scene(n) for n in range(FRAMES)]
+    light = np.where(np.arange(FRAMES) < 24, 1.0, change)
+    sequence = replace(Made(scenes).sequence(), load_light=lambda: light)
+    run = TrackingRun(
+        tuple(lost(regrouped(t, [1, 2], -1, 25, 30), 5, 25, 30) for t in tracks(scenes)), {"detections": mode}
+    )
+    found = find_errors(sequence, run)
+    assert {one.error.kind: one.cause.name for one in found.errors} == {"fragment": cause, "missed group": cause}
+
+
+def test_the_table_by_cause_needs_no_single_costs() -> None:
+    scenes = [scene(n) for n in range(FRAMES)]
+    run = [with_ghost(swapped(lost(regrouped(t, [1, 2], -1, 10, 20), 2, 25, 40), 30), 5, 50) for t in tracks(scenes)]
+    with_costs, without = (find_errors(Made(scenes).sequence(), run, costs=costs) for costs in (True, False))
+    assert without.causes == with_costs.causes
+    assert without.left == with_costs.left
+    assert all(one.cost is None for one in without.errors)
+    gains = [row.gains["HOTA"] + row.gains["group_F1"] for row in without.causes]
+    assert gains[0] == max(gains)
 
 
 def test_a_page_is_written_without_errors_that_cannot_be_found() -> None:

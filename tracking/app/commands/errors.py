@@ -59,18 +59,20 @@ def errors_of(sequence: Sequence, job: Job) -> RunErrors:
 
 
 def _causes(found: SequenceOf[RunErrors]) -> list[dict[str, Any]]:
-    """Returns the gains by kind and cause, mean over sequences, the largest first."""
+    """Returns the gains by kind and cause, mean over the runs that have the score (nan: none), the largest first."""
+    known = {key: sum(run.scores[key] == run.scores[key] for run in found) for key in SHOWN}
     rows: dict[tuple[str, str], dict[str, Any]] = {}
     for run in found:
         for part in run.causes:
-            empty = {"kind": part.kind, "cause": part.cause, "errors": 0, "seconds": 0.0, **dict.fromkeys(SHOWN, 0.0)}
+            none = {key: 0.0 if known[key] else float("nan") for key in SHOWN}
+            empty = {"kind": part.kind, "cause": part.cause, "errors": 0, "seconds": 0.0, **none}
             row = rows.setdefault((part.kind, part.cause), empty)
             row["errors"] += part.errors
             row["seconds"] += part.seconds
             for key in SHOWN:
                 gain = part.gains[key]
-                row[key] += 0.0 if gain != gain else gain / len(found)
-    return sorted(rows.values(), key=lambda row: -(row["HOTA"] + row["group_F1"]))
+                row[key] += 0.0 if gain != gain else gain / known[key]
+    return sorted(rows.values(), key=lambda row: -sum(row[key] for key in ("HOTA", "group_F1") if known[key]))
 
 
 def _tables(names: list[str], fps: list[float], found: list[RunErrors], limit: int) -> Any:
@@ -83,10 +85,15 @@ def _tables(names: list[str], fps: list[float], found: list[RunErrors], limit: i
         lost.add_column(name, justify="right")
     for row in _causes(found):
         lost.add_row(
-            row["kind"], row["cause"], str(row["errors"]), f"{row['seconds']:.1f}", *(f"{row[k]:+.3f}" for k in SHOWN)
+            row["kind"],
+            row["cause"],
+            str(row["errors"]),
+            f"{row['seconds']:.1f}",
+            *(_number(row[k], "+.3f") for k in SHOWN),
         )
-    lost.add_row("position", "", "", "", *(f"{_mean([run.left[k] for run in found]):+.3f}" for k in SHOWN))
-    now = "  ".join(f"{k} {_mean([run.scores[k] for run in found]):.3f}" for k in SHOWN)
+    left = {k: _mean([run.left[k] for run in found]) for k in SHOWN}
+    lost.add_row("position", "", "", "", *(_number(left[k], "+.3f") for k in SHOWN))
+    now = "  ".join(f"{k} {_number(_mean([run.scores[k] for run in found]), '.3f')}" for k in SHOWN)
     every = [(name, rate, error) for name, rate, run in zip(names, fps, found, strict=True) for error in run.errors]
     dearest = sorted(every, key=lambda item: -(item[2].cost or 0.0))[:limit]
     listed = empty_table()
@@ -97,10 +104,19 @@ def _tables(names: list[str], fps: list[float], found: list[RunErrors], limit: i
         facts = error.facts(rate)
         span = f"{facts['start']}–{facts['end']}"
         listed.add_row(
-            printable(name), span, facts["kind"], error.who, facts["detail"] or facts["cause"], f"{error.cost:.4f}"
+            printable(name),
+            span,
+            facts["kind"],
+            error.who,
+            facts["detail"] or facts["cause"],
+            _number(error.cost, ".4f"),
         )
     title = f"the {len(dearest)} dearest of {len(every)} errors; cost: HOTA, of groups group_F1"
     return Group(with_title(f"where the score is lost; now {now}", lost), with_title(title, listed))
+
+
+def _number(value: float | None, form: str) -> str:
+    return "–" if value is None or value != value else format(value, form)
 
 
 def _mean(values: list[float]) -> float:
