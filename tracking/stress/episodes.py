@@ -1,4 +1,4 @@
-"""Episodes of a sweep: trackers and the oracle on one scene, played in this process or in a worker; their store on disk.
+"""Episodes of a sweep: trackers and the oracle on one scene, played here or in a worker; their store on disk.
 
 All who play a scene play it in one process, so that it is simulated once.
 """

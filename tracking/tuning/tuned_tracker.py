@@ -89,8 +89,8 @@ class TunedTracker:
 
             return play_rule(source, LinkRule.from_dict(values), cache)
         return play(
-            self.limited or self.tracker, source, values or None, detections=detections, tracker_seed=source.seed, cache=cache,
-            every_score=every_score, similarity=similarity,
+            self.limited or self.tracker, source, values or None, detections=detections, tracker_seed=source.seed,
+            cache=cache, every_score=every_score, similarity=similarity,
         )  # fmt: skip
 
 

@@ -125,8 +125,7 @@ def _on_axis(plan: Plan, point: BreakingPoint) -> dict[str, float | None]:
 def _failure(failure: Failure, place: int) -> dict[str, Any]:
     source = failure.scene.source
     words = ["flockscope", "generate", failure.scenario, "--seeds", f"{source.seed}:{source.seed + 1}"]
-    words += [word for text in failure.settings for word in ("--set", text)]
-    words += ["--out", f"worst-{place}"]
+    words += ["--out", f"worst-{place}", *(word for text in failure.settings for word in ("--set", text))]
     return {
         "scenario": source.name, "seed": source.seed, "values": failure.scene.values,
         "settings": list(failure.settings), "score": failure.score, "oracle": failure.oracle,
@@ -184,8 +183,6 @@ def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
 
 
 def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
-    from rich.text import Text
-
     plan, tracker = sweep.plan, next(iter(sweep.trackers))
     table = _table("scenario", ["seed", *(axis.name for axis in plan.axes), tracker, ORACLE, "shortfall"])
     for f in data["found"]:
@@ -194,7 +191,7 @@ def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
     scenes = f"{', '.join(plan.scenarios)}, {counted(len(sweep.scenes), 'scene')}"
     yield with_title(f"where {tracker} is worst, next to the oracle: {plan.by} ({scenes})", table)
     for f in data["found"]:
-        yield Text(printable(f["command"]), no_wrap=True, overflow="ignore")
+        yield printable(f["command"].replace(" --set ", " \\\n    --set "), keep="\n")
 
 
 def _notes(data: dict[str, Any]) -> Iterator[str]:
