@@ -75,9 +75,7 @@ def test_a_failure_has_its_traceback_and_a_tracker_one_process(step_timeout, tmp
 
 def test_a_scene_that_cannot_be_made_is_nobodys_failure(tmp_path: Path) -> None:
     text = Path(write_scenes(tmp_path)[0]).read_text()
-    order = (
-        '{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", goal = [8, 5], when = { distance_lt = 0.1 } }'
-    )
+    order = '{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", goal = [8, 5], when = { time = 1 } }'
     (tmp_path / "late.toml").write_text(text.replace("group = [", f"event = [{order}]\ngroup = ["))
     (source,) = sources(tmp_path / "late.toml", (1,))
     for outcome in play_scene((task(FAKE, source), OracleTask(FAKE, source, "file"))):
