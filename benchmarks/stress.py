@@ -9,8 +9,8 @@ per second. True: the breaking value on 40 other seeds at a fine grid. Each run 
 runs whose 95 % interval holds the true value, with Wilson's interval. Width: median width of the interval, in per cent
 of the axis. Grid: nine evenly spaced values, with all seeds that the sweep's number of episodes allows.
 
-search: a tracker that loses 0.5 of its score where two groups cross while detection is below 0.55 and clutter above 4.5;
-everywhere else its score is the oracle's, with noise. `cliff`: nothing is lost outside. `slope`: the loss grows
+search: a tracker that loses 0.5 of its score where two groups cross, detection is below 0.55 and clutter above 4.5.
+Everywhere else its score is the oracle's, with noise. `cliff`: nothing is lost outside. `slope`: the loss grows
 linearly over half of either axis. The scenario's true events decide about crossings. Suite `standard`, axes detection,
 clutter and noise. First: median number of scenes until one loses 0.25; a search without one counts as all scenes.
 Failures: mean number of such scenes. Scenarios: mean number of scenarios among the listed failures.

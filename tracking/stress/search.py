@@ -1,10 +1,11 @@
 """Search for the scenes in which a tracker is worst, next to what its detections allow.
 
 A scene has a value of each axis between its ends, a scenario of the suite, and a seed. Its *shortfall* is the oracle's
-score less the tracker's; a failed tracker has the score 0. The first scenes are drawn at random, the others by Optuna's
-TPE sampler, which draws more where shortfalls were great. So that not all of them are one failure again and again, the
-shortfall that the sampler gets is reduced near a worse failure of the same scenario. Scenes are near if no axis differs
-by a fifth of its range. The failures that are listed are the worst ones, no two near each other.
+score less the tracker's; a failed tracker has the score 0. The first 16 scenes and every second one of the others are
+drawn at random, the rest by Optuna's TPE sampler, which draws more where shortfalls were great. TPE alone would stay
+with the first small shortfalls that it sees. So that not all scenes show one failure again and again, the shortfall
+that the sampler gets is reduced near a worse failure of the same scenario. Scenes are near if no axis differs by a
+fifth of its range. The failures that are listed are the worst ones, no two near each other.
 
 What is drawn depends on the seed of the search and on the scores so far, not on the number of workers. A search that
 was stopped draws the same scenes again, takes stored episodes from the store, and so goes on where it was.
@@ -27,9 +28,10 @@ if TYPE_CHECKING:
     import optuna
 
 BATCH = 8  # scenes that are drawn before their scores are known, for any number of workers
-RANDOM = 2 * BATCH  # first scenes
+RANDOM = 2 * BATCH  # first scenes, all of them drawn at random
 NEAR = 0.2  # least difference of some axis, as a share of its range, of scenes that are not near
 LISTED = 5  # failures
+SCENARIO = "scenario"  # name of the parameter
 
 
 @dataclass(frozen=True)
@@ -80,16 +82,14 @@ def search(
 
     sweep.check_scenes()
     entries = [entry for name in sweep.plan.scenarios for entry in rows(name)]
-    tracker, found = next(iter(sweep.trackers)), list[Failure]()
+    tracker, found, space = next(iter(sweep.trackers)), list[Failure](), _space(sweep.plan, entries)
     with quiet_optuna():
-        tpe = optuna.samplers.TPESampler(
-            seed=seed, n_startup_trials=RANDOM, multivariate=True, constant_liar=True
-        )  # fmt: skip
+        tpe = optuna.samplers.TPESampler(seed=seed, n_startup_trials=0, multivariate=True, constant_liar=True)
         study = optuna.create_study(direction="maximize", sampler=sampler or tpe)
         for first in range(0, count, BATCH):
             if sweep.spent():
                 break
-            trials = [study.ask(_space(sweep.plan, entries)) for _ in range(first, min(first + BATCH, count))]
+            trials = [_asked(study, space, seed, number) for number in range(first, min(first + BATCH, count))]
             drawn = [_drawn(sweep.plan, entries, trial, seed) for trial in trials]
             sweep.play([failure.scene for failure in drawn], [tracker])
             for trial, failure in zip(trials, drawn, strict=True):
@@ -116,11 +116,22 @@ def _space(plan: Plan, entries: Sequence[SuiteEntry]) -> dict[str, optuna.distri
     from optuna.distributions import CategoricalDistribution, FloatDistribution
 
     shares = {axis.name: FloatDistribution(0.0, 1.0) for axis in plan.axes}
-    return {**shares, "scenario": CategoricalDistribution(range(len(entries)))}
+    return {**shares, SCENARIO: CategoricalDistribution(range(len(entries)))}
+
+
+def _asked(
+    study: optuna.Study, space: dict[str, optuna.distributions.BaseDistribution], seed: int, number: int
+) -> optuna.Trial:
+    """Returns the next trial, drawn by the sampler of the study or at random."""
+    if number < RANDOM or number % 2:
+        rng = np.random.default_rng([seed, number, 1])
+        shares = {name: float(rng.random()) for name in space if name != SCENARIO}
+        study.enqueue_trial({**shares, SCENARIO: int(rng.integers(len(space[SCENARIO].choices)))})
+    return study.ask(space)
 
 
 def _drawn(plan: Plan, entries: Sequence[SuiteEntry], trial: optuna.Trial, seed: int) -> Failure:
-    entry: SuiteEntry = entries[trial.params["scenario"]]
+    entry: SuiteEntry = entries[trial.params[SCENARIO]]
     # Four digits, so that the scene's command is short; what was drawn and what is played differ by less than 0.1 %.
     values = tuple(float(f"{axis.at(trial.params[axis.name]):.4g}") for axis in plan.axes)
     settings = tuple(_last_of_each_key((*entry.settings, *plan.settings_at(values))))
