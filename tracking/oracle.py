@@ -9,14 +9,27 @@ boxes of what is visible of each person, from stereo pairs the true places of th
 from __future__ import annotations
 
 from collections.abc import Mapping
+from collections.abc import Sequence as SequenceOf
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from sim.types import EVENT_KINDS, Context, DetectionMode, Detections, Frame, Groups, Ints, Sequence, Tracks, Truth
-from tracking.grouping.foot_points import groups_of_people
+from sim.types import (
+    EVENT_KINDS,
+    Context,
+    DetectionMode,
+    Detections,
+    Frame,
+    GroupEvent,
+    Groups,
+    Ints,
+    Sequence,
+    Tracks,
+    Truth,
+)
+from tracking.grouping.foot_points import groups_in_frames
 from tracking.running.prepare import prepare
 from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import Scorer
@@ -53,7 +66,7 @@ def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity 
     if mode == "image":
         places = given.get("input") == "stereo"
         seen = (_visible(truth, index, places) for index in range(1, truth.length + 1))
-        return TrackingRun(tuple(_with_events(t, truth) for t in seen), info)
+        return TrackingRun(_with_groups_and_events([*seen], truth), info)
     seed = (given.get("seed") or 0) if given.get("sensor") else 0  # without errors it only shuffles the detections
     boxes = given.get("input") == "boxes" and sequence.camera is not None  # without a camera boxes have no foot points
     needs = ("boxes",) if boxes else ("boxes", "points")
@@ -68,7 +81,7 @@ def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity 
     cuts = np.cumsum([0, *(len(t.id) for t in sides.tracks)]).tolist()
     rows = [sides.mapping[a:b] for a, b in pairwise(cuts)]
     named = [_named(t, true.rows.id, true.group, row) for t, row in zip(sides.tracks, rows, strict=True)]
-    return TrackingRun(tuple(_with_events(t, truth) for t in named), info)
+    return TrackingRun(_with_groups_and_events(named, truth), info)
 
 
 def _named(t: Tracks, id: Ints, group: Ints, row: Ints) -> Tracks:
@@ -100,6 +113,11 @@ def _visible(truth: Truth, index: int, places: bool) -> Tracks:
     return Tracks(index, t, "ground" if places else "image", "person", *who, pos, none, cov, box, score)
 
 
-def _with_events(t: Tracks, truth: Truth) -> Tracks:
-    events = tuple(replace(e, emitted=t.index) for e in truth.events or () if e.start == t.index)
-    return t.replace(groups=groups_of_people(t), events=events, own_events=EVENT_KINDS)
+def _with_groups_and_events(tracks: SequenceOf[Tracks], truth: Truth) -> tuple[Tracks, ...]:
+    starting: dict[int, list[GroupEvent]] = {}
+    for e in truth.events or ():
+        starting.setdefault(e.start, []).append(replace(e, emitted=e.start))
+    return tuple(
+        t.replace(groups=groups, events=tuple(starting.get(t.index, ())), own_events=EVENT_KINDS)
+        for t, groups in zip(tracks, groups_in_frames(tracks), strict=True)
+    )

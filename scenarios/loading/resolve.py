@@ -25,7 +25,17 @@ from scenarios.errors import InputError
 from scenarios.limits import REPEATS
 from scenarios.loading import toml_files
 from scenarios.loading.checks import check
-from scenarios.loading.toml_files import SUITES, Table, did_you_mean, dump, names, parse, suite_names, toml_value
+from scenarios.loading.toml_files import (
+    CATALOGUE,
+    SUITES,
+    Table,
+    did_you_mean,
+    dump,
+    names,
+    parse,
+    suite_names,
+    toml_value,
+)
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import ObservationSpec, Scenario
 from scenarios.schema.sensor import Sensor
@@ -167,22 +177,46 @@ def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
 
     Settings are applied to each entry, after the entry's own.
     """
-    settings = tuple(set)
-    if name.startswith("suite:"):
-        return _entries(find_suite(name.removeprefix("suite:")), settings)
-    if name.endswith(".toml"):
-        path = toml_files.find(name)
-        if "entry" in toml_files.parse(path):
-            return _entries(path, settings)
-    elif name not in names():
-        if name in suite_names():
-            return _entries(find_suite(name), settings)
-        known = names() + suite_names()
-        raise InputError(
-            got=repr(name), expected="a scenario, a suite or a *.toml file", remedy=did_you_mean(name, known)
-        )
+    settings, suite = tuple(set), _suite_file(name)
+    if suite is not None:
+        return _entries(suite, settings)
     scenario = load(name, settings)
     return [Entry(scenario.name, scenario, file=str(toml_files.find(name)))]
+
+
+def rows(name: str) -> list[SuiteEntry]:
+    """Returns the scenarios that a name stands for, as `resolve` takes it, with their settings; copies count once.
+
+    The scenario of each can be given to `load`, whatever the working folder of the suite's file.
+    """
+    suite = _suite_file(name)
+    if suite is None:
+        return [SuiteEntry(name=load(name).name, scenario=name)]
+    found: dict[tuple[str, tuple[str, ...]], SuiteEntry] = {}
+    for entry in read_suite(suite).entry:
+        file = toml_files.find(entry.scenario, beside=suite.parent)
+        place = file.relative_to(CATALOGUE) if file.is_relative_to(CATALOGUE) else file
+        changes = {
+            "scenario": place.stem if str(place) == f"{place.stem}.toml" else str(place),
+            "name": entry.name.removesuffix(f"-{entry.repeat}"), "repeat": 0,
+        }  # fmt: skip
+        found.setdefault((entry.scenario, entry.settings), entry.model_copy(update=changes))
+    return list(found.values())
+
+
+def _suite_file(name: str) -> Path | None:
+    """Returns the file of the suite that a name stands for, None for a scenario."""
+    if name.startswith("suite:"):
+        return find_suite(name.removeprefix("suite:"))
+    if name.endswith(".toml"):
+        path = toml_files.find(name)
+        return path if "entry" in toml_files.parse(path) else None
+    if name in names():
+        return None
+    if name in suite_names():
+        return find_suite(name)
+    known = names() + suite_names()
+    raise InputError(got=repr(name), expected="a scenario, a suite or a *.toml file", remedy=did_you_mean(name, known))
 
 
 def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:

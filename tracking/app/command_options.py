@@ -146,14 +146,18 @@ class ScoreOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class StressOptions:
-    """Play trackers on scenes that get harder along an axis, and find where they break."""
+    """Play trackers on scenes that get harder, and find where they break, or the scenes in which one is worst."""
 
     trackers: list[str] = ARGUMENT("Trackers to compare: names, file.py:Class or module:Class.", metavar="TRACKER…")
-    vary: str = option(
-        "Axis: a name such as detection, or a key of scenarios with its ends.", metavar="NAME|KEY=EASY:HARD")
+    vary: list[str] = option(
+        "Axis: a name such as detection, or a key of scenarios with its ends. Twice: a matrix.", [],
+        metavar="NAME|KEY=EASY:HARD", flag="--vary")
     suite: list[str] = option("Scenario or suite. Can be given several times.", metavar="NAME", flag="--suite")
     seeds: str = option("Seeds that may be played, from A to B - 1.", "20000:20020", metavar="A:B")
     out: Path = OUT()
+    search: int | None = option(
+        "Search N scenes, between the ends of all axes, for those in which the first tracker is worst.", None, low=1,
+        metavar="N")
     by: str = option("The score.", "objective", metavar="SCORE")
     share: float = option(
         "A tracker breaks where its score falls to this share of its easy value.", 0.8, low=0.0, high=1.0)

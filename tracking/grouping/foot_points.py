@@ -14,7 +14,7 @@ import numpy as np
 
 from sim.scene.camera import foot_points
 from sim.scene.terrain import height_at
-from sim.truth.group_hulls import box_groups, frame_groups
+from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks
 from tracking.grouping.grouped_tracks import names_groups, with_groups, with_velocities
 from tracking.grouping.grouping_choice import Grouping
@@ -72,11 +72,22 @@ def standing(t: Tracks, camera: Camera, scene: Scene | None) -> Tracks:
 
 def groups_of_people(t: Tracks) -> Groups:
     """Returns the groups that follow from `group`: hulls round boxes in the image, else round footprints."""
-    there = np.isfinite(t.pos).all(axis=1)
-    rows = (t.id[there], t.group[there], t.pos[there], t.vel[there])
-    if t.plane != "image" or t.box is None:
-        return frame_groups(*rows)
-    return box_groups(np.full(len(rows[0]), t.index), *rows, t.box[there], t.index, 1)[0]
+    return groups_in_frames([t])[0]
+
+
+def groups_in_frames(tracks: Sequence[Tracks]) -> list[Groups]:
+    """Returns the groups of each of consecutive frames in one plane, as `groups_of_people`."""
+    if not tracks:
+        return []
+    there = [np.isfinite(t.pos).all(axis=1) for t in tracks]
+    kept = [(t.id[k], t.group[k], t.pos[k], t.vel[k]) for t, k in zip(tracks, there, strict=True)]
+    rows = [np.concatenate(column) for column in zip(*kept, strict=True)]
+    frame = np.repeat([t.index for t in tracks], [len(id) for id, *_ in kept])
+    span = (tracks[0].index, len(tracks))
+    boxes = [t.box[k] for t, k in zip(tracks, there, strict=True) if t.box is not None]
+    if tracks[0].plane != "image" or len(boxes) < len(tracks):
+        return groups_over_time(frame, *rows, *span)
+    return box_groups(frame, *rows, np.concatenate(boxes), *span)
 
 
 def feet(box: Array, camera: Camera, scene: Scene | None) -> Array:

@@ -6,7 +6,7 @@ AXES has the named ones; any other key of a scenario that takes a number is an a
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 from scenarios.errors import InputError
@@ -34,8 +34,12 @@ class Axis:
 
     def spread(self, count: int) -> list[float]:
         """Returns evenly spread values, the easy one first, without repeats."""
-        every = [self.easy + (self.hard - self.easy) * k / (count - 1) for k in range(count)]
-        return list(dict.fromkeys(float(round(v)) if self.whole else v for v in every))
+        return list(dict.fromkeys(self.at(k / (count - 1)) for k in range(count)))
+
+    def at(self, share: float) -> float:
+        """Returns the value at a share of the way from easy (0) to hard (1)."""
+        value = self.easy + (self.hard - self.easy) * share
+        return float(round(value)) if self.whole else value
 
 
 def _key(*keys: str) -> Settings:
@@ -67,6 +71,15 @@ AXES = {
         Axis("contrast", 0.0, 20.0, _key("picture.noise"), about="noise of pictures, grey levels"),
     )
 }  # fmt: skip
+
+
+def parse_axes(texts: Iterable[str]) -> tuple[Axis, ...]:
+    """Returns the axes of texts as of `parse_axis`, each named once."""
+    axes = tuple(parse_axis(text) for text in texts)
+    for axis in axes:
+        if sum(other.name == axis.name for other in axes) > 1:
+            raise InputError(place="--vary", got=f"{axis.name} twice", expected="it once", remedy="leave one out")
+    return axes
 
 
 def parse_axis(text: str) -> Axis:

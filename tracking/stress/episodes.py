@@ -1,43 +1,44 @@
-"""Episodes of a sweep: one tracker on one scene, played in this process or in a worker, and their store on disk."""
+"""Episodes of a sweep: trackers and the oracle on one scene, played here or in a worker; their store on disk.
+
+All who play a scene play it in one process, so that it is simulated once.
+"""
 
 from __future__ import annotations
 
 import json
+import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
 
-from scenarios.errors import FlockscopeError, InputError, OrderError, shortened
+from scenarios.errors import FlockscopeError, InputError, shortened
 from sim.io.files.atomic import write_file
 from sim.types import DetectionMode
-from tracking.environment.episodes import Source, SourceCache, play
-from tracking.running.time_limit import TimeLimited
-from tracking.running.tracker_registry import code_hash, find, located
+from sim.workers.pool import RemoteTraceback
+from tracking.environment.episode_cache import OpenedSource, Source
+from tracking.environment.episodes import Episode, streams_for
+from tracking.oracle import oracle
+from tracking.running.detection_mode import input_kind
+from tracking.running.tracker_registry import find
+from tracking.tuning.parallel_episodes import EpisodeTask, opened_sources, play_task, playing_workers
+from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
-CACHE_BYTES = 512 * 2**20  # of sequences that each process keeps
-
-
-@dataclass(frozen=True)
-class Contender:
-    """A tracker of a sweep."""
-
-    name: str  # as it was given
-    spec: str  # with an absolute path, for workers in another folder
-    needs: tuple[str, ...]
-    code: str  # hash of the file that defines it
-    step_timeout: float | None = None
+ORACLE = "oracle"  # its name among the trackers
+TRACE_LINES = 8  # of the traceback of a failed tracker, the last ones
 
 
 @dataclass(frozen=True)
-class EpisodeJob:
-    """One episode to play."""
+class OracleTask:
+    """An episode of the oracle with the input that a tracker gets."""
 
-    tracker: Contender
+    tracker: str
     source: Source
     detections: DetectionMode
+
+
+Tasks = tuple[EpisodeTask | OracleTask, ...]  # all of one scene
 
 
 @dataclass(frozen=True)
@@ -48,52 +49,69 @@ class Outcome:
     seconds: float = 0.0
     left_out: str = ""
     failed: str = ""
+    traceback: str = ""  # of the failed tracker's own code, its last lines
 
 
-class PlayJobs(Protocol):
-    """A function that plays jobs."""
+class PlayScenes(Protocol):
+    """A function that plays scenes."""
 
-    def __call__(self, jobs: Sequence[EpisodeJob], /) -> Iterator[Outcome]:
-        """Yields one outcome for each job, in order."""
+    def __call__(self, scenes: Sequence[Tasks], /) -> Iterator[Sequence[Outcome]]:
+        """Yields the outcomes of the tasks of each scene, in order."""
 
 
-def contender(name: str, step_timeout: float | None = None) -> Contender:
+def contender(name: str, step_timeout: float | None = None) -> TunedTracker:
     """Returns a tracker of a sweep. Raises InputError if there is none of this name."""
-    found = find(name)
-    return Contender(name, located(name), tuple(found.needs), code_hash(found), step_timeout)
+    find(name)
+    return tuned_tracker(name, step_timeout)
 
 
 @contextmanager
-def job_player(workers: int = 1, cluster: str | None = None) -> Iterator[PlayJobs]:
-    """Opens the workers for the time of the context and returns the function that plays jobs on them."""
-    from sim.workers.start import results_in_order, start_workers
+def scene_player(workers: int = 1, cluster: str | None = None) -> Iterator[PlayScenes]:
+    """Opens the workers for the time of the context and returns the function that plays scenes on them."""
+    from sim.workers.start import results_in_order
 
-    with start_workers(workers, cluster) as run:
-        yield lambda jobs: results_in_order(run, play_job, jobs)
+    with playing_workers(workers, cluster) as run:
+        yield lambda scenes: results_in_order(run, play_scene, scenes)
 
 
-def play_job(job: EpisodeJob) -> Outcome:
-    """Plays one episode; the tracker's seed is that of the scene."""
-    limit = job.tracker.step_timeout
-    tracker = job.tracker.spec if limit is None else TimeLimited(job.tracker.spec, limit)
+def play_scene(tasks: Tasks) -> list[Outcome]:
+    """Plays all episodes of a scene; a scene that cannot be made is left out."""
+    first = tasks[0]
     try:
-        episode = play(
-            tracker, job.source, detections=job.detections, tracker_seed=job.source.seed, cache=_cache(),
-            every_score=True,
-        )  # fmt: skip
-    except OrderError as error:  # the scene's fault
-        return Outcome({}, left_out=error.line())
+        opened = opened_sources().open(first.source, streams_for(first.tracker, first.detections))
+        _ = opened.truth
     except FlockscopeError as error:
-        return Outcome({}, failed=error.line())
-    finally:
-        if isinstance(tracker, TimeLimited):
-            tracker.close()
-    return Outcome(episode.scores, episode.seconds_tracking, episode.left_out)
+        return [Outcome({}, left_out=error.line())] * len(tasks)
+    played = (play_task(t) if isinstance(t, EpisodeTask) else play_oracle(t, opened) for t in tasks)
+    return [_outcome(result) for result in played]
 
 
-@cache
-def _cache() -> SourceCache:
-    return SourceCache(CACHE_BYTES)
+def play_oracle(task: OracleTask, opened: OpenedSource) -> Episode | FlockscopeError:
+    """Returns the episode of the oracle, as `tracking.comparison.compare_one` scores it."""
+    sequence, mode = opened.sequence, task.detections
+    frames = () if mode == "image" else sequence.without_pictures()
+    kind = input_kind(find(task.tracker).needs, mode, sequence, frames)
+    try:
+        run = oracle(sequence, {"detections": mode, "input": kind})
+        scores = opened.judge.scorer.evaluate(run)
+    except FlockscopeError as error:
+        return error
+    known = {key: value for key, value in scores.items() if value == value}
+    return Episode(task.source.name, task.source.seed, scores["objective"], known, len(run), 0.0, 0.0)
+
+
+def _outcome(result: Episode | FlockscopeError) -> Outcome:
+    if isinstance(result, Episode):
+        return Outcome(dict(result.scores), result.seconds_tracking, result.left_out)
+    return Outcome({}, failed=result.line(), traceback=_traceback(result.__cause__))
+
+
+def _traceback(cause: BaseException | None) -> str:
+    if cause is None:
+        return ""
+    remote = isinstance(cause.__cause__, RemoteTraceback)  # raised in the process of a tracker with a limit of time
+    text = str(cause.__cause__) if remote else "".join(traceback.format_exception(cause, chain=False))
+    return "\n".join(text.strip().splitlines()[-TRACE_LINES:])
 
 
 @dataclass

@@ -1,9 +1,14 @@
-"""A sweep: trackers play scenes at values of an axis, placed where the curve bends, until the budget is spent.
+"""A sweep: trackers and the oracle play scenes at values of axes until the budget is spent.
 
-First all scenes are played at five values. Then, in turn, the widest uncertainty is reduced: if a curve breaks and its
-breaking point's interval is wider than the distance of the two values beside it, more seeds are played; else a value is
-added in the middle of them. Without a break, a value is added where the curve is steepest. Every episode is stored when
-it is played, so a sweep that was stopped goes on where it was.
+Without an axis, the scenes are played as they are. Along one axis, values are placed where the curve bends. First all
+scenes are played at five values. Then, in turn, the widest uncertainty is reduced: if a curve breaks and its breaking
+point's interval is wider than the distance of the two values beside it, more seeds are played; else a value is added in
+the middle of them. Without a break, a value is added where the curve is steepest. Over two axes, all scenes are played
+at a grid of five by five values, then with more seeds while there is budget.
+
+The oracle has the detections that the first tracker gets, and the true ids: what is lost in its score is not the
+tracker's fault. It does not count as an episode of the budget. Every episode is stored when it is played, so a sweep
+that was stopped goes on where it was.
 """
 
 from __future__ import annotations
@@ -11,8 +16,9 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -23,11 +29,15 @@ from sim.types import Array, DetectionMode
 from tracking.environment.episode_cache import Source, sources
 from tracking.stress.axes import Axis
 from tracking.stress.curves import BreakingPoint, breaking_point, curve, overtaking
-from tracking.stress.episodes import Contender, EpisodeJob, PlayJobs, Store
+from tracking.stress.episodes import ORACLE, OracleTask, PlayScenes, Store
+from tracking.tuning.parallel_episodes import EpisodeTask
+from tracking.tuning.tuned_tracker import TunedTracker
 
 FIRST_VALUES = 5
 MOST_VALUES = 17
 NARROW = 0.05  # share of the axis: a breaking point is known well enough
+
+Values = tuple[float, ...]  # one for each axis
 
 
 @dataclass(frozen=True)
@@ -35,7 +45,7 @@ class Plan:
     """What is played."""
 
     scenarios: tuple[str, ...]
-    axis: Axis
+    axes: tuple[Axis, ...]
     seeds: tuple[int, ...]  # all that may be played, the first `start` at once
     start: int
     by: str
@@ -45,92 +55,146 @@ class Plan:
     episodes: int | None = None  # budget
     minutes: float | None = None
 
+    def settings_at(self, values: Values) -> tuple[str, ...]:
+        """Returns the settings of scenes at a value for each axis."""
+        own = (text for axis, value in zip(self.axes, values, strict=True) for text in axis.settings(value))
+        return (*self.settings, *own)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scene at a value for each axis."""
+
+    source: Source
+    values: Values
+
 
 @dataclass
 class Sweep:
-    """A sweep of several trackers; state: the values of the axis and the number of seeds so far."""
+    """A sweep of several trackers; state: the values and the number of seeds so far, and all scenes that were played.
+
+    Over two axes the values are those of a grid, the last axis fastest.
+    """
 
     plan: Plan
-    trackers: dict[str, Contender]
-    play: PlayJobs
+    trackers: dict[str, TunedTracker]
+    run_scenes: PlayScenes
     store: Store
     report: Callable[[str], None] = lambda text: None
-    values: list[float] = field(default_factory=list)
+    values: list[Values] = field(default_factory=list)
     seeds: int = 0
     played: int = 0
-    _made: dict[tuple[float, int], tuple[Source, ...]] = field(default_factory=dict)
+    scenes: dict[tuple[object, ...], Scene] = field(default_factory=dict)
+    began: float = field(default_factory=time.monotonic)
+    _made: dict[tuple[Values, int], tuple[Scene, ...]] = field(default_factory=dict)
 
     def run(self) -> None:
         """Plays until the breaking points are known, or the budget is spent."""
-        began = time.monotonic()
-        self.values, self.seeds = self.plan.axis.spread(FIRST_VALUES), self.plan.start
-        self._require_effect()
+        self.check_scenes()
+        self.values = list(product(*(axis.spread(FIRST_VALUES) for axis in self.plan.axes)))
+        self.seeds = self.plan.start
         self._play()
-        while not self._spent(began) and self._refine():
+        while not self.spent() and self._refine():
             self._play()
 
-    def _spent(self, began: float) -> bool:
-        over = self.plan.minutes is not None and time.monotonic() - began > 60 * self.plan.minutes
+    def spent(self) -> bool:
+        """Returns True if the budget of time or of episodes is spent."""
+        over = self.plan.minutes is not None and time.monotonic() - self.began > 60 * self.plan.minutes
         return over or (self.plan.episodes is not None and self.played >= self.plan.episodes)
 
-    def _require_effect(self) -> None:
-        """Raises InputError if the two ends of the axis make the same scenes."""
-        easy, hard = (self._sources(value)[0] for value in (self.values[0], self.values[-1]))
-        if self.plan.detections != "image" and _content(easy) == _content(hard):
-            raise InputError(
-                place="--vary", got=self.plan.axis.name, expected="an axis that changes the scenes",
-                remedy=f"{self.plan.scenarios[0]} is the same at both ends; pictures are not drawn for these trackers",
-            )  # fmt: skip
+    def check_scenes(self) -> None:
+        """Raises InputError if a tracker cannot play the scenes, or the two ends of an axis make the same ones."""
+        plan, easy = self.plan, tuple(axis.easy for axis in self.plan.axes)
+        (first, *_) = sources(plan.scenarios, plan.seeds[:1], plan.settings_at(easy))
+        for tracker in self.trackers.values():
+            tracker.check_input(first, plan.detections, None)
+        for k, axis in enumerate(plan.axes):
+            (other, *_) = sources(
+                plan.scenarios, plan.seeds[:1], plan.settings_at((*easy[:k], axis.hard, *easy[k + 1 :]))
+            )
+            if plan.detections != "image" and _content(first) == _content(other):
+                raise InputError(
+                    place="--vary", got=axis.name, expected="an axis that changes the scenes",
+                    remedy=f"{first.name} is the same at both ends; pictures are not drawn for these trackers",
+                )  # fmt: skip
 
-    def _sources(self, value: float) -> tuple[Source, ...]:
-        if (value, self.seeds) not in self._made:
-            settings = (*self.plan.settings, *self.plan.axis.settings(value))
-            self._made[value, self.seeds] = sources(self.plan.scenarios, self.plan.seeds[: self.seeds], settings)
-        return self._made[value, self.seeds]
+    def _scenes(self, values: Values) -> tuple[Scene, ...]:
+        if (values, self.seeds) not in self._made:
+            found = sources(self.plan.scenarios, self.plan.seeds[: self.seeds], self.plan.settings_at(values))
+            self._made[values, self.seeds] = tuple(Scene(source, values) for source in found)
+        return self._made[values, self.seeds]
 
     def _play(self) -> None:
-        for name in self.trackers:
-            for value in self.values:
-                self._play_value(name, value)
+        self.play([scene for values in self.values for scene in self._scenes(values)], [*self.trackers])
 
-    def _play_value(self, name: str, value: float) -> None:
-        wanted = {self._key(name, source, value): source for source in self._sources(value)}
-        missing = {key: source for key, source in wanted.items() if key not in self.store.known}
-        jobs = [EpisodeJob(self.trackers[name], source, self.plan.detections) for source in missing.values()]
-        for (key, source), outcome in zip(missing.items(), self.play(jobs), strict=True):
-            facts = {"tracker": name, "scenario": source.name, "seed": source.seed, "value": value}
-            self.store.add({"key": key, **facts, **asdict(outcome)})
-            self.played += 1
-            self.report(f"{name}, {self.plan.axis.name} {value:g}")
+    def play(self, scenes: Sequence[Scene], trackers: Sequence[str]) -> None:
+        """Plays the episodes of the trackers and the oracle on these scenes that are not stored."""
+        wanted = {(*scene.source.key, scene.values): scene for scene in scenes}
+        self.scenes.update(wanted)
+        every = ((scene, self._missing(scene, (*trackers, ORACLE))) for scene in wanted.values())
+        jobs = [(scene, names) for scene, names in every if names]
+        tasks = [tuple(self._task(name, scene.source) for name in names) for scene, names in jobs]
+        for (scene, names), outcomes in zip(jobs, self.run_scenes(tasks), strict=True):
+            for name, outcome in zip(names, outcomes, strict=True):
+                facts = {"tracker": name, "scenario": scene.source.name, "seed": scene.source.seed}
+                settings = list(self.plan.settings_at(scene.values))
+                self.store.add({"key": self._key(name, scene), **facts, "settings": settings, **asdict(outcome)})
+                if name != ORACLE:
+                    self.played += 1
+                    self.report(" ".join([name, scene.source.name, *(f"{value:g}" for value in scene.values)]))
 
-    def _key(self, name: str, source: Source, value: float) -> str:
-        facts = [ENGINE, name, self.trackers[name].code, self.plan.detections, *map(str, source.key), value]
+    def _missing(self, scene: Scene, names: Sequence[str]) -> list[str]:
+        return [name for name in names if self._key(name, scene) not in self.store.known]
+
+    def _task(self, name: str, source: Source) -> EpisodeTask | OracleTask:
+        if name == ORACLE:
+            return OracleTask(str(self._first.tracker), source, self.plan.detections)
+        tracker = self.trackers[name]
+        return EpisodeTask(
+            tracker.tracker, source, {}, self.plan.detections, True, tracker.code, tracker.step_timeout
+        )  # fmt: skip
+
+    @property
+    def _first(self) -> TunedTracker:
+        return next(iter(self.trackers.values()))
+
+    def _key(self, name: str, scene: Scene) -> str:
+        code = ", ".join(self._first.needs) if name == ORACLE else self.trackers[name].code
+        facts = [ENGINE, name, code, self.plan.detections, *map(str, scene.source.key)]
         return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:24]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Returns the stored episodes of this sweep, by tracker, scenario, seed and value."""
-        wanted = (
-            self._key(name, s, value) for name in self.trackers for value in self.values for s in self._sources(value)
-        )
-        found = [self.store.known[key] for key in wanted if key in self.store.known]
-        return sorted(found, key=lambda row: (row["tracker"], row["scenario"], row["seed"], row["value"]))
+        """Returns the stored episodes of this sweep, by tracker, scenario, seed and values; `values` by axis."""
+        found = []
+        for scene in self.scenes.values():
+            values = {axis.name: value for axis, value in zip(self.plan.axes, scene.values, strict=True)}
+            rows = (self.row(name, scene) for name in (*self.trackers, ORACLE))
+            found += [{**row, "values": values} for row in rows if row is not None]
+        return sorted(found, key=lambda row: (row["tracker"], row["scenario"], row["seed"], *row["values"].values()))
+
+    def row(self, name: str, scene: Scene) -> dict[str, Any] | None:
+        """Returns the stored episode of a tracker or the oracle on a scene, None if there is none."""
+        return self.store.known.get(self._key(name, scene))
+
+    def score(self, name: str, scene: Scene) -> float:
+        """Returns the score of an episode; 0 for a failed one, nan without an episode or a score."""
+        row = self.row(name, scene)
+        if row is None:
+            return float("nan")
+        return 0.0 if row["failed"] else float(row["scores"].get(self.plan.by, "nan"))
 
     def scores(self, name: str) -> Array:
-        """Returns the scores (P, V) of a tracker by scene and value; nan for an episode without; 0 for a failed one."""
-        columns = []
-        for value in self.values:
-            rows = [self.store.known.get(self._key(name, source, value)) for source in self._sources(value)]
-            columns.append([_score(row, self.plan.by) for row in rows])
-        return np.array(columns).T
+        """Returns the scores (P, V) of a tracker or the oracle by scene and values, as of `score`."""
+        return np.array([[self.score(name, scene) for scene in self._scenes(values)] for values in self.values]).T
 
     @property
     def way(self) -> Array:
-        """The values as shares of the way from easy to hard, (V,)."""
-        axis = self.plan.axis
-        return (np.array(self.values) - axis.easy) / (axis.hard - axis.easy)
+        """The values of the only axis as shares of the way from easy to hard, (V,)."""
+        (axis,) = self.plan.axes
+        return (np.array([value for (value,) in self.values]) - axis.easy) / (axis.hard - axis.easy)
 
     def breaks(self) -> dict[str, BreakingPoint]:
-        """Returns the breaking point of each tracker."""
+        """Returns the breaking point of each tracker on the only axis."""
         rng = np.random.default_rng(0)
         return {name: breaking_point(self.way, self.scores(name), self.plan.share, rng) for name in self.trackers}
 
@@ -148,6 +212,9 @@ class Sweep:
 
     def _refine(self) -> bool:
         """Adds a value or seeds where least is known; returns False if nothing is left to do."""
+        if len(self.plan.axes) != 1:
+            limited = self.plan.episodes is not None or self.plan.minutes is not None
+            return (limited or not self.plan.axes) and self._more_seeds()
         for name, point in self.breaks().items():
             if np.isfinite(point.at):
                 if point.high - point.low > NARROW and (self._narrow(point) or self._more_seeds()):
@@ -172,26 +239,21 @@ class Sweep:
         return bool(np.isfinite(steps).any()) and self._insert(int(np.nanargmax(steps)) + 1)
 
     def _insert(self, k: int) -> bool:
-        middle = self.plan.axis.between(self.values[k - 1], self.values[k])
+        (axis,) = self.plan.axes
+        middle = axis.between(*self.values[k - 1], *self.values[k])
         if middle is None:
             return False
-        self.values.insert(k, middle)
+        self.values.insert(k, (middle,))
         return True
 
     def _more_seeds(self) -> bool:
         """Doubles the seeds, or takes as many more as the budget of episodes allows."""
         more = min(self.seeds, len(self.plan.seeds) - self.seeds)
         if self.plan.episodes is not None:
-            each = len(self.trackers) * len(self.values) * len(self._sources(self.values[0])) // self.seeds
+            each = len(self.trackers) * len(self.values) * len(self._scenes(self.values[0])) // self.seeds
             more = min(more, (self.plan.episodes - self.played) // each)
         self.seeds += max(more, 0)
         return more > 0
-
-
-def _score(row: dict[str, Any] | None, by: str) -> float:
-    if row is None:
-        return float("nan")
-    return 0.0 if row["failed"] else float(row["scores"].get(by, "nan"))
 
 
 def _content(source: Source) -> bytes:

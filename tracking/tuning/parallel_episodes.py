@@ -1,4 +1,4 @@
-"""Plays the episodes of a search: in this process, in several processes, or on a cluster.
+"""Plays the episodes of a search or a sweep: in this process, in several processes, or on a cluster.
 
 Results come in the order of the sources. Workers play episodes, not trials: what is tried next depends on results and
 never on the time they took, so a search finds the same with any number of workers.
@@ -7,13 +7,14 @@ never on the time they took, so a search finds the same with any number of worke
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
 from sim.types import DetectionMode, Tracker
+from sim.workers.pool import RunItems
 from tracking.environment.episodes import Episode, Source, SourceCache
 from tracking.scoring.people_comparison import Similarity
 from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
@@ -49,45 +50,62 @@ def episode_player(
     similarity: Similarity | None = None,
 ) -> Iterator[PlayEpisodes]:
     """Opens the workers for the time of the context and returns the function play(sources, values, every_score)."""
-    from sim.workers.start import results_in_order, start_workers
+    from sim.workers.start import results_in_order
 
     if isinstance(tracker.tracker, type) and (workers > 1 or cluster):
         remedy = "give file.py:Class or module:Class, or one worker"
         raise InputError(place="--workers", got="a class", expected="a name that workers can look up", remedy=remedy)
-    with start_workers(workers, cluster) as run:
-        in_this_process, source_cache = workers == 1 and cluster is None, SourceCache(CACHE_BYTES)
+    with playing_workers(workers, cluster) as run:
 
         def play(
             sources: Sequence[Source], values: dict[str, Any], every_score: bool
         ) -> Generator[EpisodeOrError, None, None]:
-            given, limit = (values, detections, every_score, tracker.code), tracker.limited
-            timeout = None if limit is None else limit.seconds
-            tasks = [EpisodeTask(tracker.tracker, s, *given, timeout, similarity) for s in sources]
-            if in_this_process:
-                yield from (_attempt(task, tracker, source_cache) for task in tasks)
-            else:
-                yield from results_in_order(run, play_task, tasks)
+            given = (values, detections, every_score, tracker.code, tracker.step_timeout, similarity)
+            yield from results_in_order(run, play_task, [EpisodeTask(tracker.tracker, s, *given) for s in sources])
 
-        with tracker.limited or nullcontext():
-            yield play
+        yield play
+
+
+@contextmanager
+def playing_workers(workers: int = 1, cluster: str | None = None) -> Iterator[RunItems]:
+    """Opens workers for episodes for the time of the context; then this process forgets what it kept for them."""
+    from sim.workers.start import start_workers
+
+    with start_workers(workers, cluster) as run:
+        try:
+            yield run
+        finally:
+            for tracker in _trackers.values():
+                tracker.close()
+            _trackers.clear()
+            opened_sources.cache_clear()
 
 
 def play_task(task: EpisodeTask) -> EpisodeOrError:
-    """Plays an episode in a worker, which keeps the tracker class and its opened sources for later tasks."""
-    return _attempt(task, *_tracker_and_cache(task.tracker, task.code, task.step_timeout))
+    """Plays an episode in a worker, which keeps the tracker and its opened sources for later tasks."""
+    return _attempt(task, _tracker(task.tracker, task.code, task.step_timeout), opened_sources())
 
 
-@cache
-def _tracker_and_cache(
-    name: str | type[Tracker], code: str, step_timeout: float | None
-) -> tuple[TunedTracker, SourceCache]:
-    tracker = tuned_tracker(name, step_timeout)
+# In a worker: the trackers of its tasks. One with a limit of time has a process.
+_trackers: dict[tuple[str | type[Tracker], float | None], TunedTracker] = {}
+
+
+def _tracker(name: str | type[Tracker], code: str, step_timeout: float | None) -> TunedTracker:
+    if (name, step_timeout) not in _trackers:
+        _trackers[name, step_timeout] = tuned_tracker(name, step_timeout)
+    tracker = _trackers[name, step_timeout]
     if tracker.code != code:
         raise WorkError(
             place="tracker", got=f"another {tracker.name} in a worker", expected="the file as it is here",
             remedy="put the same file there, and start the workers anew",
         )  # fmt: skip
-    return tracker, SourceCache(CACHE_BYTES)
+    return tracker
+
+
+@cache
+def opened_sources() -> SourceCache:
+    """Returns the sequences that this process keeps for later episodes."""
+    return SourceCache(CACHE_BYTES)
 
 
 def _attempt(task: EpisodeTask, tracker: TunedTracker, source_cache: SourceCache) -> EpisodeOrError:

@@ -180,7 +180,7 @@ def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.
 
 
 def _search(options: TuneOptions) -> TuningResult:
-    _check_optuna()
+    require_optuna("tune")
     from tracking.tuning.study import open_study, run_trials
 
     plan = search_plan(options)
@@ -253,12 +253,13 @@ class PlayedScenes:
             )  # fmt: skip
 
 
-def _check_optuna() -> None:
+def require_optuna(place: str) -> None:
+    """Raises InputError if Optuna is missing; place: what needs it."""
     try:
         import optuna  # noqa: F401
     except ImportError:
         remedy = 'install the extra: pip install "flockscope[tune]"'
-        raise InputError(place="tune", got="no optuna", expected="the package optuna", remedy=remedy) from None
+        raise InputError(place=place, got="no optuna", expected="the package optuna", remedy=remedy) from None
 
 
 def _checked_target(out: Path) -> Path:

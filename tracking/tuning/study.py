@@ -252,7 +252,7 @@ class SearchStudy:
 @contextmanager
 def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Iterator[SearchStudy]:
     """Opens or creates the study `name` for the time of the context, and yields it as a `SearchStudy`."""
-    with _quiet_optuna():
+    with quiet_optuna():
         place = storage if storage is None or "://" in str(storage) else Path(storage)
         locks = _trial_locks(place) if isinstance(place, Path) else None
         try:
@@ -336,7 +336,8 @@ def _optuna_storage(place: str | Path | None, locks: TrialLocks | None) -> BaseS
 
 
 @contextmanager
-def _quiet_optuna() -> Iterator[None]:
+def quiet_optuna() -> Iterator[None]:
+    """Keeps Optuna from printing for the time of the context."""
     level = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     try:

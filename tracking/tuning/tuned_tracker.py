@@ -1,4 +1,4 @@
-"""What a search tunes: a tracker given by name, file or class, or the baseline rule of groups, named `grouping`."""
+"""What a search tunes, and a sweep plays: a tracker by name, file or class, or the rule of groups, named `grouping`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from tracking.config import Config
 from tracking.environment.episodes import Episode, Source, SourceCache, play, streams_for
 from tracking.grouping.link_rule import LinkRule
 from tracking.running.time_limit import TimeLimited
+from tracking.running.tracker_registry import checked, code_hash, config_class, find, located
 from tracking.scoring.people_comparison import Similarity
 
 RULE = LinkRule.tracker
@@ -18,15 +19,31 @@ RULE = LinkRule.tracker
 
 @dataclass(frozen=True)
 class TunedTracker:
-    """A tracker with parameters, or the baseline rule of groups, as a search tunes it."""
+    """A tracker, or the baseline rule of groups, as a search tunes it and a sweep plays it."""
 
     tracker: str | type[Tracker]  # as `tracking.track` takes it, or "grouping" for the rule
     name: str
-    config_class: type[Config]
     needs: tuple[str, ...]
     code: str = ""  # hash of the file that defines the tracker, "" if there is none
     # in a process of its own, with a limit of time for each step; never for a class and the rule
     limited: TimeLimited | None = None
+
+    @property
+    def config_class(self) -> type[Config]:
+        """The class of its parameters. Raises InputError if it has none."""
+        if self.name == RULE:
+            return LinkRule
+        return config_class(find(self.tracker) if isinstance(self.tracker, str) else self.tracker, self.name)
+
+    @property
+    def step_timeout(self) -> float | None:
+        """Seconds that each `reset` and `step` may take."""
+        return None if self.limited is None else self.limited.seconds
+
+    def close(self) -> None:
+        """Ends its process, if it has one; the next episode starts another."""
+        if self.limited is not None:
+            self.limited.close()
 
     @property
     def objective(self) -> str:
@@ -72,22 +89,20 @@ class TunedTracker:
 
             return play_rule(source, LinkRule.from_dict(values), cache)
         return play(
-            self.limited or self.tracker, source, values, detections=detections, tracker_seed=source.seed, cache=cache,
-            every_score=every_score, similarity=similarity,
+            self.limited or self.tracker, source, values or None, detections=detections, tracker_seed=source.seed,
+            cache=cache, every_score=every_score, similarity=similarity,
         )  # fmt: skip
 
 
 def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = None) -> TunedTracker:
     """Returns what is to be tuned; `grouping` is the baseline rule of groups."""
-    from tracking.running.tracker_registry import checked, code_hash, config_class, find, located
-
     if tracker == RULE:
         if step_timeout is not None:
             remedy = "leave it out: the rule has no steps"
             raise InputError(place="--step-timeout", got=step_timeout, expected="a tracker", remedy=remedy)
-        return TunedTracker(RULE, RULE, LinkRule, ("points", "boxes"))
+        return TunedTracker(RULE, RULE, ("points", "boxes"))
     name = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
     found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, name)
     spec = located(tracker) if isinstance(tracker, str) else tracker  # workers of a cluster run in another folder
     limited = None if step_timeout is None else TimeLimited(cast(str, spec), step_timeout)
-    return TunedTracker(spec, name, config_class(found, name), tuple(found.needs), code_hash(found), limited)
+    return TunedTracker(spec, name, tuple(found.needs), code_hash(found), limited)

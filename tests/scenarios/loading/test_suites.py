@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.loading.resolve import Entry, load, names, resolve
+from scenarios.loading.resolve import Entry, load, names, resolve, rows, suite_names
 
 
 def suite(path: Path, text: str) -> str:
@@ -78,3 +78,14 @@ def test_standard_has_every_scenario_at_two_densities() -> None:
     for name in names():
         mine = [e for e in entries if e.name in (name, f"{name}-dense")]
         assert len(mine) == 2, name
+
+
+@pytest.mark.parametrize("name", [*suite_names(), "cross"])
+def test_rows_are_the_entries_without_copies(name: str) -> None:
+    """A row loaded is what its entry is, from any working folder."""
+    entries = {entry.name.removesuffix(f"-{entry.repeat}"): entry.scenario for entry in resolve(name, ["camera.fps=4"])}
+    found = {row.name: load(row.scenario, (*row.settings, "camera.fps=4")) for row in rows(name)}
+    for row, scenario in found.items():
+        assert scenario.model_dump(exclude={"name"}) == entries[row].model_dump(exclude={"name"})
+    contents = {scenario.model_dump_json(exclude={"name"}) for scenario in entries.values()}
+    assert {scenario.model_dump_json(exclude={"name"}) for scenario in found.values()} == contents

@@ -10,10 +10,13 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
-from tracking.stress.axes import AXES, parse_axis
+from tracking.environment.episode_cache import Source
+from tracking.stress.axes import AXES, parse_axes, parse_axis
 from tracking.stress.curves import NEVER, breaking_point, crossing, overtaking
-from tracking.stress.episodes import Contender, EpisodeJob, Outcome, Store
+from tracking.stress.episodes import Outcome, Store, Tasks
 from tracking.stress.sweep import Plan, Sweep
+from tracking.tuning.parallel_episodes import EpisodeTask
+from tracking.tuning.tuned_tracker import TunedTracker
 
 WAY = np.linspace(0, 1, 9)
 
@@ -60,6 +63,11 @@ def test_wrong_axes(text: str) -> None:
         parse_axis(text)
 
 
+def test_an_axis_twice_is_refused() -> None:
+    with pytest.raises(InputError, match="detection twice"):
+        parse_axes(["detection", "clutter", "detection=1.0:0.7"])
+
+
 @pytest.mark.parametrize("name", AXES)
 def test_every_axis_sets_keys_of_a_scenario(name: str) -> None:
     axis = AXES[name]
@@ -75,22 +83,27 @@ def test_values_of_an_axis() -> None:
     assert parse_axis("sensor.clutter_rate=0.0:4.0").settings(2.5) == ["sensor.clutter_rate=2.5"]
 
 
-def sweep(tmp_path: Path, seen: list[EpisodeJob], breaks: float = 0.62, **changes) -> Sweep:
+SMALL = ("duration=4", "group.a.size=2")
+
+
+def sweep(tmp_path: Path, seen: list[EpisodeTask], breaks: float = 0.62, **changes) -> Sweep:
     """A sweep whose tracker falls from 1 at detection 0.8 to 0.5 at `breaks`; it simulates nothing but one scene."""
 
-    def play(jobs: Sequence[EpisodeJob]):
-        for job in jobs:
-            assert job.source.entry is not None
-            x = job.source.entry.scenario.sensor.detect_prob
-            rng = np.random.default_rng(job.source.seed)
-            score = np.interp(x, [0.4, breaks, 0.8, 1], [0.3, 0.5, 1, 1]) * (1 + 0.1 * rng.standard_normal())
-            seen.append(job)
-            yield Outcome({"HOTA": float(score)})
+    def score(source: Source) -> float:
+        x = source.entry.scenario.sensor.detect_prob
+        noise = 0.1 * np.random.default_rng(source.seed).standard_normal()
+        return float(np.interp(x, [0.4, breaks, 0.8, 1], [0.3, 0.5, 1, 1]) * (1 + noise))
 
-    given = {"episodes": 400, **changes}
-    settings = ("duration=4", "group.a.size=2")
-    plan = Plan(("cross",), parse_axis("detection"), tuple(range(64)), 8, "HOTA", 0.5, "file", settings, **given)
-    return Sweep(plan, {"t": Contender("t", "t", ("points",), "")}, play, Store(tmp_path / "e.jsonl"))
+    def play(scenes: Sequence[Tasks]):
+        for tasks in scenes:
+            seen.extend(task for task in tasks if isinstance(task, EpisodeTask))
+            yield [Outcome({"HOTA": score(t.source) if isinstance(t, EpisodeTask) else 1.0}) for t in tasks]
+
+    given = {
+        "scenarios": ("cross",), "axes": parse_axes(["detection"]), "seeds": tuple(range(64)), "start": 8, "by": "HOTA",
+        "share": 0.5, "detections": "file", "settings": SMALL, "episodes": 400, **changes,
+    }  # fmt: skip
+    return Sweep(Plan(**given), {"t": TunedTracker("blob", "t", ("points",))}, play, Store(tmp_path / "e.jsonl"))
 
 
 def test_values_are_placed_where_the_curve_breaks(tmp_path: Path) -> None:
@@ -100,7 +113,7 @@ def test_values_are_placed_where_the_curve_breaks(tmp_path: Path) -> None:
     at, low, high = (1 - 0.6 * share for share in (point.at, point.low, point.high))
     assert high <= 0.62 <= low
     assert at == pytest.approx(0.62, abs=0.02)
-    near = [value for value in made.values if abs(value - 0.62) < 0.1]
+    near = [value for (value,) in made.values if abs(value - 0.62) < 0.1]
     assert len(near) > len(made.values) / 3
     assert made.played <= 400
 
@@ -120,21 +133,55 @@ def test_a_sweep_goes_on_where_it_was_killed(tmp_path: Path) -> None:
     assert resumed.rows() == complete.rows()
 
 
-def test_an_axis_without_effect_is_refused(tmp_path: Path) -> None:
-    made = sweep(tmp_path, [])
-    made.plan = Plan(("cross",), parse_axis("light"), (0, 1), 2, "HOTA", 0.5, "file", ("duration=4",))
-    with pytest.raises(InputError, match="an axis that changes the scenes"):
+def test_without_an_axis_every_seed_is_played(tmp_path: Path) -> None:
+    made = sweep(tmp_path, seen := [], axes=(), seeds=tuple(range(20)), start=4, episodes=None)
+    made.run()
+    assert made.values == [()]
+    assert sorted(task.source.seed for task in seen) == list(range(20))
+    assert made.scores("t").shape == made.scores("oracle").shape == (20, 1)
+
+
+@pytest.mark.parametrize(("episodes", "seeds"), [(None, 2), (60, 2), (200, 8)])
+def test_two_axes_are_a_grid_with_more_seeds_while_there_is_budget(episodes, seeds, tmp_path: Path) -> None:
+    axes = parse_axes(["detection=1.0:0.6", "clutter=0.0:4.0"])
+    made = sweep(tmp_path, seen := [], axes=axes, start=2, episodes=episodes)
+    made.run()
+    assert made.values == [(1 - 0.1 * i, float(k)) for i in range(5) for k in range(5)]
+    assert (made.seeds, len(seen)) == (seeds, 25 * seeds)
+    row = next(row for row in made.rows() if row["tracker"] == "t" and row["values"]["clutter"] == 3)
+    assert f"sensor.detect_prob={row['values']['detection']:.10g}" in row["settings"]
+    assert "sensor.clutter_rate=3" in row["settings"]
+
+
+def test_sweeps_in_one_file_share_scenes(tmp_path: Path) -> None:
+    sweep(tmp_path, [], start=2, episodes=2).run()
+    made = sweep(tmp_path, seen := [], axes=parse_axes(["detection", "noise=1.0:3.0"]), start=2, episodes=None)
+    made.run()
+    assert len(seen) == 2 * 20
+    assert len(made.rows()) == 2 * 2 * 25
+
+
+def test_the_oracle_is_played_on_every_scene_and_not_counted(tmp_path: Path) -> None:
+    made = sweep(tmp_path, [], episodes=40)
+    made.run()
+    rows = made.rows()
+    assert sum(row["tracker"] == "oracle" for row in rows) == sum(row["tracker"] == "t" for row in rows) == made.played
+    assert np.array_equal(made.scores("oracle"), np.ones_like(made.scores("t")))
+    assert made.breaks().keys() == {"t"}
+
+
+@pytest.mark.parametrize("axes", [["light"], ["detection", "light"]])
+def test_an_axis_without_effect_is_refused(axes: list[str], tmp_path: Path) -> None:
+    made = sweep(tmp_path, [], axes=parse_axes(axes))
+    with pytest.raises(InputError, match="light; expected an axis that changes the scenes"):
         made.run()
 
 
 def test_a_failed_episode_counts_as_zero_and_one_without_script_not(tmp_path: Path) -> None:
-    made = sweep(tmp_path, [])
-    made.play = lambda jobs: (
-        Outcome({}, failed="it hangs") if j.source.seed == 0 else Outcome({}, left_out="x") if j.source.seed == 1
-        else Outcome({"HOTA": 1.0}) for j in jobs
-    )  # fmt: skip
-    made.values, made.seeds = [1.0], 3
-    made._play()
+    made = sweep(tmp_path, [], seeds=(0, 1, 2), start=3, axes=())
+    outcomes = {0: Outcome({}, failed="it hangs"), 1: Outcome({}, left_out="x"), 2: Outcome({"HOTA": 1.0})}
+    made.run_scenes = lambda scenes: ([outcomes[task.source.seed] for task in tasks] for tasks in scenes)
+    made.run()
     assert np.array_equal(made.scores("t")[:, 0], [0, np.nan, 1], equal_nan=True)
 
 

@@ -1,15 +1,18 @@
-"""`flockscope stress`: trackers on scenes that get harder along an axis; where each breaks, and who overtakes whom."""
+"""`flockscope stress`: trackers on scenes that get harder; where each breaks, who overtakes whom, and worst scenes."""
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scenarios.errors import counted, printable
-from sim.io.files.atomic import write_file
+from scenarios.errors import InputError, counted, printable
+from sim.io.files.atomic import lock_folder, write_file
 from sim.io.files.tables import Column, json_document, table_bytes
-from sim.types import DetectionMode
+from sim.types import Array, DetectionMode
 from tracking.app import option_parsing
 from tracking.app.command_options import StressOptions
 from tracking.app.command_result import CommandResult
@@ -17,89 +20,203 @@ from tracking.app.commands.score_tables import checked_key, empty_table, with_ti
 from tracking.app.progress import ProgressMeter
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval
-from tracking.stress.axes import parse_axis
+from tracking.stress.axes import parse_axes
 from tracking.stress.curves import BreakingPoint
-from tracking.stress.episodes import Store, contender, job_player
+from tracking.stress.episodes import ORACLE, Store, contender, scene_player
+from tracking.stress.search import Failure, search, worst
 from tracking.stress.sweep import Plan, Sweep
 
 EPISODES, TABLE, RESULT = "episodes.jsonl", "episodes.parquet", "stress.json"
 LISTED = 5  # failed episodes that are listed
+MOST_AXES = 2  # without a search
 
 
 def stress(options: StressOptions) -> CommandResult:
-    """Plays the sweep, stores it, and returns the curves with their breaking points."""
-    by = checked_key(options.by, better=("higher",))
+    """Plays the sweep or the search, stores it, and returns what was found."""
     trackers = {name: contender(name, options.step_timeout) for name in dict.fromkeys(options.trackers)}
     detects = all({"boxes", "points"} & {*tracker.needs} for tracker in trackers.values())
-    detections: DetectionMode = options.detections or ("file" if detects else "image")
+    plan = _plan(options, options.detections or ("file" if detects else "image"))
+    option_parsing.output_folder(options.out)
+    with (
+        lock_folder(options.out),
+        ProgressMeter("stress", options.search or options.episodes) as meter,
+        scene_player(options.workers, options.cluster) as play,
+    ):
+        sweep, found = Sweep(plan, trackers, play, Store(options.out / EPISODES), meter.step), None
+        if options.search is None:
+            sweep.run()
+        else:
+            found = search(sweep, options.search)
+        data = _data(sweep, found)
+        write_file(options.out / RESULT, json_document(data))
+        write_file(options.out / TABLE, _parquet(sweep))
+    return CommandResult(data, _text(sweep, data, options.out))
+
+
+def _plan(options: StressOptions, detections: DetectionMode) -> Plan:
+    by, axes = checked_key(options.by, better=("higher",)), parse_axes(options.vary)
     seeds = tuple(option_parsing.seeds(options.seeds, "--seeds"))
     settings = (*option_parsing.sensor_settings(options.sensor), *option_parsing.scenario_settings(options.settings))
-    budget = (options.episodes, options.minutes)
-    axis, start = parse_axis(options.vary), min(len(seeds), options.start)
-    plan = Plan(tuple(options.suite), axis, seeds, start, by, options.share, detections, settings, *budget)
-    with ProgressMeter("stress", options.episodes or 0) as meter, job_player(options.workers, options.cluster) as play:
-        sweep = Sweep(plan, trackers, play, Store(options.out / EPISODES), meter.step)
-        sweep.run()
-    data = _data(sweep)
-    write_file(options.out / RESULT, json_document(data))
-    write_file(options.out / TABLE, _parquet(sweep))
-    return CommandResult(data, _tables(sweep, data, options))
+    if options.search is None and len(axes) > MOST_AXES:
+        got, remedy = f"{len(axes)} axes", "leave some out, or search their scenes with --search N"
+        raise InputError(place="--vary", got=got, expected=f"at most {MOST_AXES}", remedy=remedy)
+    if options.search is not None and options.episodes is not None:
+        got, remedy = "it beside --search", "leave it out: --search N plays N scenes"
+        raise InputError(place="--episodes", got=got, expected="one of the two", remedy=remedy)
+    return Plan(
+        tuple(options.suite), axes, seeds, min(len(seeds), options.start), by, options.share, detections, settings,
+        options.episodes, options.minutes,
+    )  # fmt: skip
 
 
-def _data(sweep: Sweep) -> dict[str, Any]:
-    plan, breaks = sweep.plan, sweep.breaks()
+def _data(sweep: Sweep, found: list[Failure] | None) -> dict[str, Any]:
+    """Returns all that stress.json has. found: the scenes of a search."""
+    plan, rows, names = sweep.plan, sweep.rows(), [*sweep.trackers, ORACLE]
+    data: dict[str, Any] = {
+        "axes": [{"name": axis.name, "easy": axis.easy, "hard": axis.hard} for axis in plan.axes],
+        "values": sweep.values, "by": plan.by, "share": plan.share, "scenarios": list(plan.scenarios),
+        "seeds": sweep.seeds, "episodes": sum(row["tracker"] != ORACLE for row in rows),
+        "curves": {}, "by_scenario": None, "matrix": None, "overtakings": [], "found": None,
+        "failures": [row for row in rows if row["failed"]],
+        "left_out": [row for row in rows if row["left_out"] and row["tracker"] == ORACLE],
+    }  # fmt: skip
+    if found is not None:
+        return {**data, "found": [_failure(failure, k) for k, failure in enumerate(worst(found), 1)]}
+    data["curves"] = {name: {**_means(sweep.scores(name)), "break": None} for name in names}
+    if not plan.axes:
+        data["by_scenario"] = {name: _by_scenario(sweep, name) for name in names}
+    elif len(plan.axes) == 1:
+        for name, point in sweep.breaks().items():
+            data["curves"][name]["break"] = _on_axis(plan, point)
+        pairs = sweep.overtakings()
+        data["overtakings"] = [{"first": a, "second": b, **_on_axis(plan, point)} for a, b, point in pairs]
+    else:
+        first, second = ([*dict.fromkeys(values[k] for values in sweep.values)] for k in range(MOST_AXES))
+        means = {name: np.reshape(curve["mean"], (len(first), -1)).tolist() for name, curve in data["curves"].items()}
+        data["matrix"] = {"values": [first, second], "mean": means}
+    return data
 
-    def words(point: BreakingPoint) -> dict[str, float | None]:
-        easy, span = plan.axis.easy, plan.axis.hard - plan.axis.easy
-        ends = {"at": point.at, "low": point.low, "high": point.high}
-        return {name: easy + share * span if np.isfinite(share) else None for name, share in ends.items()}
 
-    curves = {}
-    for name in sweep.trackers:
-        scores = sweep.scores(name)
-        mean, low, high = (end.tolist() for end in mean_interval(scores))
-        count = np.isfinite(scores).sum(axis=0).tolist()
-        curves[name] = {"mean": mean, "low": low, "high": high, "scenes": count, "break": words(breaks[name])}
+def _means(scores: Array) -> dict[str, list[float | None]]:
+    """Returns mean, ends of its 95 % interval, and number of scenes, for each column of scores (P, V)."""
+    mean, low, high = (
+        [value if np.isfinite(value) else None for value in end.tolist()] for end in mean_interval(scores)
+    )
+    return {"mean": mean, "low": low, "high": high, "scenes": np.isfinite(scores).sum(axis=0).tolist()}
+
+
+def _by_scenario(sweep: Sweep, name: str) -> dict[str, dict[str, float | None]]:
+    scores: dict[str, list[float]] = {}
+    for scene in sweep.scenes.values():
+        scores.setdefault(scene.source.name, []).append(sweep.score(name, scene))
+    means = {scenario: _means(np.array([found]).T) for scenario, found in scores.items()}
+    return {scenario: {key: value for key, (value,) in found.items()} for scenario, found in means.items()}
+
+
+def _on_axis(plan: Plan, point: BreakingPoint) -> dict[str, float | None]:
+    (axis,) = plan.axes
+    ends = {"at": point.at, "low": point.low, "high": point.high}
     return {
-        "axis": plan.axis.name, "easy": plan.axis.easy, "hard": plan.axis.hard, "values": sweep.values, "by": plan.by,
-        "share": plan.share, "scenarios": list(plan.scenarios), "seeds": sweep.seeds, "episodes": len(sweep.rows()),
-        "curves": curves,
-        "overtakings": [{"first": a, "second": b, **words(point)} for a, b, point in sweep.overtakings()],
-        "failures": [row for row in sweep.rows() if row["failed"]],
+        name: axis.easy + share * (axis.hard - axis.easy) if np.isfinite(share) else None
+        for name, share in ends.items()
+    }
+
+
+def _failure(failure: Failure, place: int) -> dict[str, Any]:
+    source = failure.scene.source
+    words = ["flockscope", "generate", failure.scenario, "--seeds", f"{source.seed}:{source.seed + 1}"]
+    words += ["--out", f"worst-{place}", *(word for text in failure.settings for word in ("--set", text))]
+    return {
+        "scenario": source.name, "seed": source.seed, "values": failure.scene.values,
+        "settings": list(failure.settings), "score": failure.score, "oracle": failure.oracle,
+        "shortfall": failure.shortfall, "number": failure.number, "command": shlex.join(words),
     }  # fmt: skip
 
 
 def _parquet(sweep: Sweep) -> bytes:
     rows = sweep.rows()
-    words = ("tracker", "scenario", "left_out", "failed")
+    words = ("tracker", "scenario", "left_out", "failed", "traceback")
     columns = [Column(key, np.array([row[key] for row in rows], object)) for key in words]
-    columns += [Column(key, np.array([row[key] for row in rows])) for key in ("seed", "value")]
+    columns += [Column("seed", np.array([row["seed"] for row in rows]))]
+    columns += [Column(axis.name, np.array([row["values"][axis.name] for row in rows])) for axis in sweep.plan.axes]
     columns += [
         Column(score.key, np.array([row["scores"].get(score.key, np.nan) for row in rows], float), score.unit)
         for score in CATALOGUE.values()
     ]
-    return table_bytes(columns, {"axis": sweep.plan.axis.name})
+    return table_bytes(columns, {"axes": [axis.name for axis in sweep.plan.axes]})
 
 
-def _tables(sweep: Sweep, data: dict[str, Any], options: StressOptions) -> Any:
+def _text(sweep: Sweep, data: dict[str, Any], out: Path) -> Any:
     from rich.console import Group
 
-    curves, plan = data["curves"], sweep.plan
-    table = empty_table()
-    table.add_column(plan.axis.name, justify="right")
-    for name in curves:
-        table.add_column(printable(name), justify="right")
-    for k, value in enumerate(sweep.values):
-        cells = (f"{c['mean'][k]:.3f} ± {(c['high'][k] - c['low'][k]) / 2:.3f}" for c in curves.values())
-        table.add_row(f"{value:g}", *cells)
-    lines = [f"{printable(name)} {_break_words(c['break'], plan.share)}" for name, c in curves.items()]
-    for o in data["overtakings"]:
-        lines.append(f"{printable(o['first'])} falls behind {printable(o['second'])} at {_span(o)}")
-    for f in data["failures"][:LISTED]:
-        lines.append(printable(f"{f['tracker']} failed on {f['scenario']}, seed {f['seed']}: {f['failed']}"))
+    parts = _found(sweep, data) if data["found"] is not None else _curves(sweep, data)
+    return Group(*parts, *_notes(data), f"{counted(data['episodes'], 'episode')} stored in {out}")
+
+
+def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
+    plan, curves = sweep.plan, data["curves"]
     scenes = f"{', '.join(plan.scenarios)}, {counted(sweep.seeds, 'seed')}"
-    stored = f"{counted(data['episodes'], 'episode')} stored in {options.out}"
-    return Group(with_title(f"{plan.by} over {plan.axis.name} ({scenes})", table), *lines, stored)
+    over = f" over {' and '.join(axis.name for axis in plan.axes)}" if plan.axes else ""
+    if data["matrix"] is not None:
+        first, second = data["matrix"]["values"]
+        for name, means in data["matrix"]["mean"].items():
+            table = _table(plan.axes[0].name, [f"{plan.axes[1].name} {second[0]:g}", *(f"{v:g}" for v in second[1:])])
+            for value, row in zip(first, means, strict=True):
+                table.add_row(f"{value:g}", *map(_number, row))
+            yield with_title(f"{name}: {plan.by}{over} ({scenes})", table)
+        return
+    if plan.axes:
+        table = _table(plan.axes[0].name, curves)
+        for k, (value,) in enumerate(sweep.values):
+            table.add_row(f"{value:g}", *(_interval(c["mean"][k], c["low"][k], c["high"][k]) for c in curves.values()))
+    else:
+        table = _table("", curves)
+        for scenario in data["by_scenario"][ORACLE]:
+            means = [of[scenario] for of in data["by_scenario"].values()]
+            table.add_row(scenario, *(_interval(m["mean"], m["low"], m["high"]) for m in means))
+        table.add_row("all", *(_interval(c["mean"][0], c["low"][0], c["high"][0]) for c in curves.values()))
+    yield with_title(f"{plan.by}{over} ({scenes})", table)
+    for name in sweep.trackers if plan.axes else ():
+        yield f"{printable(name)} {_break_words(curves[name]['break'], plan.share)}"
+    for o in data["overtakings"]:
+        yield f"{printable(o['first'])} falls behind {printable(o['second'])} at {_span(o)}"
+
+
+def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
+    plan, tracker = sweep.plan, next(iter(sweep.trackers))
+    table = _table("scenario", ["seed", *(axis.name for axis in plan.axes), tracker, ORACLE, "shortfall"])
+    for f in data["found"]:
+        scores = (_number(f[key]) for key in ("score", "oracle", "shortfall"))
+        table.add_row(f["scenario"], str(f["seed"]), *(f"{value:g}" for value in f["values"]), *scores)
+    scenes = f"{', '.join(plan.scenarios)}, {counted(len(sweep.scenes), 'scene')}"
+    yield with_title(f"where {tracker} is worst, next to the oracle: {plan.by} ({scenes})", table)
+    for f in data["found"]:
+        yield printable(f["command"].replace(" --set ", " \\\n    --set "), keep="\n")
+
+
+def _notes(data: dict[str, Any]) -> Iterator[str]:
+    for f in data["failures"][:LISTED]:
+        yield printable(f"{f['tracker']} failed on {f['scenario']}, seed {f['seed']}: {f['failed']}")
+    if data["left_out"]:
+        first = data["left_out"][0]
+        where = f"the first {first['scenario']}, seed {first['seed']}: {first['left_out']}"
+        yield printable(f"{counted(len(data['left_out']), 'scene')} left out, {where}")
+
+
+def _table(first: str, columns: Iterable[str]) -> Any:
+    table = empty_table()
+    table.add_column(first, justify="right")
+    for name in columns:
+        table.add_column(printable(name), justify="right")
+    return table
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}"
+
+
+def _interval(mean: float | None, low: float | None, high: float | None) -> str:
+    return _number(mean) + ("" if low is None or high is None else f" ± {(high - low) / 2:.3f}")
 
 
 def _break_words(point: dict[str, float | None], share: float) -> str:

@@ -1,0 +1,265 @@
+"""`flockscope stress` on trackers whose weaknesses are known.
+
+    python -m benchmarks.stress [breaks] [search] [--runs 20] [--episodes 64] [--searches 12] [--scenes 96]
+
+breaks: the oracle's tracks, spoilt in one way each. FORGETS: who is hidden for more than 1 s gets a new id. THIRTY:
+detections beyond the 30th are ignored. CONFUSES: people nearer
+than 0.8 m get new ids in every frame. Small scenes, 5 frames
+per second. True: the breaking value on 40 other seeds at a fine grid. Each run has seeds of its own. Inside: share of
+runs whose 95 % interval holds the true value, with Wilson's interval. Width: median width of the interval, in per cent
+of the axis. Grid: nine evenly spaced values, with all seeds that the sweep's number of episodes allows.
+
+search: a tracker that loses 0.5 of its score where two groups cross, detection is below 0.55 and clutter above 4.5.
+Everywhere else its score is the oracle's, with noise. `cliff`: nothing is lost outside. `slope`: the loss grows
+linearly over half of either axis. The scenario's true events decide about crossings. Suite `standard`, axes detection,
+clutter and noise. First: median number of scenes until one loses 0.25; a search without one counts as all scenes.
+Failures: mean number of such scenes. Scenarios: mean number of scenarios among the listed failures.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import optuna
+
+from benchmarks.support.options import new_parser, one_thread
+from benchmarks.support.tables import head, row, share
+from scenarios.loading.resolve import resolve
+from sim.sequence import simulate
+from sim.types import Array, Tracks, Truth
+from tracking.environment.episode_cache import Source
+from tracking.oracle import oracle
+from tracking.scoring.evaluation import Scorer, people_scores
+from tracking.stress.axes import AXES, Axis
+from tracking.stress.curves import breaking_point, crossing, curve
+from tracking.stress.episodes import OracleTask, Outcome, Store, Tasks
+from tracking.stress.search import Failure, search, worst
+from tracking.stress.sweep import Plan, Sweep
+from tracking.tuning.tuned_tracker import TunedTracker
+
+TRUE_SEEDS = range(28_000, 28_040)
+FINE = 31  # values of the grid that gives the true breaking value
+GRID = 9
+SHARE = 0.8
+SCENE = """
+schema = 1
+duration = {duration}
+warmup = 1.0
+world = {{ size = [30, 24] }}
+camera = {{ kind = "top", fps = 5 }}
+crowd = {{ spacing = 1.2 }}
+sensor = {{ detect_prob = 0.9, clutter_rate = 0.0, noise_m = 0.05, occlusion_power = 0.0, min_visibility = 0.0, small_px = 0.0 }}
+group = [{{ id = "a", size = {size}, start = [{{ uniform = [4, 8] }}, {{ uniform = [3, 21] }}], goal = [26, {{ uniform = [3, 21] }}], repeat = {repeat} }}]
+"""  # noqa: E501
+
+Spoil = Callable[[Sequence[Tracks], Truth, int], list[Tracks]]
+
+
+@dataclass(frozen=True)
+class Weakness:
+    """A tracker made from the oracle's tracks, and the scenes and the axis on which it breaks."""
+
+    name: str
+    spoil: Spoil
+    axis: Axis
+    by: str
+    scene: str
+
+
+def forgets(tracks: Sequence[Tracks], truth: Truth, seed: int) -> list[Tracks]:
+    """Gives a new id to who was unseen for more than 1 s."""
+    last, now, found, free = dict[int, int](), dict[int, int](), list[Tracks](), 1000
+    for t in tracks:
+        for person in t.id.tolist():
+            if (t.index - last.get(person, t.index) - 1) / truth.fps > 1 + 1e-9:
+                now[person], free = free, free + 1
+            last[person] = t.index
+        found.append(t.replace(id=np.array([now.get(p, p) for p in t.id.tolist()], np.int64)))
+    return found
+
+
+def first_thirty(tracks: Sequence[Tracks], truth: Truth, seed: int) -> list[Tracks]:
+    """Ignores detections beyond the 30th."""
+    return [_kept(t, np.arange(len(t.id)) < 30) for t in tracks]
+
+
+def confuses(tracks: Sequence[Tracks], truth: Truth, seed: int) -> list[Tracks]:
+    """Gives people nearer than 0.8 m new ids, in each frame anew."""
+    found, free = [], 1000
+    for t in tracks:
+        apart = np.linalg.norm(t.pos[:, None] - t.pos[None], axis=2) + np.diag(np.full(len(t.id), np.inf))
+        near = (apart < 0.8).any(axis=1)
+        found.append(t.replace(id=np.where(near, free + np.arange(len(t.id)), t.id)))
+        free += len(t.id)
+    return found
+
+
+def _kept(t: Tracks, kept: Array) -> Tracks:
+    rows = {key: getattr(t, key)[kept] for key in ("id", "group", "pos", "vel", "cov")}
+    box = None if t.box is None else t.box[kept]
+    return t.replace(**rows, box=box, score=t.score[kept] if len(t.score) else t.score)
+
+
+def _hidden(value: float) -> list[str]:
+    return [f"sensor.hide=[{{ start = 2.0, end = {2 + value:.10g} }}]"] if value else []
+
+
+WEAKNESSES = (
+    Weakness(
+        "forgets", forgets, Axis("hidden", 0.0, 3.0, _hidden), "IDF1", SCENE.format(duration=8.0, size=2, repeat=2)
+    ),
+    Weakness(
+        "thirty", first_thirty, Axis("people", 6, 60, lambda v: [f"group.a.repeat={v:.0f}"], whole=True), "DetRe",
+        SCENE.format(duration=2.0, size=1, repeat=6),
+    ),
+    Weakness(
+        "confuses", confuses, Axis("spacing", 1.5, 0.5, lambda v: [f"crowd.spacing={v:.10g}"]), "IDF1",
+        SCENE.format(duration=6.0, size=2, repeat=2),
+    ),
+)  # fmt: skip
+
+
+def spoilt(weakness: Weakness, source: Source) -> float:
+    """Returns the score of the spoilt tracks on a scene."""
+    sequence = source.open(())
+    assert sequence.truth is not None
+    truth = sequence.truth.replace(groups=None, labelled=None, events=None)  # which are not scored
+    tracks = weakness.spoil(oracle(sequence, {"detections": "file", "input": "points"}), truth, source.seed)
+    (compared,) = Scorer(truth).compare([tracks], None, None)
+    assert compared.people is not None
+    return people_scores(compared.people)[weakness.by]
+
+
+def sweep_of(weakness: Weakness, seeds: Sequence[int], episodes: int, folder: Path) -> Sweep:
+    def play(scenes: Sequence[Tasks]) -> Iterator[list[Outcome]]:
+        for tasks in scenes:
+            yield [
+                Outcome({weakness.by: 1.0 if isinstance(t, OracleTask) else spoilt(weakness, t.source)}) for t in tasks
+            ]
+
+    scene = folder / f"{weakness.name}.toml"
+    scene.write_text(weakness.scene)
+    plan = Plan(
+        (str(scene),), (weakness.axis,), tuple(seeds), 4, weakness.by, SHARE, "file", episodes=episodes
+    )  # fmt: skip
+    return Sweep(plan, {"t": TunedTracker("blob", "t", ("points",))}, play, Store(folder / f"{weakness.name}.jsonl"))
+
+
+def at_values(sweep: Sweep, values: Sequence[float], seeds: int) -> Array:
+    """Plays a grid and returns its scores (P, V)."""
+    sweep.values, sweep.seeds = [(value,) for value in values], seeds
+    sweep._play()
+    return sweep.scores("t")
+
+
+def breaks(runs: int, episodes: int, folder: Path) -> None:
+    """Prints a row for each weakness, of sweeps and of grids."""
+    print(f"\nBreaking points, {runs} runs of about {episodes} episodes\n")
+    head(["tracker", "true", "episodes", "inside", "width, %", "inside, grid", "width, %, grid"])
+    for weakness in WEAKNESSES:
+        axis = weakness.axis
+        fine = sweep_of(weakness, TRUE_SEEDS, 0, folder)
+        mean = curve(at_values(fine, axis.spread(FINE), len(TRUE_SEEDS)))
+        true = crossing(fine.way, mean - SHARE * mean[0])
+        found, grids, played = [], [], []
+        for k in range(runs):
+            seeds = range(20_000 + 100 * k, 20_100 + 100 * k)
+            made = sweep_of(weakness, seeds, episodes, folder)
+            made.run()
+            found.append(made.breaks()["t"])
+            played.append(made.played)
+            grid = sweep_of(weakness, seeds, 0, folder)
+            scores = at_values(grid, axis.spread(GRID), played[-1] // GRID)
+            grids.append(breaking_point(grid.way, scores, SHARE, np.random.default_rng(0)))
+        cells = []
+        for points in (found, grids):
+            inside = sum(p.low <= true <= p.high for p in points)
+            cells += [share(inside, runs), f"{100 * np.median([p.high - p.low for p in points]):.1f}"]
+        row([weakness.name, f"{axis.easy + true * (axis.hard - axis.easy):.3f}", f"{np.mean(played):.0f}", *cells])
+
+
+LOSS, NOISE, BEST = 0.5, 0.03, 0.9
+SEARCHED = ("detection", "clutter", "noise")
+SUITE, SEEDS = "standard", range(20_000, 20_005)
+WHOLE = 3 / 4  # share of an axis at which the whole loss is there
+FROM = {"cliff": WHOLE, "slope": 1 / 4}  # where it begins
+
+
+@cache
+def _groups_cross(name: str, seed: int) -> bool:
+    """Returns True if two groups cross in the truth of an entry of SUITE."""
+    (entry,) = (entry for entry in resolve(SUITE) if entry.name == name)
+    truth = simulate(entry.scenario, seed, entry.repeat).truth
+    assert truth is not None
+    return any(e.kind == "cross" and min(e.before) >= 0 for e in truth.events or ())
+
+
+def planted(source: Source, kind: str) -> float:
+    """Returns the score of the tracker with the planted weakness on a scene."""
+    assert source.entry is not None
+    sensor = source.entry.scenario.sensor
+    shares = np.array([(1 - sensor.detect_prob) / 0.6, sensor.clutter_rate / 6])
+    begin = FROM[kind]
+    grown = np.clip((shares - begin) / (WHOLE - begin), 0, 1) if begin < WHOLE else shares > begin
+    loss = LOSS * float(np.prod(grown)) if np.all(grown > 0) and _groups_cross(source.name, source.seed) else 0.0
+    rng = np.random.default_rng([source.seed, int(1e6 * shares[0]), int(1e6 * shares[1])])
+    return BEST - loss + NOISE * float(rng.standard_normal())
+
+
+def searched(kind: str, seed: int, scenes: int, random: bool, folder: Path) -> list[Failure]:
+    """Returns the scenes of one search."""
+
+    def play(given: Sequence[Tasks]) -> Iterator[list[Outcome]]:
+        for tasks in given:
+            scores = (BEST if isinstance(t, OracleTask) else planted(t.source, kind) for t in tasks)
+            yield [Outcome({"objective": score}) for score in scores]
+
+    axes = tuple(AXES[name] for name in SEARCHED)
+    plan = Plan((SUITE,), axes, tuple(SEEDS), 2, "objective", SHARE, "file")
+    store = Store(folder / f"{kind}-{seed}-{random}.jsonl")
+    sweep = Sweep(plan, {"t": TunedTracker("blob", "t", ("points",))}, play, store)
+    return search(sweep, scenes, seed, optuna.samplers.RandomSampler(seed=seed) if random else None)
+
+
+def searches(count: int, scenes: int, folder: Path) -> None:
+    """Prints a row for each weakness and sampler."""
+    print(f"\nSearch, {count} searches of {scenes} scenes\n")
+    head(["weakness", "sampler", "first, median", "with a failure", "failures, mean", "scenarios, mean"])
+    for kind in FROM:
+        for random in (False, True):
+            first, failures, scenarios = [], [], []
+            for seed in range(count):
+                found = searched(kind, seed, scenes, random, folder)
+                bad = [failure.number for failure in found if failure.shortfall > LOSS / 2]
+                first.append(bad[0] + 1 if bad else scenes)
+                failures.append(len(bad))
+                listed = [failure for failure in worst(found) if failure.shortfall > LOSS / 2]
+                scenarios.append(len({failure.scene.source.name for failure in listed}))
+            cells = [f"{np.median(first):.1f}", share(sum(n > 0 for n in failures), count)]
+            means = [f"{np.mean(failures):.1f}", f"{np.mean(scenarios):.1f}"]
+            row([kind, "random" if random else "TPE", *cells, *means])
+
+
+def main() -> None:
+    one_thread()
+    parser = new_parser(__doc__)
+    parser.add_argument("parts", nargs="*", default=["breaks", "search"], help="breaks, search")
+    parser.add_argument("--runs", type=int, default=20)
+    parser.add_argument("--episodes", type=int, default=64)
+    parser.add_argument("--searches", type=int, default=12)
+    parser.add_argument("--scenes", type=int, default=96)
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        if "breaks" in args.parts:
+            breaks(args.runs, args.episodes, Path(name))
+        if "search" in args.parts:
+            searches(args.searches, args.scenes, Path(name))
+
+
+if __name__ == "__main__":
+    main()

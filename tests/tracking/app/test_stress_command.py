@@ -1,0 +1,111 @@
+"""`flockscope stress`: what it prints and stores without axes, with two, and of a search; one run in a folder."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from sim.io.files.atomic import lock_folder
+from tests.tuning_toys import TOY, write_scenes
+from tracking.app.cli import run
+
+FAKE = f"{Path(TOY.rpartition(':')[0]).parent / 'fake_tracker.py'}:Nearest"
+
+
+@pytest.fixture
+def scene(tmp_path: Path, monkeypatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    return Path(write_scenes(tmp_path)[0]).name
+
+
+def stress(scene: str, *more: str) -> int:
+    return run(
+        ["stress", FAKE, "--suite", scene, "--seeds", "0:3", "--start", "2", "--by", "HOTA", "--out", "o", *more]
+    )
+
+
+def test_without_axes_a_row_for_each_scenario(scene: str, capsys) -> None:
+    assert stress(scene, "--suite", "two.toml", "--json") == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["by_scenario"]["oracle"].keys() == {"one", "two"}
+    assert data["by_scenario"][FAKE]["one"]["scenes"] == 3
+    assert data["curves"][FAKE]["scenes"] == [6]
+    assert data["episodes"] == 6
+    assert data["matrix"] is data["found"] is None
+    assert stress(scene, "--suite", "two.toml") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[2:5]] == ["one", "two", "all"]
+    assert pq.read_table("o/episodes.parquet").column_names[:6] == [
+        "tracker", "scenario", "left_out", "failed", "traceback", "seed",
+    ]  # fmt: skip
+
+
+def test_two_axes_make_a_matrix(scene: str, capsys) -> None:
+    axes = ("--vary", "detection=1.0:0.6", "--vary", "group.a.size=1:2")
+    assert stress(scene, *axes) == 0
+    assert "detection  group.a.size 1" in capsys.readouterr().out
+    data = json.loads(Path("o/stress.json").read_text())
+    assert data["matrix"]["values"] == [[1.0, 0.9, 0.8, 0.7, 0.6], [1.0, 2.0]]
+    means = data["matrix"]["mean"]["oracle"]
+    assert [len(row) for row in means] == [2] * 5
+    assert [value for row in means for value in row] == data["curves"]["oracle"]["mean"]
+    assert means[0][0] > means[4][0]
+    assert pq.read_table("o/episodes.parquet")["group.a.size"].to_pylist().count(2.0) == 2 * 2 * 5
+
+
+def test_a_found_scene_is_generated_by_its_command(scene: str, capsys) -> None:
+    assert (
+        stress(scene, "--vary", "detection", "--vary", "clutter", "--vary", "velocity-difference", "--search", "6") == 0
+    )
+    text = capsys.readouterr().out
+    data = json.loads(Path("o/stress.json").read_text())
+    worst = data["found"][0]
+    assert worst["shortfall"] == worst["oracle"] - worst["score"] > 0
+    assert len(worst["values"]) == 3
+    assert worst["command"] in text.replace(" \\\n    ", " ")
+    assert run([*shlex.split(worst["command"])[1:], "--streams", "none"]) == 0
+    seed = str(worst["seed"])
+    assert run(["track", FAKE, "worst-1", "--detections", "file", "--seed", seed, "--out", "t"]) == 0
+    (folder,) = Path("worst-1").glob("*/one-s*")
+    capsys.readouterr()
+    assert run(["score", str(folder), f"t/{folder.name}", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["sequences"][0]["HOTA"] == worst["score"]
+
+
+def test_a_failure_is_listed_and_stored_with_its_traceback(scene: str, capsys) -> None:
+    broken = Path(FAKE.partition(":")[0]).read_text().replace("apart = ", "apart = 1 / 0 + ")
+    Path("broken.py").write_text(broken)
+    assert run(["stress", "broken.py:Nearest", "--suite", scene, "--seeds", "0:2", "--out", "o"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "failed on one, seed 0: " in text
+    assert "got ZeroDivisionError: division by zero" in text
+    assert "Traceback" not in text
+    assert "apart = " not in text
+    failed = json.loads(Path("o/stress.json").read_text())["failures"][0]
+    assert "apart = 1 / 0 + " in failed["traceback"]
+    assert failed["traceback"].endswith("ZeroDivisionError: division by zero")
+
+
+def test_a_second_run_in_the_folder_is_refused(scene: str, capsys) -> None:
+    with lock_folder(Path("o")):
+        assert stress(scene) == 2
+    assert "o: got another run that writes here; expected one at a time" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "place"),
+    [
+        ("--vary detection --vary clutter --vary noise", "--vary: got 3 axes"),
+        ("--vary noise --vary noise", "--vary: got noise twice"),
+        ("--vary noise --search 5 --episodes 10", "--episodes: got it beside --search"),
+        ("--detections image", "got a tracker that needs"),
+    ],
+)
+def test_wrong_options(words: str, place: str, scene: str, capsys) -> None:
+    assert stress(scene, *words.split()) == 2
+    assert place in capsys.readouterr().err
+    assert not Path("o").exists()

@@ -1,0 +1,152 @@
+"""Search for the scenes in which a tracker is worst, next to what its detections allow.
+
+A scene has a value of each axis between its ends, a scenario of the suite, and a seed. Its *shortfall* is the oracle's
+score less the tracker's; a failed tracker has the score 0. The first 16 scenes and every second one of the others are
+drawn at random, the rest by Optuna's TPE sampler, which draws more where shortfalls were great. TPE alone would stay
+with the first small shortfalls that it sees. So that not all scenes show one failure again and again, the shortfall
+that the sampler gets is reduced near a worse failure of the same scenario. Scenes are near if no axis differs by a
+fifth of its range. The failures that are listed are the worst ones, no two near each other.
+
+What is drawn depends on the seed of the search and on the scores so far, not on the number of workers. A search that
+was stopped draws the same scenes again, takes stored episodes from the store, and so goes on where it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenarios.loading.resolve import Entry, SuiteEntry, load, rows
+from tracking.environment.episode_cache import Source
+from tracking.stress.episodes import ORACLE
+from tracking.stress.sweep import Plan, Scene, Sweep
+
+if TYPE_CHECKING:
+    import optuna
+
+BATCH = 8  # scenes that are drawn before their scores are known, for any number of workers
+RANDOM = 2 * BATCH  # first scenes, all of them drawn at random
+NEAR = 0.2  # least difference of some axis, as a share of its range, of scenes that are not near
+LISTED = 5  # failures
+SCENARIO = "scenario"  # name of the parameter
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A scene in which the tracker falls short of the oracle."""
+
+    number: int  # of the scene in the search, from 0
+    scene: Scene
+    place: tuple[float, ...]  # shares of the way from easy to hard
+    scenario: str  # name or file, as `generate` takes it
+    settings: tuple[str, ...]
+    oracle: float
+    score: float
+
+    @property
+    def shortfall(self) -> float:
+        """The oracle's score less the tracker's; nan if one is unknown."""
+        return self.oracle - self.score
+
+    def nearness(self, other: Failure) -> float:
+        """Returns 1 for an equal place and scenario, falling to 0 for scenes that are not near."""
+        if (self.scenario, self.scene.source.name) != (other.scenario, other.scene.source.name):
+            return 0.0
+        apart = max((abs(a - b) for a, b in zip(self.place, other.place, strict=True)), default=0.0)
+        return max(0.0, 1 - apart / NEAR)
+
+
+def search(
+    sweep: Sweep, count: int, seed: int = 0, sampler: optuna.samplers.BaseSampler | None = None
+) -> list[Failure]:
+    """Plays scenes with the first tracker, and returns all of them whose scores are known, in their order.
+
+    Args:
+        sweep: Gives plan, trackers and store, and keeps the episodes. The search ends early with its budget of time.
+        count: Number of scenes.
+        seed: Of the search.
+        sampler: Draws scenes in place of TPE.
+
+    Raises:
+        InputError: Optuna is not installed, or a scene cannot be made.
+    """
+    from tracking.tuning.search import require_optuna
+
+    require_optuna("--search")
+    import optuna
+
+    from tracking.tuning.study import quiet_optuna
+
+    sweep.check_scenes()
+    entries = [entry for name in sweep.plan.scenarios for entry in rows(name)]
+    tracker, found, space = next(iter(sweep.trackers)), list[Failure](), _space(sweep.plan, entries)
+    with quiet_optuna():
+        tpe = optuna.samplers.TPESampler(seed=seed, n_startup_trials=0, multivariate=True, constant_liar=True)
+        study = optuna.create_study(direction="maximize", sampler=sampler or tpe)
+        for first in range(0, count, BATCH):
+            if sweep.spent():
+                break
+            trials = [_asked(study, space, seed, number) for number in range(first, min(first + BATCH, count))]
+            drawn = [_drawn(sweep.plan, entries, trial, seed) for trial in trials]
+            sweep.play([failure.scene for failure in drawn], [tracker])
+            for trial, failure in zip(trials, drawn, strict=True):
+                oracle, score = (sweep.score(name, failure.scene) for name in (ORACLE, tracker))
+                played = replace(failure, oracle=oracle, score=score)
+                if np.isfinite(played.shortfall):
+                    study.tell(trial, _novelty(played, found))
+                    found.append(played)
+                else:
+                    study.tell(trial, state=optuna.trial.TrialState.FAIL)
+    return found
+
+
+def worst(found: Sequence[Failure], most: int = LISTED) -> list[Failure]:
+    """Returns the failures with the greatest shortfalls, no two near each other."""
+    chosen = list[Failure]()
+    for failure in sorted(found, key=lambda one: -one.shortfall):
+        if failure.shortfall > 0 and len(chosen) < most and not any(failure.nearness(other) for other in chosen):
+            chosen.append(failure)
+    return chosen
+
+
+def _space(plan: Plan, entries: Sequence[SuiteEntry]) -> dict[str, optuna.distributions.BaseDistribution]:
+    from optuna.distributions import CategoricalDistribution, FloatDistribution
+
+    shares = {axis.name: FloatDistribution(0.0, 1.0) for axis in plan.axes}
+    return {**shares, SCENARIO: CategoricalDistribution(range(len(entries)))}
+
+
+def _asked(
+    study: optuna.Study, space: dict[str, optuna.distributions.BaseDistribution], seed: int, number: int
+) -> optuna.Trial:
+    """Returns the next trial, drawn by the sampler of the study or at random."""
+    if number < RANDOM or number % 2:
+        rng = np.random.default_rng([seed, number, 1])
+        shares = {name: float(rng.random()) for name in space if name != SCENARIO}
+        study.enqueue_trial({**shares, SCENARIO: int(rng.integers(len(space[SCENARIO].choices)))})
+    return study.ask(space)
+
+
+def _drawn(plan: Plan, entries: Sequence[SuiteEntry], trial: optuna.Trial, seed: int) -> Failure:
+    entry: SuiteEntry = entries[trial.params[SCENARIO]]
+    # Four digits, so that the scene's command is short; what was drawn and what is played differ by less than 0.1 %.
+    values = tuple(float(f"{axis.at(trial.params[axis.name]):.4g}") for axis in plan.axes)
+    settings = tuple(_last_of_each_key((*entry.settings, *plan.settings_at(values))))
+    scenario = load(entry.scenario, settings).model_copy(update={"name": entry.name})
+    of_scene = int(np.random.default_rng([seed, trial.number]).choice(plan.seeds))
+    source = Source(entry.name, of_scene, entry=Entry(entry.name, scenario))
+    place = tuple(trial.params[axis.name] for axis in plan.axes)
+    return Failure(trial.number, Scene(source, values), place, entry.scenario, settings, np.nan, np.nan)
+
+
+def _last_of_each_key(settings: Sequence[str]) -> Iterator[str]:
+    """Yields the settings that count, each key once, as `--set` wants them."""
+    yield from {text.partition("=")[0].strip(): text for text in settings}.values()
+
+
+def _novelty(played: Failure, found: Sequence[Failure]) -> float:
+    worse = (played.nearness(other) for other in found if other.shortfall >= played.shortfall)
+    return max(played.shortfall, 0.0) * (1 - max(worse, default=0.0))
