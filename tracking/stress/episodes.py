@@ -46,7 +46,8 @@ class Outcome:
     """What became of an episode: scores by key, () without; a script that did not come true; or a failed tracker."""
 
     scores: dict[str, float]
-    seconds: float = 0.0
+    seconds: float = 0.0  # in the tracker
+    frames: int = 0
     left_out: str = ""
     failed: str = ""
     traceback: str = ""  # of the failed tracker's own code, its last lines
@@ -102,7 +103,7 @@ def play_oracle(task: OracleTask, opened: OpenedSource) -> Episode | FlockscopeE
 
 def _outcome(result: Episode | FlockscopeError) -> Outcome:
     if isinstance(result, Episode):
-        return Outcome(dict(result.scores), result.seconds_tracking, result.left_out)
+        return Outcome(dict(result.scores), result.seconds_tracking, result.frames, result.left_out)
     return Outcome({}, failed=result.line(), traceback=_traceback(result.__cause__))
 
 

@@ -27,6 +27,7 @@ from tracking.stress.search import Failure, search, worst
 from tracking.stress.sweep import Plan, Sweep
 
 EPISODES, TABLE, RESULT = "episodes.jsonl", "episodes.parquet", "stress.json"
+REPORT = "report.html"
 LISTED = 5  # failed episodes that are listed
 MOST_AXES = 2  # without a search
 
@@ -50,7 +51,21 @@ def stress(options: StressOptions) -> CommandResult:
         data = _data(sweep, found)
         write_file(options.out / RESULT, json_document(data))
         write_file(options.out / TABLE, _parquet(sweep))
-    return CommandResult(data, _text(sweep, data, options.out))
+        report = _report(sweep, data, options.out / REPORT)
+    return CommandResult(data, _text(sweep, data, options.out, report))
+
+
+def _report(sweep: Sweep, data: dict[str, Any], path: Path) -> str:
+    """Writes the report; returns its path, or why it was not written."""
+    from tracking.app.report.of_sweep import report_of_sweep
+    from tracking.app.report.page import check_packages, write_report
+
+    try:
+        check_packages()
+    except InputError as error:
+        return error.line()
+    write_report(report_of_sweep(sweep, data, [*_break_lines(sweep, data)]), path)
+    return str(path)
 
 
 def _plan(options: StressOptions, detections: DetectionMode) -> Plan:
@@ -146,11 +161,11 @@ def _parquet(sweep: Sweep) -> bytes:
     return table_bytes(columns, {"axes": [axis.name for axis in sweep.plan.axes]})
 
 
-def _text(sweep: Sweep, data: dict[str, Any], out: Path) -> Any:
+def _text(sweep: Sweep, data: dict[str, Any], out: Path, report: str) -> Any:
     from rich.console import Group
 
     parts = _found(sweep, data) if data["found"] is not None else _curves(sweep, data)
-    return Group(*parts, *_notes(data), f"{counted(data['episodes'], 'episode')} stored in {out}")
+    return Group(*parts, *_notes(data), f"{counted(data['episodes'], 'episode')} stored in {out}; report: {report}")
 
 
 def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
@@ -176,8 +191,15 @@ def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
             table.add_row(scenario, *(_interval(m["mean"], m["low"], m["high"]) for m in means))
         table.add_row("all", *(_interval(c["mean"][0], c["low"][0], c["high"][0]) for c in curves.values()))
     yield with_title(f"{plan.by}{over} ({scenes})", table)
-    for name in sweep.trackers if plan.axes else ():
-        yield f"{printable(name)} {_break_words(curves[name]['break'], plan.share)}"
+    yield from _break_lines(sweep, data)
+
+
+def _break_lines(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
+    """Yields words on the breaking points and overtakings of a sweep along one axis."""
+    if len(sweep.plan.axes) != 1 or data["found"] is not None:
+        return
+    for name in sweep.trackers:
+        yield f"{printable(name)} {_break_words(data['curves'][name]['break'], sweep.plan.share)}"
     for o in data["overtakings"]:
         yield f"{printable(o['first'])} falls behind {printable(o['second'])} at {_span(o)}"
 

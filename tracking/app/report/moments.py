@@ -6,17 +6,19 @@ import base64
 import warnings
 from collections.abc import Callable
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
+import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Sequence
 from tracking.app.replay_page.page import Run, page_data, script_json
-from tracking.app.report.content import Moment
-from tracking.errors.found import FoundError, RunErrors, errors_of_run
+from tracking.app.report.content import CauseBar, Moment
+from tracking.errors.found import CauseRow, FoundError, RunErrors, errors_of_run
 from tracking.running.run import TrackingRun
 
+GAINS = ("HOTA", "group_F1")
 MOST = 12  # moments in a report
 BYTES = 7_000_000  # of all their replays
 AROUND = 6.0  # s that a replay shows before and after an error
@@ -61,20 +63,21 @@ def chosen(candidates: SequenceOf[Candidate], most: int = MOST) -> list[Candidat
     return sorted(shown, key=lambda one: -one.shortfall)
 
 
-def moments(candidates: SequenceOf[Candidate], runs: Runs) -> list[Moment]:
-    """Returns the worst moments with their replays, as far as these do not make the report too large."""
+def moments(candidates: SequenceOf[Candidate], runs: Runs) -> list[tuple[Moment, RunErrors]]:
+    """Returns the worst moments with the errors of their runs; replays as far as the report stays small."""
     found, size = [], 0
     for one in chosen(candidates):
-        moment, replay = _moment(one, *runs(one))
-        size += len(replay)
-        found.append(moment(replay if size <= BYTES else None))
+        moment, every = _moment(one, *runs(one))
+        size += len(moment.replay or "")
+        found.append((moment if size <= BYTES else replace(moment, replay=None), every))
     return found
 
 
 def _moment(
     one: Candidate, sequence: Sequence, run: TrackingRun, rival: TrackingRun | None
-) -> tuple[Callable[[str | None], Moment], str]:
-    errors = shown_errors(sequence, run, costs=True).errors
+) -> tuple[Moment, RunErrors]:
+    every = shown_errors(sequence, run, costs=True)
+    errors = every.errors
     dearest = max(errors, key=lambda error: error.cost or 0.0, default=None)
     length = sequence.length or len(run)
     first, last = (1, length) if dearest is None else (dearest.error.start, dearest.error.end)
@@ -86,12 +89,23 @@ def _moment(
     data = page_data(sequence, Run(run, errors, one.name), other, span=span, start=start)
     data["background"], data["video"] = _background(sequence), None
     kind, words = ("", "") if dearest is None else (dearest.error.kind, _words(dearest))
+    known = (one.name, one.scenario, one.sequence, one.score, one.best)
+    return Moment(*known, (first - 1) / sequence.fps, kind, words, script_json(data)), every
 
-    def moment(replay: str | None) -> Moment:
-        begins = (first - 1) / sequence.fps
-        return Moment(one.name, one.scenario, one.sequence, one.score, one.best, begins, kind, words, replay)
 
-    return moment, script_json(data)
+def cause_bars(found: SequenceOf[tuple[str, RunErrors]]) -> list[CauseBar]:
+    """Returns what each kind and cause of errors costs each tracker, mean over its runs; found: trackers and runs."""
+    bars = []
+    for name in dict.fromkeys(name for name, _ in found):
+        runs = [errors for other, errors in found if other == name]
+        parts: dict[tuple[str, str], list[CauseRow]] = {}
+        for row in (row for errors in runs for row in errors.causes):
+            parts.setdefault((row.kind, row.cause), []).append(row)
+        for (kind, cause), rows in parts.items():
+            gains = {key: float(np.nansum([row.gains[key] for row in rows]) / len(runs)) for key in GAINS}
+            counts = sum(row.errors for row in rows), sum(row.seconds for row in rows)
+            bars.append(CauseBar(name, kind, cause, *counts, gains))
+    return sorted(bars, key=lambda bar: (bar.name, -sum(bar.gains.values())))
 
 
 def _words(error: FoundError) -> str:
@@ -100,15 +114,16 @@ def _words(error: FoundError) -> str:
     )
 
 
-def shown_errors(sequence: Sequence, run: TrackingRun | None, costs: bool = False) -> RunErrors:
+def shown_errors(sequence: Sequence, run: TrackingRun, costs: bool = False) -> RunErrors:
     """Returns the errors of a run; none, with a warning, where tracks and labels cannot be compared."""
-    if run is None or sequence.truth is None or any(t.unit == "group" for t in run):
-        return RunErrors([], {})
+    none = RunErrors([], {}, [], {})
+    if sequence.truth is None:
+        return none
     try:
         return errors_of_run(sequence, run, costs=costs)
     except InputError as error:
         warnings.warn(f"{sequence.name}: the page shows no errors: {error.got}", stacklevel=2)
-        return RunErrors([], {})
+        return none
 
 
 def _background(sequence: Sequence) -> str | None:

@@ -15,13 +15,11 @@ from tracking.app.commands.score_ranking import RankedRuns, rank_words, ranked_r
 from tracking.app.commands.score_tables import SIMILARITY
 from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, read_runs, score_runs
 from tracking.app.progress import ProgressMeter
-from tracking.app.report.content import CauseBar, HeatCell, HeatMap, RankedRow, Report, Speed
-from tracking.app.report.moments import Candidate, moments, shown_errors
+from tracking.app.report.content import HeatCell, HeatMap, RankedRow, Report, Speed
+from tracking.app.report.moments import Candidate, cause_bars, moments, shown_errors
 from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.errors.found import RunErrors
 from tracking.running.run import TrackingRun
-
-GAINS = ("HOTA", "group_F1")
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ def report_of_runs(
             meter.step(sequences[len(found)].name)
             found.append(one)
     ranked = ranked_runs(list(names), sequences, [one.scored for one in found], by, [])
-    candidates = list(_candidates(ranked, found))
+    candidates = list(_candidates(ranked))
 
     def tracked(one: Candidate) -> tuple[Sequence, TrackingRun, TrackingRun | None]:
         k = ranked.comparison.sequences.index(one.sequence)
@@ -65,9 +63,9 @@ def report_of_runs(
         about=f"People are compared by {SIMILARITY[c.similarity]}. The oracle has true ids on the same input.",
         by=ranked.key, ranking=_ranking(ranked), ranking_words=[*verdict(c, ranked.key), *ranked.notes],
         heat=_heat(ranked) if len(ranked.scenarios) > 1 else None,
-        causes=list(_causes(c.runs, found)),
+        causes=cause_bars([(name, one.errors[k]) for k, name in enumerate(c.runs) for one in found]),
         causes_about="What the repair of the errors of one kind and cause adds, mean over the sequences.",
-        speeds=list(_speeds(ranked, found)), moments=moments(candidates, tracked),
+        speeds=list(_speeds(ranked, found)), moments=[moment for moment, _ in moments(candidates, tracked)],
         sequences=[
             (one.sequence, files[one.sequence], one.score)
             for one in sorted(candidates, key=lambda one: one.score) if one.sequence in files
@@ -77,7 +75,7 @@ def report_of_runs(
 
 def _find(sequence: Sequence, job: ScoringJob) -> _Found:
     runs = read_runs(sequence, job)
-    return _Found(score_runs(sequence, runs, job), [shown_errors(sequence, run, costs=True) for run in runs])
+    return _Found(score_runs(sequence, runs, job), [shown_errors(sequence, run) for run in runs])
 
 
 def _ranking(ranked: RankedRuns) -> list[RankedRow]:
@@ -114,7 +112,7 @@ def _heat(ranked: RankedRuns) -> HeatMap:
     return HeatMap(f"{ranked.key} by scenario", tuple(names), rows)
 
 
-def _candidates(ranked: RankedRuns, found: SequenceOf[_Found]) -> Iterator[Candidate]:
+def _candidates(ranked: RankedRuns) -> Iterator[Candidate]:
     c = ranked.comparison
     scenario = {k: name for name, places in ranked.scenarios.items() for k in places}
     for name in c.runs:
@@ -125,19 +123,6 @@ def _candidates(ranked: RankedRuns, found: SequenceOf[_Found]) -> Iterator[Candi
             rival = max(known, key=known.__getitem__, default="")
             if math.isfinite(score):
                 yield Candidate(name, scenario[k], sequence, float(score), _best(ranked, name, k), rival)
-
-
-def _causes(names: SequenceOf[str], found: SequenceOf[_Found]) -> Iterator[CauseBar]:
-    for r, name in enumerate(names):
-        parts: dict[tuple[str, str], list[float]] = {}
-        for one in found:
-            for row in one.errors[r].causes:
-                total = parts.setdefault((row.kind, row.cause), [0, 0.0, *[0.0] * len(GAINS)])
-                gains = [row.gains[key] if math.isfinite(row.gains[key]) else 0.0 for key in GAINS]
-                for k, value in enumerate([row.errors, row.seconds, *(gain / len(found) for gain in gains)]):
-                    total[k] += value
-        for (kind, cause), (errors, seconds, *means) in sorted(parts.items(), key=lambda part: -sum(part[1][2:])):
-            yield CauseBar(name, kind, cause, int(errors), seconds, dict(zip(GAINS, means, strict=True)))
 
 
 def _speeds(ranked: RankedRuns, found: SequenceOf[_Found]) -> Iterator[Speed]:

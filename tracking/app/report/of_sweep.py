@@ -1,0 +1,163 @@
+"""The report on a sweep: `stress`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from collections.abc import Sequence as SequenceOf
+
+import numpy as np
+
+from scenarios.errors import counted
+from sim.types import Array, Sequence
+from tracking.app.commands.score_ranking import rank_words
+from tracking.app.report.content import Curve, Curves, Failure, HeatCell, HeatMap, Json, RankedRow, Report, Speed
+from tracking.app.report.moments import Candidate, cause_bars, moments
+from tracking.environment.episodes import streams_for
+from tracking.ranking import rank
+from tracking.running.run import TrackingRun, track
+from tracking.scoring.catalogue import CATALOGUE
+from tracking.stats import mean_interval
+from tracking.stress.episodes import ORACLE
+from tracking.stress.sweep import Scene, Sweep
+
+CAUSES = "What the repair of the errors of one kind and cause adds, mean over the sequences of the worst moments."
+
+
+def report_of_sweep(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Report:
+    """Returns the report on a sweep.
+
+    data: as stress.json has it; words: on breaking points and overtakings.
+    """
+    plan, searched = sweep.plan, data["found"] is not None
+    scenes = [*sweep.scenes.values()]
+    easy = scenes if searched or not plan.axes else [s for s in scenes if s.values == sweep.values[0]]
+    candidates = dict(_candidates(sweep, scenes))
+    shown = moments([*candidates], lambda one: _replay(sweep, one, candidates[one]))
+    return Report(
+        title=f"Stress of {', '.join(sweep.trackers)}", about=_about(sweep, data), by=plan.by,
+        ranking=[] if searched else list(_ranking(sweep, easy)), ranking_words=_ranking_words(sweep, easy),
+        heat=_scenarios(sweep, easy), curves=_curves(sweep, data, words), matrices=list(_matrices(sweep, data)),
+        causes=cause_bars([(one.name, errors) for one, errors in shown]), causes_about=CAUSES,
+        speeds=list(_speeds(sweep, easy)), moments=[moment for moment, _ in shown],
+        failures=[Failure(row["tracker"], _scene(row), row["failed"], row["traceback"]) for row in data["failures"]],
+    )  # fmt: skip
+
+
+def _about(sweep: Sweep, data: Json) -> str:
+    plan = sweep.plan
+    axes = f" along {' and '.join(axis.name for axis in plan.axes)}" if plan.axes else ""
+    seeds = counted(len({scene.source.seed for scene in sweep.scenes.values()}), "seed")
+    return f"{counted(data['episodes'], 'episode')} of {', '.join(plan.scenarios)}{axes}, {seeds}"
+
+
+def _scene(row: Json) -> str:
+    return " ".join([f"{row['scenario']}, seed {row['seed']}", *row["settings"]])
+
+
+def _values(sweep: Sweep, name: str, scenes: SequenceOf[Scene], key: str | None = None) -> Array:
+    if key is None:
+        return np.array([sweep.score(name, scene) for scene in scenes])
+    rows = (sweep.row(name, scene) for scene in scenes)
+    return np.array([math.nan if row is None else row["scores"].get(key, math.nan) for row in rows])
+
+
+def _ranking(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[RankedRow]:
+    mean, low, high = (float(end[0]) for end in mean_interval(_values(sweep, ORACLE, scenes)[:, None]))
+    yield RankedRow(ORACLE, "", mean, low, high, _means(sweep, ORACLE, scenes))
+    names = [*sweep.trackers]
+    found = rank(np.array([_values(sweep, name, scenes) for name in names]))
+    for place, k in enumerate(found.order.tolist()):
+        row = {"first": int(found.first[place]), "last": int(found.last[place])}
+        mean, low, high = (float(end[place]) for end in (found.mean, found.low, found.high))
+        yield RankedRow(names[k], rank_words(row), mean, low, high, _means(sweep, names[k], scenes))
+
+
+def _means(sweep: Sweep, name: str, scenes: SequenceOf[Scene]) -> dict[str, float]:
+    return {key: _mean(_values(sweep, name, scenes, key)) for key in CATALOGUE}
+
+
+def _mean(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else math.nan
+
+
+def _ranking_words(sweep: Sweep, scenes: SequenceOf[Scene]) -> list[str]:
+    where = "at the easy end of the axes" if sweep.plan.axes else "as they are"
+    return [f"{counted(len(scenes), 'scene')}, {where}. Trackers with a common rank: no sure difference."]
+
+
+def _cell(sweep: Sweep, name: str, scenes: SequenceOf[Scene]) -> HeatCell:
+    score, best = _mean(_values(sweep, name, scenes)), _mean(_values(sweep, ORACLE, scenes))
+    rows = [row for scene in scenes if (row := sweep.row(name, scene)) is not None]
+    why = "not played" if not rows else "left out" if all(row["left_out"] for row in rows) else "not scored"
+    return HeatCell(score, score / best if best > 0 else math.nan, "" if math.isfinite(score) else why)
+
+
+def _scenarios(sweep: Sweep, scenes: SequenceOf[Scene]) -> HeatMap:
+    own: dict[str, list[Scene]] = {}
+    for scene in scenes:
+        own.setdefault(scene.source.name, []).append(scene)
+    names = [*sweep.trackers]
+    rows = {scenario: [_cell(sweep, name, found) for name in names] for scenario, found in own.items()}
+    return HeatMap(f"{sweep.plan.by} by scenario", tuple(names), rows)
+
+
+def _curves(sweep: Sweep, data: Json, words: SequenceOf[str]) -> list[Curves]:
+    if len(sweep.plan.axes) != 1 or not data["curves"]:
+        return []
+    (axis,) = sweep.plan.axes
+    unknown = {"at": None, "low": None, "high": None}
+    curves = []
+    for name, one in data["curves"].items():
+        mean, low, high = (_numbers(one[part]) for part in ("mean", "low", "high"))
+        curves.append(Curve(name, mean, low, high, one["break"] or unknown))
+    return [Curves(axis.name, axis.about, [value for (value,) in sweep.values], curves, words)]
+
+
+def _numbers(values: SequenceOf[float | None]) -> list[float]:
+    return [math.nan if value is None else value for value in values]
+
+
+def _matrices(sweep: Sweep, data: Json) -> Iterator[HeatMap]:
+    if data["matrix"] is None:
+        return
+    first, second = data["matrix"]["values"]
+    of = {(a, b): [s for s in sweep.scenes.values() if s.values == (a, b)] for a in first for b in second}
+    rows, columns = (axis.name for axis in sweep.plan.axes)
+    for name in sweep.trackers:
+        cells = {f"{rows} {a:g}": [_cell(sweep, name, of[a, b]) for b in second] for a in first}
+        yield HeatMap(name, tuple(f"{columns} {b:g}" for b in second), cells)
+
+
+def _speeds(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[Speed]:
+    for name in sweep.trackers:
+        rows = [row for scene in scenes if (row := sweep.row(name, scene)) is not None and row["seconds"] > 0]
+        if rows:
+            rate = sum(row["frames"] for row in rows) / sum(row["seconds"] for row in rows)
+            mean, low, high = (float(end[0]) for end in mean_interval(_values(sweep, name, scenes)[:, None]))
+            yield Speed(name, rate, mean, low, high)
+
+
+def _candidates(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[tuple[Candidate, Scene]]:
+    for scene in scenes:
+        scores = {name: sweep.score(name, scene) for name in sweep.trackers}
+        rows = {name: sweep.row(name, scene) for name in sweep.trackers}
+        known = [name for name, row in rows.items() if row and not row["failed"] and math.isfinite(scores[name])]
+        for name in known:
+            words = _scene(rows[name] or {})
+            rival = max((other for other in known if other != name), key=scores.__getitem__, default="")
+            best = sweep.score(ORACLE, scene)
+            yield Candidate(name, scene.source.name, words, scores[name], best, rival), scene
+
+
+def _replay(sweep: Sweep, one: Candidate, scene: Scene) -> tuple[Sequence, TrackingRun, TrackingRun | None]:
+    mode = sweep.plan.detections
+
+    def tracked(name: str) -> tuple[Sequence, TrackingRun]:
+        tracker = sweep.trackers[name].tracker
+        sequence = scene.source.open(streams_for(tracker, mode))
+        return sequence, track(tracker, sequence, detections=mode, seed=scene.source.seed)
+
+    sequence, run = tracked(one.name)
+    return sequence, run, tracked(one.rival)[1] if one.rival else None
