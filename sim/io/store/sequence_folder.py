@@ -219,7 +219,7 @@ def _light(folder: Path, manifest: dict[str, Any]) -> Array:
     from scenarios.schema.scenario import Light
     from sim.render.weather import brightness
 
-    light, about = Light.model_validate(parse(folder / "scenario.toml")["light"]), manifest["sequence"]
+    light, about = Light.model_validate(parse(folder / "scenario.toml").get("light", {})), manifest["sequence"]
     return brightness(light, manifest["seed"], manifest["repeat"], about["fps"], about["length"])
 
 
