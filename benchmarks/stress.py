@@ -3,11 +3,11 @@
     python -m benchmarks.stress [breaks] [search] [--runs 20] [--episodes 40] [--searches 10] [--scenes 96]
 
 breaks: the oracle's tracks, spoilt in one way each. FORGETS: who is hidden for more than 1 s gets a new id. THIRTY:
-detections beyond the 30th are ignored. CONFUSES: people nearer
-than 0.8 m get new ids in every frame. Small scenes, 5 frames
-per second. True: the breaking value, by construction; of CONFUSES on 40 other seeds. Each run has seeds of its own. Inside: share of
-runs whose 95 % interval holds the true value, with Wilson's interval. Width: median width of the interval, in per cent
-of the axis. Grid: nine evenly spaced values, with all seeds that the sweep's number of episodes allows.
+detections beyond the 30th are ignored. CONFUSES: people nearer than 0.8 m get new ids in every frame. Small scenes, 5
+frames per second. True: the breaking value by construction; of CONFUSES it is measured on 40 other seeds. Each run has
+seeds of its own. Inside: share of runs whose 95 % interval holds the true value, with Wilson's interval. Width: median
+width of the interval, in per cent of the axis. Grid: nine evenly spaced values, with as many seeds as the sweep's
+number of episodes allows.
 
 search: a tracker that loses 0.5 of its score where two groups cross, detection is below 0.55 and clutter above 4.5.
 Everywhere else its score is the oracle's, with noise. `cliff`: nothing is lost outside. `slope`: the loss grows
