@@ -80,14 +80,15 @@ def groups_in_frames(tracks: Sequence[Tracks]) -> list[Groups]:
     if not tracks:
         return []
     there = [np.isfinite(t.pos).all(axis=1) for t in tracks]
-    kept = [(t.id[k], t.group[k], t.pos[k], t.vel[k]) for t, k in zip(tracks, there, strict=True)]
-    rows = [np.concatenate(column) for column in zip(*kept, strict=True)]
-    frame = np.repeat([t.index for t in tracks], [len(id) for id, *_ in kept])
-    span = (tracks[0].index, len(tracks))
-    boxes = [t.box[k] for t, k in zip(tracks, there, strict=True) if t.box is not None]
+    pairs = [*zip(tracks, there, strict=True)]
+    frame = np.repeat([t.index for t in tracks], [kept.sum() for kept in there])
+    id, group, pos, vel = (
+        np.concatenate([getattr(t, name)[kept] for t, kept in pairs]) for name in ("id", "group", "pos", "vel")
+    )
+    boxes = [t.box[kept] for t, kept in pairs if t.box is not None]
     if tracks[0].plane != "image" or len(boxes) < len(tracks):
-        return groups_over_time(frame, *rows, *span)
-    return box_groups(frame, *rows, np.concatenate(boxes), *span)
+        return groups_over_time(frame, id, group, pos, vel, tracks[0].index, len(tracks))
+    return box_groups(frame, id, group, pos, vel, np.concatenate(boxes), tracks[0].index, len(tracks))
 
 
 def feet(box: Array, camera: Camera, scene: Scene | None) -> Array:

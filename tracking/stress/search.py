@@ -89,7 +89,9 @@ def search(
         for first in range(0, count, BATCH):
             if sweep.spent():
                 break
-            trials = [_asked(study, space, seed, number) for number in range(first, min(first + BATCH, count))]
+            trials = [
+                _asked(study, space, len(entries), seed, number) for number in range(first, min(first + BATCH, count))
+            ]
             drawn = [_drawn(sweep.plan, entries, trial, seed) for trial in trials]
             sweep.play([failure.scene for failure in drawn], [tracker])
             for trial, failure in zip(trials, drawn, strict=True):
@@ -120,13 +122,13 @@ def _space(plan: Plan, entries: Sequence[SuiteEntry]) -> dict[str, optuna.distri
 
 
 def _asked(
-    study: optuna.Study, space: dict[str, optuna.distributions.BaseDistribution], seed: int, number: int
+    study: optuna.Study, space: dict[str, optuna.distributions.BaseDistribution], entries: int, seed: int, number: int
 ) -> optuna.Trial:
     """Returns the next trial, drawn by the sampler of the study or at random."""
     if number < RANDOM or number % 2:
         rng = np.random.default_rng([seed, number, 1])
         shares = {name: float(rng.random()) for name in space if name != SCENARIO}
-        study.enqueue_trial({**shares, SCENARIO: int(rng.integers(len(space[SCENARIO].choices)))})
+        study.enqueue_trial({**shares, SCENARIO: int(rng.integers(entries))})
     return study.ask(space)
 
 

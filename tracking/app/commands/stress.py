@@ -212,6 +212,8 @@ def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
         table.add_row(f["scenario"], str(f["seed"]), *(f"{value:g}" for value in f["values"]), *scores)
     scenes = f"{', '.join(plan.scenarios)}, {counted(len(sweep.scenes), 'scene')}"
     yield with_title(f"where {tracker} is worst, next to the oracle: {plan.by} ({scenes})", table)
+    if not data["found"]:
+        yield f"{printable(tracker)} is nowhere worse than the oracle"
     for f in data["found"]:
         yield printable(f["command"].replace(" --set ", " \\\n    --set "), keep="\n")
 
