@@ -92,10 +92,18 @@ class Sweep:
         """Plays until the breaking points are known, or the budget is spent."""
         self.check_scenes()
         self.values = list(product(*(axis.spread(FIRST_VALUES) for axis in self.plan.axes)))
-        self.seeds = self.plan.start
+        self.seeds = self._first_seeds()
         self._play()
         while not self.spent() and self._refine():
             self._play()
+
+    def _first_seeds(self) -> int:
+        """Returns how many seeds are played at once: `start`, or as many as the budget of episodes allows, at least 1."""
+        if self.plan.episodes is None:
+            return self.plan.start
+        scenes = len(sources(self.plan.scenarios, self.plan.seeds[:1], self.plan.settings))
+        each = len(self.trackers) * len(self.values) * scenes
+        return min(self.plan.start, max(1, self.plan.episodes // each))
 
     def spent(self) -> bool:
         """Returns True if the budget of time or of episodes is spent."""
