@@ -98,7 +98,7 @@ class Sweep:
             self._play()
 
     def _first_seeds(self) -> int:
-        """Returns how many seeds are played at once: `start`, or as many as the budget of episodes allows, at least 1."""
+        """Returns how many seeds are played at once: `start`, or as many as the budget allows, at least 1."""
         if self.plan.episodes is None:
             return self.plan.start
         scenes = len(sources(self.plan.scenarios, self.plan.seeds[:1], self.plan.settings))

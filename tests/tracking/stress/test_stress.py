@@ -154,7 +154,7 @@ def test_two_axes_are_a_grid_with_more_seeds_while_there_is_budget(episodes, see
 
 
 def test_sweeps_in_one_file_share_scenes(tmp_path: Path) -> None:
-    sweep(tmp_path, [], start=2, episodes=2).run()
+    sweep(tmp_path, [], start=2, episodes=10).run()
     made = sweep(tmp_path, seen := [], axes=parse_axes(["detection", "noise=1.0:3.0"]), start=2, episodes=None)
     made.run()
     assert len(seen) == 2 * 20
