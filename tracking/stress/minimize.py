@@ -1,0 +1,212 @@
+"""Delta debugging: the smallest scenario in which a tracker still fails.
+
+Pieces of one kind (tracking.stress.reductions) are taken out in chunks: all of them, halves, quarters, down to single
+ones. What is left is kept if the tracker still fails with the scene's own seed, and with enough of the confirming
+seeds; else the chunk is put back. All kinds are tried again until no single piece can be taken out (1-minimal).
+
+First the random groups are replaced by those that the own seed draws, if the tracker still fails then. A piece that is
+taken out of the script then leaves all others where they are.
+
+The confirming seeds are the N after the own one. Enough of them are 80 % (all but one of five), or as many as fail on
+the scene at the start if these are fewer. A result is then played on N seeds that the search has not seen. If it fails
+on too few, these become confirming seeds, too, and the search goes on from the last accepted scene that holds on all.
+
+Episodes depend on scenario and seed only. No episode is played twice, and workers do not change the result.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+from scenarios.errors import WorkError
+from scenarios.loading.toml_files import dump
+from scenarios.schema.scenario import Scenario
+from tracking.stress.failures import EpisodeOf, Failure, Outcome, Subject
+from tracking.stress.reductions import STAGES, Piece, Stage, pinned, without
+
+ALLOWED = 5  # one of so many confirming seeds may not fail
+ROUNDS = 3  # of fresh seeds
+
+
+class PlayEpisodes(Protocol):
+    """A function that plays episodes."""
+
+    def __call__(self, episodes: Sequence[EpisodeOf], /) -> Iterator[Outcome]:
+        """Yields one outcome for each episode, in order, when it is asked for."""
+
+
+class BudgetSpentError(Exception):
+    """No episode or no time is left; caught by `Search.run`."""
+
+
+@dataclass
+class Search:
+    """The search for a smallest scene.
+
+    State: `trail`, the accepted scenes from the first to the smallest; `guard`, the confirming seeds; `required`, how
+    many of them must fail; `known`, the outcomes by scenario and seed; `played`, their number; `complete`, True if no
+    single piece can be taken out.
+    """
+
+    subject: Subject
+    failure: Failure
+    seed: int
+    confirm: int
+    play: PlayEpisodes
+    episodes: int | None = None  # budget
+    minutes: float | None = None
+    report: Callable[[str], None] = lambda text: None
+    stages: Sequence[Stage] = STAGES
+    trail: list[Scenario] = field(default_factory=list)
+    guard: list[int] = field(default_factory=list)
+    required: int = 0
+    known: dict[tuple[str, int], Outcome] = field(default_factory=dict)
+    played: int = 0
+    complete: bool = False
+    _end: float = float("inf")
+
+    @property
+    def smallest(self) -> Scenario:
+        """The smallest accepted scene."""
+        return self.trail[-1]
+
+    def run(self, scenario: Scenario, repeat: int = 0) -> None:
+        """Searches until a scene is smallest and confirmed, or the budget is spent.
+
+        Raises WorkError if the tracker does not fail on the scene. repeat: number of the suite's copy that the scene
+        is; smaller ones are copies of none.
+        """
+        if self.minutes is not None:
+            self._end = time.monotonic() + 60 * self.minutes
+        self._start(scenario, repeat)
+        try:
+            self._choose_start(scenario, repeat)
+            for _ in range(ROUNDS):
+                self._minimise()
+                fresh = self.fresh_seeds()
+                if self._count(self.smallest, fresh) >= self._enough(len(fresh)):
+                    break
+                self._guard_by(fresh)
+        except BudgetSpentError:
+            self.complete = False
+
+    def fresh_seeds(self) -> list[int]:
+        """Returns the seeds after all that the search has used."""
+        first = self.seed + len(self.guard) + 1
+        return list(range(first, first + self.confirm))
+
+    def _start(self, scenario: Scenario, repeat: int) -> None:
+        outcome = next(self.play([EpisodeOf(self.subject, self.failure, scenario, self.seed, repeat)]))
+        self.played += 1
+        if outcome.problem is not None:
+            raise outcome.problem
+        if not self.failure.holds(outcome):
+            raise WorkError(
+                file=f"{scenario.name}, seed {self.seed}", place="--while", got=self.failure.found(outcome),
+                expected=f"a scene with {self.failure.text}", remedy="choose another condition, or another seed",
+            )  # fmt: skip
+        if repeat == 0:
+            self.known[dump(scenario), self.seed] = outcome
+            self.trail = [scenario]
+
+    def _choose_start(self, scenario: Scenario, repeat: int) -> None:
+        """Begins with the scene or the one of fixed groups, on whichever more confirming seeds fail."""
+        fixed = pinned(scenario, self.seed, repeat)
+        starts = [s for s in (fixed, scenario) if s is not None and self._fails(s, self.seed)]
+        if not starts:
+            raise WorkError(
+                file=f"{scenario.name}, seed {self.seed}", got=f"copy {repeat} of an entry with `repeat`",
+                expected="a scene that fails as a scenario of its own, too", remedy="choose another sequence",
+            )  # fmt: skip
+        self.guard = [self.seed + 1 + k for k in range(self.confirm)]
+        counts = [self._count(start, self.guard) for start in starts]
+        self.trail.append(starts[counts.index(max(counts))])
+        self.required = min(max(counts), len(self.guard) - len(self.guard) // ALLOWED)
+
+    def _enough(self, seeds: int) -> int:
+        return self.required * seeds // max(len(self.guard), 1)
+
+    def _guard_by(self, fresh: list[int]) -> None:
+        """Adds confirming seeds, and goes back to the last accepted scene that holds on all."""
+        self.required += self._enough(len(fresh))
+        self.guard += fresh
+        while len(self.trail) > 1 and not self._confirmed(self.smallest):
+            self.trail.pop()
+
+    def _minimise(self) -> None:
+        self.complete = False
+        while any([self._reduce(stage) for stage in self.stages]):
+            pass
+        self.complete = True
+
+    def _reduce(self, stage: Stage) -> bool:
+        """Takes out all pieces of one kind that can be; returns True if there were any."""
+        pieces = stage(self.smallest)
+        size, before = len(pieces), self.smallest
+        while size:
+            first = 0
+            while first < len(pieces):
+                starts = range(first, len(pieces), size)
+                kept = self._first_that_holds([pieces[k : k + size] for k in starts])
+                if kept is None:
+                    break
+                index, scenario = kept
+                self.trail.append(scenario)
+                self.report(f"{stage.__name__}: {scenario.duration:g} s, {len(scenario.group)} groups")
+                pieces, first = stage(scenario), starts[index]
+            size //= 2
+        return self.smallest is not before
+
+    def _first_that_holds(self, chunks: Sequence[list[Piece]]) -> tuple[int, Scenario] | None:
+        candidates = ((k, without(self.smallest, chunk)) for k, chunk in enumerate(chunks))
+        valid = [(k, scenario) for k, scenario in candidates if scenario not in (None, self.smallest)]
+        while valid:
+            outcomes = self._outcomes([(scenario, self.seed) for _, scenario in valid if scenario is not None])
+            failing = next((n for n, outcome in enumerate(outcomes) if self._failed(outcome)), None)
+            if failing is None:
+                return None
+            index, scenario = valid[failing]
+            assert scenario is not None
+            if self._confirmed(scenario):
+                return index, scenario
+            valid = valid[failing + 1 :]
+        return None
+
+    def _confirmed(self, scenario: Scenario) -> bool:
+        """Returns True if enough confirming seeds fail; stops as soon as that is decided."""
+        failed, left = 0, len(self.guard)
+        outcomes = self._outcomes([(scenario, seed) for seed in self.guard])
+        while failed < self.required <= failed + left:
+            failed, left = failed + self._failed(next(outcomes)), left - 1
+        return failed >= self.required
+
+    def _count(self, scenario: Scenario, seeds: Iterable[int]) -> int:
+        return sum(map(self._failed, self._outcomes([(scenario, seed) for seed in seeds])))
+
+    def _fails(self, scenario: Scenario, seed: int) -> bool:
+        return self._count(scenario, [seed]) == 1
+
+    def _failed(self, outcome: Outcome) -> bool:
+        return outcome.problem is None and self.failure.holds(outcome)
+
+    def _outcomes(self, wanted: Sequence[tuple[Scenario, int]]) -> Iterator[Outcome]:
+        """Yields the outcomes in order; those that are not known yet are played when they are asked for."""
+        keys = [(dump(scenario), seed) for scenario, seed in wanted]
+        missing = {key: one for key, one in zip(keys, wanted, strict=True) if key not in self.known}
+        playing = self.play([EpisodeOf(self.subject, self.failure, *one) for one in missing.values()])
+        for key in keys:
+            if key not in self.known:
+                if time.monotonic() > self._end or (self.episodes is not None and self.played >= self.episodes):
+                    raise BudgetSpentError
+                self.known[key] = next(playing)
+                self.played += 1
+            yield self.known[key]
+
+    def outcome(self, scenario: Scenario, seed: int) -> Outcome:
+        """Returns the outcome of an episode beyond the budget: a known one, or one that is played."""
+        free = replace(self, episodes=None)
+        free._end = float("inf")
+        return next(free._outcomes([(scenario, seed)]))
