@@ -38,7 +38,8 @@ CAUSES = (
 class Subject:
     """The tracker with its parameters and inputs, as `tracking.track` takes them; can be pickled for workers."""
 
-    tracker: str
+    tracker: str  # as find() takes it, with an absolute path
+    name: str  # as it was given
     config: Mapping[str, Any] | None = None
     detections: DetectionMode | None = None
     sensor: Mapping[str, Any] = field(default_factory=dict)

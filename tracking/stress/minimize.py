@@ -17,11 +17,13 @@ Episodes depend on scenario and seed only. No episode is played twice, and worke
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections import Counter
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
 from typing import Protocol
 
-from scenarios.errors import WorkError
+from scenarios.errors import WorkError, counted
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario
 from tracking.stress.failures import EpisodeOf, Failure, Outcome, Subject
@@ -34,8 +36,8 @@ ROUNDS = 3  # of fresh seeds
 class PlayEpisodes(Protocol):
     """A function that plays episodes."""
 
-    def __call__(self, episodes: Sequence[EpisodeOf], /) -> Iterator[Outcome]:
-        """Yields one outcome for each episode, in order, when it is asked for."""
+    def __call__(self, episodes: Sequence[EpisodeOf], /) -> Generator[Outcome]:
+        """Yields one outcome for each episode, in order, when it is asked for; may be closed before the end."""
 
 
 class BudgetSpentError(Exception):
@@ -47,8 +49,8 @@ class Search:
     """The search for a smallest scene.
 
     State: `trail`, the accepted scenes from the first to the smallest; `guard`, the confirming seeds; `required`, how
-    many of them must fail; `known`, the outcomes by scenario and seed; `played`, their number; `complete`, True if no
-    single piece can be taken out.
+    many of them must fail; `missed`, how often each did not; `known`, the outcomes by scenario and seed; `first`, that
+    of the scene at the start; `played`, the number of episodes; `complete`, True if no single piece can be taken out.
     """
 
     subject: Subject
@@ -63,7 +65,9 @@ class Search:
     trail: list[Scenario] = field(default_factory=list)
     guard: list[int] = field(default_factory=list)
     required: int = 0
+    missed: Counter[int] = field(default_factory=Counter)
     known: dict[tuple[str, int], Outcome] = field(default_factory=dict)
+    first: Outcome = Outcome()
     played: int = 0
     complete: bool = False
     _end: float = float("inf")
@@ -83,7 +87,7 @@ class Search:
             self._end = time.monotonic() + 60 * self.minutes
         self._start(scenario, repeat)
         try:
-            self._choose_start(scenario, repeat)
+            self.trail = [self._choose_start(scenario, repeat)]
             for _ in range(ROUNDS):
                 self._minimise()
                 fresh = self.fresh_seeds()
@@ -99,8 +103,8 @@ class Search:
         return list(range(first, first + self.confirm))
 
     def _start(self, scenario: Scenario, repeat: int) -> None:
-        outcome = next(self.play([EpisodeOf(self.subject, self.failure, scenario, self.seed, repeat)]))
-        self.played += 1
+        (outcome,) = self.play([EpisodeOf(self.subject, self.failure, scenario, self.seed, repeat)])
+        self.played, self.first = 1, outcome
         if outcome.problem is not None:
             raise outcome.problem
         if not self.failure.holds(outcome):
@@ -108,12 +112,12 @@ class Search:
                 file=f"{scenario.name}, seed {self.seed}", place="--while", got=self.failure.found(outcome),
                 expected=f"a scene with {self.failure.text}", remedy="choose another condition, or another seed",
             )  # fmt: skip
+        self.trail = [scenario]
         if repeat == 0:
             self.known[dump(scenario), self.seed] = outcome
-            self.trail = [scenario]
 
-    def _choose_start(self, scenario: Scenario, repeat: int) -> None:
-        """Begins with the scene or the one of fixed groups, on whichever more confirming seeds fail."""
+    def _choose_start(self, scenario: Scenario, repeat: int) -> Scenario:
+        """Returns the scene or the one of fixed groups, on whichever more confirming seeds fail."""
         fixed = pinned(scenario, self.seed, repeat)
         starts = [s for s in (fixed, scenario) if s is not None and self._fails(s, self.seed)]
         if not starts:
@@ -123,8 +127,8 @@ class Search:
             )  # fmt: skip
         self.guard = [self.seed + 1 + k for k in range(self.confirm)]
         counts = [self._count(start, self.guard) for start in starts]
-        self.trail.append(starts[counts.index(max(counts))])
         self.required = min(max(counts), len(self.guard) - len(self.guard) // ALLOWED)
+        return starts[counts.index(max(counts))]
 
     def _enough(self, seeds: int) -> int:
         return self.required * seeds // max(len(self.guard), 1)
@@ -155,7 +159,6 @@ class Search:
                     break
                 index, scenario = kept
                 self.trail.append(scenario)
-                self.report(f"{stage.__name__}: {scenario.duration:g} s, {len(scenario.group)} groups")
                 pieces, first = stage(scenario), starts[index]
             size //= 2
         return self.smallest is not before
@@ -164,8 +167,9 @@ class Search:
         candidates = ((k, without(self.smallest, chunk)) for k, chunk in enumerate(chunks))
         valid = [(k, scenario) for k, scenario in candidates if scenario not in (None, self.smallest)]
         while valid:
-            outcomes = self._outcomes([(scenario, self.seed) for _, scenario in valid if scenario is not None])
-            failing = next((n for n, outcome in enumerate(outcomes) if self._failed(outcome)), None)
+            outcomes = self.outcomes([(scenario, self.seed) for _, scenario in valid if scenario is not None])
+            with closing(outcomes):
+                failing = next((n for n, outcome in enumerate(outcomes) if self._failed(outcome)), None)
             if failing is None:
                 return None
             index, scenario = valid[failing]
@@ -178,13 +182,18 @@ class Search:
     def _confirmed(self, scenario: Scenario) -> bool:
         """Returns True if enough confirming seeds fail; stops as soon as that is decided."""
         failed, left = 0, len(self.guard)
-        outcomes = self._outcomes([(scenario, seed) for seed in self.guard])
-        while failed < self.required <= failed + left:
-            failed, left = failed + self._failed(next(outcomes)), left - 1
+        order = sorted(self.guard, key=lambda seed: -self.missed[seed])  # those that decide soonest first
+        with closing(self.outcomes([(scenario, seed) for seed in order])) as outcomes:
+            for seed in order:
+                if not failed < self.required <= failed + left:
+                    break
+                fails = self._failed(next(outcomes))
+                failed, left = failed + fails, left - 1
+                self.missed[seed] += not fails
         return failed >= self.required
 
     def _count(self, scenario: Scenario, seeds: Iterable[int]) -> int:
-        return sum(map(self._failed, self._outcomes([(scenario, seed) for seed in seeds])))
+        return sum(map(self._failed, self.outcomes([(scenario, seed) for seed in seeds])))
 
     def _fails(self, scenario: Scenario, seed: int) -> bool:
         return self._count(scenario, [seed]) == 1
@@ -192,21 +201,25 @@ class Search:
     def _failed(self, outcome: Outcome) -> bool:
         return outcome.problem is None and self.failure.holds(outcome)
 
-    def _outcomes(self, wanted: Sequence[tuple[Scenario, int]]) -> Iterator[Outcome]:
-        """Yields the outcomes in order; those that are not known yet are played when they are asked for."""
+    def outcomes(self, wanted: Sequence[tuple[Scenario, int]], budget: bool = True) -> Generator[Outcome]:
+        """Yields the outcomes in order; those that are not known yet are played when they are asked for.
+
+        Raises BudgetSpentError if one must be played and the budget is spent; budget: False plays it all the same.
+        """
         keys = [(dump(scenario), seed) for scenario, seed in wanted]
         missing = {key: one for key, one in zip(keys, wanted, strict=True) if key not in self.known}
         playing = self.play([EpisodeOf(self.subject, self.failure, *one) for one in missing.values()])
-        for key in keys:
-            if key not in self.known:
-                if time.monotonic() > self._end or (self.episodes is not None and self.played >= self.episodes):
-                    raise BudgetSpentError
-                self.known[key] = next(playing)
-                self.played += 1
-            yield self.known[key]
+        try:
+            for key in keys:
+                if key not in self.known:
+                    if budget and self._spent():
+                        raise BudgetSpentError
+                    self.known[key] = next(playing)
+                    self.played += 1
+                    self.report(f"{self.smallest.duration:g} s, {counted(len(self.smallest.group), 'group')}")
+                yield self.known[key]
+        finally:
+            playing.close()  # before other episodes are given to the workers
 
-    def outcome(self, scenario: Scenario, seed: int) -> Outcome:
-        """Returns the outcome of an episode beyond the budget: a known one, or one that is played."""
-        free = replace(self, episodes=None)
-        free._end = float("inf")
-        return next(free._outcomes([(scenario, seed)]))
+    def _spent(self) -> bool:
+        return time.monotonic() > self._end or (self.episodes is not None and self.played >= self.episodes)

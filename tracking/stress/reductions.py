@@ -4,6 +4,7 @@ The pieces, in the order in which `tracking.stress.minimize` tries them:
 
     seconds       the last second of the duration
     script        a group, or an order of the script
+    beginning     the first second of it: fixed groups start where they are a second later
     obstacles     a door, wall, pillar, flight of stairs or service point
     difficulties  a key of sensor, light, picture, crowd or camera: set to its easiest value, else to its default
     defaults      a key that cannot have its easiest value: set to its default
@@ -45,17 +46,18 @@ DECIMALS = 2  # of places, times and speeds that are no longer drawn
 
 @dataclass(frozen=True)
 class Piece:
-    """A value in the table of a scenario, and the function that takes something away from it."""
+    """A value in the table of a scenario, () the whole table, and the function that takes something away from it."""
 
     path: tuple[str | int, ...]
     change: Callable[[Any], Any]
 
     def words(self, table: Table) -> str:
-        """Returns the key and the value that it has in a table."""
-        here: Any = table
+        """Returns the key, and the value that it has in a table if that is short."""
+        value: Any = table
         for step in self.path:
-            here = here[step]
-        return f"{'.'.join(map(str, self.path))} = {here}"
+            value = value[step]
+        key = ".".join(map(str, self.path))
+        return key if isinstance(value, dict | list) else f"{key} = {value}"
 
 
 Stage = Callable[[Scenario], list[Piece]]
@@ -70,6 +72,9 @@ def without(scenario: Scenario, pieces: Iterable[Piece]) -> Scenario | None:
     """Returns the scenario without some pieces, None if nothing valid is left."""
     table = table_of(scenario)
     for piece in pieces:
+        if not piece.path:
+            table = piece.change(table)
+            continue
         *way, last = piece.path
         here: Any = table
         for step in way:
@@ -147,6 +152,51 @@ def seconds(scenario: Scenario) -> list[Piece]:
     return [Piece(("duration",), lambda now: round(now - 1.0, 6))] * (math.ceil(scenario.duration) - 1)
 
 
+def beginning(scenario: Scenario) -> list[Piece]:
+    """Returns the seconds that can be taken from the start, none where groups are drawn."""
+    fixed = all(g.speed is not None and g.repeat == 1 and _numbers(g.enter, *g.start, *g.goal) for g in scenario.group)
+    return [Piece((), _second_later)] * (math.ceil(scenario.duration) - 1) if fixed else []
+
+
+def _numbers(*values: Any) -> bool:
+    return all(isinstance(value, int | float) for value in values)
+
+
+def _second_later(table: Table) -> Table:
+    """Returns a scene that begins a second later."""
+
+    def earlier(time: Any) -> Any:
+        return max(round(time - 1.0, DECIMALS), 0.0) if _numbers(time) else time
+
+    table["duration"] = round(table["duration"] - 1.0, 6)
+    for group in table["group"]:
+        if group["enter"] <= 0:
+            _walk(group)
+        group["enter"] = min(group["enter"], earlier(group["enter"]))
+        for stop in group.get("stops", []):
+            stop["until"] = [earlier(time) for time in stop["until"]]
+    for event in table.get("event", []):
+        event["when"] |= {key: earlier(event["when"][key]) for key in event["when"].keys() & {"time"}}
+    for hide in table["sensor"].get("hide", []):
+        hide |= {key: earlier(hide[key]) for key in ("start", "end")}
+    for switch in table["light"]["switch"]:
+        switch["at"] = earlier(switch["at"])
+    return table
+
+
+def _walk(group: Table) -> None:
+    """Moves a group's start by its way of a second, straight on to the next point or to the goal."""
+    stops, via = group.get("stops", []), group.get("via", [])
+    end = stops[0]["at"] if stops else via[0] if via else group["goal"]
+    if not _numbers(*end, group["speed"], *group["start"]):
+        return
+    way = np.subtract(end, group["start"])
+    share = min(1.0, group["speed"] / max(math.hypot(*way), 1e-9))
+    group["start"] = [round(float(v), DECIMALS) for v in group["start"] + share * way]
+    if share == 1.0 and not stops and via:
+        del via[0]
+
+
 def script(scenario: Scenario) -> list[Piece]:
     """Returns the orders, the last one first, and the groups."""
     orders = [_gone("event", k) for k in reversed(range(len(scenario.event)))]
@@ -214,7 +264,7 @@ def details(scenario: Scenario) -> list[Piece]:
     return pieces
 
 
-STAGES: tuple[Stage, ...] = (seconds, script, obstacles, difficulties, defaults, people, details)
+STAGES: tuple[Stage, ...] = (seconds, script, beginning, obstacles, difficulties, defaults, people, details)
 
 
 def _gone(*path: str | int) -> Piece:

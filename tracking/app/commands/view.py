@@ -36,14 +36,14 @@ def view(options: ViewOptions) -> CommandResult:
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
         tracks = tracks_of(sequence)
-        video, errors = page_video(sequence, path, options.video, step), _errors(sequence, tracks)
+        video, errors = page_video(sequence, path, options.video, step), errors_on_page(sequence, tracks)
         write_page(sequence, tracks, path, video=video, errors=errors)
 
     pictures = _picture_count(sequences) if options.video != "none" else 0
     return _write_each("view", sequences, options.out, ".html", write, pictures)
 
 
-def _errors(sequence: Sequence, tracks: TrackingRun | None) -> list[FoundError]:
+def errors_on_page(sequence: Sequence, tracks: TrackingRun | None) -> list[FoundError]:
     """Returns the errors of people and groups that a page shows; a warning says why there are none of them."""
     from tracking.errors.found import errors_of_run
 
