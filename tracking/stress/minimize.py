@@ -142,8 +142,11 @@ class Search:
 
     def _minimise(self) -> None:
         self.complete = False
-        while any([self._reduce(stage) for stage in self.stages]):
-            pass
+        changed = True
+        while changed:
+            changed = False
+            for stage in self.stages:
+                changed |= self._reduce(stage)
         self.complete = True
 
     def _reduce(self, stage: Stage) -> bool:

@@ -257,10 +257,10 @@ def details(scenario: Scenario) -> list[Piece]:
     for k, group in enumerate(scenario.group):
         pieces += [_gone("group", k, key, n) for key in ("stops", "via") for n in range(len(getattr(group, key)))]
     for k, event in enumerate(scenario.event):
+        sized = (n for n, part in enumerate(getattr(event, "parts", ())) if part.size is not None)
+        pieces += [_gone("event", k, "parts", n, "size") for n in sized]  # before the part itself
         for key in ("parts", "via", "groups"):
             pieces += [_gone("event", k, key, n) for n in range(len(getattr(event, key, ())))]
-        sized = (n for n, part in enumerate(getattr(event, "parts", ())) if part.size is not None)
-        pieces += [_gone("event", k, "parts", n, "size") for n in sized]
     return pieces
 
 
@@ -289,16 +289,18 @@ def pinned(scenario: Scenario, seed: int, repeat: int = 0) -> Scenario | None:
     except InputError:
         return None
     placed = script_placement(scenario, seed, repeat)
+    mirrored = placed.flip < 0 and bool(scenario.event)  # the places of orders stay as they are
 
     def place(point: Array) -> list[float]:
         c, s = np.cos(placed.turn), np.sin(placed.turn)
         x, y = point - placed.middle
-        back = np.array([placed.flip * (c * x + s * y), c * y - s * x])
+        back = np.array([(-1 if mirrored else 1) * (c * x + s * y), c * y - s * x])
         return [round(float(v), DECIMALS) for v in placed.middle + back]
 
     table = table_of(scenario)
     scatter = {name: group.get("scatter", 0.0) for group in table["group"] for name in _names(group)}
-    table["lead"] = 0.0  # the drawn starts hold it
+    table["lead"], table["mirror"] = 0.0, mirrored  # the drawn starts hold both
+    table["turn_deg"] = round(float(np.rad2deg(placed.turn)), DECIMALS)
     table["group"] = [
         {
             "id": group.name, "size": len(group.members), "start": place(group.start), "goal": place(group.goal),
