@@ -2,8 +2,8 @@
 
 The pieces, in the order in which `tracking.stress.minimize` tries them:
 
-    seconds       the last second of the duration
     script        a group, or an order of the script
+    seconds       the last second of the duration
     beginning     the first second of it: fixed groups start where they are a second later
     obstacles     a door, wall, pillar, flight of stairs or service point
     difficulties  a key of sensor, light, picture, crowd or camera: set to its easiest value, else to its default
@@ -264,7 +264,7 @@ def details(scenario: Scenario) -> list[Piece]:
     return pieces
 
 
-STAGES: tuple[Stage, ...] = (seconds, script, beginning, obstacles, difficulties, defaults, people, details)
+STAGES: tuple[Stage, ...] = (script, seconds, beginning, obstacles, difficulties, defaults, people, details)
 
 
 def _gone(*path: str | int) -> Piece:

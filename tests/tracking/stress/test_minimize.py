@@ -15,7 +15,7 @@ from tracking.app.cli import run
 from tracking.errors import causes
 from tracking.stress.failures import CAUSES, EpisodeOf, Outcome, Subject, parse_failure
 from tracking.stress.minimize import Search
-from tracking.stress.reductions import STAGES, difficulties, pinned, without
+from tracking.stress.reductions import STAGES, beginning, difficulties, pinned, script, without
 
 FAILURE = parse_failure("HOTA<0.5")
 Oracle = Callable[[Scenario, int], bool]
@@ -76,13 +76,13 @@ def test_orders_go_with_their_groups() -> None:
     scenario = load("mixed")
     fixed = pinned(scenario, 3)
     assert fixed is not None
-    small = without(fixed, [piece for piece in STAGES[1](fixed) if piece.path == ("group", 0)])
+    small = without(fixed, [piece for piece in script(fixed) if piece.path == ("group", 0)])
     assert small is not None
     assert [event.id for event in small.event] == ["q1"]
     made = search(lambda s, seed: any(event.type == "split" for event in s.event))
     made.run(scenario)
-    assert names(made.smallest) == ["b"]  # m1 needs a, so s1 splits b, if b alone can be split
-    assert [event.type for event in made.smallest.event] == ["split"]
+    assert names(made.smallest) == ["a", "b"]
+    assert [event.id for event in made.smallest.event] == ["m1", "s1"]  # without m1 there is no ab
 
 
 def test_the_drawn_groups_stay_where_they_are() -> None:
@@ -105,7 +105,7 @@ def test_the_drawn_groups_stay_where_they_are() -> None:
 def test_a_later_beginning_moves_everything_by_a_second() -> None:
     fixed = pinned(load("street"), 2)
     assert fixed is not None
-    (piece, *_) = STAGES[2](fixed)
+    (piece, *_) = beginning(fixed)
     later = without(fixed, [piece])
     assert later is not None
     assert later.duration == fixed.duration - 1
@@ -215,7 +215,7 @@ group = [
 def test_end_to_end(tmp_path, capsys) -> None:
     scene, out = tmp_path / "scene.toml", tmp_path / "small.toml"
     scene.write_text(SCENE)
-    line = ["minimize", str(scene), "--tracker", "blob", "--seed", "4", "--confirm", "2", "--out", str(out)]
+    line = ["minimize", str(scene), "--tracker", "blob", "--seed", "4", "--confirm", "1", "--out", str(out)]
     assert run([*line, "--while", "fragment"]) == 0
     text = capsys.readouterr().out
     small = load(out)
