@@ -23,6 +23,10 @@ from tracking.stress.minimize import Search
 from tracking.stress.reductions import OBSTACLES, difficulties, table_of
 
 LISTED = ("HOTA", "group_F1", "IDSW")
+SINGULAR = {
+    "people": "person", "orders": "order", "doors": "door", "walls": "wall", "pillars": "pillar", "stairs": "stair",
+    "difficulties": "difficulty",
+}  # fmt: skip
 SEQUENCES = ("manifest.json", "*/manifest.json", "*/*/manifest.json")  # below a folder with a dataset
 
 
@@ -231,14 +235,18 @@ def _counts(scenario: Scenario, outcome: Outcome) -> dict[str, float]:
     }  # fmt: skip
 
 
+def _change(noun: str, before: float, after: float) -> str:
+    noun = SINGULAR.get(noun, noun) if before == 1 else noun
+    return f"{before:g} {noun} → {f'{after:g}' if after else 'none'}{' s' if noun == 's' else ''}"
+
+
 def _text(data: dict[str, Any]) -> Any:
     from rich.console import Group
 
     before, after = data["before"], data["after"]
-    changes = [
-        f"{before[key]:g} {key} → {f'{after[key]:g}' if after[key] else 'none'}" for key in before if before[key]
-    ]
+    changes = [_change(key, before[key], after[key]) for key in before if before[key]]
     confirmed = f"fails on {data['fails']} of {counted(data['fresh'], 'fresh seed')}"
+    confirmed = confirmed if data["fresh"] else "not confirmed on other seeds"
     state = "no single piece can be removed" if data["complete"] else "stopped early: more can perhaps be removed"
     lines = [f"{', '.join(changes)}; {confirmed}; {counted(data['episodes'], 'episode')}; {state}"]
     lines += [f"difficulties that it needs: {', '.join(data['needed'])}"] if data["needed"] else []
