@@ -182,7 +182,7 @@ class MinimizeOptions:
         metavar="CONDITION")
     out: Path = TOML("Scenario to write; a replay page lies beside it.")
     tracker: str | None = option("Tracker, if no run is given.", None, metavar="TRACKER")
-    seed: int = option("Seed of a scenario; a sequence has its own.", 0, low=0)
+    seed: int | None = option("Seed of a scenario; a sequence has its own. Default: 0.", None, low=0)
     confirm: int = option("Number of other seeds on which most must fail, too.", 5, low=0, metavar="N")
     episodes: int | None = option("Stop after so many episodes.", None, low=1, metavar="N")
     minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")

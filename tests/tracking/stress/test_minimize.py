@@ -177,7 +177,8 @@ def test_a_scene_without_the_failure_is_refused_with_its_score() -> None:
     ("text", "got"),
     [
         ("HOTA", "choose one of switch"), ("HOTTA<0.7", "did you mean HOTA"), ("HOTA=0.7", "SCORE<NUMBER"),
-        ("HOTA<0..7", "correct the number"), ("swich", "'switch'"), ("switch:hiden", "'hidden'"), ("switch:", "a cause"),
+        ("HOTA<0..7", "correct the number"),
+        ("swich", "'switch'"), ("switch:hiden", "'hidden'"), ("switch:", "a cause"),
     ],
 )  # fmt: skip
 def test_wrong_conditions(text: str, got: str) -> None:

@@ -27,6 +27,7 @@ SINGULAR = {
     "people": "person", "orders": "order", "doors": "door", "walls": "wall", "pillars": "pillar", "stairs": "stair",
     "difficulties": "difficulty",
 }  # fmt: skip
+NO_RECORDING = "recordings cannot be made smaller"
 SEQUENCES = ("manifest.json", "*/manifest.json", "*/*/manifest.json")  # below a folder with a dataset
 
 
@@ -47,6 +48,9 @@ def minimize(options: MinimizeOptions) -> CommandResult:
     out = option_parsing.output_file(options.out, ".toml")
     page = out.with_suffix(".html")
     refuse_foreign_file(page)
+    if out.resolve() == Path(options.source).resolve():
+        got, remedy = "the scene itself", "choose another file"
+        raise InputError(file=out, place="--out", got=got, expected="another file", remedy=remedy)
     scene, subject = _scene_and_subject(options)
     with start_workers(options.workers) as run, ProgressMeter("minimize", options.episodes) as meter:
         search = Search(
@@ -75,7 +79,7 @@ def _scene_and_subject(options: MinimizeOptions) -> tuple[Scene, Subject]:
     source, run = Path(options.source), options.run
     if run is None and source.is_dir() and is_run(source):
         source, run = _sequence_of(source), source
-    scene = _stored_scene(source) if source.is_dir() else _named_scene(options)
+    scene = _stored_scene(source, options.seed) if source.is_dir() else _named_scene(options)
     if run is not None:
         if options.tracker is not None:
             raise InputError(
@@ -99,21 +103,24 @@ def _named_scene(options: MinimizeOptions) -> Scene:
             place="SOURCE", got=f"a suite of {len(entries)} scenes", expected="one scene",
             remedy="give a scenario, or one sequence that was generated",
         )  # fmt: skip
-    return Scene(entries[0].scenario, options.seed, entries[0].repeat)
+    return Scene(entries[0].scenario, options.seed or 0, entries[0].repeat)
 
 
-def _stored_scene(folder: Path) -> Scene:
+def _stored_scene(folder: Path, seed: int | None) -> Scene:
     from scenarios.loading.resolve import load
     from sim.io.store.seal import is_sequence, read_manifest
 
     expected = "one generated sequence, a scenario, or tracks of one"
     if not is_sequence(folder):
-        remedy = "only a simulated scene can be made smaller"
+        remedy = f"give the folder of one; {NO_RECORDING}"
         raise InputError(file=folder, got="no generated sequence", expected=expected, remedy=remedy)
     manifest = read_manifest(folder)
+    if seed is not None:
+        got, remedy = f"{seed} beside a sequence with a seed of its own", "leave it out"
+        raise InputError(place="--seed", got=got, expected="a scenario", remedy=remedy)
     if "origin" in manifest or manifest.get("stride", 1) != 1:
         got = "a replay of a recording" if "origin" in manifest else f"frames with stride {manifest['stride']}"
-        raise InputError(file=folder, got=got, expected=expected, remedy="only simulated scenes can be made smaller")
+        raise InputError(file=folder, got=got, expected=expected, remedy=f"generate a whole one; {NO_RECORDING}")
     return Scene(load(folder / "scenario.toml"), manifest["seed"], manifest["repeat"])
 
 
@@ -128,7 +135,7 @@ def _sequence_of(run: Path) -> Path:
                 return path.parent
     raise InputError(
         file=run, got=f"tracks of {info['sequence']}, which is not below this folder", expected="a generated sequence",
-        remedy="give the sequence, too: flockscope minimize SEQUENCE RUN",
+        remedy=f"give the sequence, too: flockscope minimize SEQUENCE RUN; {NO_RECORDING}",
     )  # fmt: skip
 
 
