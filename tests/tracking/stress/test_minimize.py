@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import pytest
 
@@ -156,6 +158,19 @@ def test_a_budget_ends_with_the_smallest_scene_so_far(budget: int) -> None:
     assert needs(made.smallest, 3)
 
 
+def test_a_copy_of_a_suite_becomes_a_scene_of_its_own() -> None:
+    seen: list[EpisodeOf] = []
+    made = search(needs, seen)
+    made.run(HARD, repeat=2)
+    assert [episode.repeat for episode in seen] == [2] + [0] * (len(seen) - 1)
+    drawn = pinned(HARD, 3, 2)
+    assert drawn is not None
+    assert made.trail[0] == drawn
+    alone = search(needs, play=lambda episodes: (Outcome({"HOTA": 0.4 if e.repeat else 0.9}) for e in episodes))
+    with pytest.raises(WorkError, match="copy 2 of an entry"):
+        alone.run(HARD, repeat=2)
+
+
 def test_an_order_that_does_not_come_true_is_no_failure() -> None:
     error = OrderError(got="no merge", expected="a merge", remedy="")
 
@@ -213,17 +228,45 @@ group = [
 """
 
 
-def test_end_to_end(tmp_path, capsys) -> None:
-    scene, out = tmp_path / "scene.toml", tmp_path / "small.toml"
-    scene.write_text(SCENE)
-    line = ["minimize", str(scene), "--tracker", "blob", "--seed", "4", "--confirm", "0", "--out", str(out)]
-    assert run([*line, "--while", "fragment"]) == 0
-    text = capsys.readouterr().out
-    small = load(out)
-    assert "3 people → 1, 6 s → 1 s, 1 pillar → none" in text
+def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(SCENE)
+    line = ["minimize", "scene.toml", "--tracker", "blob", "--seed", "4", "--confirm", "0", "--while"]
+    assert run([*line, "fragment", "--out", "small.toml"]) == 0
+    assert "3 people → 1, 6 s → 1 s, 1 pillar → none" in capsys.readouterr().out
+    small = load("small.toml")
     assert len(small.group) == 1
-    assert small.sensor.detect_prob < 1
-    assert "</html>" in out.with_suffix(".html").read_text()
-    commands = [words.removeprefix("# ").split() for words in out.read_text().splitlines()[:2]]
-    assert run(["minimize", str(out), "--tracker", "blob", "--seed", "4", "--out", str(out), "--while", "HOTA<0"]) == 1
-    assert commands[0][:2] == ["flockscope", "generate"]
+    assert [piece.path for piece in difficulties(small)] == [("sensor", "detect_prob")]
+    assert "</html>" in Path("small.html").read_text()
+    for words in Path("small.toml").read_text().splitlines()[:2]:
+        assert run(words.removeprefix("# flockscope ").split()) == 0
+    capsys.readouterr()
+    assert run(["errors", "small-data/flockscope-train/scene-s00004", "small-tracks", "--json"]) == 0
+    (sequence,) = json.loads(capsys.readouterr().out)["sequences"]
+    assert "fragment" in {error["kind"] for error in sequence["errors"]}
+    assert run([*line, "HOTA<0.01", "--out", "other.toml"]) == 1
+    assert "got HOTA = 0." in capsys.readouterr().err
+    assert run([*line, "fragment", "--out", "scene.toml"]) == 2
+    assert Path("scene.toml").read_text() == SCENE
+
+
+def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(SCENE)
+    assert run(["generate", "scene.toml", "--seeds", "4", "--streams", "none", "--out", "data"]) == 0
+    sequence = "data/flockscope-train/scene-s00004"
+    given = "--detections truth --set sensor.detect_prob=0.6 --set coast_time=1.0 --seed 2"
+    assert run(f"track blob {sequence} --out tracks {given}".split()) == 0
+    capsys.readouterr()
+    line = ["--while", "fragment", "--confirm", "0", "--episodes", "3", "--json", "--out", "small.toml"]
+    assert run(["minimize", "tracks", *line]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["commands"][1].endswith(
+        "--detections truth --seed 2 --set coast_time=1.0 --set sensor.detect_prob=0.6 --out small-tracks"
+    )
+    assert run(["minimize", sequence, "tracks", *line]) == 0
+    assert json.loads(capsys.readouterr().out) == found
+    Path("elsewhere").mkdir()
+    monkeypatch.chdir("elsewhere")
+    assert run(["minimize", "../tracks", *line]) == 2
+    assert "recordings cannot be made smaller" in json.loads(capsys.readouterr().out)["error"]["remedy"]

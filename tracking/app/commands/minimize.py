@@ -23,9 +23,10 @@ from tracking.stress.minimize import Search
 from tracking.stress.reductions import OBSTACLES, difficulties, table_of
 
 LISTED = ("HOTA", "group_F1", "IDSW")
+NOUNS = {"stairs": "flights of stairs", "service": "service points"}
 SINGULAR = {
-    "people": "person", "orders": "order", "doors": "door", "walls": "wall", "pillars": "pillar", "stairs": "stair",
-    "difficulties": "difficulty",
+    "people": "person", "orders": "order", "doors": "door", "walls": "wall", "pillars": "pillar",
+    "flights of stairs": "flight of stairs", "service points": "service point", "difficulties": "difficulty",
 }  # fmt: skip
 NO_RECORDING = "recordings cannot be made smaller"
 SEQUENCES = ("manifest.json", "*/manifest.json", "*/*/manifest.json")  # below a folder with a dataset
@@ -73,13 +74,15 @@ def minimize(options: MinimizeOptions) -> CommandResult:
 
 
 def _scene_and_subject(options: MinimizeOptions) -> tuple[Scene, Subject]:
+    from scenarios.loading.resolve import names
     from sim.io.store.seal import is_run
     from tracking.running.tracker_registry import find, located
 
     source, run = Path(options.source), options.run
-    if run is None and source.is_dir() and is_run(source):
+    stored = source.is_dir() and options.source not in names()  # as elsewhere, a name of the catalogue counts first
+    if run is None and stored and is_run(source):
         source, run = _sequence_of(source), source
-    scene = _stored_scene(source, options.seed) if source.is_dir() else _named_scene(options)
+    scene = _stored_scene(source, options.seed) if stored else _named_scene(options)
     if run is not None:
         if options.tracker is not None:
             raise InputError(
@@ -235,7 +238,7 @@ def _result(search: Search, scene: Scene, out: Path, outcomes: dict[int, Outcome
 
 def _counts(scenario: Scenario, outcome: Outcome) -> dict[str, float]:
     """Returns how much there is of everything in a scene."""
-    obstacles = {key: len(getattr(scenario.world, key)) for key in OBSTACLES}
+    obstacles = {NOUNS.get(key, key): len(getattr(scenario.world, key)) for key in OBSTACLES}
     return {
         "people": outcome.people, "s": scenario.duration, "orders": len(scenario.event), **obstacles,
         "difficulties": len(difficulties(scenario)),
