@@ -4,12 +4,13 @@ Pieces of one kind (tracking.stress.reductions) are taken out in chunks: all of 
 ones. What is left is kept if the tracker still fails with the scene's own seed, and with enough of the confirming
 seeds; else the chunk is put back. All kinds are tried again until no single piece can be taken out (1-minimal).
 
-First the random groups are replaced by those that the own seed draws, if the tracker still fails then. A piece that is
+Groups that are drawn are replaced by those of the own seed as soon as the tracker still fails then. A piece that is
 taken out of the script then leaves all others where they are.
 
-The confirming seeds are the N after the own one. Enough of them are 80 % (all but one of five), or as many as fail on
-the scene at the start if these are fewer. A result is then played on N seeds that the search has not seen. If it fails
-on too few, these become confirming seeds, too, and the search goes on from the last accepted scene that holds on all.
+The confirming seeds are the N after the own one. As many of them as fail at the start must fail after each step. A
+result is then played on N seeds that the search has not seen. If fewer than 80 % of these fail (or than the share at the
+start, if that is less), they become confirming seeds, too, and the search goes on from the last accepted scene that
+holds on all. After three rounds it stops there. The seeds on which the last result is shown are always new.
 
 Episodes depend on scenario and seed only. No episode is played twice, and workers do not change the result.
 """
@@ -31,6 +32,10 @@ from tracking.stress.reductions import STAGES, Piece, Stage, pinned, without
 
 ALLOWED = 5  # one of so many confirming seeds may not fail
 ROUNDS = 3  # of fresh seeds
+
+
+def _most(seeds: int) -> int:
+    return seeds - seeds // ALLOWED
 
 
 class PlayEpisodes(Protocol):
@@ -90,10 +95,9 @@ class Search:
             self.trail = [self._choose_start(scenario, repeat)]
             for _ in range(ROUNDS):
                 self._minimise()
-                fresh = self.fresh_seeds()
-                if self._count(self.smallest, fresh) >= self._enough(len(fresh)):
-                    break
-                self._guard_by(fresh)
+                if self._holds_on_fresh_seeds():
+                    return
+            self.complete = False
         except BudgetSpentError:
             self.complete = False
 
@@ -127,27 +131,41 @@ class Search:
             )  # fmt: skip
         self.guard = [self.seed + 1 + k for k in range(self.confirm)]
         counts = [self._count(start, self.guard) for start in starts]
-        self.required = min(max(counts), len(self.guard) - len(self.guard) // ALLOWED)
-        return starts[counts.index(max(counts))]
+        chosen = 0 if counts[0] >= _most(len(self.guard)) else counts.index(max(counts))
+        self.required = counts[chosen]
+        return starts[chosen]
 
     def _enough(self, seeds: int) -> int:
-        return self.required * seeds // max(len(self.guard), 1)
+        return min(_most(seeds), self.required * seeds // max(len(self.guard), 1))
 
-    def _guard_by(self, fresh: list[int]) -> None:
-        """Adds confirming seeds, and goes back to the last accepted scene that holds on all."""
-        self.required += self._enough(len(fresh))
+    def _holds_on_fresh_seeds(self) -> bool:
+        """Returns True if enough fresh seeds fail; else they confirm, too, and the search is back where all hold."""
+        fresh = self.fresh_seeds()
+        enough = self._enough(len(fresh))
+        if self._count(self.smallest, fresh) >= enough:
+            return True
+        self.required += enough
         self.guard += fresh
         while len(self.trail) > 1 and not self._confirmed(self.smallest):
             self.trail.pop()
+        return False
 
     def _minimise(self) -> None:
         self.complete = False
         changed = True
         while changed:
-            changed = False
+            changed = self._fix()
             for stage in self.stages:
                 changed |= self._reduce(stage)
         self.complete = True
+
+    def _fix(self) -> bool:
+        """Replaces drawn groups by those of the own seed; returns True if the tracker still fails then."""
+        fixed = pinned(self.smallest, self.seed)
+        if fixed in (None, self.smallest) or not (self._fails(fixed, self.seed) and self._confirmed(fixed)):
+            return False
+        self.trail.append(fixed)
+        return True
 
     def _reduce(self, stage: Stage) -> bool:
         """Takes out all pieces of one kind that can be; returns True if there were any."""

@@ -8,7 +8,7 @@ The pieces, in the order in which `tracking.stress.minimize` tries them:
     obstacles     a door, wall, pillar, flight of stairs or service point
     difficulties  a key of sensor, light, picture, crowd or camera: set to its easiest value, else to its default
     defaults      a key that cannot have its easiest value: set to its default
-    people        a person of a group, or a copy of a group with `repeat`
+    people        a person of a group (of a drawn size first those above the least), a copy of a group with `repeat`
     details       a stop or point on a group's way, a part of a split, a group of a merge or queue, a hidden time
 
 What names a group or an order that is gone goes with it.
@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,7 @@ from scenarios.loading.toml_files import Table, dump
 from scenarios.loading.validation import validate
 from scenarios.reading import parse_toml
 from scenarios.schema.scenario import Scenario, expand
+from scenarios.schema.values import Distribution, Value, bounds
 from sim.types import Array
 from tracking.running.detection_mode import PERFECT_SENSOR, SEES_ALL
 
@@ -239,15 +241,19 @@ def people(scenario: Scenario) -> list[Piece]:
     """Returns the people after the first of each group, and its copies after the first."""
     pieces = []
     for k, group in enumerate(scenario.group):
-        size = group.size
-        count = round(size) - 1 if isinstance(size, int | float) else 1
-        pieces += [Piece(("group", k, "size"), _fewer)] * count
+        drawn, least = isinstance(group.size, Distribution), _least(group.size)
+        pieces += [Piece(("group", k, "size"), partial(_fewer, least))] * (least - 1 + drawn)
         pieces += [Piece(("group", k, "repeat"), lambda now: now - 1)] * (group.repeat - 1)
     return pieces
 
 
-def _fewer(size: Any) -> Any:
-    return max(1, round(size) - 1) if isinstance(size, int | float) else 1
+def _least(size: Value) -> int:
+    low = bounds(size)[0]
+    return max(1, round(low)) if math.isfinite(low) else 1
+
+
+def _fewer(least: int, size: Any) -> int:
+    return round(size) - 1 if _numbers(size) else least
 
 
 def details(scenario: Scenario) -> list[Piece]:
