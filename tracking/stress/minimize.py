@@ -8,8 +8,8 @@ Groups that are drawn are replaced by those of the own seed as soon as the track
 taken out of the script then leaves all others where they are.
 
 The confirming seeds are the N after the own one. As many of them as fail at the start must fail after each step. A
-result is then played on N seeds that the search has not seen. If fewer than 80 % of these fail (or than the share at the
-start, if that is less), they become confirming seeds, too, and the search goes on from the last accepted scene that
+result is then played on N seeds that the search has not seen. If fewer than 80 % of these fail (or than the share at
+the start, if that is less), they become confirming seeds, too, and the search goes on from the last accepted scene that
 holds on all. After three rounds it stops there. The seeds on which the last result is shown are always new.
 
 Episodes depend on scenario and seed only. No episode is played twice, and workers do not change the result.
