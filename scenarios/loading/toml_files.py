@@ -150,9 +150,12 @@ def _merge_by_id(below: list[Table], above: list[Table]) -> list[Table]:
     return rows
 
 
-def dump(scenario: BaseModel) -> str:
-    """Returns a scenario, or another model of tables, as TOML with all defaults; equal models give equal bytes."""
-    table = scenario.model_dump(mode="python", by_alias=True, exclude_none=True)
+def dump(scenario: BaseModel, defaults: bool = True) -> str:
+    """Returns a scenario, or another model of tables, as TOML; equal models give equal bytes.
+
+    defaults: False leaves out the keys that have their default value.
+    """
+    table = scenario.model_dump(mode="python", by_alias=True, exclude_none=True, exclude_defaults=not defaults)
     flat: Table = {}
     blocks = []
     for key, value in table.items():

@@ -25,6 +25,7 @@ COMMANDS: dict[str, tuple[Any, str]] = {
     "group": (options.GroupOptions, "group:group"),
     "score": (options.ScoreOptions, "score:score"),
     "stress": (options.StressOptions, "stress:stress"),
+    "minimize": (options.MinimizeOptions, "minimize:minimize"),
     "errors": (options.ErrorsOptions, "errors:errors"),
     "compare": (options.CompareOptions, "compare:compare"),
     "tune": (CommandLine, "tune:tune"),

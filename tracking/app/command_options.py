@@ -174,6 +174,26 @@ class StressOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MinimizeOptions:
+    """Find the smallest scene in which a tracker still fails, by taking out whatever can be."""
+
+    source: str = ARGUMENT("Output of `track` on a generated sequence; or the sequence, a scenario, a *.toml file.",
+        metavar="RUN|SOURCE")
+    run: Path | None = ARGUMENT("Output of `track` on the sequence, if it is not below this folder.", None,
+        metavar="RUN")
+    condition: str = option(
+        "A score with a bound, or a kind of error: HOTA<0.7, IDSW>=3, switch, switch:hidden.", flag="--while",
+        metavar="CONDITION")
+    out: Path = TOML("Scenario to write; a replay page lies beside it.")
+    tracker: str | None = option("Tracker, if no run is given.", None, metavar="TRACKER")
+    seed: int | None = option("Seed of a scenario; a sequence has its own. Default: 0.", None, low=0)
+    confirm: int = option("Number of other seeds on which most must fail, too.", 5, low=0, metavar="N")
+    episodes: int | None = option("Stop after so many episodes.", None, low=1, metavar="N")
+    minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
+    workers: int = WORKERS()
+
+
+@dataclass(frozen=True, kw_only=True)
 class ErrorsOptions:
     """List what went wrong in a run: each error with its frames, people, cause and cost, and a sum by cause."""
 

@@ -115,7 +115,7 @@ def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
         raise InputError(place=place, got="points", expected="boxes", remedy="take a tracker that takes points")
 
 
-_PERFECT_SENSOR = {
+PERFECT_SENSOR = {
     "detect_prob": 1.0,
     "clutter_rate": 0.0,
     "box_noise": {"scale": 0.0},
@@ -123,7 +123,7 @@ _PERFECT_SENSOR = {
     "box": "amodal",
 }
 # Settings by which hidden and small people are detected as well as others.
-_SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
+SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
 
 
 def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
@@ -165,7 +165,7 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
     from sim.detector.sense import sense
     from sim.scene.visibility import with_visibility
 
-    table = {"sensor": _PERFECT_SENSOR | _SEES_ALL | _nested(sensor)}
+    table = {"sensor": PERFECT_SENSOR | SEES_ALL | _nested(sensor)}
     try:
         spec = SensorFile.model_validate(table).sensor
     except ValidationError as error:

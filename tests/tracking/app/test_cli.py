@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import WorkError
+from scenarios.loading.resolve import load
 from tracking.app.cli import run
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -120,6 +121,14 @@ COMMANDS = {
     "stress": (
         "stress " + FAKE + " --vary detection --suite {scene} --seeds 0:2 --start 2 --by HOTA --out {out}",
         "stress " + FAKE + " --vary nothing --suite {scene} --out {out}/x",
+    ),
+    "minimize": (
+        "minimize {scene} --tracker " + FAKE + " --while HOTA<=1 --confirm 1 --episodes 6 --out {out}/small.toml",
+        "minimize {scene} --tracker " + FAKE + " --while HOTTA<0.7 --out {out}/small.toml",
+    ),
+    "minimize RUN": (
+        "minimize {one} {tracks}/scene-s40000 --while HOTA<=1 --confirm 0 --episodes 6 --out {out}/small.toml",
+        "minimize {data} {tracks}/scene-s40000 --while HOTA<=1 --out {out}/small.toml",
     ),
     "compare": (
         "compare {tracks}/../scores.json {tracks}/../scores.json", "compare {tracks}/../scores.json {out}/nothing.json",
@@ -243,6 +252,8 @@ def is_whole(name: str, out: Path) -> bool:
         )
     if name == "stress":
         return [p.name for p in out.rglob("*")] == ["episodes.jsonl"]
+    if name.startswith("minimize"):
+        return all(len(load(p).group) > 0 for p in out.rglob("*.toml"))
     if name not in ("generate", "generate pictures", "demo", "track", "view all"):
         return False
     sequences = [p.parent for p in out.rglob("scenario.toml")]

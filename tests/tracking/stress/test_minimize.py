@@ -1,0 +1,272 @@
+"""Minimising: oracles whose smallest scene is known by construction, and one small scene end to end."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from scenarios.errors import InputError, OrderError, WorkError
+from scenarios.loading.resolve import load
+from scenarios.loading.toml_files import dump
+from scenarios.schema.scenario import Scenario, group_names
+from scenarios.schema.values import bounds
+from tracking.app.cli import run
+from tracking.errors import causes
+from tracking.stress.failures import CAUSES, EpisodeOf, Outcome, Subject, parse_failure
+from tracking.stress.minimize import Search
+from tracking.stress.reductions import STAGES, beginning, difficulties, pinned, script, without
+
+FAILURE = parse_failure("HOTA<0.5")
+Oracle = Callable[[Scenario, int], bool]
+
+
+def search(fails: Oracle, seen: list[EpisodeOf] | None = None, **changes) -> Search:
+    """A search whose episodes fail as the oracle says; nothing is simulated."""
+
+    def play(episodes: Sequence[EpisodeOf]):
+        for episode in episodes:
+            if seen is not None:
+                seen.append(episode)
+            yield Outcome({"HOTA": 0.4 if fails(episode.scenario, episode.seed) else 0.9}, people=1)
+
+    return Search(Subject("t", "t"), FAILURE, 3, **{"confirm": 5, "play": play, **changes})
+
+
+def names(scenario: Scenario) -> list[str]:
+    return [name for group in scenario.group for name in group_names(group)]
+
+
+def needs(scenario: Scenario, seed: int) -> bool:
+    """Fails with two groups, one of them of two people, clutter, misses, a pillar and 7 seconds; with nothing less."""
+    sizes = {name: bounds(group.size)[1] for group in scenario.group for name in group_names(group)}
+    people = sizes.get("north-1", 0) >= 1 and sizes.get("stop-4", 0) >= 2
+    hard = scenario.sensor.clutter_rate > 0 and len(scenario.world.pillars) >= 1
+    return people and hard and scenario.duration >= 7 and scenario.sensor.detect_prob < 1
+
+
+HARD = load(
+    "crowd",
+    set=(
+        "duration=40", "world.pillars=[[9, 9, 0.3], [5, 5, 0.4]]", "sensor.clutter_rate=2", "light.drift=0.2",
+        "group.stop.size=3", "camera.tilt_deg=50",
+    ),
+)  # fmt: skip
+
+
+def test_the_smallest_scene_is_found_and_no_single_piece_can_be_removed() -> None:
+    seen: list[EpisodeOf] = []
+    made = search(needs, seen)
+    made.run(HARD)
+    small = made.smallest
+    assert names(small) == ["stop-4", "north-1"]
+    assert [group.size for group in small.group] == [2, 1]
+    assert 7 <= small.duration < 8
+    assert len(small.world.pillars) == 1
+    assert [piece.path for piece in difficulties(small)] == [("sensor", "detect_prob"), ("sensor", "clutter_rate")]
+    assert made.complete
+    for stage in STAGES:
+        for piece in stage(small):
+            left = without(small, [piece])
+            assert left in (None, small) or not needs(left, 3), piece.path
+    assert len({(dump(e.scenario), e.seed) for e in seen}) == len(seen) == made.played < 400
+
+
+def test_orders_go_with_their_groups() -> None:
+    scenario = load("mixed")
+    fixed = pinned(scenario, 3)
+    assert fixed is not None
+    small = without(fixed, [piece for piece in script(fixed) if piece.path == ("group", 0)])
+    assert small is not None
+    assert [event.id for event in small.event] == ["q1"]
+    made = search(lambda s, seed: any(event.type == "split" for event in s.event))
+    made.run(scenario)
+    assert names(made.smallest) == ["a", "b"]
+    assert [event.id for event in made.smallest.event] == ["m1", "s1"]  # without m1 there is no ab
+
+
+def test_the_drawn_groups_stay_where_they_are() -> None:
+    from sim.crowd.navigation import scene_of
+    from sim.crowd.population import draw_population
+
+    for name in ("crowd", "party", "street", "queue"):
+        scenario = load(name)
+        fixed = pinned(scenario, 5)
+        assert fixed is not None
+        before, after = (draw_population(s, scene_of(s.world), 5, 0) for s in (scenario, fixed))
+        assert [g.name for g in before] == [g.name for g in after]
+        assert [len(g.members) for g in before] == [len(g.members) for g in after]
+        for old, new in zip(before, after, strict=True):
+            assert abs(old.start - new.start).max() < 0.011
+            assert abs(old.goal - new.goal).max() < 0.011
+            assert (old.enter, old.speed) == pytest.approx((new.enter, new.speed), abs=0.006)
+
+
+def test_a_later_beginning_moves_everything_by_a_second() -> None:
+    fixed = pinned(load("street"), 2)
+    assert fixed is not None
+    (piece, *_) = beginning(fixed)
+    later = without(fixed, [piece])
+    assert later is not None
+    assert later.duration == fixed.duration - 1
+    for old, new in zip(fixed.group, later.group, strict=True):
+        if old.enter > 1:
+            assert (new.enter, new.start) == (pytest.approx(old.enter - 1), old.start)
+        elif old.enter <= 0:
+            moved = ((new.start[0] - old.start[0]) ** 2 + (new.start[1] - old.start[1]) ** 2) ** 0.5
+            assert moved == pytest.approx(old.speed, abs=0.02)
+
+
+def test_a_step_that_fails_with_the_own_seed_alone_is_not_taken() -> None:
+    def fails(scenario: Scenario, seed: int) -> bool:
+        return seed == 3 or "north-1" in names(scenario)
+
+    made = search(fails)
+    made.run(HARD)
+    assert names(made.smallest) == ["north-1"]
+    own = search(fails, confirm=0)
+    own.run(HARD)
+    assert names(own.smallest) != ["north-1"]
+
+
+def test_one_confirming_seed_of_five_may_differ() -> None:
+    made = search(lambda scenario, seed: seed != 5)
+    made.run(HARD)
+    assert len(made.smallest.group) == 1
+    assert made.smallest.duration <= 1
+
+
+def test_fresh_seeds_that_do_not_fail_send_the_search_back() -> None:
+    def fails(scenario: Scenario, seed: int) -> bool:
+        return seed <= 8 or "north-1" in names(scenario)  # the confirming seeds are 4 to 8
+
+    made = search(fails)
+    made.run(HARD)
+    assert names(made.smallest) == ["north-1"]
+    assert made.guard == list(range(4, 14))
+    assert made.fresh_seeds() == list(range(14, 19))
+
+
+@pytest.mark.parametrize("budget", [1, 9, 40])
+def test_a_budget_ends_with_the_smallest_scene_so_far(budget: int) -> None:
+    made = search(needs, episodes=budget)
+    made.run(HARD)
+    assert made.played == budget
+    assert not made.complete
+    assert needs(made.smallest, 3)
+
+
+def test_a_copy_of_a_suite_becomes_a_scene_of_its_own() -> None:
+    seen: list[EpisodeOf] = []
+    made = search(needs, seen)
+    made.run(HARD, repeat=2)
+    assert [episode.repeat for episode in seen] == [2] + [0] * (len(seen) - 1)
+    drawn = pinned(HARD, 3, 2)
+    assert drawn is not None
+    assert made.trail[0] == drawn
+    alone = search(needs, play=lambda episodes: (Outcome({"HOTA": 0.4 if e.repeat else 0.9}) for e in episodes))
+    with pytest.raises(WorkError, match="copy 2 of an entry"):
+        alone.run(HARD, repeat=2)
+
+
+def test_an_order_that_does_not_come_true_is_no_failure() -> None:
+    error = OrderError(got="no merge", expected="a merge", remedy="")
+
+    def play(episodes: Sequence[EpisodeOf]):
+        for e in episodes:
+            yield Outcome({"HOTA": 0.1}) if e.scenario.duration > 30 else Outcome({"HOTA": 0.1}, problem=error)
+
+    made = search(needs, play=play)
+    made.run(HARD)
+    assert 30 < made.smallest.duration <= 31
+
+
+def test_a_scene_without_the_failure_is_refused_with_its_score() -> None:
+    with pytest.raises(WorkError, match=r"crowd, seed 3.*HOTA = 0.9.*expected a scene with HOTA<0.5"):
+        search(lambda scenario, seed: False).run(HARD)
+
+
+@pytest.mark.parametrize(
+    ("text", "got"),
+    [
+        ("HOTA", "choose one of switch"), ("HOTTA<0.7", "did you mean HOTA"), ("HOTA=0.7", "SCORE<NUMBER"),
+        ("HOTA<0..7", "correct the number"),
+        ("swich", "'switch'"), ("switch:hiden", "'hidden'"), ("switch:", "a cause"),
+    ],
+)  # fmt: skip
+def test_wrong_conditions(text: str, got: str) -> None:
+    with pytest.raises(InputError, match=got):
+        parse_failure(text)
+
+
+def test_conditions() -> None:
+    outcome = Outcome({"IDSW": 3.0}, frozenset({("switch", "hidden")}))
+    for text in ("IDSW>=3", "IDSW > 2", "IDSW<=3", "switch", "switch:hidden"):
+        assert parse_failure(text).holds(outcome), text
+    for text in ("IDSW<3", "HOTA<0.5", "switch:near", "late split"):
+        assert not parse_failure(text).holds(outcome), text
+
+
+def test_every_cause_can_be_named() -> None:
+    described = {line.split()[0] for line in (causes.__doc__ or "").splitlines() if line.startswith("    ")}
+    assert described == {*CAUSES}
+
+
+SCENE = """
+schema = 1
+duration = 6.0
+warmup = 1.0
+camera = { fps = 5 }
+sensor = { detect_prob = 0.7 }
+world = { pillars = [[2, 9, 0.3]] }
+group = [
+  { id = "a", size = 2, start = [4, 4], goal = [12, 4] },
+  { id = "b", size = 1, start = [12, 7], goal = [4, 7] },
+]
+"""
+
+
+def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(SCENE)
+    line = ["minimize", "scene.toml", "--tracker", "blob", "--seed", "4", "--confirm", "0", "--while"]
+    assert run([*line, "fragment", "--out", "small.toml"]) == 0
+    assert "3 people → 1, 6 s → 1 s, 1 pillar → none" in capsys.readouterr().out
+    small = load("small.toml")
+    assert len(small.group) == 1
+    assert [piece.path for piece in difficulties(small)] == [("sensor", "detect_prob")]
+    assert "</html>" in Path("small.html").read_text()
+    for words in Path("small.toml").read_text().splitlines()[:2]:
+        assert run(words.removeprefix("# flockscope ").split()) == 0
+    capsys.readouterr()
+    assert run(["errors", "small-data/flockscope-train/scene-s00004", "small-tracks", "--json"]) == 0
+    (sequence,) = json.loads(capsys.readouterr().out)["sequences"]
+    assert "fragment" in {error["kind"] for error in sequence["errors"]}
+    assert run([*line, "HOTA<0.01", "--out", "other.toml"]) == 1
+    assert "got HOTA = 0." in capsys.readouterr().err
+    assert run([*line, "fragment", "--out", "scene.toml"]) == 2
+    assert Path("scene.toml").read_text() == SCENE
+
+
+def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(SCENE)
+    assert run(["generate", "scene.toml", "--seeds", "4", "--streams", "none", "--out", "data"]) == 0
+    sequence = "data/flockscope-train/scene-s00004"
+    given = "--detections truth --set sensor.detect_prob=0.6 --set coast_time=1.0 --seed 2"
+    assert run(f"track blob {sequence} --out tracks {given}".split()) == 0
+    capsys.readouterr()
+    line = ["--while", "fragment", "--confirm", "0", "--episodes", "3", "--json", "--out", "small.toml"]
+    assert run(["minimize", "tracks", *line]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["commands"][1].endswith(
+        "--detections truth --seed 2 --set coast_time=1.0 --set sensor.detect_prob=0.6 --out small-tracks"
+    )
+    assert run(["minimize", sequence, "tracks", *line]) == 0
+    assert json.loads(capsys.readouterr().out) == found
+    Path("elsewhere").mkdir()
+    monkeypatch.chdir("elsewhere")
+    assert run(["minimize", "../tracks", *line]) == 2
+    assert "recordings cannot be made smaller" in json.loads(capsys.readouterr().out)["error"]["remedy"]

@@ -1,0 +1,167 @@
+"""When a tracker fails: a score beyond a bound, or an error of a kind; and one episode in which it may fail.
+
+`HOTA<0.7` compares a score of the catalogue by <, <=, > or >=. `late split` is a kind of error of `flockscope errors`
+that occurs at least once, `switch:hidden` one of this kind with this cause.
+"""
+
+from __future__ import annotations
+
+import operator
+import re
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, get_args
+
+from scenarios.errors import FlockscopeError, InputError
+from scenarios.loading.toml_files import closest, did_you_mean
+from scenarios.schema.scenario import Scenario
+from sim.types import DetectionMode, Sequence
+from tracking.errors.groups import DIVIDED, ENGULFED, MISSED, STRANGERS
+from tracking.errors.people import PersonKind
+from tracking.running.run import TrackingRun, track
+from tracking.scoring.catalogue import CATALOGUE
+
+OPERATORS: dict[str, Callable[[float, float], bool]] = {
+    "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge
+}  # fmt: skip
+COMPARISON = re.compile(r"\s*([\w-]+)\s*(<=|>=|<|>)\s*(-?[0-9.]+)\s*")
+EVENT_KINDS = ("late merge", "missed merge", "late split", "missed split", "late group", "false group")
+KINDS = (*get_args(PersonKind), MISSED, DIVIDED, ENGULFED, STRANGERS, *EVENT_KINDS)
+CAUSES = (
+    "edge", "hidden", "undetected", "near", "turned", "left", "displaced", "double", "clutter", "apart", "beside",
+    "tracker",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The tracker with its parameters and inputs, as `tracking.track` takes them; can be pickled for workers."""
+
+    tracker: str  # as find() takes it, with an absolute path
+    name: str  # as it was given
+    config: Mapping[str, Any] | None = None
+    detections: DetectionMode | None = None
+    sensor: Mapping[str, Any] = field(default_factory=dict)
+    seed: int = 0
+    rule: Mapping[str, Any] | None = None  # of groups, in place of the default grouping
+
+    def run(self, sequence: Sequence) -> TrackingRun:
+        """Tracks a sequence."""
+        from tracking.grouping.link_rule import LinkRule
+
+        grouping = None if self.rule is None else LinkRule.from_dict(self.rule)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            return track(
+                self.tracker, sequence, params=self.config, detections=self.detections, sensor=self.sensor,
+                seed=self.seed, grouping=grouping,
+            )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of an episode."""
+
+    scores: Mapping[str, float] = field(default_factory=dict)
+    errors: frozenset[tuple[str, str]] = frozenset()  # kinds and causes, if they were asked for
+    people: int = 0
+    problem: FlockscopeError | None = None  # why there is nothing to judge
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A condition on an episode: a score with its bound, or a kind of error, with or without a cause."""
+
+    text: str
+    score: str = ""
+    beyond: str = ""
+    bound: float = 0.0
+    kind: str = ""
+    cause: str = ""
+
+    def holds(self, outcome: Outcome) -> bool:
+        """Returns True if the tracker failed in this way."""
+        if self.kind:
+            return any(self.kind == kind and self.cause in ("", cause) for kind, cause in outcome.errors)
+        return OPERATORS[self.beyond](outcome.scores.get(self.score, float("nan")), self.bound)
+
+    def found(self, outcome: Outcome) -> str:
+        """Returns what the episode shows instead, in words."""
+        if outcome.problem is not None:
+            return outcome.problem.line()
+        if self.kind:
+            every = sorted({kind if not self.cause else f"{kind}:{cause}" for kind, cause in outcome.errors})
+            return f"errors: {', '.join(every) or 'none'}"
+        return f"{self.score} = {outcome.scores.get(self.score, float('nan')):.4g}"
+
+
+def parse_failure(text: str) -> Failure:
+    """Returns the condition of `--while`. Raises InputError for any other text."""
+    found = COMPARISON.fullmatch(text)
+    expected = "SCORE<NUMBER (or <=, >, >=), or a kind of error, as in HOTA<0.7, switch, switch:hidden"
+    if found is None:
+        kind, _, cause = (part.strip() for part in text.partition(":"))
+        if kind not in KINDS:
+            raise _wrong(text, expected, did_you_mean(kind, list(KINDS)))
+        if cause not in CAUSES and ":" in text:
+            raise _wrong(text, f"a cause: {', '.join(CAUSES)}", did_you_mean(cause, list(CAUSES)))
+        return Failure(text.strip(), kind=kind, cause=cause)
+    score, beyond, number = found.groups()
+    if score not in CATALOGUE:
+        raise _wrong(text, "a score of docs/reference/metrics.md", f"did you mean {closest(score, CATALOGUE)}?")
+    try:
+        return Failure(f"{score}{beyond}{number}", score, beyond, float(number))
+    except ValueError:
+        raise _wrong(text, expected, "correct the number") from None
+
+
+def _wrong(text: str, expected: str, remedy: str) -> InputError:
+    return InputError(place="--while", got=repr(text), expected=expected, remedy=remedy)
+
+
+@dataclass(frozen=True)
+class EpisodeOf:
+    """One episode to play: the subject on a scenario with a seed; `repeat` is that of a suite's copy."""
+
+    subject: Subject
+    failure: Failure
+    scenario: Scenario
+    seed: int
+    repeat: int = 0
+
+    def sequence(self) -> Sequence:
+        """Returns the simulated sequence, with pictures if the tracker works on them."""
+        from sim.sequence import simulate
+        from tracking.environment.episodes import streams_for
+
+        streams = streams_for(self.subject.tracker, self.subject.detections)
+        return simulate(self.scenario, self.seed, self.repeat, streams)
+
+
+def play_episode(episode: EpisodeOf) -> Outcome:
+    """Plays an episode; an order that does not come true, and an error of the tracker, are the outcome's problem."""
+    from tracking.comparison import scorer_of
+
+    try:
+        sequence = episode.sequence()
+        truth = sequence.truth  # raises for a script that did not come true before anything is tracked
+        assert truth is not None, "a simulated sequence has labels"
+        run = episode.subject.run(sequence)
+        with scorer_of(sequence) as scorer:
+            scores = {key: value for key, value in scorer.evaluate(run).items() if value == value}
+        errors = _errors(episode.failure, sequence, run)
+    except FlockscopeError as error:
+        return Outcome(problem=error)
+    return Outcome(scores, errors, len({*truth.id.tolist()}))
+
+
+def _errors(failure: Failure, sequence: Sequence, run: TrackingRun) -> frozenset[tuple[str, str]]:
+    from tracking.errors.found import errors_of_run, find_errors
+
+    if not failure.kind:
+        return frozenset()
+    # Only causes need the oracle, which says who was detected.
+    quick = not failure.cause and all(t.unit == "person" for t in run)
+    found = find_errors(sequence, run, costs=False) if quick else errors_of_run(sequence, run, costs=False)
+    return frozenset((one.error.kind, one.cause.name) for one in found.errors)
