@@ -1,9 +1,9 @@
 """Search for the scenes in which a tracker is worst, next to what its detections allow.
 
 A scene has a value of each axis between its ends, a scenario of the suite, and a seed. Its *shortfall* is the oracle's
-score less the tracker's; a failed tracker has the score 0. The first 16 scenes are drawn at random, of the others three
-in four. The fourth is drawn by Optuna's TPE sampler, which draws more where shortfalls were great. Once the sampler's
-scenes have a greater mean shortfall than the random ones, by a standard error, it draws three in four.
+score less the tracker's; a failed tracker has the score 0. The first 16 scenes are drawn at random. Of the others half
+are drawn by Optuna's TPE sampler, which draws more where shortfalls were great. It draws three in four once its scenes
+have a greater mean shortfall than the random ones, by a standard error, and one in four if the mean is smaller.
 
 So that not all scenes show one failure again and again, the shortfall that the sampler gets is reduced near a worse
 failure of the same scenario. Scenes are near if no axis differs by a fifth of its range. The failures that are listed
@@ -92,10 +92,10 @@ def search(
         for first in range(0, count, BATCH):
             if sweep.spent():
                 break
-            share = 0 if first < RANDOM else 3 if _sampler_pays(found) else 1
+            quarters = 0 if first < RANDOM else _quarters(found)
             numbers = range(first, min(first + BATCH, count))
-            trials = [_asked(study, sweep.plan, len(entries), seed, n, n % 4 < share) for n in numbers]
-            drawn = [_drawn(sweep.plan, entries, trial, seed, trial.number % 4 < share) for trial in trials]
+            trials = [_asked(study, sweep.plan, len(entries), seed, n, n % 4 < quarters) for n in numbers]
+            drawn = [_drawn(sweep.plan, entries, trial, seed, trial.number % 4 < quarters) for trial in trials]
             sweep.play([failure.scene for failure in drawn], [tracker])
             for trial, failure in zip(trials, drawn, strict=True):
                 oracle, score = (sweep.score(name, failure.scene) for name in (ORACLE, tracker))
@@ -117,15 +117,16 @@ def worst(found: Sequence[Failure], most: int = LISTED) -> list[Failure]:
     return chosen
 
 
-def _sampler_pays(found: Sequence[Failure]) -> bool:
-    """Returns True if the sampler's scenes have a greater mean shortfall than random ones, by a standard error."""
+def _quarters(found: Sequence[Failure]) -> int:
+    """Returns how many of four scenes the sampler draws: 2, 3 if its mean shortfall is greater, 1 if it is smaller."""
     drawn, random = (
         np.array([failure.shortfall for failure in found if failure.sampled is sampled]) for sampled in (True, False)
     )
     if len(drawn) < 2 or len(random) < 2:
-        return False
+        return 2
+    gain = drawn.mean() - random.mean()
     error = np.sqrt(drawn.var(ddof=1) / len(drawn) + random.var(ddof=1) / len(random))
-    return bool(drawn.mean() - random.mean() > error)
+    return 1 if gain < 0 else 3 if gain > error else 2
 
 
 def _asked(study: optuna.Study, plan: Plan, entries: int, seed: int, number: int, sampled: bool) -> optuna.Trial:
