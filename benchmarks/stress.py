@@ -154,7 +154,7 @@ def sweep_of(weakness: Weakness, seeds: Sequence[int], episodes: int, folder: Pa
 def at_values(sweep: Sweep, values: Sequence[float], seeds: int) -> Array:
     """Plays a grid and returns its scores (P, V)."""
     sweep.values, sweep.seeds = [(value,) for value in values], seeds
-    sweep._play()
+    sweep.play_values()
     return sweep.scores("t")
 
 

@@ -1,11 +1,13 @@
 """Search for the scenes in which a tracker is worst, next to what its detections allow.
 
 A scene has a value of each axis between its ends, a scenario of the suite, and a seed. Its *shortfall* is the oracle's
-score less the tracker's; a failed tracker has the score 0. The first 16 scenes and every second one of the others are
-drawn at random, the rest by Optuna's TPE sampler, which draws more where shortfalls were great. TPE alone would stay
-with the first small shortfalls that it sees. So that not all scenes show one failure again and again, the shortfall
-that the sampler gets is reduced near a worse failure of the same scenario. Scenes are near if no axis differs by a
-fifth of its range. The failures that are listed are the worst ones, no two near each other.
+score less the tracker's; a failed tracker has the score 0. The first 16 scenes are drawn at random. Of the others half
+are drawn by Optuna's TPE sampler, which draws more where shortfalls were great. It draws three in four once its scenes
+have a greater mean shortfall than the random ones, by a standard error, and one in four if the mean is smaller.
+
+So that not all scenes show one failure again and again, the shortfall that the sampler gets is reduced near a worse
+failure of the same scenario. Scenes are near if no axis differs by a fifth of its range. The failures that are listed
+are the worst ones, no two near each other.
 
 What is drawn depends on the seed of the search and on the scores so far, not on the number of workers. A search that
 was stopped draws the same scenes again, takes stored episodes from the store, and so goes on where it was.
@@ -43,8 +45,9 @@ class Failure:
     place: tuple[float, ...]  # shares of the way from easy to hard
     scenario: str  # name or file, as `generate` takes it
     settings: tuple[str, ...]
-    oracle: float
-    score: float
+    sampled: bool  # drawn by the sampler, not at random
+    oracle: float = float("nan")
+    score: float = float("nan")
 
     @property
     def shortfall(self) -> float:
@@ -82,17 +85,17 @@ def search(
 
     sweep.check_scenes()
     entries = [entry for name in sweep.plan.scenarios for entry in rows(name)]
-    tracker, found, space = next(iter(sweep.trackers)), list[Failure](), _space(sweep.plan, entries)
+    tracker, found = next(iter(sweep.trackers)), list[Failure]()
     with quiet_optuna():
         tpe = optuna.samplers.TPESampler(seed=seed, n_startup_trials=0, multivariate=True, constant_liar=True)
         study = optuna.create_study(direction="maximize", sampler=sampler or tpe)
         for first in range(0, count, BATCH):
             if sweep.spent():
                 break
-            trials = [
-                _asked(study, space, len(entries), seed, number) for number in range(first, min(first + BATCH, count))
-            ]
-            drawn = [_drawn(sweep.plan, entries, trial, seed) for trial in trials]
+            quarters = 0 if first < RANDOM else _quarters(found)
+            numbers = range(first, min(first + BATCH, count))
+            trials = [_asked(study, sweep.plan, len(entries), seed, n, n % 4 < quarters) for n in numbers]
+            drawn = [_drawn(sweep.plan, entries, trial, seed, trial.number % 4 < quarters) for trial in trials]
             sweep.play([failure.scene for failure in drawn], [tracker])
             for trial, failure in zip(trials, drawn, strict=True):
                 oracle, score = (sweep.score(name, failure.scene) for name in (ORACLE, tracker))
@@ -114,25 +117,30 @@ def worst(found: Sequence[Failure], most: int = LISTED) -> list[Failure]:
     return chosen
 
 
-def _space(plan: Plan, entries: Sequence[SuiteEntry]) -> dict[str, optuna.distributions.BaseDistribution]:
+def _quarters(found: Sequence[Failure]) -> int:
+    """Returns how many of four scenes the sampler draws: 2, 3 if its mean shortfall is greater, 1 if it is smaller."""
+    drawn, random = (
+        np.array([failure.shortfall for failure in found if failure.sampled is sampled]) for sampled in (True, False)
+    )
+    if len(drawn) < 2 or len(random) < 2:
+        return 2
+    gain = drawn.mean() - random.mean()
+    error = np.sqrt(drawn.var(ddof=1) / len(drawn) + random.var(ddof=1) / len(random))
+    return 1 if gain < 0 else 3 if gain > error else 2
+
+
+def _asked(study: optuna.Study, plan: Plan, entries: int, seed: int, number: int, sampled: bool) -> optuna.Trial:
+    """Returns the next trial, drawn by the sampler of the study or at random."""
     from optuna.distributions import CategoricalDistribution, FloatDistribution
 
-    shares = {axis.name: FloatDistribution(0.0, 1.0) for axis in plan.axes}
-    return {**shares, SCENARIO: CategoricalDistribution(range(len(entries)))}
-
-
-def _asked(
-    study: optuna.Study, space: dict[str, optuna.distributions.BaseDistribution], entries: int, seed: int, number: int
-) -> optuna.Trial:
-    """Returns the next trial, drawn by the sampler of the study or at random."""
-    if number < RANDOM or number % 2:
+    if not sampled:
         rng = np.random.default_rng([seed, number, 1])
-        shares = {name: float(rng.random()) for name in space if name != SCENARIO}
-        study.enqueue_trial({**shares, SCENARIO: int(rng.integers(entries))})
-    return study.ask(space)
+        study.enqueue_trial({**{axis.name: rng.random() for axis in plan.axes}, SCENARIO: int(rng.integers(entries))})
+    shares = {axis.name: FloatDistribution(0.0, 1.0) for axis in plan.axes}
+    return study.ask({**shares, SCENARIO: CategoricalDistribution(range(entries))})
 
 
-def _drawn(plan: Plan, entries: Sequence[SuiteEntry], trial: optuna.Trial, seed: int) -> Failure:
+def _drawn(plan: Plan, entries: Sequence[SuiteEntry], trial: optuna.Trial, seed: int, sampled: bool) -> Failure:
     entry: SuiteEntry = entries[trial.params[SCENARIO]]
     # Four digits, so that the scene's command is short; what was drawn and what is played differ by less than 0.1 %.
     values = tuple(float(f"{axis.at(trial.params[axis.name]):.4g}") for axis in plan.axes)
@@ -141,7 +149,7 @@ def _drawn(plan: Plan, entries: Sequence[SuiteEntry], trial: optuna.Trial, seed:
     of_scene = int(np.random.default_rng([seed, trial.number]).choice(plan.seeds))
     source = Source(entry.name, of_scene, entry=Entry(entry.name, scenario))
     place = tuple(trial.params[axis.name] for axis in plan.axes)
-    return Failure(trial.number, Scene(source, values), place, entry.scenario, settings, np.nan, np.nan)
+    return Failure(trial.number, Scene(source, values), place, entry.scenario, settings, sampled)
 
 
 def _last_of_each_key(settings: Sequence[str]) -> Iterator[str]:

@@ -93,9 +93,9 @@ class Sweep:
         self.check_scenes()
         self.values = list(product(*(axis.spread(FIRST_VALUES) for axis in self.plan.axes)))
         self.seeds = self._first_seeds()
-        self._play()
+        self.play_values()
         while not self.spent() and self._refine():
-            self._play()
+            self.play_values()
 
     def _first_seeds(self) -> int:
         """Returns how many seeds are played at once: `start`, or as many as the budget allows, at least 1."""
@@ -132,7 +132,8 @@ class Sweep:
             self._made[values, self.seeds] = tuple(Scene(source, values) for source in found)
         return self._made[values, self.seeds]
 
-    def _play(self) -> None:
+    def play_values(self) -> None:
+        """Plays all trackers at the values and with the seeds so far."""
         self.play([scene for values in self.values for scene in self._scenes(values)], [*self.trackers])
 
     def play(self, scenes: Sequence[Scene], trackers: Sequence[str]) -> None:

@@ -130,6 +130,10 @@ COMMANDS = {
         "minimize {one} {tracks}/scene-s40000 --while HOTA<=1 --confirm 0 --episodes 6 --out {out}/small.toml",
         "minimize {data} {tracks}/scene-s40000 --while HOTA<=1 --out {out}/small.toml",
     ),
+    "stress search": (
+        "stress " + FAKE + " --vary detection --search 3 --suite {scene} --seeds 0:2 --by HOTA --out {out}",
+        "stress " + FAKE + " --vary detection --search 3 --episodes 3 --suite {scene} --out {out}/x",
+    ),
     "compare": (
         "compare {tracks}/../scores.json {tracks}/../scores.json", "compare {tracks}/../scores.json {out}/nothing.json",
     ),
@@ -250,7 +254,7 @@ def is_whole(name: str, out: Path) -> bool:
         return all(json.loads(p.read_text()) for p in out.rglob("*.json")) and all(
             p.read_text().endswith("</svg>\n") for p in out.rglob("*.svg")
         )
-    if name == "stress":
+    if name.startswith("stress"):
         return [p.name for p in out.rglob("*")] == ["episodes.jsonl"]
     if name.startswith("minimize"):
         return all(len(load(p).group) > 0 for p in out.rglob("*.toml"))
@@ -295,7 +299,7 @@ def test_interrupted_and_full_disk_while_writing(name, error, code, as_json, pla
     assert run(words(COMMANDS[name][0], place) + ["--json"] * as_json) == code
     monkeypatch.undo()
     check_output(capsys, code, as_json)
-    left = {"tune": ["toy.journal", "toy.journal.locks"], "stress": ["episodes.jsonl"]}.get(name, [])
+    left = {"tune": ["toy.journal", "toy.journal.locks"], "stress": ["episodes.jsonl"]}.get(name.split()[0], [])
     assert sorted(p.name for p in place.out.rglob("*")) == left
 
 

@@ -61,7 +61,7 @@ def test_failures_near_worse_ones_are_not_listed(tmp_path: Path) -> None:
     one = search(sweep(tmp_path, []), 1)[0]
 
     def failure(at: float, score: float, scenario: str = "cross") -> Failure:
-        return Failure(0, one.scene, (at, 0.5), scenario, (), 0.9, score)
+        return Failure(0, one.scene, (at, 0.5), scenario, (), True, 0.9, score)
 
     found = [failure(0.5, 0.3), failure(0.5 + NEAR / 2, 0.2), failure(0.5 + 2 * NEAR, 0.6), failure(0.5, 0.8, "door")]
     assert worst(found) == [found[1], found[2], found[3]]

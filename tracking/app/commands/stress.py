@@ -96,7 +96,8 @@ def _data(sweep: Sweep, found: list[Failure] | None) -> dict[str, Any]:
         "left_out": [row for row in rows if row["left_out"] and row["tracker"] == ORACLE],
     }  # fmt: skip
     if found is not None:
-        return {**data, "found": [_failure(failure, k) for k, failure in enumerate(worst(found), 1)]}
+        seeds = len({scene.source.seed for scene in sweep.scenes.values()})
+        return {**data, "seeds": seeds, "found": [_failure(failure, k) for k, failure in enumerate(worst(found), 1)]}
     data["curves"] = {name: {**_means(sweep.scores(name)), "break": None} for name in names}
     if not plan.axes:
         data["by_scenario"] = {name: _by_scenario(sweep, name) for name in names}
