@@ -36,12 +36,19 @@ def test_crossing(height: list[float], where: float) -> None:
     assert crossing(np.array([0.0, 0.5, 1.0]), np.array(height)) == pytest.approx(where)
 
 
-def test_intervals_hold_the_breaking_point() -> None:
+@pytest.mark.parametrize("count", [4, 24])
+def test_intervals_hold_the_breaking_point(count: int) -> None:
     inside = 0
     for seed in range(100):
-        point = breaking_point(WAY, scenes(0.625, 24, seed), 0.5, np.random.default_rng(seed))
-        inside += point.low <= 0.625 <= point.high
+        point = breaking_point(WAY, scenes(0.66, count, seed), 0.5, np.random.default_rng(seed))
+        inside += point.low <= 0.66 <= point.high
     assert inside >= 90
+
+
+def test_one_scene_gives_no_interval() -> None:
+    point = breaking_point(WAY, scenes(0.66, 1, 0), 0.5, np.random.default_rng(0))
+    assert (point.low, point.high) == (0, NEVER)
+    assert 0 < point.at < 1
 
 
 def test_no_break() -> None:
