@@ -38,7 +38,7 @@ class FoundError:
 
     error: PersonError | GroupError
     cause: Cause
-    cost: float | None  # what its repair alone adds: HOTA, or group_F1 of errors of groups; None: lineage, or not asked
+    cost: float | None  # what its repair alone adds: HOTA, or group_F1 of errors of groups; None: unknown, or not asked
 
     @property
     def who(self) -> str:
@@ -147,7 +147,8 @@ def _cost(run: ComparedRun, error: PersonError | GroupError, whole: dict[str, fl
     if error.kind == LINEAGE:
         return None
     key = "group_F1" if isinstance(error, GroupError) else "HOTA"
-    return scores(run, [error], [key])[key] - whole[key]
+    cost = scores(run, [error], [key])[key] - whole[key]
+    return cost if np.isfinite(cost) else None
 
 
 def _by_cause(

@@ -30,7 +30,7 @@ EVENT_KINDS = ("late merge", "missed merge", "late split", "missed split", "late
 KINDS = (*get_args(PersonKind), MISSED, DIVIDED, ENGULFED, STRANGERS, *EVENT_KINDS)
 CAUSES = (
     "edge", "hidden", "undetected", "near", "turned", "left", "displaced", "double", "clutter", "apart", "beside",
-    "tracker",
+    "light", "tracker",
 )  # fmt: skip
 
 

@@ -43,7 +43,13 @@ def test_an_option_given_twice_is_refused(words: tuple[str, ...], option: str, f
 
 
 def test_every_command_with_its_options_is_tested() -> None:
-    assert {option for _, option, _, several in OPTIONS if several} == {"--set", "--suite", "--objective", "--by"}
+    assert {option for _, option, _, several in OPTIONS if several} == {
+        "--set",
+        "--suite",
+        "--objective",
+        "--by",
+        "--vary",
+    }
     assert {words[0] for words, *_ in OPTIONS} >= {"generate", "track", "score", "export", "fit", "tune", "demo"}
 
 

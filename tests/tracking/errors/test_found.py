@@ -14,7 +14,7 @@ from scenarios.errors import InputError
 from sim.types import GroupEvent, Groups, Sequence, Tracks
 from tests.hand_made import Scene, event, tracks, truth
 from tracking.app.commands.errors import _causes, _tables
-from tracking.app.commands.view import _errors
+from tracking.app.report.moments import shown_errors
 from tracking.errors.found import errors_of_run, find_errors
 from tracking.errors.groups import GroupError
 from tracking.running.run import TrackingRun
@@ -361,5 +361,4 @@ def test_a_page_is_written_without_errors_that_cannot_be_found() -> None:
     scenes = [scene(n) for n in range(FRAMES)]
     run = TrackingRun(tuple(t.replace(plane="image") for t in tracks(scenes)), {})
     with pytest.warns(UserWarning, match="made: the page shows no errors"):
-        assert _errors(Made(scenes).sequence(), run) == []
-    assert _errors(Made(scenes).sequence(), None) == []
+        assert shown_errors(Made(scenes).sequence(), run).errors == []
