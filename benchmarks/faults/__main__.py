@@ -106,17 +106,17 @@ def measure(scenes: SequenceOf[FaultScene], fault: str, count: int, seed: int, w
     total: Counter[str] = Counter()
     for of in scenes:
         if whole:
-            before = find_errors(of.sequence, of.clean_wholes, costs=False)
+            before = find_errors(of.sequence, of.clean_wholes, costs=0)
             runs = ((made, run, None) for made, run in islice(whole_cases(of, fault, count, seed), count))
         else:
-            before = find_errors(of.sequence, of.clean, costs=False)
+            before = find_errors(of.sequence, of.clean, costs=0)
             runs = (
                 (made, _run(of, made), of.clean if made.seen is None else of.tracks(of.told, made.seen))
                 for made in cases(of, fault, count, seed)
             )
         for made, run, seen in runs:
             total["cases"] += 1
-            for name, right in judged(find_errors(of.sequence, run, seen, costs=False), before, made).items():
+            for name, right in judged(find_errors(of.sequence, run, seen, costs=0), before, made).items():
                 total[name] += right
                 total[f"of {name}"] += 1
     return total

@@ -31,6 +31,8 @@ from tracking.scoring.people_comparison import Similarity, from_pixels
 from tracking.scoring.position_errors import REACH
 from tracking.scoring.rows import FrameRows, find_rows
 
+EVERY = 10**9  # costs of all errors
+
 
 @dataclass(frozen=True)
 class FoundError:
@@ -83,7 +85,7 @@ class CauseRow:
 
 @dataclass(frozen=True)
 class RunErrors:
-    """The errors of a run by start, the scores as they are, and where the rest is lost."""
+    """The errors of a run by start, the scores as they are, and where the rest is lost, if this was asked for."""
 
     errors: list[FoundError]
     scores: dict[str, float]
@@ -92,21 +94,23 @@ class RunErrors:
 
 
 def errors_of_run(
-    sequence: Sequence, run: TrackingRun, similarity: Similarity | None = None, costs: bool = True
+    sequence: Sequence, run: TrackingRun, similarity: Similarity | None = None, costs: int = EVERY, causes: bool = True
 ) -> RunErrors:
     """Returns the errors of a run, with the detections of the input that it names; raises as `find_errors`."""
     known = run.info.get("detections") is not None and not any(t.unit == "group" for t in run)
-    return find_errors(sequence, run, oracle(sequence, run.info, similarity) if known else None, similarity, costs)
+    return find_errors(
+        sequence, run, oracle(sequence, run.info, similarity) if known else None, similarity, costs, causes
+    )
 
 
 def find_errors(
     sequence: Sequence, tracks: SequenceOf[Tracks], seen: SequenceOf[Tracks] | None = None,
-    similarity: Similarity | None = None, costs: bool = True,
+    similarity: Similarity | None = None, costs: int = EVERY, causes: bool = True,
 ) -> RunErrors:  # fmt: skip
     """Returns the errors of a run; seen: tracks of true ids that show which people were detected.
 
-    Without costs, those of single errors are None, which is much quicker. Raises InputError without labels, or if they
-    and the tracks cannot be compared.
+    Costs are known of so many of the longest errors; the sums by cause only with `causes`. Both take most of the time.
+    Raises InputError without labels, or if they and the tracks cannot be compared.
     """
     given = [tracks] if seen is None else [tracks, seen]
     with scorer_of(sequence) as scorer:
@@ -121,11 +125,11 @@ def find_errors(
     run, place = _compared_run(compared[0], tracked)
     of = _facts(sequence, compared[0], None if seen is None else compared[1], from_pixels(tracks))
     found = [FoundError(*one, None) for one in _with_causes(compared[0], tracked, run, place, of)]
-    whole = scores(run)
-    if costs:
-        found = [FoundError(one.error, one.cause, _cost(run, one.error, whole)) for one in found]
+    whole = scores(run) if costs or causes else {}
+    found.sort(key=lambda one: one.error.start - one.error.end)
+    found[:costs] = [FoundError(one.error, one.cause, _cost(run, one.error, whole)) for one in found[:costs]]
     found.sort(key=lambda one: (one.error.start, one.error.end))
-    return RunErrors(found, whole, *_by_cause(run, found, whole, of.fps))
+    return RunErrors(found, whole, *(_by_cause(run, found, whole, of.fps) if causes else ([], {})))
 
 
 def _with_causes(

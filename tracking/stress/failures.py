@@ -163,5 +163,5 @@ def _errors(failure: Failure, sequence: Sequence, run: TrackingRun) -> frozenset
         return frozenset()
     # Only causes need the oracle, which says who was detected.
     quick = not failure.cause and all(t.unit == "person" for t in run)
-    found = find_errors(sequence, run, costs=False) if quick else errors_of_run(sequence, run, costs=False)
+    found = (find_errors if quick else errors_of_run)(sequence, run, costs=0, causes=False)
     return frozenset((one.error.kind, one.cause.name) for one in found.errors)

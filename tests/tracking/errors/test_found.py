@@ -15,7 +15,7 @@ from sim.types import GroupEvent, Groups, Sequence, Tracks
 from tests.hand_made import Scene, event, tracks, truth
 from tracking.app.commands.errors import _causes, _tables
 from tracking.app.report.moments import shown_errors
-from tracking.errors.found import errors_of_run, find_errors
+from tracking.errors.found import EVERY, errors_of_run, find_errors
 from tracking.errors.groups import GroupError
 from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import evaluate
@@ -349,7 +349,7 @@ def test_a_change_of_the_light_is_a_cause_of_errors_from_pixels(mode: str, chang
 def test_the_table_by_cause_needs_no_single_costs() -> None:
     scenes = [scene(n) for n in range(FRAMES)]
     run = [with_ghost(swapped(lost(regrouped(t, [1, 2], -1, 10, 20), 2, 25, 40), 30), 5, 50) for t in tracks(scenes)]
-    with_costs, without = (find_errors(Made(scenes).sequence(), run, costs=costs) for costs in (True, False))
+    with_costs, without = (find_errors(Made(scenes).sequence(), run, costs=costs) for costs in (EVERY, 0))
     assert without.causes == with_costs.causes
     assert without.left == with_costs.left
     assert all(one.cost is None for one in without.errors)

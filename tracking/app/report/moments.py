@@ -19,6 +19,7 @@ from tracking.errors.found import CauseRow, FoundError, RunErrors, errors_of_run
 from tracking.running.run import TrackingRun
 
 GAINS = ("HOTA", "group_F1")
+COSTS = 8  # longest errors of a run, of which the dearest is shown
 MOST = 12  # moments in a report
 BYTES = 7_000_000  # of all their replays
 AROUND = 6.0  # s that a replay shows before and after an error
@@ -76,7 +77,7 @@ def moments(candidates: SequenceOf[Candidate], runs: Runs) -> list[tuple[Moment,
 def _moment(
     one: Candidate, sequence: Sequence, run: TrackingRun, rival: TrackingRun | None
 ) -> tuple[Moment, RunErrors]:
-    every = shown_errors(sequence, run, costs=True)
+    every = shown_errors(sequence, run, COSTS, causes=True)
     errors = every.errors
     dearest = max(errors, key=lambda error: error.cost or 0.0, default=None)
     length = sequence.length or len(run)
@@ -114,13 +115,13 @@ def _words(error: FoundError) -> str:
     )
 
 
-def shown_errors(sequence: Sequence, run: TrackingRun, costs: bool = False) -> RunErrors:
+def shown_errors(sequence: Sequence, run: TrackingRun, costs: int = 0, causes: bool = False) -> RunErrors:
     """Returns the errors of a run; none, with a warning, where tracks and labels cannot be compared."""
     none = RunErrors([], {}, [], {})
     if sequence.truth is None:
         return none
     try:
-        return errors_of_run(sequence, run, costs=costs)
+        return errors_of_run(sequence, run, costs=costs, causes=causes)
     except InputError as error:
         warnings.warn(f"{sequence.name}: the page shows no errors: {error.got}", stacklevel=2)
         return none

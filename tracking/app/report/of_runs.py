@@ -75,7 +75,7 @@ def report_of_runs(
 
 def _find(sequence: Sequence, job: ScoringJob) -> _Found:
     runs = read_runs(sequence, job)
-    return _Found(score_runs(sequence, runs, job), [shown_errors(sequence, run) for run in runs])
+    return _Found(score_runs(sequence, runs, job), [shown_errors(sequence, run, causes=True) for run in runs])
 
 
 def _ranking(ranked: RankedRuns) -> list[RankedRow]:

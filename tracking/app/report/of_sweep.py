@@ -152,12 +152,8 @@ def _candidates(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[tuple[Candi
 
 
 def _replay(sweep: Sweep, one: Candidate, scene: Scene) -> tuple[Sequence, TrackingRun, TrackingRun | None]:
-    mode = sweep.plan.detections
-
-    def tracked(name: str) -> tuple[Sequence, TrackingRun]:
-        tracker = sweep.trackers[name].tracker
-        sequence = scene.source.open(streams_for(tracker, mode))
-        return sequence, track(tracker, sequence, detections=mode, seed=scene.source.seed)
-
-    sequence, run = tracked(one.name)
-    return sequence, run, tracked(one.rival)[1] if one.rival else None
+    mode, trackers = sweep.plan.detections, [sweep.trackers[name].tracker for name in (one.name, one.rival) if name]
+    streams = dict.fromkeys(stream for tracker in trackers for stream in streams_for(tracker, mode))
+    sequence = scene.source.open(tuple(streams))
+    run, *rival = (track(tracker, sequence, detections=mode, seed=scene.source.seed) for tracker in trackers)
+    return sequence, run, rival[0] if rival else None
