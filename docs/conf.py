@@ -1,7 +1,8 @@
 """Sphinx configuration of the site (`make docs`), and the parts of its pages that are made from the code.
 
 A page asks for such a part with the comment `<!-- generated: NAME -->` or `<!-- generated: NAME ARGUMENT -->` on a line
-of its own; PARTS has the names. `<!-- pages TITLE: a b -->` puts pages into the navigation. A code host shows neither.
+of its own; PARTS has the names. A line below it, which the part replaces, says on a code host where the text is.
+`<!-- pages TITLE: a b -->` puts pages into the navigation.
 """
 
 from __future__ import annotations
@@ -189,7 +190,7 @@ PARTS: dict[str, Callable[..., str]] = {
         contributing,
     )
 }
-GENERATED = re.compile(r"^<!-- generated: (\S+) ?(\S*) -->$", re.MULTILINE)
+GENERATED = re.compile(r"^<!-- generated: (\S+) ?(\S*) -->(?:\n\*`make docs` puts .*\*)?$", re.MULTILINE)
 OUTSIDE = re.compile(r"\]\((?:\.\./)+(README|CONTRIBUTING|CHANGELOG)\.md")
 PAGE_OF = {"README": "index.md", "CONTRIBUTING": "contributing.md", "CHANGELOG": "changelog.md"}
 PAGES = re.compile(r"^<!-- pages (\w+): (.*) -->$", re.MULTILINE)

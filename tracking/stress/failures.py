@@ -1,7 +1,8 @@
 """When a tracker fails: a score beyond a bound, or an error of a kind; and one episode in which it may fail.
 
-`HOTA<0.7` compares a score of the catalogue by <, <=, > or >=. `late split` is a kind of error of `flockscope errors`
-that occurs at least once, `switch:hidden` one of this kind with this cause.
+`HOTA<0.7` compares a score of the catalogue by <, <=, > or >=. It counts only where the oracle has the score, too: a
+false group in a scene without true groups is no failure of group_F1. `late split` is a kind of error of `flockscope
+errors` that occurs at least once, `switch:hidden` one of this kind with this cause.
 """
 
 from __future__ import annotations
@@ -142,6 +143,7 @@ class EpisodeOf:
 def play_episode(episode: EpisodeOf) -> Outcome:
     """Plays an episode; an order that does not come true, and an error of the tracker, are the outcome's problem."""
     from tracking.comparison import scorer_of
+    from tracking.oracle import oracle
 
     try:
         sequence = episode.sequence()
@@ -150,6 +152,10 @@ def play_episode(episode: EpisodeOf) -> Outcome:
         run = episode.subject.run(sequence)
         with scorer_of(sequence) as scorer:
             scores = {key: value for key, value in scorer.evaluate(run).items() if value == value}
+            failure = episode.failure
+            if failure.score and failure.holds(Outcome(scores)):
+                best = scorer.evaluate(oracle(sequence, run.info))[failure.score]
+                scores = {key: value for key, value in scores.items() if key != failure.score or best == best}
         errors = _errors(episode.failure, sequence, run)
     except FlockscopeError as error:
         return Outcome(problem=error)

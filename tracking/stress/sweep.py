@@ -83,7 +83,6 @@ class Sweep:
     report: Callable[[str], None] = lambda text: None
     values: list[Values] = field(default_factory=list)
     seeds: int = 0
-    played: int = 0
     scenes: dict[tuple[object, ...], Scene] = field(default_factory=dict)
     began: float = field(default_factory=time.monotonic)
     _made: dict[tuple[Values, int], tuple[Scene, ...]] = field(default_factory=dict)
@@ -104,6 +103,11 @@ class Sweep:
         scenes = len(sources(self.plan.scenarios, self.plan.seeds[:1], self.plan.settings))
         each = len(self.trackers) * len(self.values) * scenes
         return min(self.plan.start, max(1, self.plan.episodes // each))
+
+    @property
+    def played(self) -> int:
+        """Number of the trackers' episodes on the scenes so far, stored ones included."""
+        return sum(self.row(name, scene) is not None for scene in self.scenes.values() for name in self.trackers)
 
     def spent(self) -> bool:
         """Returns True if the budget of time or of episodes is spent."""
@@ -149,7 +153,6 @@ class Sweep:
                 settings = list(self.plan.settings_at(scene.values))
                 self.store.add({"key": self._key(name, scene), **facts, "settings": settings, **asdict(outcome)})
                 if name != ORACLE:
-                    self.played += 1
                     self.report(" ".join([name, scene.source.name, *(f"{value:g}" for value in scene.values)]))
 
     def _missing(self, scene: Scene, names: Sequence[str]) -> list[str]:

@@ -88,3 +88,9 @@ def test_too_few(tmp_path, capsys):
     assert run(["compare", two, two, "--by", "HOTA"]) == 2
     assert "HOTA: got known in 0 sequences" in capsys.readouterr().err
     assert run(["compare", two, two, "--by", "hota"]) == 2
+
+
+def test_scores_of_other_data_are_not_compared(tmp_path, capsys):
+    before, now = (stored(tmp_path / name, BASE, truth=name) for name in ("a", "b"))
+    assert run(["compare", before, now]) == 2
+    assert "s0: truth" in capsys.readouterr().err

@@ -15,7 +15,7 @@ from scenarios.schema.scenario import Scenario, group_names
 from scenarios.schema.values import bounds
 from tracking.app.cli import run
 from tracking.errors import causes
-from tracking.stress.failures import CAUSES, EpisodeOf, Outcome, Subject, parse_failure
+from tracking.stress.failures import CAUSES, EpisodeOf, Outcome, Subject, parse_failure, play_episode
 from tracking.stress.minimize import Search
 from tracking.stress.reductions import STAGES, beginning, difficulties, pinned, script, without
 
@@ -248,6 +248,34 @@ def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
     assert "got HOTA = 0." in capsys.readouterr().err
     assert run([*line, "fragment", "--out", "scene.toml"]) == 2
     assert Path("scene.toml").read_text() == SCENE
+
+
+ONE_GROUP = """import numpy as np
+from sim.types import Tracks
+
+class OneGroup:
+    needs = ("points",)
+
+    def reset(self, context, seed):
+        pass
+
+    def step(self, frame, detections):  # everybody is in one group
+        n = len(detections.pos)
+        none, cov = np.full((n, 2), np.nan), np.tile(np.eye(4), (n, 1, 1))
+        who = np.arange(n), np.zeros(n, int)
+        return Tracks(frame.index, frame.t, "ground", "person", *who, detections.pos, none, cov)
+"""
+
+
+@pytest.mark.parametrize("groups", [True, False])
+def test_a_score_counts_only_where_the_oracle_has_it(tmp_path: Path, groups: bool) -> None:
+    (tmp_path / "one.py").write_text(ONE_GROUP)
+    (tmp_path / "scene.toml").write_text(SCENE if groups else SCENE.replace("size = 2", "size = 1"))
+    failure = parse_failure("pairwise_F1<1")
+    subject = Subject(f"{tmp_path}/one.py:OneGroup", "one", detections="truth")
+    outcome = play_episode(EpisodeOf(subject, failure, load(str(tmp_path / "scene.toml")), 4))
+    assert outcome.problem is None
+    assert failure.holds(outcome) == groups
 
 
 def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, capsys) -> None:

@@ -150,6 +150,15 @@ def test_a_sweep_goes_on_where_it_was_killed(tmp_path: Path) -> None:
     assert resumed.rows() == complete.rows()
 
 
+def test_a_finished_sweep_plays_nothing_again(tmp_path: Path) -> None:
+    done = sweep(tmp_path, [], episodes=40)
+    done.run()
+    again = sweep(tmp_path, seen := [], episodes=40)
+    again.run()
+    assert seen == []
+    assert again.rows() == done.rows()
+
+
 def test_without_an_axis_every_seed_is_played(tmp_path: Path) -> None:
     made = sweep(tmp_path, seen := [], axes=(), seeds=tuple(range(20)), start=4, episodes=None)
     made.run()

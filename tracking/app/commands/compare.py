@@ -27,7 +27,7 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import paired
 
 FEWEST = 2  # sequences without which there is no interval
-HOW = ("similarity", "given")  # what must be equal for scores to be compared
+HOW = ("similarity", "given", "truth")  # what must be equal for scores to be compared
 EXPECTED = "a file of `flockscope score --json`, or of `compare --save`"
 
 Stored = dict[str, dict[str, Any]]  # by name of the sequence
@@ -83,7 +83,8 @@ def _require_same(options: CompareOptions, before: Stored, now: Stored) -> None:
             if key in row and key in now[name] and row[key] != now[name][key]:
                 raise InputError(
                     file=options.now, place=f"{name}: {key}", got=repr(now[name][key]),
-                    expected=f"{row[key]!r}, as in {options.baseline}", remedy="score both alike",
+                    expected=f"{row[key]!r}, as in {options.baseline}",
+                    remedy="track and score the same sequences" if key == "truth" else "score both alike",
                 )  # fmt: skip
 
 
@@ -91,9 +92,10 @@ def _row(key: str, before: Stored, now: Stored, tolerance: float) -> dict[str, A
     pairs = np.array([[_value(row, key), _value(now[name], key)] for name, row in before.items()])
     known = np.isfinite(pairs).all(axis=1)
     if known.sum() < FEWEST:
+        both = [k for k in CATALOGUE if all(np.isfinite(_value(s[name], k)) for s in (before, now) for name in before)]
         raise InputError(
             place=key, got=f"known in {counted(int(known.sum()), 'sequence')} on both sides",
-            expected=f"at least {FEWEST}", remedy="choose another score with --by",
+            expected=f"at least {FEWEST}", remedy=f"choose another score with --by, such as {' or '.join(both[:2])}",
         )  # fmt: skip
     first, second = pairs[known].T
     mean, low, high = (float(end[0]) for end in paired(first[:, None], second[:, None]))

@@ -215,7 +215,9 @@ def _write_page(path: Path, episode: EpisodeOf) -> None:
 
     sequence = episode.sequence()
     tracks = episode.subject.run(sequence)
-    write_page(sequence, Run(tracks, shown_errors(sequence, tracks).errors), path)
+    errors = shown_errors(sequence, tracks).errors
+    own = (one.error.start for one in errors if one.error.kind == episode.failure.kind)
+    write_page(sequence, Run(tracks, errors, episode.subject.name), path, start=next(own, 1))
 
 
 def _result(search: Search, scene: Scene, out: Path, outcomes: dict[int, Outcome]) -> CommandResult:
@@ -259,7 +261,8 @@ def _text(data: dict[str, Any]) -> Any:
     confirmed = confirmed if data["fresh"] else "not confirmed on other seeds"
     state = "no single piece can be removed" if data["complete"] else "stopped early: more can perhaps be removed"
     lines = [f"{', '.join(changes)}; {confirmed}; {counted(data['episodes'], 'episode')}; {state}"]
-    lines += [f"difficulties that it needs: {', '.join(data['needed'])}"] if data["needed"] else []
+    left = "difficulties that it needs" if data["complete"] else "difficulties that are left"
+    lines += [f"{left}: {', '.join(data['needed'])}"] if data["needed"] else []
     table = empty_table()
     scored = data["while"].split("<")[0].split(">")[0]
     keys = list(dict.fromkeys([*LISTED, *([scored] if scored in data["seeds"][0]["scores"] else [])]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.formats.options import BoxScale, parse_box_scale
+from sim.io.store.seal import tracked_hash
 from sim.types import Array, Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
@@ -37,10 +39,12 @@ def score(options: ScoreOptions) -> CommandResult:
         for sequence, one in zip(sequences, scored, strict=True)
     ]
     notes = [*sparse_notes([row.scores for row in rows]), *dict.fromkeys(one.note for one in scored if one.note)]
+    hashes = {sequence.name: tracked_hash(sequence) for sequence in sequences}
     if options.blocks:
-        return _result([(rows, _block_means(scored[0]))], [*notes, *short_notes(sequences[0], rows[0].scores)])
+        notes += short_notes(sequences[0], rows[0].scores)
+        return _result([(rows, _block_means(scored[0]))], hashes, notes)
     parts = [[row for row in rows if row.given == given] for given in dict.fromkeys(row.given for row in rows)]
-    return _result([(part, summary(part)) for part in parts], notes)
+    return _result([(part, summary(part)) for part in parts], hashes, notes)
 
 
 def _score_all(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) -> list[ScoredSequence]:
@@ -72,14 +76,15 @@ def _block_means(scored: ScoredSequence) -> Means:
     }
 
 
-def _result(parts: list[tuple[list[SequenceScores], Means]], notes: list[str] | None = None) -> CommandResult:
+def _result(
+    parts: list[tuple[list[SequenceScores], Means]], hashes: Mapping[str, str | None], notes: list[str]
+) -> CommandResult:
     from rich.console import Group
 
-    notes = notes or []
     total = sum(len(rows) for rows, _ in parts)
     texts = [tables(rows, means, notes, total) for rows, means in parts]
     data = {
-        "sequences": [_row_data(row) for rows, _ in parts for row in rows],
+        "sequences": [{**_row_data(row), "truth": hashes[row.sequence]} for rows, _ in parts for row in rows],
         "mean": parts[0][1] if len(parts) == 1 else None,
         "means": [{"given": rows[0].given, "sequences": len(rows), "mean": means} for rows, means in parts],
         "notes": notes,

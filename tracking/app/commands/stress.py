@@ -251,5 +251,5 @@ def _break_words(point: dict[str, float | None], share: float) -> str:
 
 def _span(point: dict[str, float | None]) -> str:
     known = sorted(v for v in (point["low"], point["high"]) if v is not None)
-    ends = f"{known[0]:.3g} to {known[1]:.3g}" if len(known) == 2 else "no end known"
+    ends = f"{known[0]:.3g} to {known[1]:.3g}" if len(known) == 2 else "its interval is not known: play more episodes"
     return f"{point['at']:.3g} ({ends})"

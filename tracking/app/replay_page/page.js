@@ -311,4 +311,8 @@ buildControls();
 layOut();
 listen();
 seekToAddress();
+if (data.zoomed && hasPlan) {
+  zoomTo(3);
+  show();
+}
 addEventListener("hashchange", seekToAddress);

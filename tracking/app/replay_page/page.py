@@ -51,12 +51,13 @@ def write_page(
     title: str | None = None,
     video: PageVideo | None = None,
     other: Run | None = None,
+    start: int = 1,
 ) -> Path:
     """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all.
 
-    other: of a second tracker, which is shown beside the first.
+    other: of a second tracker, which is shown beside the first. start: the frame that is shown first.
     """
-    shown = page_data(sequence, run, other, scores)
+    shown = page_data(sequence, run, other, scores, start=start)
     shown |= {"video": None if video is None else video.facts()}
     film = "" if video is None else video.content
     text = page_html(title or sequence.name, script_json(shown), film)
@@ -100,7 +101,7 @@ def page_data(
     true = None if truth is None else rows_of_truth(truth).within(span)
     tracked, encoded = _encoded(run, sequence, span)
     second, encoded_second = (None, None) if other is None else _encoded(other, sequence, span)
-    detections = _detections(sequence)
+    detections = _detections(sequence, span)
     both = [rows for rows in (true, tracked, second) if rows is not None]
     length = _length(sequence, both, detections)
     return {
@@ -111,6 +112,7 @@ def page_data(
         "from": 1 if span is None else span[0],
         "to": length if span is None else span[1],
         "start": start,
+        "zoomed": span is not None,
         "image": sequence.image_size or _image_size(both),
         "bounds": _bounds(sequence, both),
         "scene": scene_json(sequence.scene),
@@ -118,7 +120,7 @@ def page_data(
         "truth": None if true is None or truth is None else encode_rows(true, _within(truth.events or (), span)),
         "tracks": encoded,
         "other": None if other is None else {"tracker": _tracker(other), "tracks": encoded_second},
-        "detections": detections if span is None else None,
+        "detections": detections,
         "background": None,
         "unlabelled": _unlabelled(truth),
         "near": _near_strangers(truth),
@@ -205,13 +207,13 @@ def _near_strangers(truth: Truth | None) -> list[list[int]]:
     return listed
 
 
-def _detections(sequence: Sequence) -> Json | None:
+def _detections(sequence: Sequence, span: tuple[int, int] | None) -> Json | None:
     if not sequence.has_detections:
         return None
     found = [
         (f.index, f.detections)
         for f in sequence.without_pictures()
-        if f.detections is not None and len(f.detections.pos)
+        if f.detections is not None and len(f.detections.pos) and (span is None or span[0] <= f.index <= span[1])
     ]
     if not found:
         return None

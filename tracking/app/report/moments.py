@@ -16,6 +16,7 @@ from sim.types import Sequence
 from tracking.app.replay_page.page import Run, page_data, script_json
 from tracking.app.report.content import CauseBar, Moment
 from tracking.errors.found import CauseRow, FoundError, RunErrors, errors_of_run
+from tracking.errors.groups import GroupError
 from tracking.running.run import TrackingRun
 
 GAINS = ("HOTA", "group_F1")
@@ -25,7 +26,6 @@ BYTES = 7_000_000  # of all their replays
 AROUND = 6.0  # s that a replay shows before and after an error
 LONGEST = 40.0  # s of a replay
 JPEG_QUALITY = 60
-CAUSE_WORDS = {"tracker": "no cause in the scene"}
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ Runs = Callable[[Candidate], tuple[Sequence, TrackingRun, TrackingRun | None]]  
 def chosen(candidates: SequenceOf[Candidate], most: int = MOST) -> list[Candidate]:
     """Returns the runs that are shown, worst first: in turn each tracker's worst, of another scenario if it can be."""
     waiting: dict[str, list[Candidate]] = {}
-    for one in sorted(candidates, key=lambda one: -one.shortfall):
+    for one in sorted((one for one in candidates if one.shortfall > 0), key=lambda one: -one.shortfall):
         waiting.setdefault(one.name, []).append(one)
     shown: list[Candidate] = []
     while len(shown) < most and any(waiting.values()):
@@ -110,9 +110,9 @@ def cause_bars(found: SequenceOf[tuple[str, RunErrors]]) -> list[CauseBar]:
 
 
 def _words(error: FoundError) -> str:
-    return (
-        f"{error.error.kind}: {error.who} ({error.cause.text or CAUSE_WORDS.get(error.cause.name, error.cause.name)})"
-    )
+    score = "group_F1" if isinstance(error.error, GroupError) else "HOTA"
+    costs = f", costs {error.cost:.3f} {score}" if error.cost else ""
+    return f"{error.error.kind}: {error.who} ({error.cause.text or error.cause.name}){costs}"
 
 
 def shown_errors(sequence: Sequence, run: TrackingRun, costs: int = 0, causes: bool = False) -> RunErrors:
