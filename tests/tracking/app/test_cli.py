@@ -255,7 +255,8 @@ def is_whole(name: str, out: Path) -> bool:
             p.read_text().endswith("</svg>\n") for p in out.rglob("*.svg")
         )
     if name.startswith("stress"):
-        return [p.name for p in out.rglob("*")] == ["episodes.jsonl"]
+        json.loads((out / "stress.json").read_text()) if (out / "stress.json").exists() else None
+        return {p.name for p in out.rglob("*")} <= {"episodes.jsonl", "episodes.parquet", "stress.json"}
     if name.startswith("minimize"):
         return all(len(load(p).group) > 0 for p in out.rglob("*.toml"))
     if name not in ("generate", "generate pictures", "demo", "track", "view all"):

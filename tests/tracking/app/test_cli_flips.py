@@ -510,13 +510,17 @@ ELSEWHERE = {
     ("track", "sensor"),
     ("track", "grouping"),  # commands/test_fit.py
     ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
+    ("view", "by"),  # report/test_in_browser.py
+    ("view", "workers"),
     ("generate", "stride"),  # tests/sim/test_stride.py
     ("coco", "min_visibility"),  # tests/sim/io/export/test_coco.py
     *((command, "person_class") for command in ("coco", "score", "track")),  # tests/sim/io/formats/test_mot_people.py
     *((command, "box_scale") for command in ("score", "track")),  # tests/sim/io/formats/test_box_columns.py
 }
-OWN = ("group", "grouping", "joint", "relational", "replay", "sensor", "tune")
-"""Commands whose options are tested one by one in commands/, test_tune.py and test_cli_bad_input.py."""
+OWN = (
+    "compare", "errors", "group", "grouping", "joint", "minimize", "relational", "replay", "sensor", "stress", "tune",
+)  # fmt: skip
+"""Commands whose options are tested one by one in commands/, ../stress, ../errors, and test_*.py here."""
 
 
 def commands(group) -> list[tuple[str, list[str]]]:

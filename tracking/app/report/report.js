@@ -46,6 +46,8 @@ function buttons() {
 function show(button) {
   open = buttons().indexOf(button);
   if (open < 0) return;
+  if (!$("player").open) $("player").showModal();
+  $("close").focus(); // keys work while the page loads
   const frame = $("player").querySelector("iframe");
   const page = $("replay-page").textContent.replaceAll("<\\/script", "</script");
   frame.srcdoc = page.replace("@@DATA@@", () => $(`moment-${button.dataset.moment}`).textContent);
@@ -56,7 +58,6 @@ function show(button) {
   $("which").textContent = button.querySelector("strong").textContent + ": " + button.lastChild.textContent.trim();
   $("before").disabled = open === 0;
   $("after").disabled = open === buttons().length - 1;
-  if (!$("player").open) $("player").showModal();
 }
 
 function move(by) {

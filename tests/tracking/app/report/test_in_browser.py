@@ -26,7 +26,8 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (out / "bad.py").write_text(BAD, encoding="utf-8")
     lines = [["generate", "merge", "--seeds", "0:2", "--streams", "left", "--out", f"{out}/data"]]
     lines += [["track", "blob", f"{out}/data", "--detections", "file", "--out", f"{out}/good"]]
-    lines += [["view", f"{out}/data", f"{out}/good", f"{out}/bad.py:Bad", "--out", f"{out}/pages"]]
+    options = ["--by", "group_F1", "--workers", "2", "--out", f"{out}/pages"]
+    lines += [["view", f"{out}/data", f"{out}/good", f"{out}/bad.py:Bad", *options]]
     for line in lines:
         assert run(line) == 0
     return out / "pages" / "index.html"
@@ -61,6 +62,7 @@ def page(report: Path, tmp_path: Path) -> Iterator[Page]:
 
 
 def test_open_filter_replay(page: Page) -> None:
+    assert page.value("document.querySelector('#ranking h2').textContent") == "Ranking by group_F1"
     assert set(page.value(SHOWN)) == {"good", "Bad"}
     page.value(CHOOSE)
     assert set(page.value(SHOWN)) == {"Bad"}
