@@ -12,6 +12,7 @@ from sim.io.source import open_source
 from tests.short_scene import write_short_scene
 from tracking import track
 from tracking.app.cli import run
+from tracking.app.commands.score_ranking import run_differences
 
 FAKE = f"{Path(__file__).resolve().parents[3] / 'fake_tracker.py'}:Nearest"
 
@@ -60,3 +61,10 @@ def test_any_number_of_workers_gives_the_same(made: Path, tmp_path: Path, capsys
     alone, both = (ranked(capsys, made, *runs, "--workers", n, "--csv", str(tmp_path / n)) for n in "12")
     assert alone == both
     assert (tmp_path / "1").read_bytes() == (tmp_path / "2").read_bytes()
+
+
+def test_a_class_without_a_truth_hash_is_no_difference() -> None:
+    stored, played = {"tracker": "a", "truth_hash": "x"}, {"tracker": "a"}
+    assert run_differences({"a": [stored], "b": [played]}) == []
+    (found,) = run_differences({"a": [stored], "b": [played], "c": [{**stored, "truth_hash": "y"}]})
+    assert found == {"what": "truth hash of what was tracked", "runs": {"a": ["x"], "c": ["y"]}}
