@@ -155,6 +155,8 @@ class OpenedSource:
         pictures = opened.has_images or opened.has_right
         frames = opened.frames if pictures else frames_without_pictures
         self.sequence = replace(opened, bare=frames_without_pictures, frames=frames)
+        if opened.load_truth is not None:  # what a copy has loaded is not the original's
+            self.sequence = replace(self.sequence, load_truth=lambda: self.truth)
         if opened.load_background is not None:
             self.sequence = replace(self.sequence, load_background=_computed_once(opened.load_background))
 
