@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sim.sequence
+from sim.truth.label import label
 from tracking.environment.episode_cache import SourceCache
 from tracking.environment.episodes import play, sources
 
@@ -30,3 +32,12 @@ def test_it_is_bounded_and_drops_what_was_used_longest_ago():
         play("blob", source, cache=cache)
         assert cache.bytes <= cache.limit * 2
     assert before <= len(cache) < 4
+
+
+def test_the_truth_is_labelled_once(monkeypatch):
+    calls = []
+    monkeypatch.setattr(sim.sequence, "label", lambda *given: calls.append(0) or label(*given))
+    opened = SourceCache().open(sources("merge", [0])[0])
+    assert opened.sequence.truth is not None
+    assert opened.truth.frame is not None
+    assert len(calls) == 1
