@@ -20,7 +20,7 @@ from tracking.comparison import scorer_of
 from tracking.errors.causes import Cause, Facts, cause_of_ghost, cause_of_group, cause_of_person, facts
 from tracking.errors.groups import LINEAGE, GroupError, Memberships, group_errors, wrong_lineages
 from tracking.errors.people import PersonError, matched_people, person_errors
-from tracking.errors.repairs import ComparedPeople, ComparedRun, scores
+from tracking.errors.repairs import SHOWN, ComparedPeople, ComparedRun, scores
 from tracking.oracle import oracle
 from tracking.running.run import TrackingRun
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
@@ -91,6 +91,23 @@ class RunErrors:
     scores: dict[str, float]
     causes: list[CauseRow]
     left: dict[str, float]  # what is missing after all repairs
+
+
+def sums_by_cause(runs: SequenceOf[RunErrors]) -> list[CauseRow]:
+    """Returns the rows of all runs by kind and cause, what adds most first.
+
+    Errors and seconds are sums; gains are means over the runs that have the score, nan if none has it.
+    """
+    known = {key: sum(run.scores[key] == run.scores[key] for run in runs) for key in SHOWN}
+    parts: dict[tuple[str, str], list[CauseRow]] = {}
+    for row in (row for run in runs for row in run.causes):
+        parts.setdefault((row.kind, row.cause), []).append(row)
+    rows = []
+    for (kind, cause), same in parts.items():
+        sums = {key: float(np.nansum([row.gains[key] for row in same])) for key in SHOWN}
+        gains = {key: sums[key] / known[key] if known[key] else float("nan") for key in SHOWN}
+        rows.append(CauseRow(kind, cause, sum(row.errors for row in same), sum(row.seconds for row in same), gains))
+    return sorted(rows, key=lambda row: -np.nansum([row.gains["HOTA"], row.gains["group_F1"]]))
 
 
 def errors_of_run(

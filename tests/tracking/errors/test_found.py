@@ -13,9 +13,9 @@ from rich.console import Console
 from scenarios.errors import InputError
 from sim.types import GroupEvent, Groups, Sequence, Tracks
 from tests.hand_made import Scene, event, tracks, truth
-from tracking.app.commands.errors import _causes, _tables
+from tracking.app.commands.errors import _tables
 from tracking.app.report.moments import shown_errors
-from tracking.errors.found import EVERY, errors_of_run, find_errors
+from tracking.errors.found import EVERY, errors_of_run, find_errors, sums_by_cause
 from tracking.errors.groups import GroupError
 from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import evaluate
@@ -279,13 +279,13 @@ def test_the_tables_show_a_dash_for_scores_that_whole_groups_do_not_have() -> No
     scenes = [scene(n) for n in range(FRAMES)]
     found = find_errors(Made(scenes).sequence(), hulls(scenes, 20, 29, {1: ([1, 2], None), 7: ([], (90, 90, 92, 92))}))
     console = Console(width=120, file=io.StringIO())
-    console.print(_tables(["made"], [10.0], [found], 5))
+    console.print(_tables(["made"], [10.0], [found], sums_by_cause([found]), 5))
     text = console.file.getvalue()
     assert "now HOTA –  IDF1 –  group_F1 0.917" in text
     assert re.search(r"missed group +tracker +1 +1.0 +– +– +\+0.0\d\d", text)
     assert re.search(r"20–29 +false group +nobody", text)
-    (missed,) = (row for row in _causes([found]) if row["kind"] == "missed group")
-    assert np.isnan(missed["HOTA"])
+    (missed,) = (row for row in sums_by_cause([found]) if row.kind == "missed group")
+    assert np.isnan(missed.gains["HOTA"])
 
 
 def test_a_part_of_a_group_that_is_found_is_an_error() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence as SequenceOf
 from typing import Any
 
 from scenarios.errors import printable
@@ -15,7 +14,7 @@ from tracking.app.commands.score_tables import empty_table, with_title
 from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.app.stored_tracks import StoredTracks
-from tracking.errors.found import RunErrors, errors_of_run
+from tracking.errors.found import CauseRow, RunErrors, errors_of_run, sums_by_cause
 from tracking.errors.repairs import SHOWN
 from tracking.scoring.people_comparison import Similarity
 
@@ -37,6 +36,7 @@ def errors(options: ErrorsOptions) -> CommandResult:
             found.append(one)
     names = [sequence.name for sequence in sequences]
     fps = [sequence.fps for sequence in sequences]
+    causes = sums_by_cause(found)
     data = {
         "sequences": [
             {
@@ -47,9 +47,12 @@ def errors(options: ErrorsOptions) -> CommandResult:
             }
             for name, rate, one in zip(names, fps, found, strict=True)
         ],
-        "causes": _causes(found),
-    }
-    return CommandResult(data, _tables(names, fps, found, options.limit))
+        "causes": [
+            {"kind": row.kind, "cause": row.cause, "errors": row.errors, "seconds": row.seconds, **row.gains}
+            for row in causes
+        ],
+    }  # fmt: skip
+    return CommandResult(data, _tables(names, fps, found, causes, options.limit))
 
 
 def errors_of(sequence: Sequence, job: Job) -> RunErrors:
@@ -58,24 +61,7 @@ def errors_of(sequence: Sequence, job: Job) -> RunErrors:
     return errors_of_run(sequence, stored.read(sequence, box_scale), similarity)
 
 
-def _causes(found: SequenceOf[RunErrors]) -> list[dict[str, Any]]:
-    """Returns the gains by kind and cause, mean over the runs that have the score (nan: none), the largest first."""
-    known = {key: sum(run.scores[key] == run.scores[key] for run in found) for key in SHOWN}
-    rows: dict[tuple[str, str], dict[str, Any]] = {}
-    for run in found:
-        for part in run.causes:
-            none = {key: 0.0 if known[key] else float("nan") for key in SHOWN}
-            empty = {"kind": part.kind, "cause": part.cause, "errors": 0, "seconds": 0.0, **none}
-            row = rows.setdefault((part.kind, part.cause), empty)
-            row["errors"] += part.errors
-            row["seconds"] += part.seconds
-            for key in SHOWN:
-                gain = part.gains[key]
-                row[key] += 0.0 if gain != gain else gain / known[key]
-    return sorted(rows.values(), key=lambda row: -sum(row[key] for key in ("HOTA", "group_F1") if known[key]))
-
-
-def _tables(names: list[str], fps: list[float], found: list[RunErrors], limit: int) -> Any:
+def _tables(names: list[str], fps: list[float], found: list[RunErrors], causes: list[CauseRow], limit: int) -> Any:
     from rich.console import Group
 
     lost = empty_table()
@@ -83,14 +69,9 @@ def _tables(names: list[str], fps: list[float], found: list[RunErrors], limit: i
         lost.add_column(name)
     for name in ("errors", "seconds", *SHOWN):
         lost.add_column(name, justify="right")
-    for row in _causes(found):
-        lost.add_row(
-            row["kind"],
-            row["cause"],
-            str(row["errors"]),
-            f"{row['seconds']:.1f}",
-            *(_number(row[k], "+.3f") for k in SHOWN),
-        )
+    for row in causes:
+        gains = (_number(row.gains[k], "+.3f") for k in SHOWN)
+        lost.add_row(row.kind, row.cause, str(row.errors), f"{row.seconds:.1f}", *gains)
     left = {k: _mean([run.left[k] for run in found]) for k in SHOWN}
     lost.add_row("position", "", "", "", *(_number(left[k], "+.3f") for k in SHOWN))
     now = "  ".join(f"{k} {_number(_mean([run.scores[k] for run in found]), '.3f')}" for k in SHOWN)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import base64
+import math
 import warnings
 from collections.abc import Callable
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass, replace
 
 import cv2
-import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Sequence
 from tracking.app.replay_page.page import Run, page_data, script_json
 from tracking.app.report.content import CauseBar, Moment
-from tracking.errors.found import CauseRow, FoundError, RunErrors, errors_of_run
+from tracking.errors.found import FoundError, RunErrors, errors_of_run, sums_by_cause
 from tracking.errors.groups import GroupError
 from tracking.running.run import TrackingRun
 
@@ -97,16 +97,11 @@ def _moment(
 def cause_bars(found: SequenceOf[tuple[str, RunErrors]]) -> list[CauseBar]:
     """Returns what each kind and cause of errors costs each tracker, mean over its runs; found: trackers and runs."""
     bars = []
-    for name in dict.fromkeys(name for name, _ in found):
-        runs = [errors for other, errors in found if other == name]
-        parts: dict[tuple[str, str], list[CauseRow]] = {}
-        for row in (row for errors in runs for row in errors.causes):
-            parts.setdefault((row.kind, row.cause), []).append(row)
-        for (kind, cause), rows in parts.items():
-            gains = {key: float(np.nansum([row.gains[key] for row in rows]) / len(runs)) for key in GAINS}
-            counts = sum(row.errors for row in rows), sum(row.seconds for row in rows)
-            bars.append(CauseBar(name, kind, cause, *counts, gains))
-    return sorted(bars, key=lambda bar: (bar.name, -sum(bar.gains.values())))
+    for name in sorted({name for name, _ in found}):
+        for row in sums_by_cause([errors for other, errors in found if other == name and errors.scores]):
+            gains = {key: 0.0 if math.isnan(row.gains[key]) else row.gains[key] for key in GAINS}
+            bars.append(CauseBar(name, row.kind, row.cause, row.errors, row.seconds, gains))
+    return bars
 
 
 def _words(error: FoundError) -> str:
