@@ -27,6 +27,10 @@ from sim.types import Array, Bools, Ints, Truth
 from tracking.errors.groups import GroupError
 from tracking.errors.people import NOBODY, MatchedPeople, PersonError
 
+CAUSES = (
+    "edge", "hidden", "undetected", "light", "near", "turned", "left", "displaced", "double", "clutter", "apart",
+    "beside", "tracker",
+)  # fmt: skip
 CUT = 0.2  # truncation from which a person is cut by the edge
 HIDDEN = 0.35  # visibility below which most of a person is hidden
 NEAR = 0.8  # m

@@ -38,6 +38,9 @@ JOINS, PARTS = ("merge", "form"), ("split", "dissolve")
 FOUND, UNSEEN = "found", "unseen"
 MISSED, DIVIDED, ENGULFED, STRANGERS = "missed group", "divided group", "engulfed group", "strangers joined"
 FALSE, LINEAGE = "false group", "wrong lineage"
+LATE_GROUP = "late group"
+EVENT_KINDS = ("late merge", "missed merge", "late split", "missed split")
+KINDS = (MISSED, DIVIDED, ENGULFED, STRANGERS, *EVENT_KINDS, LATE_GROUP, FALSE, LINEAGE)
 
 
 @dataclass(frozen=True)
@@ -250,7 +253,7 @@ def _named(error: GroupError, of: Memberships, events: Sequence[GroupEvent], rea
         return error
     first = int(of.true.rows.frame[of.true.rows.id == error.group][0])
     late = error.kind == MISSED and error.start <= first + reach and _when(error, of) == "late"
-    return replace(error, kind="late group") if late else error
+    return replace(error, kind=LATE_GROUP) if late else error
 
 
 def _concerns(event: GroupEvent, error: GroupError) -> bool:

@@ -18,7 +18,8 @@ from scenarios.errors import FlockscopeError, InputError
 from scenarios.loading.toml_files import closest, did_you_mean
 from scenarios.schema.scenario import Scenario
 from sim.types import DetectionMode, Sequence
-from tracking.errors.groups import DIVIDED, ENGULFED, MISSED, STRANGERS
+from tracking.errors import groups
+from tracking.errors.causes import CAUSES
 from tracking.errors.people import PersonKind
 from tracking.running.run import TrackingRun, track
 from tracking.scoring.catalogue import CATALOGUE
@@ -27,12 +28,7 @@ OPERATORS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge
 }  # fmt: skip
 COMPARISON = re.compile(r"\s*([\w-]+)\s*(<=|>=|<|>)\s*(-?[0-9.]+)\s*")
-EVENT_KINDS = ("late merge", "missed merge", "late split", "missed split", "late group", "false group")
-KINDS = (*get_args(PersonKind), MISSED, DIVIDED, ENGULFED, STRANGERS, *EVENT_KINDS)
-CAUSES = (
-    "edge", "hidden", "undetected", "near", "turned", "left", "displaced", "double", "clutter", "apart", "beside",
-    "light", "tracker",
-)  # fmt: skip
+KINDS = (*get_args(PersonKind), *groups.KINDS)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -14,8 +15,10 @@ from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario, group_names
 from scenarios.schema.values import bounds
 from tracking.app.cli import run
-from tracking.errors import causes
-from tracking.stress.failures import CAUSES, EpisodeOf, Outcome, Subject, parse_failure, play_episode
+from tracking.errors import causes, groups
+from tracking.errors.causes import CAUSES
+from tracking.errors.people import PersonKind
+from tracking.stress.failures import EpisodeOf, Outcome, Subject, parse_failure, play_episode
 from tracking.stress.minimize import Search
 from tracking.stress.reductions import STAGES, beginning, difficulties, pinned, script, without
 
@@ -207,6 +210,11 @@ def test_conditions() -> None:
         assert parse_failure(text).holds(outcome), text
     for text in ("IDSW<3", "HOTA<0.5", "switch:near", "late split"):
         assert not parse_failure(text).holds(outcome), text
+
+
+def test_every_kind_of_error_can_be_named() -> None:
+    assert parse_failure("wrong lineage").kind == "wrong lineage"
+    assert all(parse_failure(kind).kind == kind for kind in (*get_args(PersonKind), *groups.KINDS))
 
 
 def test_every_cause_can_be_named() -> None:
