@@ -141,6 +141,9 @@ COMMANDS = {
         "view {one} {tracks}/scene-s40000 --out {out}/page.html", "view {one} {out}/nothing --out {out}/page.html",
     ),
     "view all": ("view {data} {tracks} --out {out}", "view {data} {tracks} --out {out}/page.html"),
+    "view report": (
+        "view {data} {tracks} " + FAKE + " --out {out}", "view {data} {tracks} " + FAKE + " --out {out}/page.html",
+    ),
     "view pictures": (
         "view {seen} --video beside --out {out}/page.html", "view {seen} --video outside --out {out}/page.html",
     ),

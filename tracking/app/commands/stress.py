@@ -11,6 +11,7 @@ import numpy as np
 
 from scenarios.errors import InputError, counted, printable
 from sim.io.files.atomic import lock_folder, write_file
+from sim.io.files.own_files import refuse_foreign_file
 from sim.io.files.tables import Column, json_document, table_bytes
 from sim.types import Array, DetectionMode
 from tracking.app import option_parsing
@@ -38,6 +39,7 @@ def stress(options: StressOptions) -> CommandResult:
     detects = all({"boxes", "points"} & {*tracker.needs} for tracker in trackers.values())
     plan = _plan(options, options.detections or ("file" if detects else "image"))
     option_parsing.output_folder(options.out)
+    refuse_foreign_file(options.out / REPORT)
     with (
         lock_folder(options.out),
         ProgressMeter("stress", options.search or options.episodes) as meter,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -31,18 +32,38 @@ def view(options: ViewOptions) -> CommandResult:
     if options.by is not None:
         checked_key(options.by)
     sequences, names = _open(options), run_names(options.tracks)
-    if len(sequences) > 1 and len(names) > 1:
-        pages = CommandResult({"files": []})
-    elif len(names) <= 2:
-        pages = _pages(options, sequences, names)
-    else:
+    if len(sequences) == 1:
+        if len(names) > 2:
+            raise InputError(
+                place="TRACKS", got=counted(len(names), "run"), expected="one or two for a single sequence",
+                remedy="give two, or the whole dataset",
+            )  # fmt: skip
+        return _pages(options, sequences, names)
+    _require_folder(options.out, ".html", sequences)
+    unlabelled = next((sequence.name for sequence in sequences if sequence.load_truth is None), None)
+    if len(names) > 1 and unlabelled is not None:
         raise InputError(
-            place="TRACKS", got=counted(len(names), "run"), expected="one or two for a single sequence",
-            remedy="give two, or the whole dataset",
+            file=unlabelled, got="no labels", expected="labels, by which several runs are compared",
+            remedy="give one run, or one sequence",
         )  # fmt: skip
-    if len(sequences) == 1 or not names or any(sequence.truth is None for sequence in sequences):
-        return pages
-    return _report(options, sequences, names, pages)
+    reported = bool(names) and unlabelled is None and _can_report(options.out / INDEX, alone=len(names) > 1)
+    pages = _pages(options, sequences, names) if len(names) < 2 else CommandResult({"files": []})
+    return _report(options, sequences, names, pages) if reported else pages
+
+
+def _can_report(index: Path, alone: bool) -> bool:
+    """Returns True if the report can be written; without its packages a warning, or InputError if it is `alone`."""
+    from tracking.app.report.page import check_packages
+
+    refuse_foreign_file(index)
+    try:
+        check_packages()
+    except InputError as error:
+        if alone:
+            raise
+        warnings.warn(error.line(), stacklevel=2)
+        return False
+    return True
 
 
 def _pages(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str]) -> CommandResult:
@@ -68,9 +89,8 @@ def _report(
 ) -> CommandResult:
     """Writes index.html: the report on all runs, which links to the pages of the sequences, if there are any."""
     from tracking.app.report.of_runs import report_of_runs
-    from tracking.app.report.page import check_packages, write_report
+    from tracking.app.report.page import write_report
 
-    check_packages()
     index = options.out / INDEX
     source = OpenedAs(options.source, options.fps, options.px_per_m, options.camera, images=False)
     files = {sequence.name: path.name for sequence, path in zip(sequences, pages.data["files"], strict=False)}
@@ -129,12 +149,16 @@ def _write_each(
 def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
     if len(sequences) == 1:
         return [option_parsing.output_file(out, suffix)]
+    _require_folder(out, suffix, sequences)
+    files = output_paths(out, [sequence.name for sequence in sequences], suffix)
+    for file in files:
+        refuse_foreign_file(file)
+    return files
+
+
+def _require_folder(out: Path, suffix: str, sequences: list[Sequence]) -> None:
     if out.suffix.lower() == suffix:
         raise InputError(
             file=out, place="--out", got=f"one file for {len(sequences)} sequences", expected="a folder",
             remedy="give a folder, or one sequence",
         )  # fmt: skip
-    files = output_paths(out, [sequence.name for sequence in sequences], suffix)
-    for file in files:
-        refuse_foreign_file(file)
-    return files

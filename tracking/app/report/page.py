@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError
 from sim.io.files.atomic import write_file
-from sim.io.files.own_files import GENERATOR, refuse_foreign_file
+from sim.io.files.own_files import GENERATOR
 from tracking.app.commands.score_tables import number
-from tracking.app.replay_page.page import page_html, script_json
+from tracking.app.replay_page.page import page_html, script_json, theme
 from tracking.app.report.content import Report
 from tracking.scoring.catalogue import CATALOGUE
 
@@ -39,9 +39,7 @@ def check_packages() -> None:
 
 
 def write_report(report: Report, path: Path) -> None:
-    """Writes the report as one HTML file. Raises InputError if the file there is not ours, or without its packages."""
-    check_packages()
-    refuse_foreign_file(path)
+    """Writes the report as one HTML file; needs the packages of `check_packages`."""
     write_file(path, report_html(report).encode("utf-8", "replace"))
 
 
@@ -57,7 +55,7 @@ def report_html(report: Report) -> str:
     found = _environment().get_template("report.html").render(
         report=report, parts=drawn, generator=GENERATOR, ranking_keys=keys,
         meanings={key: score.meaning for key, score in CATALOGUE.items()},
-        style=Markup((HERE / "report.css").read_text(encoding="utf-8")),
+        style=Markup(theme() + (HERE / "report.css").read_text(encoding="utf-8")),
         script=Markup((HERE / "report.js").read_text(encoding="utf-8")),
         bokeh=Markup(scripts()), cause_parts=cause_parts(report.causes),
         charts=Markup(script_json(charts(report))),

@@ -1,0 +1,53 @@
+"""What `view` refuses before it writes anything, and what it does without the packages of a report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scenarios.errors import InputError
+from sim.types import Sequence, Truth
+from tracking.app.command_options import ViewOptions
+from tracking.app.commands import view
+from tracking.app.report import page
+
+
+@pytest.fixture
+def options(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ViewOptions:
+    """Two runs of two sequences, which have no labels."""
+    bare = [Sequence(name, 10.0, 1, lambda: iter(())) for name in ("a", "b")]
+    monkeypatch.setattr(view, "_open", lambda _: bare)
+    return ViewOptions(source=tmp_path, tracks=["one", "two"], out=tmp_path / "out")
+
+
+def test_several_runs_need_labels(options: ViewOptions) -> None:
+    with pytest.raises(InputError, match="no labels"):
+        view.view(options)
+    assert not options.out.exists()
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_without_the_packages_of_a_report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, alone: bool) -> None:
+    def missing() -> None:
+        raise InputError(place="report.html", got="no package bokeh", expected="it", remedy="install it")
+
+    monkeypatch.setattr(page, "check_packages", missing)
+    if alone:
+        with pytest.raises(InputError, match="bokeh"):
+            view._can_report(tmp_path / "index.html", alone)
+    else:
+        with pytest.warns(UserWarning, match="bokeh"):
+            assert not view._can_report(tmp_path / "index.html", alone)
+
+
+def test_a_page_of_others_is_not_replaced(options: ViewOptions, monkeypatch: pytest.MonkeyPatch) -> None:
+    def never() -> Truth:
+        raise AssertionError("the labels are not needed")
+
+    labelled = [Sequence(name, 10.0, 1, lambda: iter(()), never) for name in ("a", "b")]
+    monkeypatch.setattr(view, "_open", lambda _: labelled)
+    options.out.mkdir()
+    (options.out / "index.html").write_text("theirs")
+    with pytest.raises(InputError, match="did not write"):
+        view.view(options)
