@@ -145,8 +145,11 @@ class OpenedSource:
     """
 
     def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
-        self.source, self._opened = source, source.open(streams)
-        opened = self._opened
+        found = source.open(streams)
+        loads = {name: getattr(found, name) for name in ("load_truth", "load_background")}
+        once: dict[str, Any] = {name: _computed_once(load) for name, load in loads.items() if load is not None}
+        opened = replace(found, **once)
+        self.source, self._opened = source, opened
         frames_once = _computed_once(lambda: tuple(opened.without_pictures()))
 
         def frames_without_pictures() -> Iterator[Frame]:
@@ -155,10 +158,6 @@ class OpenedSource:
         pictures = opened.has_images or opened.has_right
         frames = opened.frames if pictures else frames_without_pictures
         self.sequence = replace(opened, bare=frames_without_pictures, frames=frames)
-        if opened.load_truth is not None:  # what a copy has loaded is not the original's
-            self.sequence = replace(self.sequence, load_truth=lambda: self.truth)
-        if opened.load_background is not None:
-            self.sequence = replace(self.sequence, load_background=_computed_once(opened.load_background))
 
     @cached_property
     def truth(self) -> Truth:
