@@ -70,13 +70,18 @@ def page_html(title: str, data: str, film: str = "") -> str:
     """Returns the page; data: a JSON object as text for a script element."""
     parts = {
         "TITLE": escape(title),
-        "STYLE": (HERE / "page.css").read_text(encoding="utf-8"),
+        "STYLE": theme() + (HERE / "page.css").read_text(encoding="utf-8"),
         "DATA": data,
         "FILM": film,
         "SCRIPT": "\n".join((HERE / script).read_text(encoding="utf-8") for script in SCRIPTS),
     }
     pieces = (HERE / "page.html").read_text(encoding="utf-8").split("@@")
     return "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
+
+
+def theme() -> str:
+    """Returns the colours of our pages, light and dark, as CSS variables."""
+    return (HERE / "theme.css").read_text(encoding="utf-8")
 
 
 def script_json(value: Json) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 Json = dict[str, Any]
@@ -27,8 +28,13 @@ class HeatCell:
     """A tracker's mean score in one scenario."""
 
     score: float
-    share: float  # of the oracle's score; nan without one
+    best: float  # the oracle's, nan without one
     why: str = ""  # why it is empty
+
+    @property
+    def share(self) -> float:
+        """The score as a share of the oracle's, nan without one."""
+        return self.score / self.best if self.best > 0 else math.nan
 
 
 @dataclass(frozen=True)
@@ -127,4 +133,4 @@ class Report:
     speeds: SequenceOf[Speed] = ()
     moments: SequenceOf[Moment] = ()
     failures: SequenceOf[Failure] = ()
-    sequences: SequenceOf[tuple[str, str, float]] = field(default=())  # name, address of its page, score: worst first
+    sequences: SequenceOf[tuple[str, str, float]] = ()  # name, address of its page, score: worst first

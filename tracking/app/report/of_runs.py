@@ -106,8 +106,7 @@ def _heat(ranked: RankedRuns) -> HeatMap:
             scores = np.array([c.scores[name][k][ranked.key] for k in places], float)
             best = np.array([_best(ranked, name, k) for k in places])
             score = float(scores.mean())
-            why = "" if math.isfinite(score) else "not scored"
-            cells.append(HeatCell(score, float(score / best.mean()) if best.mean() > 0 else math.nan, why))
+            cells.append(HeatCell(score, float(best.mean()), "" if math.isfinite(score) else "not scored"))
         rows[scenario] = cells
     return HeatMap(f"{ranked.key} by scenario", tuple(names), rows)
 

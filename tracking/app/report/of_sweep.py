@@ -91,7 +91,7 @@ def _cell(sweep: Sweep, name: str, scenes: SequenceOf[Scene]) -> HeatCell:
     score, best = _mean(_values(sweep, name, scenes)), _mean(_values(sweep, ORACLE, scenes))
     rows = [row for scene in scenes if (row := sweep.row(name, scene)) is not None]
     why = "not played" if not rows else "left out" if all(row["left_out"] for row in rows) else "not scored"
-    return HeatCell(score, score / best if best > 0 else math.nan, "" if math.isfinite(score) else why)
+    return HeatCell(score, best, "" if math.isfinite(score) else why)
 
 
 def _scenarios(sweep: Sweep, scenes: SequenceOf[Scene]) -> HeatMap:

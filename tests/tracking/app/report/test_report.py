@@ -31,7 +31,7 @@ EMPTY = Report("Two trackers", "about", "HOTA", [])
 
 def full(name: str) -> Report:
     """A report with all parts, in which trackers, scenes and errors have this name."""
-    cells = [HeatCell(0.5, 0.7), HeatCell(math.nan, math.nan, f"no scene, {name}")]
+    cells = [HeatCell(0.5, 0.8), HeatCell(math.nan, math.nan, f"no scene, {name}")]
     ends = [0.8, math.nan, 0.2], [1, math.nan, 0.4]
     curve = Curve(name, [0.9, math.nan, 0.3], *ends, {"at": 0.6, "low": 0.5, "high": 1.0})
     rows = [RankedRow("oracle", "", 0.9, math.nan, math.nan, {}), RankedRow(name, "1", 0.8, 0.7, 0.9, {"MOTA": 0.5})]
