@@ -14,22 +14,18 @@ def evidence(pos, time, seconds):
     """dict from (step, a, b) to the dict of quantities; pos (S, P, 2), time (S, P), nan where not seen."""
     steps, people = pos.shape[:2]
     seen = [[p for p in range(people) if np.isfinite(pos[t, p, 0])] for t in range(steps)]
-    first = {p: next(t for t in range(steps) if p in seen[t]) for p in range(people) if any(p in s for s in seen)}
     past, found = {}, {}
     for t in range(steps):
         vel = {p: chord(pos, time, t, p, seconds) for p in seen[t]}
         for a, b in combinations(seen[t], 2):
             if np.hypot(*(pos[t, b] - pos[t, a])) < 4.0:
-                past.setdefault((a, b), []).append((t, instant(pos[t], vel, a, b, seen[t])))
+                past.setdefault((a, b), []).append((t, instant(pos[t], vel, a, b)))
                 row = {
                     f"{name}, {time:g} s": mean(past[a, b], name, t, time, seconds)
                     for name in past[a, b][0][1]
                     for time in TIMES
                 }
-                late = max(first[a], first[b])
-                row["distance"] = np.hypot(*(pos[t, b] - pos[t, a]))
-                row["arrival gap"] = abs(first[a] - first[b]) * seconds if min(first[a], first[b]) > 0 else math.nan
-                row["first distance"] = np.hypot(*(pos[late, b] - pos[late, a])) if late > 0 else math.nan
+                row["time near"] = min(len(past[a, b]) * seconds, 20.0)
                 found[t, a, b] = row
     return found
 
@@ -41,32 +37,19 @@ def chord(pos, time, t, p, seconds):
     return np.full(2, math.nan)
 
 
-def instant(pos, vel, a, b, seen):
+def instant(pos, vel, a, b):
     apart, m = pos[b] - pos[a], (vel[a] + vel[b]) / 2
     distance, pace = np.hypot(*apart), np.hypot(*m)
     side, along = distance, math.nan
     if pace >= 0.3:
         side, along = abs(apart[0] * m[1] - apart[1] * m[0]) / pace, abs(apart @ m) / pace
-    third = [q for q in seen if q not in (a, b)]
-
-    def far(p, q):
-        return np.hypot(*(pos[q] - pos[p]))
-
-    def differ(p, q):
-        return np.hypot(*(vel[q] - vel[p]))
-
-    around = [sum(far(p, q) < 3.0 for q in third) for p in (a, b)]
-    within = [differ(p, q) < 0.5 for p in (a, b) for q in third if far(p, q) < 4.0]
     speeds = [np.hypot(*vel[p]) for p in (a, b)]
     turn = math.nan
     if min(speeds) >= 0.3:
         turn = math.acos(min(max(vel[a] @ vel[b] / speeds[0] / speeds[1], -1.0), 1.0))
     return {
-        "velocity difference": differ(a, b), "sideways": side, "lengthwise": along, "others": sum(around) / 2,
-        "stream": sum(within) / len(within) if within else math.nan, "speed": sum(speeds) / 2,
-        "rank": sum(far(p, q) < distance for p in (a, b) for q in third) / 2,
-        "growth": apart @ (vel[b] - vel[a]) / max(distance, 0.1), "turn": turn,
-        "common": sum(all(far(p, q) < 1.5 and differ(p, q) < 0.7 for p in (a, b)) for q in third),
+        "distance": distance, "velocity difference": np.hypot(*(vel[b] - vel[a])), "sideways": side,
+        "lengthwise": along, "growth": apart @ (vel[b] - vel[a]) / max(distance, 0.1), "turn": turn,
     }  # fmt: skip
 
 
@@ -76,19 +59,14 @@ def mean(rows, name, t, time, seconds):
 
 
 def beliefs(pos, time, seconds, belief):
-    """dict from (step, a, b) to log-odds."""
+    """dict from (step, a, b) to the two log-odds."""
     found = {}
     for (t, a, b), row in evidence(pos, time, seconds).items():
-        speed = row["speed, 5 s"]
-        stands = 0.0 if math.isnan(speed) else min(max((0.6 - speed) / 0.4, 0.0), 1.0)
-        many = min(max((row["others, 5 s"] - 1) / 5, 0.0), 1.0)
-        log_odds = belief.bias
+        log_odds = belief.bias.copy()
         for table in belief.tables:
             x = row[table.name]
             if not math.isnan(x):
-                walk, stand, walk_many, stand_many = (np.interp(x, table.at, y) for y in table.log_odds)
-                log_odds += (1 - many) * ((1 - stands) * walk + stands * stand)
-                log_odds += many * ((1 - stands) * walk_many + stands * stand_many)
+                log_odds += [np.interp(x, table.at, y) for y in table.log_odds]
         found[t, a, b] = log_odds
     return found
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 PersonSet = frozenset[int]
 Members = Mapping[int, PersonSet]
 ALONE = -1
+NOBODY: Members = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,18 +122,28 @@ class Identities:
     born: dict[int, int] = field(default_factory=dict)
     people: PersonSet = frozenset()  # all people present at the last time
 
-    def step(
-        self, t: int, people: PersonSet, parts: Iterable[PersonSet], entered: PersonSet = frozenset()
-    ) -> list[GroupChange]:
-        """Takes the partition of time t, not before the last one, and returns what has changed since; at first all
-        enter.
-        """
+    def name(self, t: int, parts: Iterable[PersonSet], known: Members) -> dict[int, PersonSet]:
+        """Returns the parts of time t by id: that of a present group or of one in `known`, or a new one."""
         new: dict[int, PersonSet] = {}
-        for part, kept in identify(self.groups, parts, self.born).items():
+        for part, kept in identify({**known, **self.groups}, parts, self.born).items():
             g = self.next_id if kept is None else kept
             self.next_id += kept is None
             new[g] = part
             self.born.setdefault(g, t)
+        return new
+
+    def step(
+        self,
+        t: int,
+        people: PersonSet,
+        parts: Iterable[PersonSet],
+        entered: PersonSet = frozenset(),
+        known: Members = NOBODY,
+    ) -> list[GroupChange]:
+        """Takes the partition of time t, not before the last one, and returns what has changed since; at first all
+        enter. known: as for `name`.
+        """
+        new = self.name(t, parts, known)
         changes = lineage(self.groups, new, self.people, people, entered)
         self.groups, self.people = new, people
         return changes

@@ -337,6 +337,9 @@ class FitGroupingOptions:
     names: list[str] = NAMES()
     out: Path = TOML("File to write, for --grouping.")
     seeds: str = FIT_SEEDS()
+    events: list[str] = option(
+        "Fit the log-odds of events to this scenario or suite. Can be given several times. Default: the NAMEs.", [],
+        metavar="NAME", flag="--events")
     check: str | None = CHECK()
 
 

@@ -1,35 +1,36 @@
 """`fit_belief`: fits the belief of who belongs together to simulated scenes, by penalised maximum likelihood.
 
-Every scene weighs the same. The penalty is on the squared log-odds, on their differences between the situations
-(walking or standing, among few or many), and on the curvature of the tables.
+Every scene weighs the same, and every pair of a scene. The penalty is on the squared log-odds and on the curvature of
+the tables.
 
 Also here: how well beliefs tell who belongs together: log loss, calibration error and F1 of rows of pairs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
 
 from scenarios.errors import InputError
 from sim.compiler import njit
-from sim.types import Array, Bools
+from sim.types import Array, Bools, Ints
 from tracking.fitting.grouping_scenes import PairScene
-from tracking.grouping.belief import SITUATIONS, Belief, Table, situations
+from tracking.grouping.belief import Belief, Table
 from tracking.grouping.pair_evidence import NAMES
 
-KNOTS = 10  # Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %.
-# Weights of the penalties: of curvature; of squared log-odds, and, twice, of their differences between situations.
+KNOTS = 6  # Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %.
+# Weights of the penalties: of curvature, and of squared log-odds.
 CURVED, LARGE = 3e-4, 1e-4
 STEPS = 200  # Most iterations.
 
 
 @dataclass(frozen=True)
 class PairSample:
-    """Rows of scenes: values (R, len(NAMES)); together (R,); weight (R,), of sum 1, equal for all scenes."""
+    """Rows of scenes: values (R, len(NAMES)); together (R,); weight (R,), of sum 1, equal for all scenes,
+    and for all pairs of a scene."""
 
     values: np.ndarray
     together: Bools
@@ -42,34 +43,58 @@ def sample_of(scenes: Sequence[PairScene]) -> PairSample:
     if not scenes:
         remedy = "name scenarios with people who meet"
         raise InputError(place="fit grouping", got="no two people within 4 m", expected="pairs", remedy=remedy)
-    weight = np.concatenate([np.full(len(s.pair), 1 / len(s.pair) / len(scenes)) for s in scenes])
+    weight = np.concatenate([_weights(s.pair) / len(scenes) for s in scenes])
     values, together = (np.concatenate([getattr(s, name) for s in scenes]) for name in ("values", "together"))
     return PairSample(values, together, weight, sum(len(np.unique(s.pair)) for s in scenes))
 
 
-def fit_belief(sample: PairSample, used: Sequence[str] = NAMES) -> Belief:
-    """Returns the belief with the least penalised log loss on a sample. used: names of the quantities with a table."""
-    knots_of = {name: _knots(sample.values[:, NAMES.index(name)]) for name in used}
+def _weights(pair: Ints) -> Array:
+    _, number, count = np.unique(pair, return_inverse=True, return_counts=True)
+    return np.asarray(1 / count[number] / len(count))
+
+
+def fit_belief(now: PairSample, events: PairSample | None = None, used: Sequence[str] = NAMES) -> Belief:
+    """Returns the belief with the least penalised log loss.
+
+    now, events: the samples of the two columns of its tables; None: the same. used: names of quantities with a table.
+    """
+    knots_of = {name: _knots(now.values[:, NAMES.index(name)]) for name in used}
     knots_of = {name: at for name, at in knots_of.items() if len(at) > 1}
-    at, columns = list(knots_of.values()), [NAMES.index(name) for name in knots_of]
-    place, part = _places(sample.values[:, columns], at)
-    curves, count = _curvature(at), len(SITUATIONS)
-    bends, mix = curves.T @ curves, situations(sample.values)
+    first = _fit_column(now, knots_of)
+    columns = np.stack([first, first if events is None else _fit_column(events, knots_of)])
+    cuts = np.cumsum([len(knots) for knots in knots_of.values()])
+    *heights, bias = np.split(columns, cuts, axis=1)
+    tables = tuple(Table(*row) for row in zip(knots_of, knots_of.values(), heights, strict=True))
+    belief = Belief(tables, bias[:, 0])
+    return replace(belief, threshold=best_threshold(belief.log_odds(now.values)[:, 0]))
+
+
+def _fit_column(sample: PairSample, knots_of: Mapping[str, Array]) -> Array:
+    """Returns the log-odds at all knots, and the bias as the last number."""
+    at = list(knots_of.values())
+    place, part = _places(sample.values[:, [NAMES.index(name) for name in knots_of]], at)
+    curves = _curvature(at)
+    bends = curves.T @ curves
 
     def objective(x: Array) -> tuple[float, Array]:
-        heights, slopes = x[:-1].reshape(count, -1), np.zeros_like(x)
-        gradient = slopes[:-1].reshape(count, -1)
-        loss, slopes[-1] = loss_and_gradient(place, part, mix, sample.together, sample.weight, heights, x[-1], gradient)
-        differ = heights - heights.mean(axis=0)
-        gradient += 2 * CURVED * heights @ bends + 2 * LARGE * heights + 4 * LARGE * differ
-        penalty = CURVED * float(((heights @ bends) * heights).sum())
-        return loss + penalty + LARGE * float((heights**2).sum() + 2 * (differ**2).sum()), slopes
+        heights, slopes = x[:-1], np.zeros_like(x)
+        loss, slopes[-1] = loss_and_gradient(place, part, sample.together, sample.weight, heights, x[-1], slopes[:-1])
+        slopes[:-1] += 2 * CURVED * bends @ heights + 2 * LARGE * heights
+        return loss + CURVED * float(heights @ bends @ heights) + LARGE * float(heights @ heights), slopes
 
-    start = np.append(np.zeros(count * sum(map(len, at))), -2.0)
-    found = minimize(objective, start, jac=True, method="L-BFGS-B", options={"maxiter": STEPS, "maxcor": 20}).x
-    cuts = np.cumsum([len(knots) for knots in at])[:-1]
-    heights = np.split(found[:-1].reshape(count, -1), cuts, axis=1)
-    return Belief(tuple(Table(*row) for row in zip(knots_of, at, heights, strict=True)), float(found[-1]))
+    start = np.append(np.zeros(sum(map(len, at))), -2.0)
+    options = {"maxiter": STEPS, "maxcor": 20}
+    return np.asarray(minimize(objective, start, jac=True, method="L-BFGS-B", options=options).x)
+
+
+def best_threshold(log_odds: Array) -> float:
+    """Returns the probability above which a pair is to count as together, for the greatest expected F1 of rows (R,).
+
+    It is half of the greatest expected F1 (Lipton, Elkan & Naryanaswamy 2014).
+    """
+    probability = np.sort(1 / (1 + np.exp(-log_odds)))[::-1]
+    hits = np.cumsum(probability)
+    return float((hits / (hits[-1] + np.arange(1, len(hits) + 1))).max())
 
 
 def _knots(values: Array) -> Array:
@@ -135,13 +160,12 @@ def reliability(log_odds: Array, true: Bools, weight: Array) -> Array:
 
 @njit(cache=True)
 def loss_and_gradient(
-    place: np.ndarray, part: np.ndarray, mix: Array, together: Bools, weight: Array, heights: Array, bias: float,
-    gradient: Array,
-) -> tuple[float, float]:  # fmt: skip
-    """Returns the weighted log loss of R rows and its slope with respect to the bias; adds to gradient (M, K).
+    place: np.ndarray, part: np.ndarray, together: Bools, weight: Array, heights: Array, bias: float, gradient: Array
+) -> tuple[float, float]:
+    """Returns the weighted log loss of R rows and its slope with respect to the bias; adds to gradient (K,).
 
-    place, part (R, Q): knot below each value, -1 if unknown, and how far it is to the next. mix (R, M): weights of the
-    M columns of the tables, whose log-odds at all knots are heights (M, K).
+    place, part (R, Q): knot below each value, -1 if unknown, and how far it is to the next. heights (K,): log-odds at
+    all knots.
     """
     rows, quantities = place.shape
     loss, slopes = 0.0, 0.0
@@ -151,8 +175,7 @@ def loss_and_gradient(
             k = place[r, q]
             if k >= 0:
                 u = part[r, q]
-                for m in range(len(heights)):
-                    log_odds += mix[r, m] * ((1 - u) * heights[m, k] + u * heights[m, k + 1])
+                log_odds += (1 - u) * heights[k] + u * heights[k + 1]
         true = 1.0 if together[r] else 0.0
         loss += weight[r] * (np.log1p(np.exp(-abs(log_odds))) + max(log_odds, 0.0) - true * log_odds)
         slope = weight[r] * (1 / (1 + np.exp(-log_odds)) - true)
@@ -161,7 +184,6 @@ def loss_and_gradient(
             k = place[r, q]
             if k >= 0:
                 u = part[r, q]
-                for m in range(len(heights)):
-                    gradient[m, k] += slope * mix[r, m] * (1 - u)
-                    gradient[m, k + 1] += slope * mix[r, m] * u
+                gradient[k] += slope * (1 - u)
+                gradient[k + 1] += slope * u
     return loss, slopes

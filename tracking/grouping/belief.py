@@ -1,9 +1,11 @@
 """The belief that two people belong together: log-odds of each pair from fitted tables of evidence.
 
-The belief of a row (`pair_evidence`) is a sum of tables, read off by linear interpolation. Each has four columns, for
-people who walk and who stand, among few others and among many, mixed by the pair's speed and its others over 5 s.
-`flockscope fit grouping` fits the tables to simulated scenes and writes them as a text file; belief.toml beside this
-module is the default.
+The belief of a row (`pair_evidence`) is a sum of tables, read off by linear interpolation. `flockscope fit grouping`
+fits the tables to simulated scenes and writes them as a text file; belief.toml beside this module is the default.
+
+From one evidence two decisions, each with a column of log-odds in every table. Who is together *now* follows from the
+probability and `threshold`, by the loss of pairwise F1. *Events* follow from groups that change late (`stay`, `come`),
+as a false event costs more than a late one; their log-odds are fitted to scenes in which people meet and part.
 
 Also here: how probable it is that two tracked people belong together, for every pair and frame: a table of pairs.
 """
@@ -31,12 +33,8 @@ from tracking.grouping.tracks_table import tabulate
 FROZEN = Path(__file__).with_name("belief.toml")  # The default belief.
 KIND = "belief"
 UNSEEN = -4.0  # Belief about two people who are too far apart for a row: log-odds.
-# m/s: a pair counts as standing below the first, as walking above the second, in between in proportion.
-STANDS, WALKS = 0.2, 0.6
-FEW, MANY = 1.0, 6.0  # Other people within 3 m: a pair counts as among few at the first, among many at the second.
-SPEED, OTHERS = NAMES.index("speed, 5 s"), NAMES.index("others, 5 s")
-SITUATIONS = ("walking", "standing", "walking_among_many", "standing_among_many")  # Columns of a table.
-NUMBERS = ("bias", "stay", "come", "memory", "arrival")  # Numbers of `Belief` in its file.
+DECISIONS = NOW, EVENTS = ("now", "events")  # Columns of a table.
+NUMBERS = ("threshold", "stay", "come", "memory", "arrival")  # Numbers of `Belief` in its file.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +43,7 @@ class Table:
 
     name: str  # one of `NAMES`
     at: Array  # (K,): ascending values of the quantity
-    log_odds: Array  # (4, K): at these values, for `SITUATIONS`
+    log_odds: Array  # (2, K): at these values, for `DECISIONS`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,11 +51,12 @@ class Belief:
     """A fitted belief: its tables, and how beliefs of pairs become groups."""
 
     tables: tuple[Table, ...]
-    bias: float  # log-odds added to the tables
+    bias: Array  # (2,): log-odds added to the tables, for `DECISIONS`
+    threshold: float = 0.5  # probability above which two people are together now
     # stay, come: log-odds added for pairs that were in one group a step before, and taken from all others: groups
-    # change the later the greater they are
-    stay: float = 5.0
-    come: float = 1.6
+    # of events change the later the greater they are
+    stay: float = 4.0
+    come: float = 1.0
     memory: float = 1.0  # (s): a missed member stays so long in the group
     arrival: float = 1.0  # (s): people who were together so soon after a first frame arrived together: no merge
 
@@ -68,8 +67,8 @@ class Belief:
 
     def as_dict(self) -> dict[str, object]:
         """Returns what run.json tells of the belief: its numbers, and a hash of its file's text."""
-        text = self.toml_text().encode()
-        return {"grouping": KIND, **{name: getattr(self, name) for name in NUMBERS}, "hash": sha256(text).hexdigest()}
+        text, numbers = self.toml_text().encode(), {name: getattr(self, name) for name in NUMBERS}
+        return {"grouping": KIND, "bias": self.bias.tolist(), **numbers, "hash": sha256(text).hexdigest()}
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Belief:
@@ -78,41 +77,36 @@ class Belief:
         kind, rows = content.pop("grouping", None), content.pop("table", None)
         if kind != KIND or not isinstance(rows, list) or not rows:
             _refuse(path, "grouping", kind, f'grouping = "{KIND}" and at least one [[table]]')
-        if unknown := sorted(content.keys() - set(NUMBERS)):
-            _refuse(path, unknown[0], "an unknown key", "one of " + ", ".join(NUMBERS))
+        if unknown := sorted(content.keys() - {"bias", *NUMBERS}):
+            _refuse(path, unknown[0], "an unknown key", "one of " + ", ".join(("bias", *NUMBERS)))
+        bias = content.pop("bias", None)
+        if not isinstance(bias, list) or len(bias) != 2 or not all(is_number(x, -math.inf, math.inf) for x in bias):
+            _refuse(path, "bias", bias, "two numbers")
         for name in NUMBERS:
-            low = -math.inf if name == "bias" else 0.0
-            if not is_number(content.get(name), low, math.inf):
-                _refuse(path, name, content.get(name, "nothing"), "a number" + (" of 0 or above" if low == 0 else ""))
-        return cls(tuple(_table(path, k, row) for k, row in enumerate(rows, 1)), **content)
+            if not is_number(content.get(name), 0.0, math.inf):
+                _refuse(path, name, content.get(name, "nothing"), "a number of 0 or above")
+        return cls(tuple(_table(path, k, row) for k, row in enumerate(rows, 1)), np.array(bias, float), **content)
 
     def toml_text(self, comment: str = "") -> str:
         """Returns the file's text. comment: lines at its beginning."""
         lines = [*(f"# {line}" for line in comment.splitlines()), f'grouping = "{KIND}"']
+        lines += [f"bias = {toml_value(np.round(self.bias, 4).tolist())}"]
         lines += [f"{name} = {toml_value(round(float(getattr(self, name)), 4))}" for name in NUMBERS]
         for table in self.tables:
-            rows = {"at": table.at, **dict(zip(SITUATIONS, table.log_odds, strict=True))}
             lines += ["", "[[table]]", f"name = {toml_value(table.name)}"]
+            rows = {"at": table.at, **dict(zip(DECISIONS, table.log_odds, strict=True))}
             lines += [f"{key} = {toml_value(np.round(values, 4).tolist())}" for key, values in rows.items()]
         return "\n".join([*lines, ""])
 
     def log_odds(self, values: Array) -> Array:
-        """Returns the beliefs (R,) of rows of quantities (R, len(NAMES)), in log-odds."""
+        """Returns the beliefs (R, 2) for `DECISIONS` of rows of quantities (R, len(NAMES)), in log-odds."""
         from tracking.grouping.belief_kernels import table_sums
 
         column = np.array([NAMES.index(table.name) for table in self.tables])
         cut = np.cumsum([0, *(len(table.at) for table in self.tables)])
         at = np.concatenate([table.at for table in self.tables])
         heights = np.concatenate([table.log_odds for table in self.tables], axis=1)
-        return table_sums(values, situations(values), self.bias, column, cut, at, heights)
-
-
-def situations(values: Array) -> Array:
-    """Returns how far each of `SITUATIONS` holds for rows of quantities, (R, 4); unknown speed is walking."""
-    speed, others = values[:, SPEED], values[:, OTHERS]
-    stand = np.where(np.isnan(speed), 0.0, np.clip((WALKS - speed) / (WALKS - STANDS), 0.0, 1.0))
-    many = np.clip((others - FEW) / (MANY - FEW), 0.0, 1.0)
-    return np.column_stack([(1 - stand) * (1 - many), stand * (1 - many), (1 - stand) * many, stand * many])
+        return table_sums(values, self.bias, column, cut, at, heights)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +114,7 @@ class PairBeliefs:
     """Log-odds that two people belong together, one row per pair and step in which both were seen within 4 m."""
 
     step: Ints  # (R,): from 0, ascending
-    # a, b (R,): columns, a < b; log_odds (R,)
+    # a, b (R,): columns, a < b; log_odds (R, 2): for `DECISIONS`
     a: Ints
     b: Ints
     log_odds: Array
@@ -131,7 +125,7 @@ def pair_beliefs(pos: Array, time: Array, seconds: float, belief: Belief) -> Pai
     parts = [(rows.step, rows.a, rows.b, belief.log_odds(rows.values)) for rows in evidence(pos, time, seconds)]
     if not parts:
         nobody = np.zeros(0, np.int64)
-        return PairBeliefs(nobody, nobody, nobody, np.zeros(0))
+        return PairBeliefs(nobody, nobody, nobody, np.zeros((0, 2)))
     return PairBeliefs(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
@@ -150,7 +144,7 @@ def default_belief() -> Belief:
 
 def _table(path: str | Path, number: int, row: Any) -> Table:
     place = f"table {number}"
-    keys = ("name", "at", *SITUATIONS)
+    keys = ("name", "at", *DECISIONS)
     if not isinstance(row, dict) or set(row) != set(keys):
         _refuse(path, place, sorted(row) if isinstance(row, dict) else row, ", ".join(keys))
     if row["name"] not in NAMES:
@@ -198,5 +192,5 @@ def pair_probabilities(tracks: Sequence[Tracks], fps: float, px_per_m: float, be
     both = present[frame, a] & present[frame, b]
     row, frame, a, b = row[both], frame[both], a[both], b[both]
     order = np.lexsort((b, a, frame))
-    probability = 1 / (1 + np.exp(-found.log_odds[row]))
+    probability = 1 / (1 + np.exp(-found.log_odds[row, 0]))
     return PairProbabilities(frame[order] + 1, table.ids[a[order]], table.ids[b[order]], probability[order])

@@ -1,7 +1,7 @@
 """Numba kernels of the belief, in the order of its steps: evidence of pairs, sums of tables, partition into groups.
 
-Evidence: exponential means over a pair's rows, and counts of common neighbours. Partition: average linkage in each
-step, with a memory of the step before.
+Evidence: exponential means over a pair's rows. Partition: average linkage in each step, with a memory of the step
+before.
 """
 
 from __future__ import annotations
@@ -10,16 +10,18 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.elementary_kernels import find_root
-from sim.types import Array, Bools, Ints
+from sim.types import Array, Ints
 
 
 @njit(cache=True)
 def add_to_means(
-    step: Ints, pair: Ints, values: Array, times: Array, total: Array, weight: Array, last: Ints, out: Array
-) -> None:
+    step: Ints, pair: Ints, values: Array, times: Array, total: Array, weight: Array, last: Ints, rows: Ints,
+    out: Array, count: Ints,
+) -> None:  # fmt: skip
     """Adds rows (R,) of values (R, V) to the means of their pairs, in order, and writes the means after each to out.
 
-    times (T,): in steps. total, weight (K, V, T), last (K,): state by pair. out (R, V, T): nan before the first number.
+    times (T,): in steps. total, weight (K, V, T), last, rows (K,): state by pair. out (R, V, T): nan before the first
+    number; count (R,): the pair's rows so far.
     """
     fade = np.empty(len(times))
     for r in range(len(step)):
@@ -28,6 +30,8 @@ def add_to_means(
             # the age of all former rows, applied once for each time
             fade[n] = np.exp(-(step[r] - last[k]) / times[n])
         last[k] = step[r]
+        rows[k] += 1
+        count[r] = rows[k]
         for v in range(values.shape[1]):
             x = values[r, v]
             known = not np.isnan(x)
@@ -38,47 +42,15 @@ def add_to_means(
 
 
 @njit(cache=True)
-def common_neighbours(i: Ints, j: Ints, linked: Bools, rows: int) -> Array:
-    """Returns for each pair (i, j) (R,) of `rows` rows how many third rows are linked with both, (R,)."""
-    # neighbours of each row, one list after the other
-    start = np.zeros(rows + 1, np.int64)
-    for r in range(len(i)):
-        if linked[r]:
-            start[i[r] + 1] += 1
-            start[j[r] + 1] += 1
-    for r in range(rows):
-        start[r + 1] += start[r]
-    neighbour, end = np.empty(start[rows], np.int64), np.empty(rows, np.int64)
-    for r in range(rows):
-        end[r] = start[r]
-    for r in range(len(i)):
-        if linked[r]:
-            neighbour[end[i[r]]], neighbour[end[j[r]]] = j[r], i[r]
-            end[i[r]] += 1
-            end[j[r]] += 1
-    out, marked = np.zeros(len(i)), np.empty(rows, np.int64)
-    for r in range(rows):
-        marked[r] = -1
-    for r in range(len(i)):
-        if start[i[r]] < end[i[r]] and start[j[r]] < end[j[r]]:
-            for n in range(start[i[r]], end[i[r]]):
-                marked[neighbour[n]] = r
-            for n in range(start[j[r]], end[j[r]]):
-                if marked[neighbour[n]] == r:
-                    out[r] += 1
-    return out
+def table_sums(values: Array, bias: Array, column: Ints, cut: Ints, at: Array, heights: Array) -> Array:
+    """Returns the beliefs (R, D) of quantities (R, Q): bias plus what each table says, 0 where a quantity is unknown.
 
-
-@njit(cache=True)
-def table_sums(values: Array, mix: Array, bias: float, column: Ints, cut: Ints, at: Array, heights: Array) -> Array:
-    """Returns the beliefs (R,) of quantities (R, Q): bias plus what each table says, 0 where a quantity is unknown.
-
-    mix (R, M): weights of the M columns of the tables. cut (T + 1,): where the knots of each table begin in at (N,) and
-    heights (M, N).
+    bias (D,). cut (T + 1,): where the knots of each table begin in at (N,) and heights (D, N).
     """
-    out = np.empty(len(values))
+    out = np.empty((len(values), len(bias)))
     for r in range(len(values)):
-        out[r] = bias
+        for d in range(len(bias)):
+            out[r, d] = bias[d]
         for t in range(len(column)):
             x = values[r, column[t]]
             if not np.isnan(x):
@@ -86,25 +58,23 @@ def table_sums(values: Array, mix: Array, bias: float, column: Ints, cut: Ints, 
                 while k < last and at[k + 1] <= x:
                     k += 1
                 part = (x - at[k]) / (at[k + 1] - at[k]) if x > at[k] and k < last else 0.0
-                for m in range(len(heights)):
-                    # most rows have a weight in one or two columns only
-                    if mix[r, m] > 0:
-                        out[r] += mix[r, m] * heights[m, k]
-                        if part > 0:
-                            out[r] += mix[r, m] * part * (heights[m, k + 1] - heights[m, k])
+                for d in range(len(bias)):
+                    out[r, d] += heights[d, k]
+                    if part > 0:
+                        out[r, d] += part * (heights[d, k + 1] - heights[d, k])
     return out
 
 
 @njit(cache=True)
 def linked_groups(
-    cut: Ints, a: Ints, b: Ints, log_odds: Array, unseen: float, stay: float, come: float, label: Ints
+    cut: Ints, a: Ints, b: Ints, values: Array, unseen: float, stay: float, come: float, label: Ints
 ) -> None:
     """Finds the groups of each of S steps by average linkage, with a memory of the step before.
 
-    cut (S + 1,): where the rows of each step begin in a, b, log_odds (R,). label (S, P): filled with the lowest member
+    cut (S + 1,): where the rows of each step begin in a, b, values (R,). label (S, P): filled with the lowest member
     of each person's group; -1, as given, where a person is alone.
     """
-    # Only people whose log-odds are positive with somebody can be in a group: linkage runs in each connected component
+    # Only people whose value is positive with somebody can be in a group: linkage runs in each connected component
     # of these pairs alone, in a table of the component's size.
     steps, people = label.shape
     root, place, size = np.empty(people, np.int64), np.empty(people, np.int64), np.empty(people, np.int64)
@@ -115,7 +85,7 @@ def linked_groups(
         before = label[max(s - 1, 0)]
         rows = range(cut[s], cut[s + 1])
         for r in rows:
-            if log_odds[r] + _memory(before, a[r], b[r], stay, come) > 0:
+            if values[r] + _memory(before, a[r], b[r], stay, come) > 0:
                 place[a[r]] = place[b[r]] = 0
                 i, j = find_root(root, a[r]), find_root(root, b[r])
                 root[max(i, j)] = min(i, j)
@@ -144,8 +114,8 @@ def linked_groups(
         for r in rows:
             i = find_root(root, a[r])
             if place[a[r]] >= 0 and i == find_root(root, b[r]):
-                table[start[i] + place[a[r]] * size[i] + place[b[r]]] = log_odds[r]
-                table[start[i] + place[b[r]] * size[i] + place[a[r]]] = log_odds[r]
+                table[start[i] + place[a[r]] * size[i] + place[b[r]]] = values[r]
+                table[start[i] + place[b[r]] * size[i] + place[a[r]]] = values[r]
         for k in range(count):
             i = node[k]
             if root[i] == i:
@@ -173,13 +143,13 @@ def linked_groups(
 
 @njit(cache=True)
 def _memory(before: Ints, p: int, q: int, stay: float, come: float) -> float:
-    """Returns what is added to the log-odds of two people; before (P,): labels of the step before."""
+    """Returns what is added to the value of two people; before (P,): labels of the step before."""
     return stay if before[p] >= 0 and before[p] == before[q] else -come
 
 
 @njit(cache=True)
 def _average_linkage(x: Array) -> Ints:
-    """Returns the group (M,) of each person, its lowest member; x (M, M): log-odds of pairs, changed in place."""
+    """Returns the group (M,) of each person, its lowest member; x (M, M): values of pairs, changed in place."""
     count = len(x)
     size, group, best = np.empty(count), np.empty(count, np.int64), np.empty(count, np.int64)
     for u in range(count):

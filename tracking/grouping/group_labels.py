@@ -1,9 +1,10 @@
 """From links between two people to groups over time: group ids in each frame, and events of membership.
 
-A group is a connected component of linked people. People are numbered as columns of arrays by frame and person, from 0;
-frames count from 0. Events are form, dissolve, merge, split, enter and leave; crossings and queues are not found here.
-Ids follow the identity rule of the truth (sim.truth.identity): a group that changes keeps its id where it shares most
-members.
+A group is a connected component of linked people. Where the grouping says who is together *now*, these groups are
+shown, with the ids of the linked groups that they stand for; events are those of the linked groups. People are numbered
+as columns of arrays by frame and person, from 0; frames count from 0. Events are form, dissolve, merge, split, enter
+and leave; crossings and queues are not found here. Ids follow the identity rule of the truth (sim.truth.identity): a
+group that changes keeps its id where it shares most members.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from sim.truth.identity import GroupChange, Identities, Members, PersonSet
 from sim.truth.merge_split_rules import frames_of, stretches
 from sim.types import GroupEvent, Ints
 from tracking.grouping.belief import Belief
-from tracking.grouping.link_rule import LinkRule, Links
+from tracking.grouping.grouping_choice import FoundGroups
+from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.merge_split_events import LinkSwitch, Parts, TrackedMotion, event_of_change
 
 
@@ -47,12 +49,15 @@ class LinkedPeople:
             found += [frozenset(part)] if len(part) > 1 else []
         return found
 
-    def step(self, t: int, switched: Sequence[LinkSwitch], arrival: int) -> list[GroupChange]:
-        """Switches links in frame t and returns what changes in the groups; `present` is up to date before."""
+    def step(self, t: int, switched: Sequence[LinkSwitch], arrival: int, known: Members) -> list[GroupChange]:
+        """Switches links in frame t and returns what changes in the groups; `present` is up to date before.
+
+        known: groups by id whose ids new groups take over.
+        """
         for a, b, on, _ in switched:
             self.switch(a, b, on)
         entered = _entered(self, switched, arrival)
-        return self.identities.step(t, frozenset(self.present), self.components(), entered)
+        return self.identities.step(t, frozenset(self.present), self.components(), entered, known)
 
     def switch(self, a: int, b: int, on: bool) -> None:
         """Set (`on` True) or remove the link between two people a and b; no effect if it is so already."""
@@ -62,7 +67,7 @@ class LinkedPeople:
 
 
 def label_people(
-    frame: Ints, column: Ints, motion: TrackedMotion, links: Links, rule: LinkRule | Belief
+    frame: Ints, column: Ints, motion: TrackedMotion, found: FoundGroups, rule: LinkRule | Belief
 ) -> tuple[Ints, list[GroupEvent]]:
     """Returns the group id of each row (R,), from 1, -1 alone, and the membership events in order of `emitted`.
 
@@ -73,19 +78,39 @@ def label_people(
     state, events = LinkedPeople(), []
     group = np.full(motion.pos.shape[:2], -1, np.int64)
     arrival = frames_of(rule.arrival, motion.fps)
+    assert found.links is not None
+    links, shown, changes_now = found.links, dict[int, PersonSet](), _changes(found)
     cuts = np.searchsorted(links.frame, np.arange(length + 1))
-    for t, until in pairwise([*sorted({*spells, *links.frame.tolist()}), length]):
+    for t, until in pairwise([*sorted({*spells, *changes_now, *links.frame.tolist()}), length]):
         for p, since in spells.get(t, ()):
             _come_or_go(state, p, since)
         now = slice(int(cuts[t]), int(cuts[t + 1]))
         switched = list(zip(*(getattr(links, k)[now].tolist() for k in ("a", "b", "on")), strict=True))
         old = state.identities.groups
-        changes = state.step(t, _dated(state, t, switched, motion), arrival)
-        for g, people in state.identities.groups.items():
+        changes = state.step(t, _dated(state, t, switched, motion), arrival, shown)
+        shown = state.identities.name(t, _together_now(found, t, state), shown)
+        for g, people in shown.items():
             group[t:until, sorted(people)] = g
-        found = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in changes)
-        events += [e for e in found if e is not None]
+        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in changes)
+        events += [e for e in told if e is not None]
     return _without_singles(frame, group[frame, column]), events
+
+
+def _changes(found: FoundGroups) -> list[int]:
+    """Returns the frames in which it changes who is together now."""
+    if found.now is None:
+        return []
+    return ((np.flatnonzero((np.diff(found.now, axis=0) != 0).any(axis=1)) + 1) * found.size).tolist()
+
+
+def _together_now(found: FoundGroups, t: int, state: LinkedPeople) -> Iterable[PersonSet]:
+    """Returns the groups of frame t, without people who are gone."""
+    if found.now is None:
+        return state.identities.groups.values()
+    parts, label = dict[int, set[int]](), found.now[t // found.size]
+    for p in np.flatnonzero(label >= 0).tolist():
+        parts.setdefault(int(label[p]), set()).update({p} & state.present.keys())
+    return [frozenset(people) for people in parts.values() if len(people) > 1]
 
 
 def _dated(

@@ -31,7 +31,7 @@ from sim.truth.merge_split_rules import frames_of
 from sim.truth.queue_detection import ADVANCE_TIME, BRIDGE_TIME, queues
 from sim.types import EVENT_KINDS, Array, Bools, GroupEvent, Groups, Ints, Tracks
 from tracking.grouping.group_labels import label_people
-from tracking.grouping.grouping_choice import Grouping, default_grouping, links_of
+from tracking.grouping.grouping_choice import Grouping, default_grouping, find_groups
 from tracking.grouping.merge_split_events import TrackedMotion, events_of_labels
 from tracking.grouping.tracks_table import TracksTable, boxes_of_rows, tabulate
 
@@ -124,9 +124,9 @@ def _grouped(table: TracksTable, named: bool, fps: float, rule: Grouping) -> tup
     """Returns the table with group ids filled in, and the membership events."""
     if named and (table.group < 0).all():
         return table, []
-    links = links_of(table, fps, rule)
+    found = find_groups(table, fps, rule)
     motion = TrackedMotion(table.positions(), table.velocities(), fps)
-    group, events = label_people(table.frame, table.column, motion, links, rule)
+    group, events = label_people(table.frame, table.column, motion, found, rule)
     if not named:
         return replace(table, group=group), events
     # As long as a tracker's groups equal those of the grouping, the grouping's events are used: their onsets are dated

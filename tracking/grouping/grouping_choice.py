@@ -2,15 +2,15 @@
 
 `grouping_of` reads what a user names: "rule", "belief", or a TOML file of either.
 
-Also here: consistent groups from beliefs of pairs, by average linkage with a memory, and the links these groups stand
-for.
-
-In each step the two groups (or people) with the highest mean log-odds over their pairs are joined, as long as it is
-above 0. So a chain of strangers is no group, and a group whose ends are far apart is one.
+Also here: consistent groups from beliefs of pairs, by average linkage: the two groups (or people) with the highest mean
+over their pairs are joined, as long as it is above 0. So a chain of strangers is no group, and a group whose ends are
+far apart is one. Groups of *now* take a pair's probability minus the belief's threshold, groups of *events* its
+log-odds with a memory of the step before.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,43 +24,81 @@ from tracking.grouping.pair_evidence import frames_per_step, step_positions
 from tracking.grouping.tracks_table import TracksTable
 
 
-def groups_of_steps(
-    step: Ints, a: Ints, b: Ints, log_odds: Array, unseen: float, stay: float = 0.0, come: float = 0.0
-) -> tuple[Ints, Ints, Ints]:
-    """Returns step, person and group (N,) of all people in groups, sorted by group; people alone are left out.
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundGroups:
+    """Who belongs together in a sequence: links, for events, and who is together now."""
 
-    step, a, b, log_odds (R,): one row per pair and step, step ascending. stay, come: added for pairs that were in one
-    group in the step before, taken from all others.
+    links: Links | None  # None: not asked for
+    # now (S, P): by step of `size` frames and person the least person of the group, -1 alone; None: as linked
+    now: Ints | None = None
+    size: int = 1
+
+
+def groups_of_steps(
+    shape: tuple[int, int],
+    step: Ints,
+    a: Ints,
+    b: Ints,
+    values: Array,
+    unseen: float,
+    stay: float = 0.0,
+    come: float = 0.0,
+) -> Ints:
+    """Returns the least person of each person's group, shape (S, P), -1 for people alone.
+
+    step, a, b, values (R,): one row per pair and step, step ascending; pairs without a row have the value `unseen`.
+    stay, come: added for pairs that were in one group in the step before, taken from all others.
     """
     from tracking.grouping.belief_kernels import linked_groups
 
-    people = int(max(a.max(initial=0), b.max(initial=0))) + 1
-    steps = int(step.max(initial=-1)) + 1
-    label = np.full((steps, people), -1, np.int64)
-    linked_groups(np.searchsorted(step, np.arange(steps + 1)), a, b, log_odds, unseen, stay, come, label)
-    when, person = np.nonzero(label >= 0)
-    group = when * people + label[when, person]
-    order = np.argsort(group, kind="stable")
-    return when[order], person[order], group[order]
+    label = np.full(shape, -1, np.int64)
+    linked_groups(np.searchsorted(step, np.arange(shape[0] + 1)), a, b, values, unseen, stay, come, label)
+    return label
 
 
-def belief_links(frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief) -> Links:
-    """Returns all switches of links in a sequence of `length` frames: any two members of a group are linked."""
+def belief_groups(
+    frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief, *, events: bool = True
+) -> FoundGroups:
+    """Returns the groups of a sequence of `length` frames; any two members of a group of events are linked."""
     size = frames_per_step(fps)
     people = int(column.max(initial=0)) + 1
     places, times = step_positions(frame, column, pos, length, people, fps)
-    found, steps = pair_beliefs(places, times, size / fps, belief), len(places)
-    seen = np.isfinite(places[..., 0])
+    found = pair_beliefs(places, times, size / fps, belief)
     pair = found.a * people + found.b
     order = np.lexsort((found.step, pair))
-    row, at = _remembered(pair[order], found.step[order], seen, frames_of(belief.memory, fps / size))
+    row, at = _remembered(pair[order], found.step[order], np.isfinite(places[..., 0]), belief.memory * fps / size)
     row = np.concatenate([np.arange(len(pair)), order[row]])
     step = np.concatenate([found.step, at])
     order = np.argsort(step, kind="stable")
     row, step = row[order], step[order]
-    t, person, group = groups_of_steps(
-        step, found.a[row], found.b[row], found.log_odds[row], UNSEEN, belief.stay, belief.come
-    )
+    pairs, shape = (step, found.a[row], found.b[row]), (len(places), people)
+    gain, log_odds = _gain(found.log_odds[row, 0], belief), found.log_odds[row, 1]
+    now = groups_of_steps(shape, *pairs, gain, float(_gain(UNSEEN, belief)))
+    if not events:
+        return FoundGroups(None, now, size)
+    lasting = groups_of_steps(shape, *pairs, log_odds, UNSEEN, belief.stay, belief.come)
+    return FoundGroups(_links(lasting, size), now, size)
+
+
+def groups_now(table: TracksTable, fps: float, belief: Belief) -> Ints:
+    """Returns a label of each row of a table, (R,), equal for people of one frame who are together now, -1 alone."""
+    found = belief_groups(table.frame, table.column, table.pos, table.length, fps, belief, events=False)
+    assert found.now is not None
+    return found.now[table.frame // found.size, table.column]
+
+
+def _gain(log_odds: Array | float, belief: Belief) -> Array:
+    """Returns what it is worth to put pairs into one group now: their probability above the threshold."""
+    return np.asarray(1 / (1 + np.exp(-np.asarray(log_odds))) - belief.threshold)
+
+
+def _links(label: Ints, size: int) -> Links:
+    """Returns all switches of links: any two people of one label (S, P) are linked."""
+    when, person = np.nonzero(label >= 0)
+    steps, people = label.shape
+    group = when * people + label[when, person]
+    order = np.argsort(group, kind="stable")
+    t, person, group = when[order], person[order], group[order]
     i, j = runs(np.arange(len(group)) + 1, np.searchsorted(group, group, side="right"))
     low, high = np.minimum(person[i], person[j]), np.maximum(person[i], person[j])
     both, when = low * people + high, t[i]
@@ -74,9 +112,9 @@ def belief_links(frame: Ints, column: Ints, pos: Array, length: int, fps: float,
     return Links(t * size, both // people, both % people, on)
 
 
-def _remembered(pair: Ints, step: Ints, seen: Bools, memory: int) -> tuple[Ints, Ints]:
+def _remembered(pair: Ints, step: Ints, seen: Bools, memory: float) -> tuple[Ints, Ints]:
     """Returns (row, step) of rows that stand for steps in which one of a pair was missed; seen (S, P)."""
-    steps, people = seen.shape
+    (steps, people), memory = seen.shape, frames_of(memory, 1.0)
     last = np.concatenate([np.diff(pair) != 0, [True]])[: len(pair)]
     following = np.where(last, steps, np.append(step[1:], steps)[: len(step)])
     row, at = runs(step + 1, np.minimum(following, step + memory + 1))
@@ -101,8 +139,8 @@ def grouping_of(source: str | Path) -> Grouping:
     return Belief.from_toml(source) if "grouping" in parse(Path(source)) else LinkRule.from_toml(source)
 
 
-def links_of(table: TracksTable, fps: float, grouping: Grouping) -> Links:
-    """Returns all switches of links between the people of a table, by the rule or the belief."""
+def find_groups(table: TracksTable, fps: float, grouping: Grouping) -> FoundGroups:
+    """Returns the groups of the people of a table, by the rule or the belief."""
     if isinstance(grouping, Belief):
-        return belief_links(table.frame, table.column, table.pos, table.length, fps, grouping)
-    return find_links(table.frame, table.column, table.pos, table.vel, table.length, fps, grouping)
+        return belief_groups(table.frame, table.column, table.pos, table.length, fps, grouping)
+    return FoundGroups(find_links(table.frame, table.column, table.pos, table.vel, table.length, fps, grouping))

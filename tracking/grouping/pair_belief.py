@@ -12,14 +12,11 @@ import numpy as np
 
 from sim.truth.merge_split_rules import close_pairs
 from sim.types import Array, Bools, Ints
-from tracking.grouping.belief import UNSEEN, default_belief
+from tracking.grouping.belief import DECISIONS, NOW, UNSEEN, default_belief
 from tracking.grouping.pair_evidence import (
     CHORD,
-    QUANTITIES,
     REACH,
-    TIMES,
     ExponentialMeans,
-    arrival_gap,
     frames_per_step,
     instant_evidence,
 )
@@ -28,51 +25,40 @@ PAIR = 2**31  # Numbers of people are below this.
 
 
 class PairBelief:
-    """The log-odds that each pair of K people belongs together.
+    """The log-odds that each pair of K people belongs together, for one of the belief's `DECISIONS`.
 
     State: log_odds (K, K): of the last step, or, of new people, of their first frame; UNSEEN for pairs that are 4 m
     apart or more, or of whom one was not seen in the last step. total (K, 3): sums of x, y, m, and of time, s, over the
     frames of the current step in which each was seen; count (K,): of these frames. past: means of `total` in the last
-    steps, (K, 3), nan where there are none. first (K,): step in which each person was seen first, nan before its end.
-    first_distance (K, K): m, in the first step of both, or when the later one was added, nan if unknown. number (K,):
-    of each person, in the order of coming, never given twice. means: of the evidence, of the R pairs that have been
-    near each other; pair (R,), ascending: PAIR times the number of the one plus that of the other. frames, steps: how
-    many there were.
+    steps, (K, 3), nan where there are none. number (K,): of each person, in the order of coming, never given twice.
+    means: of the evidence, of the R pairs that have been near each other; pair (R,), ascending: PAIR times the number
+    of the one plus that of the other. frames, steps: how many there were.
     """
 
-    def __init__(self, fps: float) -> None:
+    def __init__(self, fps: float, decision: str = NOW) -> None:
+        self.column = DECISIONS.index(decision)
         self.fps, self.size = fps, frames_per_step(fps)
         self.seconds = self.size / fps
         self.frames = self.steps = 0
         self.past: deque[Array] = deque(maxlen=1 + max(1, round(CHORD / self.seconds)))
-        self.log_odds, self.first_distance = np.zeros((0, 0)), np.zeros((0, 0))
-        self.total, self.count, self.first = np.zeros((0, 3)), np.zeros(0), np.zeros(0)
+        self.log_odds = np.zeros((0, 0))
+        self.total, self.count = np.zeros((0, 3)), np.zeros(0)
         self.number, self.people, self.pair = np.zeros(0, np.int64), 0, np.zeros(0, np.int64)
-        self.means = ExponentialMeans(0, len(QUANTITIES), self.seconds)
+        self.means = ExponentialMeans(0, self.seconds)
 
-    def add(self, state: Array, ago: Array | None = None) -> None:
-        """Adds people as the last rows; state (K, 4): x, y, m, vx, vy, m/s, of all people now, nan if not seen.
-
-        ago (M,): time from the first sight of each new person to the last frame, s; None: seen first in the next one.
-        """
+    def add(self, state: Array) -> None:
+        """Adds people as the last rows; state (K, 4): x, y, m, vx, vy, m/s, of all people now, nan if not seen."""
         old, n = len(self.count), len(state)
         self._reorder(np.concatenate([np.arange(old), np.full(n - old, -1)]))
-        pos = state[:, :2]
-        if ago is not None:
-            frame = np.maximum(self.frames - 1 - np.rint(ago * self.fps), 0)
-            self.first[old:] = np.ceil(frame / self.size)
-        came = np.nan_to_num(self.first, nan=self.steps)
         new = np.arange(n) >= old
-        pairs = new[:, None] | new
-        self.first_distance[pairs] = np.where(np.maximum(came[:, None], came) > 0, _distances(pos), np.nan)[pairs]
-        i, j = self._pairs(pos)
+        self.log_odds[new[:, None] | new] = UNSEEN
+        i, j = self._pairs(state[:, :2])
         i, j = i[new[j]], j[new[j]]
-        self.log_odds[pairs] = UNSEEN
         if len(i):
-            distance, quantities = instant_evidence(pos, state[:, 2:], i, j)
             # new people have no past: the evidence of this moment stands for all times
-            averaged = np.repeat(quantities, len(TIMES), axis=1)
-            self._judge(i, j, averaged, distance, came, self.first_distance[i, j])
+            fresh = ExponentialMeans(len(i), self.seconds)
+            now = instant_evidence(state[:, :2], state[:, 2:], i, j)
+            self._judge(i, j, fresh.add(np.zeros(len(i), np.int64), np.arange(len(i)), now))
 
     def keep(self, rows: Bools) -> None:
         """Remove all people but those where `rows` (K,) is True."""
@@ -99,11 +85,6 @@ class PairBelief:
         self.past.append(now)
         self.total, self.count = np.zeros((n, 3)), np.zeros(n)
         pos = now[:, :2]
-        # people who are there in step 0 were there before: how far apart they came is unknown
-        fresh = np.isnan(self.first) & np.isfinite(pos[:, 0])
-        self.first[fresh] = self.steps
-        new = fresh[:, None] | fresh
-        self.first_distance[new] = _distances(pos)[new] if self.steps > 0 else np.nan
         vel = np.full((n, 2), np.nan)
         for before in list(self.past)[-2::-1]:
             chord = (pos - before[:, :2]) / (now[:, 2] - before[:, 2])[:, None]
@@ -111,16 +92,13 @@ class PairBelief:
         self.log_odds[:] = UNSEEN
         i, j = self._pairs(pos)
         if len(i):
-            distance, quantities = instant_evidence(pos, vel, i, j)
-            averaged = self.means.add(np.full(len(i), self.steps), self._rows(i, j), quantities)
-            self._judge(i, j, averaged, distance, self.first, self.first_distance[i, j])
+            step = np.full(len(i), self.steps)
+            self._judge(i, j, self.means.add(step, self._rows(i, j), instant_evidence(pos, vel, i, j)))
         self.steps += 1
 
-    def _judge(self, i: Ints, j: Ints, averaged: Array, distance: Array, came: Array, first: Array) -> None:
-        """Sets the log-odds of the pairs i, j (R,); came (K,): step of arrival."""
-        gap = arrival_gap(np.stack([came[i], came[j]]), self.seconds)
-        values = np.column_stack([averaged, distance, gap, first])
-        self.log_odds[i, j] = self.log_odds[j, i] = default_belief().log_odds(values)
+    def _judge(self, i: Ints, j: Ints, values: Array) -> None:
+        """Sets the log-odds of the pairs i, j (R,)."""
+        self.log_odds[i, j] = self.log_odds[j, i] = default_belief().log_odds(values)[:, self.column]
 
     def _pairs(self, pos: Array) -> tuple[Ints, Ints]:
         seen = np.flatnonzero(np.isfinite(pos[:, 0]))
@@ -139,8 +117,8 @@ class PairBelief:
             padded[:n, :n] = table
             return padded[np.ix_(old, old)]
 
-        self.log_odds, self.first_distance = square(self.log_odds, 0.0), square(self.first_distance, np.nan)
-        self.total, self.count, self.first = rows(self.total, 0.0), rows(self.count, 0.0), rows(self.first, np.nan)
+        self.log_odds = square(self.log_odds, 0.0)
+        self.total, self.count = rows(self.total, 0.0), rows(self.count, 0.0)
         self.past = deque((rows(p, np.nan) for p in self.past), self.past.maxlen)
         count = int(new.sum())
         number = np.append(self.number, self.people)[old]
@@ -161,7 +139,3 @@ class PairBelief:
             self.pair = every
             self.means.take(rows)
         return np.searchsorted(self.pair, pair)
-
-
-def _distances(pos: Array) -> Array:
-    return np.asarray(np.hypot(*(pos[:, None] - pos).transpose(2, 0, 1)))

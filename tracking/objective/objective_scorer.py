@@ -6,8 +6,7 @@ prepared once. Only one step is replaced: of groups that must be derived from tr
 
 Also here: members of the groups that the default grouping derives from tracked people, without shapes, ids and events.
 
-The groups are those of `tracking.grouping.grouped_tracks.derive`, in the same frames and with the same members. Links
-come from `links_of`; connected components are compiled.
+The groups are those of `tracking.grouping.grouped_tracks.derive`, in the same frames and with the same members.
 """
 
 from __future__ import annotations
@@ -17,10 +16,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.truth.merge_split_rules import frames_of
 from sim.types import Bools, Ints, Tracks, Truth
+from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import names_groups, with_groups
-from tracking.grouping.grouping_choice import default_grouping, links_of
+from tracking.grouping.grouping_choice import groups_now
 from tracking.grouping.tracks_table import TracksTable, tabulate
 from tracking.scoring.evaluation import Scorer, objective_of
 from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
@@ -38,7 +37,7 @@ def derived_members(tracks: Sequence[Tracks], fps: float, px_per_m: float, label
 
     Both are sorted by group, groups by frame. labelled (length + 1,): bool by frame number.
     """
-    table = tabulate(tracks, fps, px_per_m, default_grouping().smooth)
+    table = tabulate(tracks, fps, px_per_m, default_belief().smooth)
     group = _group_of_rows(table, fps, names_groups(tracks))
     order = np.lexsort((group, table.frame))
     order = order[(group[order] >= 0) & labelled[table.frame[order] + 1]]
@@ -52,17 +51,7 @@ def derived_members(tracks: Sequence[Tracks], fps: float, px_per_m: float, label
 
 def _group_of_rows(table: TracksTable, fps: float, named: bool) -> Ints:
     """Returns a label for each of the R table rows, equal for members of one group in a frame, -1 alone."""
-    from tracking.objective.derived_members_kernels import connected_people
-
-    if named:
-        return table.group
-    rule = default_grouping()
-    links = links_of(table, fps, rule)
-    label: Ints = connected_people(
-        table.frame, table.column, table.length, len(table.ids), frames_of(rule.memory, fps),
-        links.frame, links.a, links.b, links.on,
-    )  # fmt: skip
-    return label
+    return table.group if named else groups_now(table, fps, default_belief())
 
 
 class ObjectiveScorer:

@@ -62,7 +62,14 @@ def test_beliefs_equal_the_slow_twin(seed):
     found, expected = pair_beliefs(pos, time, 0.4, belief), slow.beliefs(pos, time, 0.4, belief)
     keys = zip(found.step.tolist(), found.a.tolist(), found.b.tolist(), strict=True)
     np.testing.assert_allclose(found.log_odds, [expected[key] for key in keys], atol=1e-9)
-    assert len(found.log_odds) == len(expected)
+    assert len(found.log_odds) == len(expected) > 50
+
+
+def parts(label):
+    """The groups of a step as sets of people; label (P,): the least person of each one's group, -1 alone."""
+    found = {frozenset(np.flatnonzero(label == g).tolist()) for g in set(label.tolist()) - {-1}}
+    assert all(label[min(part)] == min(part) for part in found)
+    return found
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -73,11 +80,10 @@ def test_groups_of_steps_equals_average_linkage_one_join_at_a_time(seed):
     kept = (a < b) & (r.random(len(a)) < 0.7)
     step, a, b = step[kept], a[kept], b[kept]
     log_odds = r.normal(0, 3, len(a))
-    t, person, group = groups_of_steps(step, a, b, log_odds, -4.0)
+    label = groups_of_steps((steps, people), step, a, b, log_odds, -4.0)
     for s in range(steps):
         table = {(i, j): x for q, i, j, x in zip(step, a, b, log_odds, strict=True) if q == s}
-        found = {frozenset(person[(t == s) & (group == g)].tolist()) for g in set(group[t == s].tolist())}
-        assert found == slow.groups(range(people), table, -4.0)
+        assert parts(label[s]) == slow.groups(range(people), table, -4.0)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -89,7 +95,7 @@ def test_groups_of_steps_remembers_the_step_before(seed):
     kept = (a < b) & (r.random(len(a)) < 0.7)
     step, a, b = step[kept], a[kept], b[kept]
     log_odds = r.normal(0.5, 3, len(a))
-    t, person, group = groups_of_steps(step, a, b, log_odds, unseen, stay, come)
+    label = groups_of_steps((steps, people), step, a, b, log_odds, unseen, stay, come)
     before, differ = set(), 0
     for s in range(steps):
         known = {(i, j): x for q, i, j, x in zip(step, a, b, log_odds, strict=True) if q == s}
@@ -97,7 +103,7 @@ def test_groups_of_steps_remembers_the_step_before(seed):
             (i, j): known.get((i, j), unseen) + (stay if any({i, j} <= g for g in before) else -come)
             for i in range(people) for j in range(i + 1, people)
         }  # fmt: skip
-        found = {frozenset(person[(t == s) & (group == g)].tolist()) for g in set(group[t == s].tolist())}
+        found = parts(label[s])
         assert found == slow.groups(range(people), table, unseen)
         differ += found != slow.groups(range(people), known, unseen)
         before = found
@@ -109,8 +115,8 @@ def test_a_chain_of_strangers_is_no_group_and_a_stretched_group_is_one():
     a, b = np.array(pairs).T
     chain, stretched = np.array([1.0, -5, -6, 1, -5, 1]), np.array([4.0, 1, -1, 4, 1, 4])
     for log_odds, size in ((chain, 2), (stretched, 4)):
-        _, _, group = groups_of_steps(np.zeros(6, np.int64), a, b, log_odds, -4.0)
-        assert np.bincount(group).max() == size
+        label = groups_of_steps((1, 4), np.zeros(6, np.int64), a, b, log_odds, -4.0)
+        assert max(map(len, parts(label[0]))) == size
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -136,14 +142,14 @@ def test_the_file_is_read_as_written(tmp_path):
     ("old", "new", "named"),
     [
         ('grouping = "belief"', 'grouping = "rule"', "grouping"),
-        ("bias = ", "bias = nan # ", "bias"),
+        ("bias = [", "bias = [nan, ", "bias"),
         ("memory = ", "memory = -", "memory"),
         ("stay", "wait", "wait"),
-        ('name = "sideways, 5 s"', 'name = "sideways, 3 s"', "table 5: name"),
-        ("walking = [", "walking = [1, ", "table 1: at"),
+        ('name = "sideways, 5 s"', 'name = "sideways, 3 s"', "table 8: name"),
+        ("now = [", "now = [1, ", "table 1: at"),
         ("at = [", "at = [9, ", "table 1: at"),
-        ("standing = [", 'standing = ["x", ', "table 1: standing"),
-        ("standing = [", "sitting = [", "table 1"),
+        ("events = [", 'events = ["x", ', "table 1: events"),
+        ("events = [", "change = [", "table 1"),
         ("[[table]]", "[[row]]", "grouping"),
     ],
 )
@@ -172,4 +178,4 @@ def test_probabilities_are_those_of_the_pairs(scene):
     label = {(f, p): g for f, p, g in zip(scene.frame.tolist(), scene.id.tolist(), scene.group.tolist(), strict=True)}
     rows = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), strict=True)
     same = np.array([label[f, a] == label[f, b] >= 0 for f, a, b in rows])
-    assert found.probability[same].mean() > found.probability[~same].mean() + 0.5
+    assert found.probability[same].mean() > found.probability[~same].mean() + 0.4

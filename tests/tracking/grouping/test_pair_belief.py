@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from tracking.grouping.belief import UNSEEN, beliefs_of_tracks, default_belief
+from tracking.grouping.belief import DECISIONS, UNSEEN, beliefs_of_tracks, default_belief
 from tracking.grouping.pair_belief import PairBelief
 
 FPS = 10.0
 
 
-def test_the_belief_is_that_of_the_whole_sequence():
+@pytest.mark.parametrize("decision", DECISIONS)
+def test_the_belief_is_that_of_the_whole_sequence(decision):
     """People come and go: after each step all pairs have the belief of tracking.grouping, to the last bit."""
     rng = np.random.default_rng(0)
     people, frames = 7, 90
@@ -21,7 +23,7 @@ def test_the_belief_is_that_of_the_whole_sequence():
     there = (np.arange(frames)[:, None] >= born) & (np.arange(frames)[:, None] < gone)
     frame, column = np.nonzero(there)
     whole = beliefs_of_tracks(frame, column, pos[there], frames, FPS, default_belief())
-    kept, now, compared = PairBelief(FPS), np.zeros(0, np.int64), 0
+    kept, now, compared = PairBelief(FPS, decision), np.zeros(0, np.int64), 0
     for t in range(frames):
         kept.keep(there[t, now])
         now = now[there[t, now]]
@@ -32,7 +34,9 @@ def test_the_belief_is_that_of_the_whole_sequence():
         if t % kept.size == 0:
             expected = np.full((people, people), UNSEEN)
             rows = whole.step == t // kept.size
-            expected[whole.a[rows], whole.b[rows]] = expected[whole.b[rows], whole.a[rows]] = whole.log_odds[rows]
+            expected[whole.a[rows], whole.b[rows]] = expected[whole.b[rows], whole.a[rows]] = whole.log_odds[
+                rows, DECISIONS.index(decision)
+            ]
             apart = ~np.eye(len(now), dtype=bool)
             np.testing.assert_allclose(kept.log_odds[apart], expected[np.ix_(now, now)][apart], rtol=0, atol=1e-9)
             compared += int(rows.sum())

@@ -73,9 +73,11 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     out = option_parsing.output_file(options.out, ".toml")
     seeds = _fit_and_check_seeds(options.seeds, options.check)
     samples = {key: sample_of(list(pair_scenes(options.names, numbers))) for key, numbers in seeds.items()}
-    belief = fit_belief(samples["fitted"])
-    scores = {key: belief_scores(sample, belief.log_odds(sample.values)) for key, sample in samples.items()}
-    words = " ".join(["flockscope fit grouping", *options.names, f"--seeds {options.seeds}"])
+    changes = sample_of(list(pair_scenes(options.events, seeds["fitted"]))) if options.events else None
+    belief = fit_belief(samples["fitted"], changes)
+    scores = {key: belief_scores(sample, belief.log_odds(sample.values)[:, 0]) for key, sample in samples.items()}
+    asked = [f"--events {name}" for name in options.events]
+    words = " ".join(["flockscope fit grouping", *options.names, f"--seeds {options.seeds}", *asked])
     lines = _score_lines(seeds, scores)
     write_file(out, belief.toml_text("\n".join([words, *lines])).encode())
     text = "\n".join([*lines, f"→ {out}: use it as --grouping {out}"])

@@ -73,7 +73,7 @@ from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
 from tracking.detect.point_detections import PointTracker, boxes_at
 from tracking.filters.particles import ParticleHealth, effective_number
 from tracking.filters.person_streams import NOBODY, PersonStreams
-from tracking.grouping.belief import default_belief
+from tracking.grouping.belief import EVENTS, default_belief
 from tracking.grouping.pair_belief import PairBelief
 from tracking.papers.joint import decentralised_filter, partition_kernels, report
 from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SPEED_PRIOR, JointConfig
@@ -119,7 +119,7 @@ class Joint(PointTracker):
         self.nested = Nested.empty((c.particles, c.partitions), STATE * self.frames)
         self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
         self.events = ReportedEvents(context.fps)
-        self.belief = PairBelief(context.fps)
+        self.belief = PairBelief(context.fps, EVENTS)
         self.health = ParticleHealth(context.fps, "effective_particles", "effective_particles_of_a_person")
         self.streams = PersonStreams(seed)
 
@@ -221,7 +221,7 @@ class Joint(PointTracker):
         past = np.concatenate([moved(state, -k * self.dt) for k in range(self.frames)], axis=-1)
         self.nested = n = self.nested.joined(past)
         self.people.add(self.newcomers.size[rows], key)
-        self.belief.add(n.x[..., :STATE].mean(axis=0), self.newcomers.age[rows])
+        self.belief.add(n.x[..., :STATE].mean(axis=0))
         if c.newcomers == "validity":
             drawn = self.streams.uniforms(PLACING, key, n.log_q.size, 2).reshape(*n.log_q.shape, len(key), 2)
             uniforms = np.ascontiguousarray(drawn[..., 0])
