@@ -63,11 +63,16 @@ def test_each_plot_is_noticed(plots):
 @settings(max_examples=8, deadline=None)
 @given(scenes(), st.data())
 def test_ids_do_not_matter(grouping, plots, data):
-    scene = look(plots, FPS)
+    scene = beside(look(plots, FPS))
     ids = data.draw(st.permutations(range(3, 3 + 2 * scene.pos.shape[1]))).copy()[: scene.pos.shape[1]]
     base, renamed = derive(tracks(scene), FPS, grouping=grouping), derive(tracks(scene, ids), FPS, grouping=grouping)
     assert partition(renamed) == partition(base)
     assert events(renamed, ids) == events(base)
+
+
+def beside(scene):
+    """A scene a little beside the plots, whose round numbers lie on thresholds and are ties, where order decides."""
+    return scene.but(pos=scene.pos + np.random.default_rng(0).normal(0, 1e-5, scene.pos.shape))
 
 
 CORNER = 22.5
@@ -81,9 +86,7 @@ CORNER = 22.5
     st.booleans(), st.sampled_from([1.0, 18.8, 250.0]),
 )  # fmt: skip
 def test_place_turn_and_unit_do_not_matter(grouping, plots, x, degrees, mirror, scale):
-    """Of scenes a little beside the plots, whose round numbers lie on thresholds, where rounding would decide."""
-    scene = look(plots, FPS)
-    scene = scene.but(pos=scene.pos + np.random.default_rng(0).normal(0, 1e-5, scene.pos.shape))
+    scene = beside(look(plots, FPS))
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turn = np.array([[c, s], [-s, c]]) @ np.diag([1.0, -1.0 if mirror else 1.0])
     moved = scene.but(pos=scene.pos @ turn + [x, -x], vel=scene.vel @ turn)

@@ -131,7 +131,7 @@ def test_labels_of_groups_are_never_read(tmp_path, capsys, groups):
 
 
 def test_truth_of_groups_is_not_used():
-    sequence = simulate(load("merge", ["camera.fps=5"]), seed=0, streams=())
+    sequence = simulate(load("merge", ["camera.fps=5"]), seed=3, streams=())
     truth = sequence.truth
     blind = truth.replace(group=np.full(len(truth.id), -1), groups=None, groups_px=None, events=None, near=None)
     one, other = (group(replace(sequence, load_truth=lambda t=t: t)) for t in (truth, blind))
