@@ -186,7 +186,7 @@ def breaks(runs: int, episodes: int, folder: Path) -> None:
             played.append(made.played)
             grid = sweep_of(weakness, seeds, 0, folder)
             scores = at_values(grid, axis.spread(GRID), played[-1] // GRID)
-            grids.append(breaking_point(grid.way, scores, SHARE, np.random.default_rng(0)))
+            grids.append(breaking_point(grid.way, scores, SHARE))
         cells = []
         for points in (found, grids):
             inside = sum(p.low <= true <= p.high for p in points)
