@@ -16,8 +16,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
 from typing import Any
@@ -266,6 +267,13 @@ class Sweep:
             more = min(more, (self.plan.episodes - self.played) // each)
         self.seeds += max(more, 0)
         return more > 0
+
+
+def generate_command(scenario: str, seed: int, settings: Iterable[str], out: str) -> str:
+    """Returns the command that generates one scene; of several settings of a key the last one counts."""
+    last = {text.partition("=")[0].strip(): text for text in settings}
+    words = ["flockscope", "generate", scenario, "--seeds", f"{seed}:{seed + 1}", "--out", out]
+    return shlex.join([*words, *(word for text in last.values() for word in ("--set", text))])
 
 
 def _content(source: Source) -> bytes:

@@ -38,6 +38,7 @@ class Candidate:
     score: float
     best: float  # the oracle's score
     rival: str  # the best other tracker there, "" without one
+    command: str = ""  # generates the sequence
 
     @property
     def shortfall(self) -> float:
@@ -86,7 +87,7 @@ def _moment(one: Candidate, sequence: Sequence, run: Run, rival: Run | None) -> 
     data["background"], data["video"] = _background(sequence), None
     kind, words = ("", "") if dearest is None else (dearest.error.kind, _words(dearest))
     known = (one.name, one.scenario, one.sequence, one.score, one.best)
-    return Moment(*known, (first - 1) / sequence.fps, kind, words, script_json(data))
+    return Moment(*known, (first - 1) / sequence.fps, kind, words, script_json(data), one.command)
 
 
 def cause_bars(found: SequenceOf[tuple[str, RunErrors]]) -> list[CauseBar]:

@@ -9,6 +9,7 @@ from collections.abc import Sequence as SequenceOf
 import numpy as np
 
 from scenarios.errors import counted
+from scenarios.loading.resolve import rows
 from sim.types import Array, Sequence
 from tracking.app.commands.score_ranking import rank_words
 from tracking.app.replay_page.page import Run
@@ -21,7 +22,7 @@ from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval
 from tracking.stress.episodes import ORACLE
-from tracking.stress.sweep import Scene, Sweep
+from tracking.stress.sweep import Scene, Sweep, generate_command
 from tracking.tuning.parallel_episodes import opened_sources
 
 CAUSES = "What the repair of the errors of one kind and cause adds, mean over the sequences of the worst moments."
@@ -144,15 +145,19 @@ def _speeds(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[Speed]:
 
 
 def _candidates(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[tuple[Candidate, Scene]]:
+    entries = {entry.name: entry for name in sweep.plan.scenarios for entry in rows(name)}
     for scene in scenes:
         scores = {name: sweep.score(name, scene) for name in sweep.trackers}
-        rows = {name: sweep.row(name, scene) for name in sweep.trackers}
-        known = [name for name, row in rows.items() if row and not row["failed"] and math.isfinite(scores[name])]
+        played = {name: sweep.row(name, scene) for name in sweep.trackers}
+        known = [name for name, row in played.items() if row and not row["failed"] and math.isfinite(scores[name])]
+        entry = entries.get(scene.source.name)  # None of a copy, which no command generates alone
+        settings = () if entry is None else (*entry.settings, *sweep.plan.settings_at(scene.values))
+        command = "" if entry is None else generate_command(entry.scenario, scene.source.seed, settings, "worst")
         for name in known:
-            words = _scene(rows[name] or {})
+            words = _scene(played[name] or {})
             rival = max((other for other in known if other != name), key=scores.__getitem__, default="")
             best = sweep.score(ORACLE, scene)
-            yield Candidate(name, scene.source.name, words, scores[name], best, rival), scene
+            yield Candidate(name, scene.source.name, words, scores[name], best, rival, command), scene
 
 
 def _replay(
