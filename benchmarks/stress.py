@@ -259,8 +259,11 @@ def searched(kind: str, number: int, scenes: int, random: bool, folder: Path) ->
 
     def play(given: SequenceOf[Tasks]) -> Iterator[list[Outcome]]:
         for tasks in given:
-            scores = (BEST if isinstance(t, OracleTask) else planted(t.source, kind) for t in tasks)
-            yield [Outcome({"objective": score}) for score in scores]
+            try:
+                scores = [BEST if isinstance(t, OracleTask) else planted(t.source, kind) for t in tasks]
+                yield [Outcome({"objective": score}) for score in scores]
+            except FlockscopeError as error:  # the script did not come true
+                yield [Outcome({}, left_out=error.line())] * len(tasks)
 
     names, seeds, first = SEARCHED[kind]
     axes = tuple(AXES[name] for name in names)
