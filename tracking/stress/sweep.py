@@ -228,7 +228,7 @@ class Sweep:
         if len(self.plan.axes) != 1:
             limited = self.plan.episodes is not None or self.plan.minutes is not None
             return (limited or not self.plan.axes) and self._more_seeds()
-        for name, point in self.breaks().items():
+        for name, point in sorted(self.breaks().items(), key=lambda item: -_width(item[1])):
             if np.isfinite(point.at):
                 if point.high - point.low > NARROW and (self._narrow(point) or self._more_seeds()):
                     return True
@@ -267,6 +267,11 @@ class Sweep:
             more = min(more, (self.plan.episodes - self.played) // each)
         self.seeds += max(more, 0)
         return more > 0
+
+
+def _width(point: BreakingPoint) -> float:
+    """Returns the width of an interval, 0 of one that is not known at all."""
+    return point.high - point.low if np.isfinite(point.low) else 0.0
 
 
 def generate_command(scenario: str, seed: int, settings: Iterable[str], out: str) -> str:
