@@ -18,18 +18,19 @@ import numpy as np
 
 from sim.types import (
     EVENT_KINDS,
+    Bools,
     Context,
     DetectionMode,
     Detections,
     Frame,
     GroupEvent,
     Groups,
-    Ints,
     Sequence,
     Tracks,
     Truth,
 )
 from tracking.grouping.foot_points import groups_in_frames
+from tracking.grouping.grouped_tracks import with_velocities
 from tracking.running.prepare import prepare
 from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import Scorer
@@ -54,19 +55,24 @@ class _Detections:
         id, alone = np.arange(count), np.full(count, -1)
         vel, cov = np.full((count, dims), np.nan), np.full((count, 2 * dims, 2 * dims), np.nan)
         rows = (id, alone, pos, vel, cov, box, detections.score)
-        return Tracks(frame.index, frame.t, plane, "person", *rows, Groups.none())
+        return Tracks(frame.index, frame.t, plane, "person", *rows, Groups.none(), derived=True)
 
 
 def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None = None) -> TrackingRun:
     """Returns the oracle's tracks of a sequence with truth."""
-    truth = sequence.truth
-    assert truth is not None, "an oracle knows the truth"
-    mode: DetectionMode = given.get("detections") or ("file" if sequence.has_detections else "truth")
+    truth, mode = _truth(sequence), _mode(sequence, given)
     info = {"tracker": "oracle", "detections": mode, "sensor": given.get("sensor") or {}}
+    people = [_rows(t, t.id >= 0) for t in named_detections(sequence, given, similarity)]
+    return TrackingRun(_with_groups_and_events(with_velocities(people, truth.fps), truth), info)
+
+
+def named_detections(
+    sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None = None
+) -> list[Tracks]:
+    """Returns what the input shows of the true people, with their ids and groups; false alarms have ids below 0."""
+    truth, mode = _truth(sequence), _mode(sequence, given)
     if mode == "image":
-        places = given.get("input") == "stereo"
-        seen = (_visible(truth, index, places) for index in range(1, truth.length + 1))
-        return TrackingRun(_with_groups_and_events([*seen], truth), info)
+        return [_visible(truth, index, given.get("input") == "stereo") for index in range(1, truth.length + 1)]
     seed = (given.get("seed") or 0) if given.get("sensor") else 0  # without errors it only shuffles the detections
     boxes = given.get("input") == "boxes" and sequence.camera is not None  # without a camera boxes have no foot points
     needs = ("boxes",) if boxes else ("boxes", "points")
@@ -80,15 +86,27 @@ def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity 
     sides, true = compared.sides, compared.sides.true
     cuts = np.cumsum([0, *(len(t.id) for t in sides.tracks)]).tolist()
     rows = [sides.mapping[a:b] for a, b in pairwise(cuts)]
-    named = [_named(t, true.rows.id, true.group, row) for t, row in zip(sides.tracks, rows, strict=True)]
-    return TrackingRun(_with_groups_and_events(named, truth), info)
+    id, group = np.append(true.rows.id, -1), np.append(true.group, -1)  # the last: of nobody
+    return [
+        t.replace(id=np.where(row >= 0, id[row], -1 - np.arange(len(row))), group=group[row])
+        for t, row in zip(sides.tracks, rows, strict=True)
+    ]
 
 
-def _named(t: Tracks, id: Ints, group: Ints, row: Ints) -> Tracks:
-    kept = row >= 0
+def _truth(sequence: Sequence) -> Truth:
+    truth = sequence.truth
+    assert truth is not None, "an oracle knows the truth"
+    return truth
+
+
+def _mode(sequence: Sequence, given: Mapping[str, Any]) -> DetectionMode:
+    return given.get("detections") or ("file" if sequence.has_detections else "truth")
+
+
+def _rows(t: Tracks, kept: Bools) -> Tracks:
     box = None if t.box is None else t.box[kept]
     return t.replace(
-        id=id[row[kept]], group=group[row[kept]], pos=t.pos[kept], vel=t.vel[kept], cov=t.cov[kept], box=box,
+        id=t.id[kept], group=t.group[kept], pos=t.pos[kept], vel=t.vel[kept], cov=t.cov[kept], box=box,
         score=t.score[kept] if len(t.score) else t.score,
     )  # fmt: skip
 
@@ -110,7 +128,8 @@ def _visible(truth: Truth, index: int, places: bool) -> Tracks:
     who, none = (truth.id[rows], truth.group[rows]), np.full((len(rows), 2), np.nan)
     cov, score = np.full((len(rows), 4, 4), np.nan), np.ones(len(rows))
     t = (index - 1) / truth.fps
-    return Tracks(index, t, "ground" if places else "image", "person", *who, pos, none, cov, box, score)
+    plane = "ground" if places else "image"
+    return Tracks(index, t, plane, "person", *who, pos, none, cov, box, score, Groups.none(), derived=True)
 
 
 def _with_groups_and_events(tracks: SequenceOf[Tracks], truth: Truth) -> tuple[Tracks, ...]:
@@ -118,6 +137,6 @@ def _with_groups_and_events(tracks: SequenceOf[Tracks], truth: Truth) -> tuple[T
     for e in truth.events or ():
         starting.setdefault(e.start, []).append(replace(e, emitted=e.start))
     return tuple(
-        t.replace(groups=groups, events=tuple(starting.get(t.index, ())), own_events=EVENT_KINDS)
+        t.replace(groups=groups, events=tuple(starting.get(t.index, ())), own_events=EVENT_KINDS, derived=True)
         for t, groups in zip(tracks, groups_in_frames(tracks), strict=True)
     )

@@ -14,12 +14,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from collections.abc import Sequence as SequenceOf
+from dataclasses import replace
 from itertools import islice, zip_longest
 
 import numpy as np
 
-from benchmarks.faults.groups import GROUPS
-from benchmarks.faults.people import PEOPLE, Fault, Span
+from benchmarks.faults.groups import FAULTS, GROUPS
+from benchmarks.faults.people import Fault, Span
 from benchmarks.faults.scene import FaultScene, scene
 from benchmarks.support.options import new_parser, one_thread
 from benchmarks.support.tables import head, row
@@ -37,7 +38,7 @@ COLUMNS = ("listed", "named", "cause", "nothing else", "repaired")
 
 def cases(of: FaultScene, fault: str, count: int, seed: int) -> list[Fault]:
     """Returns up to `count` cases of a fault, of each true cause as many as there are."""
-    makers = list({**PEOPLE, **GROUPS}[fault](of))
+    makers = list(FAULTS[fault](of))
     drawn = np.random.default_rng(seed).permutation(len(makers))[:DRAWN]
     by_cause: dict[str, list[Fault]] = {}
     for k in drawn.tolist():
@@ -111,7 +112,7 @@ def measure(scenes: SequenceOf[FaultScene], fault: str, count: int, seed: int, w
         else:
             before = find_errors(of.sequence, of.clean, costs=0)
             runs = (
-                (made, _run(of, made), of.clean if made.seen is None else of.tracks(of.told, made.seen))
+                (made, _run(of, made), of.tracks(replace(of.told, ghosts=made.alarms), made.seen))
                 for made in cases(of, fault, count, seed)
             )
         for made, run, seen in runs:
@@ -138,7 +139,7 @@ def main() -> None:
     scenes = [scene(name, args.seed, args.fps) for name in args.scenes]
     head(["fault", "cases", *COLUMNS])
     for whole in (False, True):
-        for fault in GROUPS if whole else {**PEOPLE, **GROUPS}:
+        for fault in GROUPS if whole else FAULTS:
             found = measure(scenes, fault, args.frames, args.seed, whole)
             cells = {c: f"{found[c] / found[f'of {c}']:.1%}" if found[f"of {c}"] else "" for c in COLUMNS}
             cells["cause"] += f" of {found['of cause']}"

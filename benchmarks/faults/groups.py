@@ -7,10 +7,11 @@ cause follows from the places of the people concerned: members apart, others bes
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.faults.people import GAP, NEW, SECOND, Fault, Span
+from benchmarks.faults.people import GAP, NEW, PEOPLE, SECOND, Fault, Span
 from benchmarks.faults.scene import FaultScene, changed
 from sim.types import GroupEvent, Ints
 
@@ -85,6 +86,19 @@ def missed(of: FaultScene) -> Iterator[Callable[[], Fault]]:
             changed(of.told, rows, members, label=-1), (_span(of, "missed group", rows, members),),
             _cause(of, _middle(rows), members, members[:0]),
         )  # fmt: skip
+
+
+def missed_in_clutter(of: FaultScene) -> Iterator[Callable[[], Fault]]:
+    """Yields groups whose members stand alone for a while, one of them 1 m from a false alarm of the detector."""
+    for make in missed(of):
+        yield lambda make=make: _in_clutter(of, make())
+
+
+def _in_clutter(of: FaultScene, made: Fault) -> Fault:
+    ((_, first, last, people),) = made.expected
+    p = int(np.searchsorted(of.people, min(people)))
+    alarms = tuple((k + 1, NEW, *(of.pos[k, p] + np.array([1.0, 0.0])).tolist()) for k in range(first - 1, last))
+    return replace(made, cause="clutter" if made.cause == "tracker" else made.cause, alarms=alarms)
 
 
 def divided(of: FaultScene) -> Iterator[Callable[[], Fault]]:
@@ -202,3 +216,8 @@ GROUPS = {
     "late split": late_splits, "late merge": late_merges, "missed group": missed, "divided group": divided,
     "engulfed group": engulfed, "strangers joined": strangers, "false group": false,
 }  # fmt: skip
+FAULTS = {
+    **PEOPLE,
+    **GROUPS,
+    "missed group in clutter": missed_in_clutter,
+}  # trackers of whole groups get no detections

@@ -1,5 +1,5 @@
-"""Faults of people: a switch, a fragment (also of a tracker from pixels when the light changes), a lost person, a late
-confirmation, a ghost, each with its true cause.
+"""Faults of people: a switch (also beside a false alarm), a fragment (also of a tracker from pixels when the light
+changes), a lost person, a late confirmation, a ghost, each with its true cause.
 
 The cause is that of the injection: the person was dropped while hidden, while cut by the edge, when the detector lost
 them, beside somebody, in a turn, or with nothing of this around (the tracker's own fault). Cases between two causes are
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.faults.scene import NOBODY, FaultScene, Told, changed
+from benchmarks.faults.scene import NOBODY, FaultScene, Ghost, Told, changed
 from sim.types import Bools, Ints
 
 Span = tuple[str, int, int, frozenset[int]]  # kind, first and last frame, ids of the people
@@ -30,6 +30,7 @@ class Fault:
     cause: str | None  # None: not unambiguous
     seen: Bools | None = None  # (T, P): who was detected; None: everybody
     pixels: bool = False  # the tracker worked on pictures
+    alarms: tuple[Ghost, ...] = ()  # false alarms of the detector
 
 
 def _cause(of: FaultScene, p: int, gap: Ints, first: int, last: int) -> str | None:
@@ -87,6 +88,18 @@ def switches(of: FaultScene) -> Iterator[Callable[[], Fault]]:
                 changed(of.told, slice(k, None), p, id=NEW), (("switch", k + 1, k + 1, _who(of, p)),),
                 _cause(of, p, none, k, k),
             )  # fmt: skip
+
+
+def switches_in_clutter(of: FaultScene) -> Iterator[Callable[[], Fault]]:
+    """Yields switches without a gap beside a false alarm of the detector: in the frame 0.5 m away, or 1.2 m."""
+    for p, rows in _presences(of):
+        for k in rows[of.frames(SECOND) :].tolist():
+            for far in (0.5, 1.2):
+                yield lambda p=p, k=k, far=far, none=rows[:0]: Fault(
+                    changed(of.told, slice(k, None), p, id=NEW), (("switch", k + 1, k + 1, _who(of, p)),),
+                    "clutter" if far < 0.8 else _cause(of, p, none, k, k),
+                    alarms=((k + 1, NEW, *(of.pos[k, p] + np.array([far, 0.0])).tolist()),),
+                )  # fmt: skip
 
 
 def fragments(of: FaultScene) -> Iterator[Callable[[], Fault]]:
@@ -175,6 +188,6 @@ def _left(of: FaultScene, p: int, last: int, n: int) -> Fault:
 
 
 PEOPLE = {
-    "switch": switches, "fragment": fragments, "fragment in changing light": in_changing_light,
-    "lost person": losses, "late confirmation": late, "ghost": ghosts,
+    "switch": switches, "switch in clutter": switches_in_clutter, "fragment": fragments,
+    "fragment in changing light": in_changing_light, "lost person": losses, "late confirmation": late, "ghost": ghosts,
 }  # fmt: skip

@@ -15,6 +15,7 @@ from sim.types import EVENT_KINDS, Array, Bools, Groups, Ints, Sequence, Tracks
 from tracking.grouping.foot_points import groups_of_people
 
 NOBODY = -1
+Ghost = tuple[int, int, float, float]  # frame from 1, id, x, y in m
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +24,7 @@ class Told:
 
     id: Ints  # (T, P) id of each person's track, -1 not tracked
     label: Ints  # (T, P) group, -1 alone
-    ghosts: tuple[tuple[int, int, float, float], ...] = ()  # frame from 1, id, x, y in m
+    ghosts: tuple[Ghost, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

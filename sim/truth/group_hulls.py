@@ -15,7 +15,7 @@ import numpy as np
 from sim.geometry.polygons import convex_hull, footprint_hulls
 from sim.types import Array, Groups, Ints
 
-__all__ = ["box_groups", "frame_groups", "groups_over_time"]
+__all__ = ["box_groups", "groups_over_time"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,15 +37,10 @@ class _MemberRows:
         return np.diff(np.append(self.starts, len(self.id)))
 
 
-def frame_groups(id: Ints, group: Ints, pos: Array, vel: Array) -> Groups:
-    """Returns the groups of two or more people of one frame (see `groups_over_time`)."""
-    return groups_over_time(np.zeros(len(id), np.int64), id, group, pos, vel, 0, 1)[0]
-
-
 def groups_over_time(
     frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, first: int, length: int, px_per_m: float = 1.0
 ) -> list[Groups]:
-    """Returns the Groups of each of the frames first … first + length - 1, by ascending id.
+    """Returns the Groups, of two or more people, of each of the frames first … first + length - 1, by ascending id.
 
     frame, id, group (R,): people in frames, in any order, group -1 = alone. pos, vel (R, D): m, m/s, or px with a
     px_per_m, the scale of the footprints; results are in the same unit. extent is the covariance of x and y.

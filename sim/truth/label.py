@@ -8,7 +8,6 @@ inscribed in the ellipses of body and head.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -113,7 +112,7 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     found = groups_and_events(s.pos, s.vel, s.present, s.intent, s.rate)
     shown = FrameTicks.of(truth.length, motion.fps, s.rate, s.present)
     truth = truth.replace(group=found.group[shown.tick[people.frame - 1], people.id - 1])
-    ground = tuple(_ground_groups(truth))
+    ground = _ground_groups(truth)
     events, orders = _events_in_frames(_events(s, found), motion, found.group, shown)
     return truth.replace(
         groups=ground, groups_px=None if camera is None else image_groups(truth, ground, camera, people.shapes),
@@ -169,11 +168,9 @@ def _near_in_frames(near: Near, shown: FrameTicks) -> Near:
     return Near(start[kept], end[kept], near.a[kept], near.b[kept])
 
 
-def _ground_groups(truth: Truth) -> Iterator[Groups]:
-    from sim.truth.group_hulls import frame_groups
+def _ground_groups(truth: Truth) -> tuple[Groups, ...]:
+    from sim.truth.group_hulls import groups_over_time
 
     assert truth.pos is not None
     assert truth.vel is not None
-    for index in range(1, truth.length + 1):
-        r = truth.rows(index)
-        yield frame_groups(truth.id[r], truth.group[r], truth.pos[r], truth.vel[r])
+    return tuple(groups_over_time(truth.frame, truth.id, truth.group, truth.pos, truth.vel, 1, truth.length))

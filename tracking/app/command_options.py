@@ -182,7 +182,7 @@ class MinimizeOptions:
     run: Path | None = ARGUMENT("Output of `track` on the sequence, if it is not below this folder.", None,
         metavar="RUN")
     condition: str = option(
-        "A score with a bound, or a kind of error: HOTA<0.7, IDSW>=3, switch, switch:hidden.", flag="--while",
+        "A score with a bound, or a kind of error: HOTA<0.7, IDSW>=3, switch, switch:hidden, crash.", flag="--while",
         metavar="CONDITION")
     out: Path = TOML("Scenario to write; a replay page lies beside it.")
     tracker: str | None = option("Tracker, if no run is given.", None, metavar="TRACKER")

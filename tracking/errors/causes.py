@@ -6,6 +6,7 @@ A cause is a fact of the truth, not a proof. The first that holds is named:
     hidden      most of the body is hidden, for most of the gap
     undetected  the detector has no detection of the person, for most of the gap
     light       the brightness changes by more than a fifth within a second of the error's start (input from pixels)
+    clutter     a switch with a false alarm of the detector nearer than 0.8 m to the person, in its frames
     near        another person is nearer than 0.8 m
     turned      the person's direction turns by more than 60 degrees within a second
     left        a ghost of somebody who is gone
@@ -14,6 +15,7 @@ A cause is a fact of the truth, not a proof. The first that holds is named:
     clutter     any other ghost
     apart       people of one group are more than 2 m apart
     beside      strangers walk within 1.5 m of the group
+    clutter     an error of groups with a false alarm of the detector within 1.5 m of one of its people
     tracker     none of these: the tracker alone
 """
 
@@ -65,6 +67,7 @@ class Facts:
     detected: Bools | None  # (R,): the detector has a detection of the person; None: not known
     light: Array | None  # (length,): factor of brightness of each frame; None: not known, or not from pixels
     fps: float
+    alarms: tuple[Ints, Array]  # frames (A,) and places (A, 2), as pos, of the detector's false alarms
 
     def rows(self, frame: int) -> Ints:
         """Returns the rows of a frame."""
@@ -79,6 +82,17 @@ class Facts:
         ratio = float(near.max() / near.min())
         return Cause("light", f"brightness changes by {ratio - 1:.0%}") if ratio > LIGHT else None
 
+    def false_alarm(self, rows: Ints, frames: range, reach: float) -> Cause | None:
+        """Returns the false alarm in these frames that is nearest to some people (rows) as a cause, None out of reach.
+
+        People and false alarms are compared in the same frame.
+        """
+        frame, pos = self.alarms
+        near = np.flatnonzero((frame >= frames.start) & (frame < frames.stop))
+        gaps = np.hypot(*(self.pos[rows][:, None] - pos[near][None]).transpose(2, 0, 1)) / self.metre
+        least = gaps[self.frame[rows][:, None] == frame[near]].min(initial=np.inf)
+        return Cause("clutter", f"{least:.2f} m from a false alarm") if least < reach else None
+
     def row(self, frame: int, id: int) -> int:
         """Returns the row of a person in a frame, -1 if not there."""
         found = self.rows(frame)[self.id[self.rows(frame)] == id]
@@ -86,8 +100,9 @@ class Facts:
 
 
 def facts(
-    truth: Truth, kept: Bools, pos: Array, metre: float, detected: Bools | None, light: Array | None = None
-) -> Facts:
+    truth: Truth, kept: Bools, pos: Array, metre: float, detected: Bools | None, light: Array | None,
+    alarms: tuple[Ints, Array],
+) -> Facts:  # fmt: skip
     """Returns the facts of the rows `kept` of a truth; pos (R, 2): where they are compared."""
 
     def of(values: Array | None) -> Array | None:
@@ -95,7 +110,7 @@ def facts(
 
     return Facts(
         truth.frame[kept], truth.id[kept], pos, metre, of(truth.vel), truth.visibility[kept], of(truth.truncation),
-        of(truth.box), detected, light, truth.fps,
+        of(truth.box), detected, light, truth.fps, alarms,
     )  # fmt: skip
 
 
@@ -117,6 +132,9 @@ def cause_of_person(error: PersonError, of: Facts) -> Cause:
     if error.kind == "late" and frames < CONFIRMED:
         return Cause("tracker")
     around = _around(error, of)
+    during = range(error.start, error.end + 1)
+    if error.kind == "switch" and (clutter := of.false_alarm(around, during, NEAR)) is not None:
+        return clutter
     near = _nearest(around, of)
     if near is not None and near[0] < NEAR:
         return Cause("near", f"{near[0]:.2f} m from person {near[1]}")
@@ -206,8 +224,18 @@ def cause_of_group(error: GroupError, of: Facts) -> Cause:
     """Returns the cause of an error of a group, from the middle of its time."""
     frame = (error.start + error.end) // 2
     rows = np.array([row for id in error.people if (row := of.row(frame, id)) != NOBODY], np.int64)
+    return (
+        _places_of_group(error, rows, frame, of)
+        or of.false_alarm(rows, range(frame, frame + 1), BESIDE)
+        or of.change_of_light(error.start)
+        or Cause("tracker")
+    )
+
+
+def _places_of_group(error: GroupError, rows: Ints, frame: int, of: Facts) -> Cause | None:
+    """Returns members who are apart, or others beside them, as a cause."""
     if len(rows) < 2:
-        return of.change_of_light(error.start) or Cause("tracker")
+        return None
     gaps = np.hypot(*(of.pos[rows][:, None] - of.pos[rows][None]).transpose(2, 0, 1)) / of.metre
     np.fill_diagonal(gaps, np.inf)
     if error.group is not None and gaps.min(axis=1).max() > APART:
@@ -219,4 +247,4 @@ def cause_of_group(error: GroupError, of: Facts) -> Cause:
             return Cause("beside", f"{d:.1f} m from others")
     if error.false and gaps.min() < BESIDE:
         return Cause("beside", f"{gaps.min():.1f} m apart")
-    return of.change_of_light(error.start) or Cause("tracker")
+    return None

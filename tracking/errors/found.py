@@ -21,7 +21,7 @@ from tracking.errors.causes import Cause, Facts, cause_of_ghost, cause_of_group,
 from tracking.errors.groups import LINEAGE, GroupError, Memberships, group_errors, wrong_lineages
 from tracking.errors.people import PersonError, matched_people, person_errors
 from tracking.errors.repairs import SHOWN, ComparedPeople, ComparedRun, scores
-from tracking.oracle import oracle
+from tracking.oracle import named_detections
 from tracking.running.run import TrackingRun
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.evaluation import MatchedSides
@@ -116,7 +116,7 @@ def errors_of_run(
     """Returns the errors of a run, with the detections of the input that it names; raises as `find_errors`."""
     known = run.info.get("detections") is not None and not any(t.unit == "group" for t in run)
     return find_errors(
-        sequence, run, oracle(sequence, run.info, similarity) if known else None, similarity, costs, causes
+        sequence, run, named_detections(sequence, run.info, similarity) if known else None, similarity, costs, causes
     )
 
 
@@ -124,7 +124,7 @@ def find_errors(
     sequence: Sequence, tracks: SequenceOf[Tracks], seen: SequenceOf[Tracks] | None = None,
     similarity: Similarity | None = None, costs: int = EVERY, causes: bool = True,
 ) -> RunErrors:  # fmt: skip
-    """Returns the errors of a run; seen: tracks of true ids that show which people were detected.
+    """Returns the errors of a run; seen: the detections, with the ids of the true people that they show.
 
     Costs are known of so many of the longest errors; the sums by cause only with `causes`. Both take most of the time.
     Raises InputError without labels, or if they and the tracks cannot be compared.
@@ -236,9 +236,14 @@ def _metre(compared: MatchedSides) -> float:
 
 
 def _facts(sequence: Sequence, compared: MatchedSides, seen: MatchedSides | None, pixels: bool) -> Facts:
-    """Returns what is known of the true people and of the light."""
+    """Returns what is known of the true people, of the light and of false alarms."""
     sides = compared.sides
-    detected: Bools | None = None if seen is None else find_rows(seen.sides.est.rows, sides.true.rows) >= 0
+    detected: Bools | None = None
+    alarms = np.zeros(0, np.int64), np.zeros((0, 2))
+    if seen is not None:
+        rows = seen.sides.est.rows
+        detected, false = find_rows(rows, sides.true.rows) >= 0, find_rows(sides.true.rows, rows) < 0
+        alarms = rows.frame[false], _positions(seen)[1][false]
     light = sequence.load_light() if pixels and sequence.load_light is not None else None
     kept = sides.inside[sides.truth.frame]
-    return facts(sides.truth, kept, _positions(compared)[0], _metre(compared), detected, light)
+    return facts(sides.truth, kept, _positions(compared)[0], _metre(compared), detected, light, alarms)

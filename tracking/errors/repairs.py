@@ -17,12 +17,14 @@ from sim.types import Array, Bools, Ints
 from tracking.errors.groups import UNSEEN, GroupError, Memberships, group_f1
 from tracking.errors.people import NOBODY, MatchedPeople, PersonError
 from tracking.scoring.candidate_pairs import Pairs
-from tracking.scoring.evaluation import people_scores
 from tracking.scoring.group_scores import shared_members
 from tracking.scoring.people_and_groups import GroupRows, bare_groups
 from tracking.scoring.rows import FrameRows
+from tracking.scoring.track_scores import weighted_hota, weighted_identity
+from tracking.scoring.weighted_sums import unweighted
 
 SHOWN = ("HOTA", "IDF1", "group_F1")
+OF_PEOPLE = {"HOTA": weighted_hota, "IDF1": weighted_identity}
 NO_HULL = np.zeros((0, 2))
 
 
@@ -52,8 +54,9 @@ def scores(
     if run.people is not None:
         label, kept, new = _labels(run.people.matched, [error for error in errors if isinstance(error, PersonError)])
         added = np.array(list(new), np.int64)
-        if {"HOTA", "IDF1"} & set(keys):
-            found |= _scores_of_people(run.people, label, kept, new)
+        if parts := OF_PEOPLE.keys() & keys:
+            pairs = _repaired_pairs(run.people, label, kept, new)
+            found |= {key: unweighted(OF_PEOPLE[key](pairs, pairs.size), pairs.size)[key] for key in parts}
     if "group_F1" in keys:
         of_groups = [error for error in errors if isinstance(error, GroupError)]
         ghosts = [row for e in errors if isinstance(e, PersonError) and e.person is None for row in e.rows]
@@ -62,13 +65,15 @@ def scores(
     return {key: found[key] for key in keys}
 
 
-def _scores_of_people(people: ComparedPeople, label: Ints, kept: Bools, new: dict[int, int]) -> dict[str, float]:
+def _repaired_pairs(people: ComparedPeople, label: Ints, kept: Bools, new: dict[int, int]) -> Pairs:
     true, est, rows = people.matched.pairs.true, people.matched.pairs.est, np.array(list(new), np.int64)
     frame = np.concatenate([est.frame[kept], true.frame[rows]])
     order = np.argsort(frame, kind="stable")
     id = np.concatenate([label[kept], np.array(list(new.values()), np.int64)])[order]
     place = np.concatenate([people.place[kept], people.true_place[rows]])[order]
-    return people_scores(people.pairs(FrameRows(frame[order], id), place))
+    pairs = people.pairs(FrameRows(frame[order], id), place)
+    pairs.require_unique_ids()
+    return pairs
 
 
 def _fresh(values: Ints) -> int:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -50,7 +51,7 @@ def completed(
     """Returns the tracks with groups and events, as `with_groups`, or from where boxes stand on the ground."""
     if camera is None or not can_stand(tracks, camera, pixels) or all(t.derived for t in tracks):
         return with_groups(tracks, fps, px_per_m, rule)
-    grouped = with_groups([standing(t, camera, scene) for t in tracks], fps, 1.0, rule)
+    grouped = with_groups(standing(tracks, camera, scene), fps, 1.0, rule)
     named = names_groups(tracks)
     return tuple(_grouped_as(t, g, named) for t, g in zip(with_velocities(tracks, fps), grouped, strict=True))
 
@@ -61,13 +62,20 @@ def _grouped_as(t: Tracks, grouped: Tracks, named: bool) -> Tracks:
     return out if named and t.groups is not None else out.replace(groups=groups_of_people(out))
 
 
-def standing(t: Tracks, camera: Camera, scene: Scene | None) -> Tracks:
-    """Returns tracks of boxes in the image as tracks on the ground. Velocities are nan, groups those that t names."""
-    pos = np.zeros((0, 2)) if t.box is None else feet(t.box, camera, scene)
-    events = moved_events(t.events, t.id, pos)
-    moved = t.replace(plane="ground", pos=pos, vel=np.full_like(pos, np.nan), events=events)
-    named = t.groups is not None or bool((t.group >= 0).any())
-    return moved.replace(groups=groups_of_people(moved) if named else None)
+def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> list[Tracks]:
+    """Returns tracks of boxes in the image as tracks on the ground. Velocities are nan, groups those that they name."""
+    boxes = [np.zeros((0, 4)) if t.box is None else t.box for t in tracks]
+    ground = feet(np.concatenate([np.zeros((0, 4)), *boxes]), camera, scene)
+    cuts = np.cumsum([0, *map(len, boxes)]).tolist()
+    moved = [
+        t.replace(
+            plane="ground", pos=ground[a:b], vel=np.full((b - a, 2), np.nan),
+            events=moved_events(t.events, t.id, ground[a:b]),
+        ) for t, (a, b) in zip(tracks, pairwise(cuts), strict=True)
+    ]  # fmt: skip
+    named = [t.groups is not None or bool((t.group >= 0).any()) for t in moved]
+    every = groups_in_frames(moved) if any(named) else [None] * len(moved)
+    return [t.replace(groups=groups if own else None) for t, groups, own in zip(moved, every, named, strict=True)]
 
 
 def groups_of_people(t: Tracks) -> Groups:
@@ -76,19 +84,19 @@ def groups_of_people(t: Tracks) -> Groups:
 
 
 def groups_in_frames(tracks: Sequence[Tracks]) -> list[Groups]:
-    """Returns the groups of each of consecutive frames in one plane, as `groups_of_people`."""
+    """Returns the groups of each of several frames in one plane, as `groups_of_people`."""
     if not tracks:
         return []
     there = [np.isfinite(t.pos).all(axis=1) for t in tracks]
     pairs = [*zip(tracks, there, strict=True)]
-    frame = np.repeat([t.index for t in tracks], [kept.sum() for kept in there])
+    frame = np.repeat(np.arange(len(tracks)), [kept.sum() for kept in there])
     id, group, pos, vel = (
         np.concatenate([getattr(t, name)[kept] for t, kept in pairs]) for name in ("id", "group", "pos", "vel")
     )
     boxes = [t.box[kept] for t, kept in pairs if t.box is not None]
     if tracks[0].plane != "image" or len(boxes) < len(tracks):
-        return groups_over_time(frame, id, group, pos, vel, tracks[0].index, len(tracks))
-    return box_groups(frame, id, group, pos, vel, np.concatenate(boxes), tracks[0].index, len(tracks))
+        return groups_over_time(frame, id, group, pos, vel, 0, len(tracks))
+    return box_groups(frame, id, group, pos, vel, np.concatenate(boxes), 0, len(tracks))
 
 
 def feet(box: Array, camera: Camera, scene: Scene | None) -> Array:

@@ -122,7 +122,7 @@ def _can_be_grounded(truth: Truth, run: Sequence[Tracks], pixels: bool) -> bool:
 def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
     if truth.camera is None or not can_stand(run, truth.camera, pixels=False):
         return run
-    return [standing(t, truth.camera, truth.scene) for t in run]
+    return standing(run, truth.camera, truth.scene)
 
 
 def _in_image(truth: Truth, run: Sequence[Tracks], pixels: bool) -> Sequence[Tracks]:

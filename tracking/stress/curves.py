@@ -1,26 +1,27 @@
 """Curves of a score over an axis, and breaking points with their intervals.
 
 Scores are paired: P scenes (scenario and seed), each played at the same values of the axis with the same random
-numbers. The curve is the mean over scenes. Its *breaking point* is the first value, from easy to hard, at which the
-curve falls to a share of its value at the easy end, linear between values. The 95 % interval takes P scenes with
-replacement, many times: the percentiles of the breaking points of their curves. Of few scenes such draws vary too
-little, so the distances of both ends from the breaking point are multiplied by sqrt(P / (P - 1)) t / 1.96, where t is
-the quantile of Student's distribution with P - 1 degrees of freedom: 1.87 for four scenes, 1.12 for 16. A draw that
-never breaks counts as breaking beyond the hard end, so an end of the interval may be unknown. The interval also holds
-the two values beside the breaking point, as the curve between them is not known.
+numbers. The *height* of a scene is its score less a share of its score at the easy end, or less the other tracker's
+score. Its mean over scenes has a 95 % interval at each value, Student's. Between values all three are linear, and the
+first value, from easy to hard, at which one falls to 0 is:
+
+    of the mean            the breaking point
+    of the lower end       the low end of its interval: the first value at which the curve may have broken
+    of the upper end       the high end: the first value at which it surely has; unknown if there is none
+
+The interval also holds the two values beside the breaking point, as the curve between them is not known. One scene
+gives no interval.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from sim.types import Array
-from tracking.stats import LEVEL, student
+from tracking.stats import mean_interval
 
-DRAWS = 1000
 NEVER = np.inf
 
 
@@ -54,33 +55,18 @@ def crossing(way: Array, height: Array) -> float:
     return float(way[k - 1] + (way[k] - way[k - 1]) * a / (a - b))
 
 
-def breaking_point(way: Array, scores: Array, share: float, rng: np.random.Generator) -> BreakingPoint:
+def breaking_point(way: Array, scores: Array, share: float) -> BreakingPoint:
     """Returns where the curve of scores (P, V) at `way` (V,), ascending from 0, falls to a share of its easy value."""
-    return _with_interval(way, scores, lambda mean: mean - share * mean[0] if mean[0] > 0 else mean + NEVER, rng)
+    easy = scores[:, :1]
+    return falling(way, scores - share * easy) if curve(easy) > 0 else BreakingPoint(NEVER, NEVER, NEVER)
 
 
-def overtaking(way: Array, first: Array, second: Array, rng: np.random.Generator) -> BreakingPoint:
-    """Returns where the first tracker, ahead at the easy end, falls behind the second; both (P, V), paired."""
-    return _with_interval(way, first - second, lambda mean: mean, rng)
-
-
-def _with_interval(
-    way: Array, scores: Array, height: Callable[[Array], Array], rng: np.random.Generator
-) -> BreakingPoint:
-    at = crossing(way, height(curve(scores)))
-    draws = rng.integers(0, len(scores), (DRAWS, len(scores)))
-    found = np.sort([crossing(way, height(curve(scores[draw]))) for draw in draws])
-    outside = int((1 - LEVEL) / 2 * DRAWS)
-    low, high = float(found[outside]), float(found[-1 - outside])
+def falling(way: Array, heights: Array) -> BreakingPoint:
+    """Returns where the mean of heights (P, V) falls to 0."""
+    at, low, high = (crossing(way, end) for end in mean_interval(heights))
     if not np.isfinite(at):
         return BreakingPoint(at, low, high)
-    if len(scores) == 1:
+    if len(heights) == 1:
         return BreakingPoint(at, float(way[0]), NEVER)
-    low, high = (at + _widening(len(scores)) * (end - at) for end in (low, high))
-    low, high = max(low, float(way[0])), high if high <= way[-1] else NEVER
     k = int(np.clip(np.searchsorted(way, at), 1, len(way) - 1))
     return BreakingPoint(at, min(low, float(way[k - 1])), max(high, float(way[k])))
-
-
-def _widening(scenes: int) -> float:
-    return float(np.sqrt(scenes / (scenes - 1)) * student(scenes - 1) / student(np.inf))

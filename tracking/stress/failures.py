@@ -2,7 +2,8 @@
 
 `HOTA<0.7` compares a score of the catalogue by <, <=, > or >=. It counts only where the oracle has the score, too: a
 false group in a scene without true groups is no failure of group_F1. `late split` is a kind of error of `flockscope
-errors` that occurs at least once, `switch:hidden` one of this kind with this cause.
+errors` that occurs at least once, `switch:hidden` one of this kind with this cause. `crash` is an error that the
+tracker raises.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, get_args
 
-from scenarios.errors import FlockscopeError, InputError
+from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading.toml_files import closest, did_you_mean
 from scenarios.schema.scenario import Scenario
 from sim.types import DetectionMode, Sequence
@@ -28,7 +29,8 @@ OPERATORS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge
 }  # fmt: skip
 COMPARISON = re.compile(r"\s*([\w-]+)\s*(<=|>=|<|>)\s*(-?[0-9.]+)\s*")
-KINDS = (*get_args(PersonKind), *groups.KINDS)
+CRASH = "crash"
+KINDS = (*get_args(PersonKind), *groups.KINDS, CRASH)
 
 
 @dataclass(frozen=True)
@@ -96,12 +98,12 @@ class Failure:
 def parse_failure(text: str) -> Failure:
     """Returns the condition of `--while`. Raises InputError for any other text."""
     found = COMPARISON.fullmatch(text)
-    expected = "SCORE<NUMBER (or <=, >, >=), or a kind of error, as in HOTA<0.7, switch, switch:hidden"
+    expected = "SCORE<NUMBER (or <=, >, >=), a kind of error, or crash, as in HOTA<0.7, switch, switch:hidden"
     if found is None:
         kind, _, cause = (part.strip() for part in text.partition(":"))
         if kind not in KINDS:
             raise _wrong(text, expected, did_you_mean(kind, list(KINDS)))
-        if cause not in CAUSES and ":" in text:
+        if ":" in text and (cause not in CAUSES or kind == CRASH):
             raise _wrong(text, f"a cause: {', '.join(CAUSES)}", did_you_mean(cause, list(CAUSES)))
         return Failure(text.strip(), kind=kind, cause=cause)
     score, beyond, number = found.groups()
@@ -137,7 +139,7 @@ class EpisodeOf:
 
 
 def play_episode(episode: EpisodeOf) -> Outcome:
-    """Plays an episode; an order that does not come true, and an error of the tracker, are the outcome's problem."""
+    """Plays an episode; an order that does not come true, and an unwanted error of the tracker, are its problem."""
     from tracking.comparison import scorer_of
     from tracking.oracle import oracle
 
@@ -145,7 +147,12 @@ def play_episode(episode: EpisodeOf) -> Outcome:
         sequence = episode.sequence()
         truth = sequence.truth  # raises for a script that did not come true before anything is tracked
         assert truth is not None, "a simulated sequence has labels"
-        run = episode.subject.run(sequence)
+        try:
+            run = episode.subject.run(sequence)
+        except WorkError:
+            if episode.failure.kind != CRASH:
+                raise
+            return Outcome({}, frozenset([(CRASH, "")]), len({*truth.id.tolist()}))
         with scorer_of(sequence) as scorer:
             scores = {key: value for key, value in scorer.evaluate(run).items() if value == value}
             failure = episode.failure
@@ -161,7 +168,7 @@ def play_episode(episode: EpisodeOf) -> Outcome:
 def _errors(failure: Failure, sequence: Sequence, run: TrackingRun) -> frozenset[tuple[str, str]]:
     from tracking.errors.found import errors_of_run, find_errors
 
-    if not failure.kind:
+    if failure.kind in ("", CRASH):
         return frozenset()
     # Only causes need the oracle, which says who was detected.
     quick = not failure.cause and all(t.unit == "person" for t in run)

@@ -3,8 +3,9 @@
 Without an axis, the scenes are played as they are. Along one axis, values are placed where the curve bends. First all
 scenes are played at five values. Then, in turn, the widest uncertainty is reduced: if a curve breaks and its breaking
 point's interval is wider than the distance of the two values beside it, more seeds are played; else a value is added in
-the middle of them. Without a break, a value is added where the curve is steepest. Over two axes, all scenes are played
-at a grid of five by five values, then with more seeds while there is budget.
+the middle of them. So no value is added because a few scenes happen to be alike. Without a break, a value is added
+where the curve is steepest. Over two axes, all scenes are played at a grid of five by five values, then with more seeds
+while there is budget.
 
 The oracle has the detections that the first tracker gets, and the true ids: what is lost in its score is not the
 tracker's fault. It does not count as an episode of the budget. Every episode is stored when it is played, so a sweep
@@ -15,8 +16,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
 from typing import Any
@@ -28,7 +30,7 @@ from sim.hashing import ENGINE
 from sim.types import Array, DetectionMode
 from tracking.environment.episode_cache import Source, sources
 from tracking.stress.axes import Axis
-from tracking.stress.curves import BreakingPoint, breaking_point, curve, overtaking
+from tracking.stress.curves import BreakingPoint, breaking_point, curve, falling
 from tracking.stress.episodes import ORACLE, OracleTask, PlayScenes, Store
 from tracking.tuning.parallel_episodes import EpisodeTask
 from tracking.tuning.tuned_tracker import TunedTracker
@@ -36,6 +38,7 @@ from tracking.tuning.tuned_tracker import TunedTracker
 FIRST_VALUES = 5
 MOST_VALUES = 17
 NARROW = 0.05  # share of the axis: a breaking point is known well enough
+ROUNDING = 1e-9
 
 Values = tuple[float, ...]  # one for each axis
 
@@ -207,18 +210,16 @@ class Sweep:
 
     def breaks(self) -> dict[str, BreakingPoint]:
         """Returns the breaking point of each tracker on the only axis."""
-        rng = np.random.default_rng(0)
-        return {name: breaking_point(self.way, self.scores(name), self.plan.share, rng) for name in self.trackers}
+        return {name: breaking_point(self.way, self.scores(name), self.plan.share) for name in self.trackers}
 
     def overtakings(self) -> Iterator[tuple[str, str, BreakingPoint]]:
         """Yields pairs of trackers of which the first, better at the easy end, falls behind the second."""
-        rng = np.random.default_rng(0)
         every = {name: self.scores(name) for name in self.trackers}
         for first in every:
             for second in every:
                 ahead = curve(every[first])[0] > curve(every[second])[0]
                 if first != second and ahead:
-                    point = overtaking(self.way, every[first], every[second], rng)
+                    point = falling(self.way, every[first] - every[second])
                     if np.isfinite(point.at):
                         yield first, second, point
 
@@ -227,7 +228,7 @@ class Sweep:
         if len(self.plan.axes) != 1:
             limited = self.plan.episodes is not None or self.plan.minutes is not None
             return (limited or not self.plan.axes) and self._more_seeds()
-        for name, point in self.breaks().items():
+        for name, point in sorted(self.breaks().items(), key=lambda item: -_width(item[1])):
             if np.isfinite(point.at):
                 if point.high - point.low > NARROW and (self._narrow(point) or self._more_seeds()):
                     return True
@@ -242,7 +243,7 @@ class Sweep:
         """Adds the middle of the values beside a breaking point, if these are what its interval is wide by."""
         k = int(np.clip(np.searchsorted(self.way, point.at), 1, len(self.way) - 1))
         gap = self.way[k] - self.way[k - 1]
-        wide = gap > NARROW / 2 and gap >= (point.high - point.low) / 2
+        wide = gap > NARROW / 2 and gap >= point.high - point.low - ROUNDING
         return wide and len(self.values) < MOST_VALUES and self._insert(k)
 
     def _bend(self, name: str) -> bool:
@@ -266,6 +267,18 @@ class Sweep:
             more = min(more, (self.plan.episodes - self.played) // each)
         self.seeds += max(more, 0)
         return more > 0
+
+
+def _width(point: BreakingPoint) -> float:
+    """Returns the width of an interval, 0 of one that is not known at all."""
+    return point.high - point.low if np.isfinite(point.low) else 0.0
+
+
+def generate_command(scenario: str, seed: int, settings: Iterable[str], out: str) -> str:
+    """Returns the command that generates one scene; of several settings of a key the last one counts."""
+    last = {text.partition("=")[0].strip(): text for text in settings}
+    words = ["flockscope", "generate", scenario, "--seeds", f"{seed}:{seed + 1}", "--out", out]
+    return shlex.join([*words, *(word for text in last.values() for word in ("--set", text))])
 
 
 def _content(source: Source) -> bytes:

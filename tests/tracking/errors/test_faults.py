@@ -7,8 +7,7 @@ from functools import cache
 import pytest
 
 from benchmarks.faults.__main__ import COLUMNS, measure
-from benchmarks.faults.groups import GROUPS
-from benchmarks.faults.people import PEOPLE
+from benchmarks.faults.groups import FAULTS
 from benchmarks.faults.scene import FaultScene, scene
 
 FPS = 5.0
@@ -27,7 +26,7 @@ def made(name: str) -> FaultScene:
 
 @pytest.mark.parametrize(
     ("fault", "whole"),
-    [*((fault, False) for fault in {**PEOPLE, **GROUPS}), ("missed group", True), ("engulfed group", True)],
+    [*((fault, False) for fault in FAULTS), ("missed group", True), ("engulfed group", True)],
 )
 def test_a_fault(fault: str, whole: bool) -> None:
     found = measure([made(SCENE_OF.get(fault, "merge"))], fault, 2, 0, whole)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sim.geometry.polygons import iou_matrix
-from sim.truth.group_hulls import frame_groups
+from sim.truth.group_hulls import groups_over_time
 from sim.types import Groups, Tracks, Truth
 from tests.reference_social import (
     gmitre_scores,
@@ -54,6 +54,10 @@ def scene(seed: int, unit: str) -> tuple[Truth, list[Tracks]]:
         np.ones(len(id)), groups=tuple(truths), labelled=np.ones(FRAMES, bool), events=(),
     )  # fmt: skip
     return truth, tracks
+
+
+def frame_groups(id, group, pos, vel) -> Groups:
+    return groups_over_time(np.zeros(len(id), np.int64), id, group, pos, vel, 0, 1)[0]
 
 
 def answer(index: int, id, group, pos, unit: str) -> Tracks:

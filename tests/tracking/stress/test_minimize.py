@@ -306,3 +306,26 @@ def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, c
     monkeypatch.chdir("elsewhere")
     assert run(["minimize", "../tracks", *line]) == 2
     assert "recordings cannot be made smaller" in json.loads(capsys.readouterr().out)["error"]["remedy"]
+
+
+CRASHES = """
+class Crashes:
+    needs = ("points",)
+
+    def reset(self, context, seed):
+        pass
+
+    def step(self, frame, detections):
+        raise ValueError("no")
+"""
+
+
+@pytest.mark.parametrize("condition", ["crash", "IDSW>=0"])
+def test_a_tracker_that_raises_fails_if_that_is_the_condition(condition: str, tmp_path: Path) -> None:
+    (tmp_path / "crashes.py").write_text(CRASHES)
+    subject = Subject(f"{tmp_path / 'crashes.py'}:Crashes", "c")
+    failure = parse_failure(condition)
+    outcome = play_episode(
+        EpisodeOf(subject, failure, load("merge", set=("duration=4", "camera.fps=4", "event=[]")), 0)
+    )
+    assert (outcome.problem is None) == failure.holds(outcome) == (condition == "crash")

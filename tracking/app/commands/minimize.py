@@ -18,7 +18,7 @@ from tracking.app.command_options import MinimizeOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import empty_table, number
 from tracking.app.progress import ProgressMeter
-from tracking.stress.failures import EpisodeOf, Outcome, Subject, parse_failure, play_episode
+from tracking.stress.failures import CRASH, EpisodeOf, Outcome, Subject, parse_failure, play_episode
 from tracking.stress.minimize import Search
 from tracking.stress.reductions import OBSTACLES, difficulties, table_of
 
@@ -214,6 +214,9 @@ def _write_page(path: Path, episode: EpisodeOf) -> None:
     from tracking.app.report.moments import shown_errors
 
     sequence = episode.sequence()
+    if episode.failure.kind == CRASH:
+        write_page(sequence, Run(), path)
+        return
     tracks = episode.subject.run(sequence)
     errors = shown_errors(sequence, tracks).errors
     own = (one.error.start for one in errors if one.error.kind == episode.failure.kind)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -25,7 +24,7 @@ from tracking.stress.axes import parse_axes
 from tracking.stress.curves import BreakingPoint
 from tracking.stress.episodes import ORACLE, Store, contender, scene_player
 from tracking.stress.search import Failure, search, worst
-from tracking.stress.sweep import Plan, Sweep
+from tracking.stress.sweep import Plan, Sweep, generate_command
 
 EPISODES, TABLE, RESULT = "episodes.jsonl", "episodes.parquet", "stress.json"
 REPORT = "report.html"
@@ -142,12 +141,11 @@ def _on_axis(plan: Plan, point: BreakingPoint) -> dict[str, float | None]:
 
 def _failure(failure: Failure, place: int) -> dict[str, Any]:
     source = failure.scene.source
-    words = ["flockscope", "generate", failure.scenario, "--seeds", f"{source.seed}:{source.seed + 1}"]
-    words += ["--out", f"worst-{place}", *(word for text in failure.settings for word in ("--set", text))]
+    command = generate_command(failure.scenario, source.seed, failure.settings, f"worst-{place}")
     return {
         "scenario": source.name, "seed": source.seed, "values": failure.scene.values,
         "settings": list(failure.settings), "score": failure.score, "oracle": failure.oracle,
-        "shortfall": failure.shortfall, "number": failure.number, "command": shlex.join(words),
+        "shortfall": failure.shortfall, "number": failure.number, "command": command,
     }  # fmt: skip
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError, counted
 from sim.io.files.own_files import output_paths, refuse_foreign_file
@@ -19,6 +21,9 @@ from tracking.app.commands.scored_sequence import ScoringJob, read_runs
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import OpenedAs
 from tracking.app.stored_tracks import find_tracks, match_tracks
+
+if TYPE_CHECKING:
+    from tracking.errors.found import RunErrors
 
 INDEX = "index.html"  # the report in the folder of the pages
 
@@ -47,8 +52,7 @@ def view(options: ViewOptions) -> CommandResult:
             remedy="give one run, or one sequence",
         )  # fmt: skip
     reported = bool(names) and unlabelled is None and _can_report(options.out / INDEX, alone=len(names) > 1)
-    pages = _pages(options, sequences, names) if len(names) < 2 else CommandResult({"files": []})
-    return _report(options, sequences, names, pages) if reported else pages
+    return _report(options, sequences, names) if reported else _pages(options, sequences, names)
 
 
 def _can_report(index: Path, alone: bool) -> bool:
@@ -66,7 +70,13 @@ def _can_report(index: Path, alone: bool) -> bool:
     return True
 
 
-def _pages(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str]) -> CommandResult:
+def _pages(
+    options: ViewOptions,
+    sequences: list[Sequence],
+    names: Mapping[str, str],
+    known: Mapping[str, RunErrors] = MappingProxyType({}),
+) -> CommandResult:
+    """Writes the page of each sequence; known: errors of the only run, by sequence, if they have been found."""
     from tracking.app.replay_page.page import Run, write_page
     from tracking.app.replay_page.video import page_video
     from tracking.app.report.moments import shown_errors
@@ -76,7 +86,8 @@ def _pages(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, 
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
         given = read_runs(sequence, ScoringJob(runs.get(sequence.name, ())))
-        shown = [Run(run, shown_errors(sequence, run).errors, word) for word, run in zip(words, given, strict=True)]
+        errors = [known.get(sequence.name) or shown_errors(sequence, run) for run in given]
+        shown = [Run(run, own.errors, word) for word, run, own in zip(words, given, errors, strict=True)]
         first, other = shown[0] if shown else Run(), shown[1] if len(shown) > 1 else None
         write_page(sequence, first, path, video=page_video(sequence, path, options.video, step), other=other)
 
@@ -84,17 +95,21 @@ def _pages(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, 
     return _write_each("view", sequences, options.out, ".html", write, pictures)
 
 
-def _report(
-    options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str], pages: CommandResult
-) -> CommandResult:
-    """Writes index.html: the report on all runs, which links to the pages of the sequences, if there are any."""
-    from tracking.app.report.of_runs import report_of_runs
+def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str]) -> CommandResult:
+    """Writes index.html, the report on all runs; for one run it links to the pages of the sequences."""
+    from tracking.app.report.of_runs import judged_runs, report_of_runs
     from tracking.app.report.page import write_report
 
-    index = options.out / INDEX
+    index, pages = options.out / INDEX, CommandResult({"files": []})
+    if len(names) == 1:
+        _files(sequences, options.out, ".html")  # refuses files of others before anything is tracked
     source = OpenedAs(options.source, options.fps, options.px_per_m, options.camera, images=False)
+    found = judged_runs(names, sequences, source, options.workers)
+    if len(names) == 1:
+        known = {sequence.name: one.errors[0] for sequence, one in zip(sequences, found, strict=True)}
+        pages = _pages(options, sequences, names, known)
     files = {sequence.name: path.name for sequence, path in zip(sequences, pages.data["files"], strict=False)}
-    write_report(report_of_runs(names, sequences, source, options.by, options.workers, files), index)
+    write_report(report_of_runs([*names], sequences, found, options.by, files), index)
     return CommandResult({"files": [index, *pages.data["files"]]}, f"{index}\n{pages.text}".rstrip())
 
 

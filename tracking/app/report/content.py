@@ -104,6 +104,7 @@ class Moment:
     kind: str  # of the dearest error, "" without one
     words: str
     replay: str | None  # page data as text for a script element; None: it was left out
+    command: str = ""  # generates the sequence, "" for a given one
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,7 @@ class Candidate:
     score: float
     best: float  # the oracle's score
     rival: str  # the best other tracker there, "" without one
+    command: str = ""  # generates the sequence
 
     @property
     def shortfall(self) -> float:
@@ -45,7 +46,7 @@ class Candidate:
         return (1.0 if self.best != self.best else self.best) - self.score
 
 
-Runs = Callable[[Candidate], tuple[Sequence, TrackingRun, TrackingRun | None]]  # the sequence, its run, the rival's
+Runs = Callable[[Candidate], tuple[Sequence, Run, Run | None]]  # the sequence, its run, the rival's
 
 
 def chosen(candidates: SequenceOf[Candidate], most: int = MOST) -> list[Candidate]:
@@ -64,34 +65,29 @@ def chosen(candidates: SequenceOf[Candidate], most: int = MOST) -> list[Candidat
     return sorted(shown, key=lambda one: -one.shortfall)
 
 
-def moments(candidates: SequenceOf[Candidate], runs: Runs) -> list[tuple[Moment, RunErrors]]:
-    """Returns the worst moments with the errors of their runs; replays as far as the report stays small."""
+def moments(candidates: SequenceOf[Candidate], runs: Runs) -> list[Moment]:
+    """Returns the worst moments, with replays as far as the report stays small; runs: with costs of their errors."""
     found, size = [], 0
     for one in chosen(candidates):
-        moment, every = _moment(one, *runs(one))
+        moment = _moment(one, *runs(one))
         size += len(moment.replay or "")
-        found.append((moment if size <= BYTES else replace(moment, replay=None), every))
+        found.append(moment if size <= BYTES else replace(moment, replay=None))
     return found
 
 
-def _moment(
-    one: Candidate, sequence: Sequence, run: TrackingRun, rival: TrackingRun | None
-) -> tuple[Moment, RunErrors]:
-    every = shown_errors(sequence, run, COSTS, causes=True)
-    errors = every.errors
-    dearest = max(errors, key=lambda error: error.cost or 0.0, default=None)
-    length = sequence.length or len(run)
+def _moment(one: Candidate, sequence: Sequence, run: Run, rival: Run | None) -> Moment:
+    dearest = max(run.errors, key=lambda error: error.cost or 0.0, default=None)
+    length = sequence.length or len(run.tracks or ())
     first, last = (1, length) if dearest is None else (dearest.error.start, dearest.error.end)
     around, longest = round(AROUND * sequence.fps), round(LONGEST * sequence.fps)
     low = max(first - around, 1)
     span = low, min(last + around, low + longest, length)
     start = max(first - round(sequence.fps), low)
-    other = None if rival is None else Run(rival, shown_errors(sequence, rival).errors, one.rival)
-    data = page_data(sequence, Run(run, errors, one.name), other, span=span, start=start)
+    data = page_data(sequence, run, rival, span=span, start=start)
     data["background"], data["video"] = _background(sequence), None
     kind, words = ("", "") if dearest is None else (dearest.error.kind, _words(dearest))
     known = (one.name, one.scenario, one.sequence, one.score, one.best)
-    return Moment(*known, (first - 1) / sequence.fps, kind, words, script_json(data)), every
+    return Moment(*known, (first - 1) / sequence.fps, kind, words, script_json(data), one.command)
 
 
 def cause_bars(found: SequenceOf[tuple[str, RunErrors]]) -> list[CauseBar]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,46 +15,54 @@ from tracking.app.commands.score_ranking import RankedRuns, rank_words, ranked_r
 from tracking.app.commands.score_tables import SIMILARITY
 from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, read_runs, score_runs
 from tracking.app.progress import ProgressMeter
+from tracking.app.replay_page.page import Run
 from tracking.app.report.content import HeatCell, HeatMap, RankedRow, Report, Speed
-from tracking.app.report.moments import Candidate, cause_bars, moments, shown_errors
+from tracking.app.report.moments import COSTS, Candidate, cause_bars, moments, shown_errors
 from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.errors.found import RunErrors
-from tracking.running.run import TrackingRun
 
 
 @dataclass(frozen=True)
-class _Found:
+class JudgedRuns:
+    """The scores and errors of all runs on a sequence."""
+
+    job: ScoringJob
     scored: ScoredSequence
     errors: list[RunErrors]  # of each run
 
 
-def report_of_runs(
-    names: Mapping[str, str],
-    sequences: list[Sequence],
-    source: OpenedAs,
-    by: str | None,
-    workers: int,
-    files: Mapping[str, str],
-) -> Report:
-    """Returns the report on runs, by name the text of the command line: stored tracks or a tracker class.
-
-    files: by sequence, the address of its page.
-    """
+def judged_runs(
+    names: Mapping[str, str], sequences: list[Sequence], source: OpenedAs, workers: int
+) -> list[JudgedRuns]:
+    """Returns scores and errors of runs, by name the text of the command line: stored tracks or a tracker class."""
     runs = stored_runs(names, sequences)
     jobs = [ScoringJob(sources, oracles=True) for sources in zip(*runs, strict=True)]
-    found: list[_Found] = []
+    found: list[JudgedRuns] = []
     with ProgressMeter("report", len(sequences)) as meter:
-        for one in over_sequences(_find, sequences, jobs, source, workers):
+        for one in over_sequences(_judge, sequences, jobs, source, workers):
             meter.step(sequences[len(found)].name)
             found.append(one)
+    return found
+
+
+def report_of_runs(
+    names: SequenceOf[str],
+    sequences: list[Sequence],
+    found: SequenceOf[JudgedRuns],
+    by: str | None,
+    files: Mapping[str, str],
+) -> Report:
+    """Returns the report on runs; files: by sequence, the address of its page."""
     ranked = ranked_runs(list(names), sequences, [one.scored for one in found], by, [])
     candidates = list(_candidates(ranked))
 
-    def tracked(one: Candidate) -> tuple[Sequence, TrackingRun, TrackingRun | None]:
+    def replayed(one: Candidate) -> tuple[Sequence, Run, Run | None]:
         k = ranked.comparison.sequences.index(one.sequence)
-        wanted = [name for name in (one.name, one.rival) if name]
-        job = ScoringJob(tuple(jobs[k].sources[list(names).index(name)] for name in wanted))
-        run, *rival = read_runs(sequences[k], job)
+        places = [names.index(name) for name in (one.name, one.rival) if name]
+        tracks = read_runs(sequences[k], replace(found[k].job, sources=tuple(found[k].job.sources[r] for r in places)))
+        run, *rival = (
+            Run(tracked, found[k].errors[r].errors, names[r]) for r, tracked in zip(places, tracks, strict=True)
+        )
         return sequences[k], run, rival[0] if rival else None
 
     c = ranked.comparison
@@ -65,7 +73,7 @@ def report_of_runs(
         heat=_heat(ranked) if len(ranked.scenarios) > 1 else None,
         causes=cause_bars([(name, one.errors[k]) for k, name in enumerate(c.runs) for one in found]),
         causes_about="What the repair of the errors of one kind and cause adds, mean over the sequences.",
-        speeds=list(_speeds(ranked, found)), moments=[moment for moment, _ in moments(candidates, tracked)],
+        speeds=list(_speeds(ranked, found)), moments=moments(candidates, replayed),
         sequences=[
             (one.sequence, files[one.sequence], one.score)
             for one in sorted(candidates, key=lambda one: one.score) if one.sequence in files
@@ -73,9 +81,10 @@ def report_of_runs(
     )  # fmt: skip
 
 
-def _find(sequence: Sequence, job: ScoringJob) -> _Found:
+def _judge(sequence: Sequence, job: ScoringJob) -> JudgedRuns:
     runs = read_runs(sequence, job)
-    return _Found(score_runs(sequence, runs, job), [shown_errors(sequence, run, causes=True) for run in runs])
+    errors = [shown_errors(sequence, run, COSTS, causes=True) for run in runs]
+    return JudgedRuns(job, score_runs(sequence, runs, job), errors)
 
 
 def _ranking(ranked: RankedRuns) -> list[RankedRow]:
@@ -124,7 +133,7 @@ def _candidates(ranked: RankedRuns) -> Iterator[Candidate]:
                 yield Candidate(name, scenario[k], sequence, float(score), _best(ranked, name, k), rival)
 
 
-def _speeds(ranked: RankedRuns, found: SequenceOf[_Found]) -> Iterator[Speed]:
+def _speeds(ranked: RankedRuns, found: SequenceOf[JudgedRuns]) -> Iterator[Speed]:
     rows = {row["run"]: row for row in ranked.table}
     for r, name in enumerate(ranked.comparison.runs):
         speeds = [speed for one in found if (speed := one.scored.infos[r].get("frames_per_second"))]

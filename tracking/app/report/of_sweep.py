@@ -9,17 +9,21 @@ from collections.abc import Sequence as SequenceOf
 import numpy as np
 
 from scenarios.errors import counted
+from scenarios.loading.resolve import rows
 from sim.types import Array, Sequence
 from tracking.app.commands.score_ranking import rank_words
+from tracking.app.replay_page.page import Run
 from tracking.app.report.content import Curve, Curves, Failure, HeatCell, HeatMap, Json, RankedRow, Report, Speed
-from tracking.app.report.moments import Candidate, cause_bars, moments
+from tracking.app.report.moments import COSTS, Candidate, cause_bars, moments, shown_errors
 from tracking.environment.episodes import streams_for
+from tracking.errors.found import RunErrors
 from tracking.ranking import rank
-from tracking.running.run import TrackingRun, track
+from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval
 from tracking.stress.episodes import ORACLE
-from tracking.stress.sweep import Scene, Sweep
+from tracking.stress.sweep import Scene, Sweep, generate_command
+from tracking.tuning.parallel_episodes import opened_sources
 
 CAUSES = "What the repair of the errors of one kind and cause adds, mean over the sequences of the worst moments."
 
@@ -33,13 +37,14 @@ def report_of_sweep(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Report:
     scenes = [*sweep.scenes.values()]
     easy = scenes if searched or not plan.axes else [s for s in scenes if s.values == sweep.values[0]]
     candidates = dict(_candidates(sweep, scenes))
-    shown = moments([*candidates], lambda one: _replay(sweep, one, candidates[one]))
+    errors: list[tuple[str, RunErrors]] = []
+    shown = moments([*candidates], lambda one: _replay(sweep, one, candidates[one], errors))
     return Report(
         title=f"Stress of {', '.join(sweep.trackers)}", about=_about(sweep, data), by=plan.by,
         ranking=[] if searched else list(_ranking(sweep, easy)), ranking_words=_ranking_words(sweep, easy),
         heat=_scenarios(sweep, easy), curves=_curves(sweep, data, words), matrices=list(_matrices(sweep, data)),
-        causes=cause_bars([(one.name, errors) for one, errors in shown]), causes_about=CAUSES,
-        speeds=list(_speeds(sweep, easy)), moments=[moment for moment, _ in shown],
+        causes=cause_bars(errors), causes_about=CAUSES,
+        speeds=list(_speeds(sweep, easy)), moments=shown,
         failures=[Failure(row["tracker"], _scene(row), row["failed"], row["traceback"]) for row in data["failures"]],
     )  # fmt: skip
 
@@ -140,20 +145,30 @@ def _speeds(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[Speed]:
 
 
 def _candidates(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[tuple[Candidate, Scene]]:
+    entries = {entry.name: entry for name in sweep.plan.scenarios for entry in rows(name)}
     for scene in scenes:
         scores = {name: sweep.score(name, scene) for name in sweep.trackers}
-        rows = {name: sweep.row(name, scene) for name in sweep.trackers}
-        known = [name for name, row in rows.items() if row and not row["failed"] and math.isfinite(scores[name])]
+        played = {name: sweep.row(name, scene) for name in sweep.trackers}
+        known = [name for name, row in played.items() if row and not row["failed"] and math.isfinite(scores[name])]
+        entry = entries.get(scene.source.name)  # None of a copy, which no command generates alone
+        settings = () if entry is None else (*entry.settings, *sweep.plan.settings_at(scene.values))
+        command = "" if entry is None else generate_command(entry.scenario, scene.source.seed, settings, "worst")
         for name in known:
-            words = _scene(rows[name] or {})
+            words = _scene(played[name] or {})
             rival = max((other for other in known if other != name), key=scores.__getitem__, default="")
             best = sweep.score(ORACLE, scene)
-            yield Candidate(name, scene.source.name, words, scores[name], best, rival), scene
+            yield Candidate(name, scene.source.name, words, scores[name], best, rival, command), scene
 
 
-def _replay(sweep: Sweep, one: Candidate, scene: Scene) -> tuple[Sequence, TrackingRun, TrackingRun | None]:
-    mode, trackers = sweep.plan.detections, [sweep.trackers[name].tracker for name in (one.name, one.rival) if name]
+def _replay(
+    sweep: Sweep, one: Candidate, scene: Scene, found: list[tuple[str, RunErrors]]
+) -> tuple[Sequence, Run, Run | None]:
+    """Returns the tracks of a candidate and its rival; the errors of the candidate are added to `found`."""
+    mode, names = sweep.plan.detections, [name for name in (one.name, one.rival) if name]
+    trackers = [sweep.trackers[name].tracker for name in names]
     streams = dict.fromkeys(stream for tracker in trackers for stream in streams_for(tracker, mode))
-    sequence = scene.source.open(tuple(streams))
-    run, *rival = (track(tracker, sequence, detections=mode, seed=scene.source.seed) for tracker in trackers)
-    return sequence, run, rival[0] if rival else None
+    sequence = opened_sources().open(scene.source, tuple(streams)).sequence  # it may be open still
+    runs = [track(tracker, sequence, detections=mode, seed=scene.source.seed) for tracker in trackers]
+    found.append((one.name, shown_errors(sequence, runs[0], COSTS, causes=True)))
+    rivals = [Run(run, shown_errors(sequence, run).errors, one.rival) for run in runs[1:]]
+    return sequence, Run(runs[0], found[-1][1].errors, one.name), rivals[0] if rivals else None

@@ -89,9 +89,9 @@ def test_moments_are_shared_among_trackers_and_scenarios() -> None:
 
 def test_a_report_stays_small(monkeypatch: pytest.MonkeyPatch) -> None:
     made = Moment("a", "merge", "merge-s0", 0.5, 0.9, 0.0, "switch", "words", "x" * 3_000_000)
-    monkeypatch.setattr(moments, "_moment", lambda *_: (made, None))
+    monkeypatch.setattr(moments, "_moment", lambda *_: made)
     chosen_ones = [candidate("a", "merge", k / 10) for k in range(4)]
-    found = [one for one, _ in moments.moments(chosen_ones, lambda one: ())]  # type: ignore[return-value, arg-type]
+    found = moments.moments(chosen_ones, lambda one: ())  # type: ignore[return-value, arg-type]
     assert [one.replay is None for one in found] == [False, False, True, True]
     page = report_html(replace(EMPTY, moments=found))
     assert page.count('id="moment-') == 2
