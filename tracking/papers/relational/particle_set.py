@@ -152,6 +152,13 @@ class ParticleSet:
         related[np.searchsorted(key, kept)] = self.related
         self.pairs, self.related = np.stack([key % LARGEST, key // LARGEST], axis=1), related
 
+    def close_groups(self) -> None:
+        """Relate all members of each group, the connected components of a particle's relations, to each other."""
+        label, some = self.labels(), np.empty((1, self.people), np.int64)
+        particle_set_kernels.group_labels(self.pairs, self.related.any(axis=1, keepdims=True), some)
+        self.hold(np.argwhere(np.triu(some == some.T, 1)))
+        self.related[:] = (label[:, self.pairs[:, 0]] == label[:, self.pairs[:, 1]]).T
+
     def drop_strangers(self) -> None:
         """Keep no relation of pairs that walk together in no particle."""
         rows = self.related.any(axis=1)

@@ -68,6 +68,7 @@ from tracking.papers.relational.config import (
     BIRTH_DOUBT,
     BODY_RADIUS,
     KERNEL_WIDTH,
+    LEAST_EXISTENCE,
     NEWCOMER_SHARE,
     RESAMPLE_SHARE,
     SPEED_PRIOR,
@@ -116,8 +117,7 @@ class Particle(PointTracker):
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
     the people; streams, the random numbers of each person; hidden (K,): probability that each person is behind a known
     pillar or wall, or behind another person; cut (K,): that the feet are behind another person; shown: the tracks
-    reported last, None before; vanished: number of frames in which all weights were 0; health: how many particles the
-    weights are worth.
+    reported last, None before; health: how many particles the weights are worth.
     """
 
     config_class: ClassVar[type[ParticleConfig]] = ParticleConfig
@@ -134,7 +134,7 @@ class Particle(PointTracker):
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
         self.streams = PersonStreams(seed)
         self.hidden = np.zeros(0)
-        self.vanished, self.health = 0, ParticleHealth(context.fps, "effective_particles_of_a_person")
+        self.health = ParticleHealth(context.fps, "effective_particles_of_a_person")
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the people of the frame as Tracks; updates all particles.
@@ -191,7 +191,6 @@ class Particle(PointTracker):
         missed = self.slots.missed > 0
         sight = sensor.Sight(self._detection_probability(), missed, self.cut, self.eye)
         said = sensor.weigh(self.particles, points, sight, self.noise, self.config)
-        self.vanished += said.vanished
         if self.particles.people:
             least = float(self.particles.effective().min())
             self.health.add("effective_particles_of_a_person", least / self.particles.count)
@@ -208,8 +207,7 @@ class Particle(PointTracker):
         return np.asarray(np.where(self.slots.missed > 0, again, c.detect_prob) * visible)
 
     def _remove(self) -> None:
-        c = self.config
-        keep = (self.particles.existence >= c.least_existence) & (self.slots.missed <= c.time_window + 1e-9)
+        keep = (self.particles.existence >= LEAST_EXISTENCE) & (self.slots.missed <= self.config.time_window + 1e-9)
         if not keep.all():
             self._keep(keep)
 
@@ -301,6 +299,8 @@ class Relational(Particle):
             rules = np.where(np.isin(range(4), (DISTANCE, VELOCITY)), 0.0, rules)
         uniforms = self.streams.uniforms(RELATIONS, self.slots.key, p.count, 2)
         transition_kernels.relate(p.pos, p.vel, p.pairs, p.related, odds, uniforms, rules)
+        if self.belief is None:
+            p.close_groups()
 
     def _follow(self, state: Array) -> None:
         if self.belief is not None:
