@@ -18,6 +18,9 @@ from tracking.papers.relational.association_sums_kernels import (
     sparse_sum,
 )
 
+NOTHING = 1e-20
+"""Pairs of complete mappings that are less probable than those of the best mapping by this factor are left out."""
+
 
 @njit(cache=True)
 def densities(
@@ -195,7 +198,8 @@ def _complete_component(pos, points, sd, rows, columns, first, logs, marginals):
         for b in range(m):
             spare[b] = math.exp(v[b])
             for a in range(n):
-                W[a, b] = math.exp(u[a] + v[b] - W[a, b])
+                weight = math.exp(u[a] + v[b] - W[a, b])
+                W[a, b] = weight if weight > NOTHING else 0.0  # so that people are not linked, and the sum is cheap
         logs[p, 0] += sparse_sum(W, np.zeros(n), spare, found) - u.sum() - v.sum()
         for a in range(n):
             for b in range(m):

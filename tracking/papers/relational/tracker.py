@@ -152,7 +152,9 @@ class Particle(PointTracker):
         self.shown = tracks = self._report(frame)
         if detections is not None:
             one = self.particles.one_weight
-            self.particles.resample(1.0 if one else RESAMPLE_SHARE, 0.0 if one else KERNEL_WIDTH, self._own_draws)
+            few = self.particles.resample(1.0 if one else RESAMPLE_SHARE, self._uniforms)
+            if not one and len(few):
+                self.particles.spread(few, KERNEL_WIDTH, self._normals(few))
             self.health.resampled(self.particles.ancestor)
         return tracks
 
@@ -223,13 +225,12 @@ class Particle(PointTracker):
         self.slots.extend(id=np.full(len(key), -1), size=sizes, key=key)
         self._relate_newcomers(points)
 
-    def _own_draws(self, people: Ints) -> tuple[Array, Array]:
-        count, key = self.particles.count, self.slots.key[people]
-        uniforms, normals = (
-            self.streams.uniforms(RESAMPLING, key, 1, count),
-            self.streams.normals(SPREAD, key, 1, 4 * count),
-        )
-        return uniforms[0], normals.reshape(len(key), 4, count)
+    def _uniforms(self, people: Ints) -> Array:
+        return self.streams.uniforms(RESAMPLING, self.slots.key[people], 1, self.particles.count)[0]
+
+    def _normals(self, people: Ints) -> Array:
+        key, count = self.slots.key[people], self.particles.count
+        return self.streams.normals(SPREAD, key, 1, 4 * count).reshape(len(key), 4, count)
 
     def _relate_newcomers(self, points: Array) -> None: ...
 

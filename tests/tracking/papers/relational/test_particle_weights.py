@@ -60,7 +60,7 @@ def test_people_get_weights_of_their_own_only_after_resampling():
     particles.share_weights(False)
     assert particles.one_weight
     assert np.array_equal(particles.weights, before)
-    particles.resample(1.0, 0.0, drawn(particles, np.random.default_rng(0)))
+    particles.resample(1.0, drawn(particles, np.random.default_rng(0)))
     particles.share_weights(False)
     assert not particles.one_weight
 
@@ -73,7 +73,7 @@ def test_a_person_is_resampled_alone_and_takes_the_own_relations():
     particles.weights[:, 0] = few / 40
     old = {tuple(x) for x in particles.pos[few, 0]}
     others = particles.pos[:, 1:].copy()
-    particles.resample(0.9, 0.0, drawn(particles, np.random.default_rng(0)))
+    particles.resample(0.9, drawn(particles, np.random.default_rng(0)))
     assert {tuple(x) for x in particles.pos[:, 0]} <= old
     assert np.array_equal(particles.pos[:, 1:], others)
     assert particles.pairs.tolist() == [[0, 1], [1, 2]]
@@ -115,7 +115,9 @@ def test_the_kernel_keeps_the_moments_and_draws_equal_particles_apart():
     particles = three(20_000)
     particles.pos[:] = particles.pos[np.random.default_rng(5).integers(0, 20, 20_000)]
     before = [np.cov(particles.pos[:, 0].T), particles.pos[:, 0].mean(axis=0)]
-    particles.resample(1.0, 1.0, drawn(particles, np.random.default_rng(6)))
+    rng = np.random.default_rng(6)
+    few = particles.resample(1.0, drawn(particles, rng))
+    particles.spread(few, 1.0, rng.standard_normal((len(few), 4, particles.count)))
     assert len(np.unique(particles.pos[:, 0, 0])) == 20_000
     np.testing.assert_allclose(particles.pos[:, 0].mean(axis=0), before[1], atol=0.003)
     np.testing.assert_allclose(np.cov(particles.pos[:, 0].T), before[0], rtol=0.05, atol=3e-4)

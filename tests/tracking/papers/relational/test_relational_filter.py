@@ -167,7 +167,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
         particles.pos[:, 1] = 1e6  # never near the detection
         if seen:
             sensor.weigh(particles, points, sight([0.9, 0.0], [False, True]), r, config)
-            particles.resample(1.0, 0.0, drawn(particles, rng))
+            particles.resample(1.0, drawn(particles, rng))
         out.append(particles.vel[:, 1].var(axis=0).mean())
     return np.array(out)
 
