@@ -46,6 +46,15 @@ def test_presets_run_over_scenarios(scenario: str) -> None:
         run(tracker, preset, sequence, 30, "file")
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", scenario_names())
+def test_presets_run_over_pictures(scenario: str) -> None:
+    settings = ["camera.fps=5", "camera.image=[160,120]"]
+    sequence = simulate(load(scenario, settings), 40_001, 0, ("left", "right", "background"))
+    for tracker, preset in PRESETS:
+        run(tracker, preset, sequence, 12, "image")
+
+
 RECORDINGS = (
     "biwi/seq_hotel", "biwi/zara01", "caviar/mwt1gt.xml", "mot/PETS09-S2L1-first200", "mot/TUD-Campus",
     "mot/AVG-TownCentre-first225",

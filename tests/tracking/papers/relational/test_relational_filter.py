@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -53,6 +54,11 @@ def stepped(tracker, fps, *frames, seed=0):
         found = None if points is None else detections(k, *points)
         out.append(tracker.step(Frame(k, (k - 1) / fps), found))
     return out
+
+
+def first(sequence, length):
+    """The first frames of a sequence."""
+    return dataclasses.replace(sequence, frames=lambda: islice(sequence.frames(), length), bare=None, length=length)
 
 
 def placed(count, pos, vel=None, exist=1.0):
@@ -299,6 +305,37 @@ def test_velocities_of_partners_approach_each_other_with_the_time_constant():
         np.testing.assert_allclose(a - b, np.array([2, -1]) / np.e, rtol=1e-12)
         np.testing.assert_allclose((a + b) / 2, [1, 0.5], rtol=1e-12)
         assert alone.tolist() == [1, 1]
+
+
+def test_all_members_of_a_particles_group_have_its_mean_velocity():
+    """Sec. 3.2; also those who are related by way of others, and in each particle by its own relations."""
+    particles = placed(3, [[0, 0], [0, 1], [0, 2], [0, 9]], [[3, 0], [0, 0], [0, 3], [1, 1]])
+    relate(particles, 0, 1, np.array([True, True, False]))
+    relate(particles, 1, 2, np.array([True, False, False]))
+    particles.close_groups()
+    assert particles.pairs.tolist() == [[0, 1], [0, 2], [1, 2]]
+    move(particles, np.zeros((3, 4, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), AT_ONCE, 1.0)
+    expected = np.array([
+        [[1, 1], [1, 1], [1, 1], [1, 1]], [[1.5, 0], [1.5, 0], [0, 3], [1, 1]], [[3, 0], [0, 0], [0, 3], [1, 1]],
+    ])  # fmt: skip
+    np.testing.assert_allclose(particles.vel, expected, rtol=1e-12)
+
+
+def test_the_preset_keeps_groups_closed():
+    """No member of a group is related to a part of it alone, after each frame."""
+    scene = simulate(load("queue", ["camera.fps=5"]), 40_002, 0, ())
+    config = RelationalConfig.preset("paper").with_set("particles=100")
+    ready = prepare("relational", first(scene, 40), detections="file", params=config)
+    ready.reset(0)
+    largest = 0
+    for frame in ready.frames():
+        ready.step(frame)
+        made = relations(ready.tracker.particles)
+        closed = made | np.eye(made.shape[1], dtype=bool)
+        steps = closed.astype(int) @ closed.astype(int) > 0
+        assert np.array_equal(steps, closed)
+        largest = max(largest, int(closed.sum(axis=2).max(initial=0)))
+    assert largest > 2
 
 
 def test_partners_count_by_how_alike_they_are():
