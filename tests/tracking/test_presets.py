@@ -62,6 +62,7 @@ RECORDINGS = {
 """Recordings with labels, and their frame rates."""
 
 
+@pytest.mark.filterwarnings("ignore:.*scores from:UserWarning")
 @pytest.mark.parametrize("recording", RECORDINGS)
 @pytest.mark.parametrize(("tracker", "preset"), PRESETS)
 def test_presets_run_over_recordings(shared_data: Path, recording: str, tracker: str, preset: str) -> None:
