@@ -48,9 +48,5 @@ def relate(particles, i, j, where=True):
 
 
 def drawn(particles, rng):
-    """Random numbers for `resample`, from one generator."""
-
-    def draws(people):
-        return rng.random((len(people), particles.count)), rng.standard_normal((len(people), 4, particles.count))
-
-    return draws
+    """Uniform numbers for `resample`, from one generator."""
+    return lambda people: rng.random((len(people), particles.count))

@@ -2,9 +2,9 @@
 
     python -m benchmarks.relational MODE [--seeds a:b] [--counts 500,1000,…] [--set k=v]… [--params PRESET]
 
-particles    the paper's Fig. 7: error of both filters against the number of particles, on the suite occlusion. The
-             detections are those of the simulated detector, whose foot points are displaced by partial occlusion. The
-             baseline's noise is the best of three for each number, on training seeds; --chart FILE.svg
+particles    the paper's Figs 7 and 8: errors of both filters, from the preset paper and by default, against the number
+             of particles, on the suite occlusion. As in the paper, every visible person is detected and nobody else,
+             and feet are displaced by partial occlusion; intervals are over the filter seeds; --chart FILE.svg
 hidden       error of one of two people who walk together while nobody sees this one, against the length of the
              occlusion; --chart FILE.svg
 recordings   error of one member of each labelled group in three recordings (--recordings) who is not detected for 2 s
@@ -13,10 +13,10 @@ groups       scores of people, groups and events on a suite, beside `blob`; grou
 ablation     errors, HOTA, IDF1, group and pairwise F1 without each departure from the paper that has a parameter, and
              differences to the defaults
 
-The error of a frame is the sum, over the true people, of the distance to the track that an optimal assignment gives
-them, at most 2 m, which is also the cost of a missing track. Both filters have the same detections and the same seeds;
-the filter's seed is that of the scene, and further ones with --filter-seeds. Differences are paired, with 95 %
-intervals of means over seeds.
+The error is the mean, over true people and frames, of the distance to the track that an optimal assignment gives them,
+at most 2 m, which is also the cost of a missing track. Both filters have the same detections and the same seeds. The
+filter's seed is that of the scene, and further ones with --filter-seeds; in mode particles those alone. Differences are
+paired, with 95 % intervals of means over seeds.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def main() -> None:
     }  # fmt: skip
     parser.add_argument("mode", choices=modes)
     add_seeds(parser, "20000:20030")
-    add_seeds(parser, "0:1", "--filter-seeds", "modes groups and ablation: of the filter, beside that of the scene; ")
+    add_seeds(parser, "0:1", "--filter-seeds", "modes particles, groups and ablation: of the filter; ")
     parser.add_argument("--counts", type=lambda x: [int(n) for n in x.split(",")], default=[500, 1000, 2000, 4000])
     parser.add_argument("--set", action="append", default=[], metavar="K=V", help="parameters of both filters")
     parser.add_argument("--params", help="preset of both filters, as paper")

@@ -21,12 +21,13 @@ from tracking.papers.relational import sensor_kernels, transition_kernels
 
 DEPARTURES = (
     "relation_evidence=state", "coupling_time=0 common_noise=0", "coupling_time=0", "common_noise=0",
-    "relation_bias=40", "weights=joint", "NO_FACTORS",
+    "relation_bias=40", "detect_prob=1 clutter_density=0", "NO_FACTORS",
     "PAIR_BY_PAIR", "outlier_share=0",
-    "hidden_time=0.3", "noise_scale=1", "least_existence=0",
+    "hidden_time=0.3", "noise_scale=1",
     "clutter_density=0.02",
 )  # fmt: skip
-"""Settings of the ablation beside the defaults. With relation_bias 40 partners count fully. Capitals: of SWITCHES."""
+"""Settings of the ablation beside the defaults. With relation_bias 40 partners count fully; detect_prob 1 and
+clutter_density 0 are the paper's sensor and weights. Capitals: of SWITCHES."""
 
 
 def _pair_by_pair(

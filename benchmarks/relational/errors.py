@@ -15,6 +15,7 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
+from tracking.fitting.relational import LABELS
 from tracking.papers.relational.config import ParticleConfig
 from tracking.running.prepare import prepare
 from tracking.running.tracker_registry import find
@@ -22,10 +23,7 @@ from tracking.stats import mean_interval, paired
 
 FILTERS = ("particle", "relational")
 DIFFERENCE = "relational − particle"
-NOISES = (1.5, 3.0, 6.0)
-"""Values of noise_scale from which the baseline's best is taken for each number of particles."""
-TRAINING = range(700, 703)
-"""Seeds on which it is taken."""
+PRESETS = {"paper": "paper", "default": None}
 HIDDEN = 0.2
 """People who are less visible are never detected: `sensor.min_visibility`."""
 CUT = 2.0
@@ -68,71 +66,42 @@ def config_of(name: str, count: int, given: argparse.Namespace) -> ParticleConfi
     return config.with_set(f"particles={count}", *known)
 
 
-def run(name: str, config: ParticleConfig, seed: int, sequence: Sequence) -> tuple[list[Tracks], int]:
-    """Returns the tracks of a filter whose seed is that of the scene, and the frames with all weights 0."""
+def run(name: str, config: ParticleConfig, seed: int, sequence: Sequence) -> list[Tracks]:
+    """Returns the tracks of a filter of this seed."""
     ready = prepare(name, sequence, params=config, detections="file")
     ready.reset(seed)
-    return [ready.step(frame) for frame in ready.frames()], ready.tracker.vanished
+    return [ready.step(frame) for frame in ready.frames()]
 
 
 def particles(given: argparse.Namespace) -> None:
-    """Prints a table for each scene: rows are numbers of particles, columns both filters and their difference."""
+    """Prints a table for each scene: rows are numbers of particles, columns the errors of both filters."""
     panels = []
-    for entry in (e for e in resolve("suite:occlusion") if not given.entry or e.name in given.entry.split(",")):
-        train = [(seed, simulate(entry.scenario, seed, 0, ())) for seed in TRAINING]
-        test = [(seed, simulate(entry.scenario, seed, 0, ())) for seed in given.seeds]
-        print(f"\n{entry.name}: error per person and frame, m; seeds {given.seeds.start}:{given.seeds.stop}\n")
-        tables.head(
-            ["particles", "noise of the baseline", "particle, RMSE", "relational, RMSE", *FILTERS,
-             DIFFERENCE, "the same, hidden people", "difference of sums, m"]
-        )  # fmt: skip
-        curves: dict[str, list[Array]] = {name: [] for name in (*FILTERS, DIFFERENCE)}
+    for entry in (e for e in resolve("suite:occlusion", LABELS) if not given.entry or e.name in given.entry.split(",")):
+        scenes = [simulate(entry.scenario, seed, 0, ()) for seed in given.seeds]
+        print(f"\n{entry.name}: error per person and frame, m; seeds {given.seeds.start}:{given.seeds.stop}, "
+              f"filter seeds {given.filter_seeds.start}:{given.filter_seeds.stop}\n")  # fmt: skip
+        tables.head(["particles", *(f"{name}, {preset}" for preset in PRESETS for name in (*FILTERS, DIFFERENCE))])
+        curves: dict[str, list[Array]] = {}
         for count in given.counts:
-            base = config_of("particle", count, given)
-            tried = {
-                noise: float(np.mean([_mean_error(base.with_set(f"noise_scale={noise}"), *scene) for scene in train]))
-                for noise in NOISES
-            }
-            noise = min(tried, key=tried.__getitem__)
-            compared = {name: np.array(values) for name, values in _compare(count, noise, test, given).items()}
-            for name, values in compared.items():
-                curves[name].append(np.array(mean_interval(values)))
-            curves[DIFFERENCE].append(np.array(paired(*(compared[name] for name in FILTERS))))
+            cells = []
+            for preset in PRESETS:
+                found = {name: _errors_by_seed(name, count, preset, scenes, given) for name in FILTERS}
+                cells += [tables.interval(*map(float, mean_interval(values))) for values in found.values()]
+                cells.append(_difference(found))
+                for name, values in found.items():
+                    curves.setdefault(f"{name}, {preset}", []).append(np.array(mean_interval(values)))
+            tables.row([str(count), *cells])
         shown = {name: tuple(np.array(values).T) for name, values in curves.items()}
-        apart = {DIFFERENCE: shown.pop(DIFFERENCE)}
         panels.append(chart.Panel(f"{entry.name}: error, m", given.counts, shown, "particles"))
-        panels.append(chart.Panel(f"{entry.name}: difference of errors, m", given.counts, apart, "particles"))
     if given.chart:
         chart.lines(panels, given.chart)
 
 
-def _mean_error(config: ParticleConfig, seed: int, sequence: Sequence) -> float:
-    return float(errors(sequence.truth, run("particle", config, seed, sequence)[0]).mean())
-
-
-def _compare(
-    count: int, noise: float, test: list[tuple[int, Sequence]], given: argparse.Namespace
-) -> dict[str, list[float]]:
-    """Prints a row of the table and returns the mean errors of the sequences of each filter."""
-    mean, square, hidden, total = ({name: [] for name in FILTERS} for _ in range(4))
-    for seed, sequence in test:
-        assert sequence.truth.visibility is not None
-        away = sequence.truth.visibility < HIDDEN
-        for name in FILTERS:
-            config = config_of(name, count, given)
-            config = config.with_set(f"noise_scale={noise}") if name == "particle" else config
-            found = errors(sequence.truth, run(name, config, seed, sequence)[0])
-            mean[name].append(found.mean())
-            square[name].append((found**2).mean())
-            total[name].append(found.sum())
-            hidden[name].append(found[away].mean() if away.any() else np.nan)
-    gone = np.isfinite(hidden["particle"])
-    tables.row(
-        [str(count), f"{noise:g}", *(f"{np.sqrt(np.mean(square[n])):.3f}" for n in FILTERS),
-         *(tables.interval(*map(float, mean_interval(np.array(mean[n])))) for n in FILTERS),
-         _difference(mean), _difference({n: np.array(hidden[n])[gone] for n in FILTERS}), _difference(total)]
-    )  # fmt: skip
-    return mean
+def _errors_by_seed(name: str, count: int, preset: str, scenes: list[Sequence], given: argparse.Namespace) -> Array:
+    """Returns the mean error of each filter seed."""
+    config = config_of(name, count, argparse.Namespace(**{**vars(given), "params": PRESETS[preset]}))
+    found = [[errors(q.truth, run(name, config, seed, q)) for q in scenes] for seed in given.filter_seeds]
+    return np.array([np.concatenate(values).mean() for values in found])
 
 
 def _difference(values: dict[str, Any]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from scenarios.errors import InputError
@@ -90,7 +91,7 @@ def test_the_paper_preset_names_every_parameter_that_is_ours(kind):
     assert ours
     assert not ours - given.keys(), "give them their off values in tracking/presets/paper"
     paper = kind.preset("paper")
-    assert all(getattr(paper, name) == value for name, value in given.items())
+    assert all(np.array_equal(getattr(paper, name), value) for name, value in given.items())
 
 
 def test_a_preset_is_found_by_name_beside_files(tmp_path, monkeypatch):

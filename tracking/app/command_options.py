@@ -360,4 +360,7 @@ class FitRelationalOptions:
     names: list[str] = NAMES()
     out: Path = TOML("File to write: parameters of relational, for --params.")
     seeds: str = SEEDS(default="30000:30004")
+    observed: bool = option(
+        "Learn the speed table and the noise of positions from detections of successive frames, as the paper does; "
+        "no relations.", False)
 # fmt: on

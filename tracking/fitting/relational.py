@@ -1,8 +1,10 @@
-"""`fit_relational`: the speed table and the relation dynamics of `relational`, learned from clean simulated truth.
+"""`fit_relational`: the speed table and the relation dynamics of `relational`, learned from clean simulated truth;
+`fit_observed`: the speed table and the sensor's noise, learned from observations, as the paper does.
 
 Speed table (Table 3 of Cattelani et al. 2012): for each row of speeds the mean of the velocity's change over LAG,
 against the direction of motion, and its standard deviation per axis; as drift per second and diffusion per root second.
-The paper learns from differences of measured boxes, which mixes the sensor's errors with the motion.
+The paper learns from differences of measured boxes in consecutive frames, which mixes the sensor's errors with the
+motion.
 
 Relations (ours; the paper gives none): a logistic regression of "in one true group" on distance and velocity
 difference, and the rate at which the relation follows it: the one whose moving average of probabilities has the least
@@ -18,6 +20,10 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Array, Bools, Ints, Truth
+from sim.types import Sequence as Recording
+from tracking.filters.assignment import optimal
+
+Changes = tuple[Array, Array, Array, Array]
 
 LAG = 0.4  # Time over which changes of velocity are measured, s: steering is correlated over shorter times.
 NEAR = 6.0  # Pairs farther apart teach nothing, m.
@@ -25,6 +31,10 @@ LEAST = 500  # Fewest rows from which anything is fitted.
 RATES = tuple(0.05 * 2.0**k for k in range(9))  # Rates of relations that are tried, 1/s.
 # Standard deviation of the prior of each logistic weight, about 0: pairs that a line separates have finite weights.
 PRIOR = 5.0
+FURTHEST = 2.0  # Largest distance of a detection from its person, m.
+LABELS = ("sensor.detect_prob=1", "sensor.occlusion_power=0", "sensor.clutter_rate=0")
+"""Settings of a sensor as the paper's observations are: every visible person, nobody else, and displaced feet."""
+PAPER_ENDS = (0.0125, 2.5, 5.0, 7.5)  # Column A of the paper's Table 3, m/s.
 STEPS = 50  # Most steps of Newton's method.
 
 
@@ -46,15 +56,63 @@ def fit_relational(truths: Iterable[Truth], ends: Sequence[float]) -> dict[str, 
     """
     changes, pairs = [], []
     for truth in truths:
-        changes.append(velocity_changes(truth))
+        changes.append(velocity_changes(truth, max(1, round(LAG * truth.fps))))
         pairs.append(pair_rows(truth))
-    speed, along, across, lag = (np.concatenate(x) for x in zip(*changes, strict=True)) if changes else np.zeros((4, 0))
+    speed = np.concatenate([c[0] for c in changes]) if changes else np.zeros(0)
     same = np.concatenate([p.same for p in pairs]) if pairs else np.zeros(0, bool)
     if len(speed) < LEAST or same.all() or not same.any():
         raise InputError(
             place="scenes", got=f"{len(speed)} changes of velocity, {int(same.sum())} pairs in groups of {len(same)}",
             expected=f"{LEAST} changes, and pairs in and out of groups", remedy="give more seeds or scenarios",
         )  # fmt: skip
+    weights = logistic(np.concatenate([p.design for p in pairs]), same)
+    losses = [_log_loss(pairs, weights, rate) for rate in RATES]
+    rate = RATES[int(np.argmin(losses))]
+    names = ("relation_bias", "relation_distance", "relation_velocity")
+    return speed_table(changes, ends) | {"relation_rate": rate, **dict(zip(names, weights.tolist(), strict=True))}
+
+
+def fit_observed(sequences: Iterable[Recording], ends: Sequence[float]) -> dict[str, float | list[float]]:
+    """Returns fitted parameters by name: drift, diffusion, and point_noise, of positions about the truth."""
+    changes, errors = [], []
+    for sequence in sequences:
+        truth, error = observed(sequence)
+        changes.append(velocity_changes(truth, 1))
+        errors.append(error)
+    noise = float(np.sqrt(np.mean(np.square(np.concatenate(errors)))))
+    return speed_table(changes, ends) | {"point_noise": noise}
+
+
+def observed(sequence: Recording) -> tuple[Truth, Array]:
+    """Returns the truth with the positions of detections and their differences from the frame before as velocities,
+    people without them left out; and the errors (R, 2) of detected positions, m."""
+    truth = sequence.truth
+    assert truth is not None
+    assert truth.pos is not None
+    pos, true = np.full((len(truth.id), 2), np.nan), truth.pos[:, :2]
+    for frame in sequence:
+        rows = truth.rows(frame.index)
+        assert frame.detections is not None
+        points = frame.detections.pos[:, :2]
+        people, found = optimal(np.hypot(*(true[rows][:, None] - points).transpose(2, 0, 1)), FURTHEST)
+        pos[np.arange(rows.start, rows.stop)[people]] = points[found]
+    order = np.lexsort((truth.frame, truth.id))
+    before, after = order[:-1], order[1:]
+    vel = np.full(pos.shape, np.nan)
+    vel[after] = (pos[after] - pos[before]) * truth.fps
+    apart = (truth.id[after] != truth.id[before]) | (truth.frame[after] - truth.frame[before] != 1)
+    vel[after[apart]] = np.nan
+    kept, errors = np.isfinite(vel[:, 0]), pos - true
+    frame, id, group = truth.frame[kept], truth.id[kept], truth.group[kept]
+    seen = truth.replace(
+        frame=frame, id=id, group=group, pos=pos[kept], vel=vel[kept], box=None, visibility=truth.visibility[kept]
+    )
+    return seen, errors[np.isfinite(errors[:, 0])]
+
+
+def speed_table(changes: Sequence[Changes], ends: Sequence[float]) -> dict[str, float | list[float]]:
+    """Returns drift and diffusion of each row of speeds; changes: of `velocity_changes`."""
+    speed, along, across, lag = (np.concatenate(x) for x in zip(*changes, strict=True))
     row = np.searchsorted(ends, speed)
     drifts, diffusions = [], []
     for k in range(len(ends) + 1):
@@ -65,23 +123,12 @@ def fit_relational(truths: Iterable[Truth], ends: Sequence[float]) -> dict[str, 
         spread = np.mean((along[inside] + drift * lag[inside]) ** 2 / lag[inside] + across[inside] ** 2 / lag[inside])
         drifts.append(drift)
         diffusions.append(float(np.sqrt(spread / 2)))
-    weights = logistic(np.concatenate([p.design for p in pairs]), same)
-    losses = [_log_loss(pairs, weights, rate) for rate in RATES]
-    rate = RATES[int(np.argmin(losses))]
-    names = ("relation_bias", "relation_distance", "relation_velocity")
-    return {
-        "drift": drifts,
-        "diffusion": diffusions,
-        "relation_rate": rate,
-        **dict(zip(names, weights.tolist(), strict=True)),
-    }
+    return {"drift": drifts, "diffusion": diffusions}
 
 
-def velocity_changes(truth: Truth) -> tuple[Array, Array, Array, Array]:
+def velocity_changes(truth: Truth, frames: int) -> Changes:
     """Returns speed, change of velocity along and across its direction, m/s, and its time, s, (R,) each."""
-    assert truth.pos is not None
     assert truth.vel is not None
-    frames = max(1, round(LAG * truth.fps))
     order = np.lexsort((truth.frame, truth.id))
     frame, id, vel = truth.frame[order], truth.id[order], truth.vel[order]
     later = np.arange(len(frame)) + frames

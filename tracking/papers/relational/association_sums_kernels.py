@@ -22,8 +22,8 @@ SWEEPS = 200
 """Most sweeps of belief propagation."""
 CONVERGED = 1e-10
 """Belief propagation ends when no message changes by more than this share."""
-TINY = 1e-300
-"""A row that is never without column counts as missed with this weight in belief propagation."""
+TINY = 1e-150
+"""Least weight of a row without column, and of a column without row, in belief propagation."""
 
 
 @njit(cache=True)
@@ -87,10 +87,11 @@ def exact_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
                         pair += forward[i, s] * backward[i + 1, s | (1 << j)]
             marginals[i, j] = pair * W[i, j]
             whole += marginals[i, j]
+        # Underflow: the row has a part in no mapping that a float can tell from 0.
         for j in range(m):
-            marginals[i, j] /= whole
+            marginals[i, j] /= whole if whole > 0 else 1.0
         for s in range(full):
-            backward[i, s] /= top
+            backward[i, s] /= top if top > 0 else 1.0
     return log_scale + math.log(total)
 
 
@@ -179,6 +180,42 @@ def dense_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
         for j in range(m):
             marginals[i, j] = found[j, i]
     return log_sum
+
+
+@njit(cache=True)
+def cheapest(cost: Array, u: Array, v: Array) -> None:
+    """Writes the dual variables u (n,) and v (m,) of the cheapest mapping of all rows, n <= m, to a column each.
+
+    cost[i, j] - u[i] - v[j] is 0 for the pairs of this mapping and not negative for all others. v is not positive, and
+    0 for columns without a row. Shortest augmenting paths (Jonker & Volgenant 1987).
+    """
+    n, m = cost.shape
+    u[:], v[:] = 0.0, 0.0
+    owner, before = np.full(m + 1, -1), np.empty(m, np.int64)  # column m is where the path of a new row begins
+    for start in range(n):
+        away, done = np.full(m, np.inf), np.zeros(m + 1, np.bool_)
+        owner[m], j = start, m
+        while owner[j] >= 0:
+            done[j] = True
+            i, nearest, least = owner[j], -1, np.inf
+            for k in range(m):
+                if not done[k]:
+                    reduced = cost[i, k] - u[i] - v[k]
+                    if reduced < away[k]:
+                        away[k], before[k] = reduced, j
+                    if away[k] < least:
+                        nearest, least = k, away[k]
+            for k in range(m + 1):
+                if done[k]:
+                    u[owner[k]] += least
+                    if k < m:
+                        v[k] -= least
+                elif k < m:
+                    away[k] -= least
+            j = nearest
+        while j != m:
+            owner[j] = owner[before[j]]
+            j = before[j]
 
 
 @njit(cache=True)

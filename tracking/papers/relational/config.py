@@ -22,6 +22,7 @@ KERNEL_WIDTH = 1.0
 RESAMPLE_SHARE = 0.5
 # Least probability that a detection is nobody's for it to start a person; the paper does not say which starts one.
 BIRTH_DOUBT = 0.5
+LEAST_EXISTENCE = 0.02  # A person whose existence is less probable is removed (ours).
 NEWCOMER_SHARE = 0.5  # Probability that a new person near a group belongs to it (sec. 3.2).
 # m: half the width of a body that hides others from a known camera (ours); not with the paper's sensor.
 BODY_RADIUS = 0.25
@@ -40,8 +41,6 @@ class ParticleConfig(BackgroundSettings):
 
     # fmt: off
     particles: int = param(1000, (50, 20000), "particles", "number of particles", "int", online=False, tunable=False)
-    weights: str = param("factorised", ("factorised", "joint"), "",
-        "factorised: people have own weights (ours); joint: a particle has one weight (the paper)", "categorical")
     noise_scale: float = param(3.0, (0.1, 10.0), "",
         "the standard deviations of the speed table are multiplied by this (ours)", "log")
     speed_ends: tuple[float, ...] = param((0.15, 0.6, 1.0, 1.4), (0.0, 100.0), "m/s",
@@ -55,7 +54,7 @@ class ParticleConfig(BackgroundSettings):
     pixel_noise: float = param(0.15, (0.005, 2.0), "m",
         "from pixels: standard deviation of the centre of a blob, per axis (ours)", "log", sees="pixels")
     outlier_share: float = param(0.05, (0.0, 0.5), "share",
-        "measured positions that are displaced, as by partial occlusion; 0: none (ours)")
+        "measured positions that are displaced, as by partial occlusion; without effect with the paper's sensor (ours)")
     outlier_noise: float = param(0.4, (0.05, 3.0), "m",
         "standard deviation of a displaced position, per axis, at least that of a position (ours)", "log")
     detect_prob: float = param(0.95, (0.3, 1.0), "probability",
@@ -67,8 +66,6 @@ class ParticleConfig(BackgroundSettings):
     birth_rate: float = param(0.003, (1e-5, 1.0), "1/(m^2 s)", "new people per square metre and second (ours)", "log")
     time_window: float = param(3.0, (0.1, 30.0), "s",
         "a person who is not measured for so long is removed (sec. 2.1.1)", "log")
-    least_existence: float = param(0.02, (0.0, 0.5), "probability",
-        "a person whose existence is less probable is removed (ours)")
     report_existence: float = param(0.5, (0.0, 1.0), "probability",
         "people whose existence is at least so probable are reported (ours)")
 
@@ -83,13 +80,9 @@ class ParticleConfig(BackgroundSettings):
 
     @property
     def certain_sensor(self) -> bool:
-        """True for the paper's sensor, without missed people and false alarms: its mappings are complete."""
+        """True for the paper's sensor, without missed people and false alarms: its mappings are complete, and a
+        particle has one weight for all people."""
         return self.detect_prob == 1 and self.clutter_density == 0
-
-    @property
-    def one_weight(self) -> bool:
-        """True if a particle has one weight for all people: in joint mode and with the paper's sensor."""
-        return self.weights == "joint" or self.certain_sensor
 
     def speed_table(self, dt: float) -> Array:
         """Returns the speed table (5, 3) of a step of dt s, as transition_kernels has it."""

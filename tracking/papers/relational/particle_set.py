@@ -15,8 +15,7 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.particles import residual_resample
 from tracking.papers.relational import particle_set_kernels
 
-# Returns uniforms (R, P) in [0, 1) and standard normals (R, 4, P) of the people (R,).
-Draws = Callable[[Ints], tuple[Array, Array]]
+Draws = Callable[[Ints], Array]  # Returns uniforms (R, P) in [0, 1) of the people (R,).
 LARGEST = 2**31  # Numbers of slots are below this.
 
 
@@ -89,13 +88,13 @@ class ParticleSet:
         """Returns the effective number of particles of each slot, (K,)."""
         return np.asarray(1 / particle_set_kernels.column_sums(self.weights, self.weights))
 
-    def resample(self, share: float, width: float, draws: Draws) -> None:
+    def resample(self, share: float, draws: Draws) -> Ints:
         """Resample each person whose effective number is at most this share of the particles (sec. 2.1); with one
-        weight all people together."""
+        weight all people together. Returns who is resampled."""
         few = np.flatnonzero(self.effective() <= share * self.count * (1 + 1e-9))
         if not len(few):
-            return
-        uniforms, normals = draws(few)
+            return few
+        uniforms = draws(few)
         chosen = np.empty((self.count, 1 if self.one_weight else len(few)), np.int64)
         for column, person in enumerate(few[: chosen.shape[1]].tolist()):
             weights = np.ascontiguousarray(self.weights[:, person])  # of one column numpy sums in another order
@@ -109,10 +108,11 @@ class ParticleSet:
                 values[:, few] = values[chosen, few]
             particle_set_kernels.redraw_relations(self.pairs, self.related, few, chosen)
         self.weights[:, few] = 1 / self.count
-        if width > 0:
-            self._spread(few, width, normals)
+        return few
 
-    def _spread(self, members: Ints, width: float, normals: Array) -> None:
+    def spread(self, members: Ints, width: float, normals: Array) -> None:
+        """Draw the particles of members (R,) apart by a kernel of so many optimal widths, which keeps their moments;
+        normals (R, 4, P): standard normals."""
         h = min(width * (4 / (self.count * 6)) ** (1 / 8), 1.0)
         state = np.concatenate([self.pos[:, members], self.vel[:, members]], axis=2)
         state = np.ascontiguousarray(state.transpose(1, 2, 0))
@@ -151,6 +151,13 @@ class ParticleSet:
         related = np.zeros((len(key), self.count), bool)
         related[np.searchsorted(key, kept)] = self.related
         self.pairs, self.related = np.stack([key % LARGEST, key // LARGEST], axis=1), related
+
+    def close_groups(self) -> None:
+        """Relate all members of each group, the connected components of a particle's relations, to each other."""
+        label, some, ever = self.labels(), np.empty((1, self.people), np.int64), self.related.any(axis=1)
+        particle_set_kernels.group_labels(self.pairs, ever[:, None], some)
+        self.hold(np.argwhere(np.triu(some == some.T, 1)))
+        self.related[:] = (label[:, self.pairs[:, 0]] == label[:, self.pairs[:, 1]]).T
 
     def drop_strangers(self) -> None:
         """Keep no relation of pairs that walk together in no particle."""

@@ -22,20 +22,17 @@ REACH, WIDE_REACH = 6.0, 3.0
 # A person and a detection are no pair if it is, among all detections and none, the person's with less than this
 # probability (ours).
 UNLIKELY = 1e-3
-ALMOST = 1 - 1e-9  # Largest probability of a detection, but with the paper's sensor (ours).
-LEAST_LOG = -745.0  # Log of the smallest float: the paper's weights are 0 below it.
+ALMOST = 1 - 1e-9  # Largest probability of a detection (ours).
 
 
 @dataclass(frozen=True)
 class Weighing:
     """What a frame's detections say, over P particles, K people and M detections.
 
-    vanished: all weights are 0; the particles were left as they were. pairs (K, M): probability that person and
-    detection belong together, weighted over particles. seen (K,): probability that the person, if existing, is
-    measured. nobody (M,): probability that the detection is no known person's.
+    pairs (K, M): probability that person and detection belong together, weighted over particles. seen (K,): probability
+    that the person, if existing, is measured. nobody (M,): probability that the detection is no known person's.
     """
 
-    vanished: bool
     pairs: Array
     seen: Array
     nobody: Array
@@ -60,20 +57,18 @@ def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, con
     """Multiply the weights of the particles by p(z_t | s^a_t), update existence, and return what the detections say."""
     people, count, certain = particles.people, len(points), config.certain_sensor
     if not people:
-        return Weighing(False, np.zeros((0, count)), np.zeros(0), np.ones(count))
-    particles.share_weights(config.one_weight)
-    pairs, density = _pairs(particles, points, sight, noise, config)
-    person, marginals = pairs[:, 0], np.empty(density.shape)
-    detect = sight.detect if certain else np.minimum(sight.detect, ALMOST)
-    given = density, pairs, particles.exist, detect, config.clutter_density
-    if particles.one_weight:
-        logs = np.empty((particles.count, 1))
-        sensor_kernels.particle_sums(*given, count, logs, marginals)
-        if certain and logs[particles.weights[:, 0] > 0].max() < LEAST_LOG:
-            return Weighing(True, np.zeros((people, count)), np.zeros(people), np.ones(count))
+        return Weighing(np.zeros((0, count)), np.zeros(0), np.ones(count))
+    particles.share_weights(certain)
+    if certain:
+        pairs, logs, marginals = _complete(particles, points, noise)
     else:
-        logs, free = np.empty(particles.exist.shape), _free(particles, pairs, density, count, detect, config)
-        sensor_kernels.person_sums(*given, free, logs, marginals)
+        pairs, density = _pairs(particles, points, sight, noise, config)
+        logs, marginals = np.empty(particles.exist.shape), np.empty(density.shape)
+        detect = np.minimum(sight.detect, ALMOST)
+        free = _free(particles, pairs, density, count, detect, config)
+        sensor_kernels.person_sums(
+            density, pairs, particles.exist, detect, config.clutter_density, free, logs, marginals
+        )
         sensor_kernels.partner_factors(particles.pairs, particles.related, particles.weights, sight.missed, logs)
     particles.weigh(logs)
     measured = sensor_kernels.measured(marginals, pairs, people)
@@ -81,23 +76,29 @@ def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, con
         unseen = particles.exist * (1 - detect) / np.maximum(1 - particles.exist * detect, np.finfo(float).tiny)
         particles.exist = np.minimum(measured + (1 - measured) * unseen, 1.0)
     found = np.zeros((people, count))
-    found[person, pairs[:, 1]] = particle_set_kernels.pair_sums(
+    found[pairs[:, 0], pairs[:, 1]] = particle_set_kernels.pair_sums(
         particles.weights, np.ones_like(particles.exist), pairs, marginals
     )
     exist, seen = particles.existence, particle_set_kernels.column_sums(particles.weights, measured)
     seen = np.divide(seen, exist, out=np.zeros(people), where=exist > 0)
-    return Weighing(False, found, seen, 1.0 - found.sum(axis=0))
+    return Weighing(found, seen, 1.0 - found.sum(axis=0))
+
+
+def _complete(particles: ParticleSet, points: Array, noise: float) -> tuple[Ints, Array, Array]:
+    near = sensor_kernels.near_detections(particles.pos, points, (REACH * noise) ** 2)
+    person, point = sensor_kernels.components(near)
+    pairs = _places_of(person[:, None] == point)
+    logs, marginals = np.zeros((particles.count, 1)), np.empty((particles.count, len(pairs)))
+    sensor_kernels.complete_sums(particles.pos, points, noise, person, point, logs, marginals)
+    return pairs, logs, marginals
 
 
 def _pairs(
     particles: ParticleSet, points: Array, sight: Sight, noise: float, config: ParticleConfig
 ) -> tuple[Ints, Array]:
     wide = max(config.outlier_noise, noise)
-    certain = config.outlier_share == 0
-    share = np.zeros(particles.people) if certain else config.outlier_share + (1 - config.outlier_share) * sight.cut
-    if config.certain_sensor:
-        pairs = _places_of(np.ones((particles.people, len(points)), bool))
-        return pairs, sensor_kernels.densities(particles.pos, points, pairs, noise, wide, share, sight.eye, np.inf)
+    normal = config.outlier_share == 0
+    share = np.zeros(particles.people) if normal else config.outlier_share + (1 - config.outlier_share) * sight.cut
     displaced = WIDE_REACH * wide if config.outlier_share > 0 else 0.0
     reach = max(REACH * noise, displaced) ** 2
     pairs = _places_of(sensor_kernels.near_detections(particles.pos, points, reach))

@@ -9,7 +9,17 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Bools, Ints
-from tracking.papers.relational.association_sums_kernels import EXACT_BITS, chosen, free_messages, linked, sparse_sum
+from tracking.papers.relational.association_sums_kernels import (
+    EXACT_BITS,
+    cheapest,
+    chosen,
+    free_messages,
+    linked,
+    sparse_sum,
+)
+
+NOTHING = 1e-20
+"""Pairs of complete mappings that are less probable than those of the best mapping by this factor are left out."""
 
 
 @njit(cache=True)
@@ -136,30 +146,65 @@ def person_sums(
 
 
 @njit(cache=True)
-def particle_sums(
-    density: Array, pairs: Ints, exist: Array, detect: Array, clutter: float, count: int, logs: Array, marginals: Array
-) -> None:
-    """Writes the log-likelihoods (P, 1) of each particle, the sum over all mappings, and the marginals (P, N).
+def components(near: Bools) -> tuple[Ints, Ints]:
+    """Returns the numbers (K,) and (M,) of the connected components of people and detections; near (K, M): which are
+    linked. A detection that is linked to nobody has -1."""
+    n, m = near.shape
+    person, point = np.empty(n, np.int64), np.full(m, -1)
+    row_done, column_done = np.zeros(n, np.bool_), np.zeros(m, np.bool_)
+    rows, columns = np.empty(n, np.int64), np.empty(m, np.int64)
+    for k in range(n):
+        if not row_done[k]:
+            count, width = linked(near, k, row_done, column_done, rows, columns)
+            person[rows[:count]], point[columns[:width]] = k, k
+    return person, point
 
-    Arguments as of `person_sums`; count: M. W = exist detect g / clutter, miss = 1 - exist detect, spare = 1. Without
-    clutter (the paper's sensor) W = g and mappings are complete: the smaller side is mapped wholly.
+
+@njit(cache=True)
+def complete_sums(
+    pos: Array, points: Array, sd: float, person: Ints, point: Ints, logs: Array, marginals: Array
+) -> None:
+    """Adds to the log-likelihoods (P, 1) of each particle the sum over all complete mappings, but for constants, and
+    writes the marginals (P, N).
+
+    pos (P, K, 2), m; points (M, 2), m; sd: standard deviation of a point per axis, m. person (K,), point (M,): of
+    `components`; the N pairs are those in one component, in order of people, then points. A complete mapping maps the
+    smaller side of each component wholly: nobody is missed, and no detection a false alarm, as far as numbers allow.
     """
-    particles, n = exist.shape
-    W, miss, spare, found = np.zeros((n, count)), np.ones(n), np.ones(count), np.empty((n, count))
-    if clutter == 0.0 and n <= count:
-        miss[:] = 0.0
-    if clutter == 0.0 and n > count:
-        spare[:] = 0.0
-    for p in range(particles):
-        for c in range(len(pairs)):
-            k, j = pairs[c, 0], pairs[c, 1]
-            W[k, j] = density[p, c] if clutter == 0.0 else exist[p, k] * detect[k] * density[p, c] / clutter
-        if clutter > 0.0:
-            for k in range(n):
-                miss[k] = 1.0 - exist[p, k] * detect[k]
-        logs[p, 0] = sparse_sum(W, miss, spare, found)
-        for c in range(len(pairs)):
-            marginals[p, c] = found[pairs[c, 0], pairs[c, 1]]
+    first, start = np.empty(len(person), np.int64), 0
+    for k in range(len(person)):
+        first[k] = start
+        start += np.sum(point == person[k])
+    for k in range(len(person)):
+        columns = np.flatnonzero(point == k)
+        if person[k] == k and len(columns):
+            _complete_component(pos, points, sd, np.flatnonzero(person == k), columns, first, logs, marginals)
+
+
+@njit(cache=True)
+def _complete_component(pos, points, sd, rows, columns, first, logs, marginals):  # type: ignore[no-untyped-def]
+    turned = len(rows) > len(columns)
+    n, m = min(len(rows), len(columns)), max(len(rows), len(columns))
+    W, found, u, v, spare = np.empty((n, m)), np.empty((n, m)), np.empty(n), np.empty(m), np.empty(m)
+    for p in range(len(pos)):
+        for a in range(n):
+            for b in range(m):
+                row, column = (b, a) if turned else (a, b)
+                k, j = rows[row], columns[column]
+                dx, dy = points[j, 0] - pos[p, k, 0], points[j, 1] - pos[p, k, 1]
+                W[a, b] = 0.5 * (dx * dx + dy * dy) / sd**2
+        # With these factors of rows and columns the most probable mapping has the weight 1, so that no sum underflows.
+        cheapest(W, u, v)
+        for b in range(m):
+            spare[b] = math.exp(v[b])
+            for a in range(n):
+                weight = math.exp(u[a] + v[b] - W[a, b])
+                W[a, b] = weight if weight > NOTHING else 0.0  # so that people are not linked, and the sum is cheap
+        logs[p, 0] += sparse_sum(W, np.zeros(n), spare, found) - u.sum() - v.sum()
+        for a in range(n):
+            for b in range(m):
+                row, column = (b, a) if turned else (a, b)
+                marginals[p, first[rows[row]] + column] = found[a, b]
 
 
 @njit(cache=True)

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import linear_sum_assignment
 
 from tests.reference_relational import sum_over_mappings
-from tracking.papers.relational.association_sums_kernels import exact_sum, propagated_sum, sparse_sum
+from tracking.papers.relational.association_sums_kernels import cheapest, exact_sum, propagated_sum, sparse_sum
 
 
 def summed(kernel, W, miss, spare):
@@ -52,6 +53,29 @@ def test_tiny_and_huge_weights():
     W = np.full((9, 9), 1e-200)
     log_sum, _ = summed(sparse_sum, W, np.zeros(9), np.ones(9))
     assert log_sum == pytest.approx(9 * math.log(1e-200) + math.lgamma(10), rel=1e-12)
+
+
+def test_a_sum_of_which_a_part_underflows():
+    """The only mapping has the weight 1e-263 after the first row is scaled, its parts are too small for a float."""
+    W = np.array([[0.0, 1e-279], [1e-263, 1e-116]])
+    log_sum, found = summed(exact_sum, W, np.zeros(2), np.ones(2))
+    assert log_sum == pytest.approx(math.log(1e-279) + math.log(1e-263), rel=1e-12)
+    assert np.isfinite(found).all()
+
+
+def test_the_cheapest_mapping_has_reduced_costs_of_zero():
+    for seed in range(50):
+        rng = np.random.default_rng(seed)
+        n = int(rng.integers(1, 7))
+        m = n + int(rng.integers(0, 3))
+        cost, u, v = rng.exponential(1000.0, (n, m)), np.empty(n), np.empty(m)
+        cheapest(cost, u, v)
+        rows, columns = linear_sum_assignment(cost)
+        reduced = cost - u[:, None] - v
+        assert reduced.min() > -1e-9
+        np.testing.assert_allclose(reduced[rows, columns], 0.0, atol=1e-9)
+        assert (v <= 0).all()
+        assert not v[~np.isin(np.arange(m), columns)].any()
 
 
 def test_bethe_value_is_a_lower_bound():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -58,7 +60,7 @@ def test_people_get_weights_of_their_own_only_after_resampling():
     particles.share_weights(False)
     assert particles.one_weight
     assert np.array_equal(particles.weights, before)
-    particles.resample(1.0, 0.0, drawn(particles, np.random.default_rng(0)))
+    particles.resample(1.0, drawn(particles, np.random.default_rng(0)))
     particles.share_weights(False)
     assert not particles.one_weight
 
@@ -71,7 +73,7 @@ def test_a_person_is_resampled_alone_and_takes_the_own_relations():
     particles.weights[:, 0] = few / 40
     old = {tuple(x) for x in particles.pos[few, 0]}
     others = particles.pos[:, 1:].copy()
-    particles.resample(0.9, 0.0, drawn(particles, np.random.default_rng(0)))
+    particles.resample(0.9, drawn(particles, np.random.default_rng(0)))
     assert {tuple(x) for x in particles.pos[:, 0]} <= old
     assert np.array_equal(particles.pos[:, 1:], others)
     assert particles.pairs.tolist() == [[0, 1], [1, 2]]
@@ -85,13 +87,15 @@ def test_weights_of_a_person_are_those_of_the_joint_filter_with_the_others_avera
     rng = np.random.default_rng(3)
     x, y = rng.normal([0.0, 0.0], 0.1, (count, 2)), rng.normal([0.4, 0.0], 0.1, (count, 2))
     pos = np.stack([np.repeat(x, count, axis=0), np.tile(y, (count, 1))], axis=1)
-    every, alone = ParticleSet.empty(count * count), ParticleSet.empty(count)
-    for made, places in ((every, pos), (alone, np.stack([x, y], axis=1))):
-        for k in range(2):
-            made.add(places[:, k, None], np.zeros((made.count, 1, 2)), 0.9)
-    sensor.weigh(every, points, sight([0.9] * 2), 0.08, ParticleConfig(weights="joint"))
-    sensor.weigh(alone, points, sight([0.9] * 2), 0.08, ParticleConfig())
-    joint = every.weights[:, 0].reshape(count, count)
+    alone, config = ParticleSet.empty(count), ParticleConfig()
+    for places in (x, y):
+        alone.add(places[:, None], np.zeros((count, 1, 2)), 0.9)
+    sensor.weigh(alone, points, sight([0.9] * 2), 0.08, config)
+    near, wide, share = np.square(pos[:, :, None] - points).sum(axis=3), config.outlier_noise, config.outlier_share
+    density = (1 - share) * np.exp(-near / 2 / 0.08**2) / 0.08**2 + share * np.exp(-near / 2 / wide**2) / wide**2
+    W = 0.9 * 0.9 * density / (2 * np.pi) / config.clutter_density
+    joint = np.exp([reference_sum(w, np.full(2, 1 - 0.9 * 0.9))[0] for w in W]).reshape(count, count)
+    joint /= joint.sum()
     np.testing.assert_allclose(alone.weights[:, 0], joint.sum(axis=1), rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(alone.weights[:, 1], joint.sum(axis=0), rtol=1e-6, atol=1e-9)
 
@@ -111,7 +115,9 @@ def test_the_kernel_keeps_the_moments_and_draws_equal_particles_apart():
     particles = three(20_000)
     particles.pos[:] = particles.pos[np.random.default_rng(5).integers(0, 20, 20_000)]
     before = [np.cov(particles.pos[:, 0].T), particles.pos[:, 0].mean(axis=0)]
-    particles.resample(1.0, 1.0, drawn(particles, np.random.default_rng(6)))
+    rng = np.random.default_rng(6)
+    few = particles.resample(1.0, drawn(particles, rng))
+    particles.spread(few, 1.0, rng.standard_normal((len(few), 4, particles.count)))
     assert len(np.unique(particles.pos[:, 0, 0])) == 20_000
     np.testing.assert_allclose(particles.pos[:, 0].mean(axis=0), before[1], atol=0.003)
     np.testing.assert_allclose(np.cov(particles.pos[:, 0].T), before[0], rtol=0.05, atol=3e-4)
@@ -159,14 +165,28 @@ def weights_of(density, pairs, exist, detect, clutter, p):
     return W
 
 
-def test_sums_of_particles_are_those_of_all_mappings():
-    density, pairs, exist, detect = candidates(4)
-    logs, found = np.empty((20, 1)), np.empty(density.shape)
-    sensor_kernels.particle_sums(density, pairs, exist, detect, 0.01, 5, logs, found)
+@pytest.mark.parametrize("people", [2, 3, 5])
+@pytest.mark.parametrize("spread", [0.3, 30.0])
+def test_complete_sums_are_those_of_all_mappings_of_the_smaller_side(people, spread):
+    """3 detections, and one more with a person of its own; with a large spread the weights underflow as floats."""
+    rng = np.random.default_rng(people)
+    pos, points = rng.normal(0, spread, (20, people + 1, 2)), rng.normal(0, spread, (4, 2))
+    person, point = np.array([0] * people + [people]), np.array([0, 0, 0, people])
+    logs, found = np.zeros((20, 1)), np.empty((20, 3 * people + 1))
+    sensor_kernels.complete_sums(pos, points, 0.5, person, point, logs, found)
     for p in range(20):
-        log, marginals = reference_sum(weights_of(density, pairs, exist, detect, 0.01, p), 1 - exist[p] * detect)
-        assert logs[p, 0] == pytest.approx(log, rel=1e-10)
-        np.testing.assert_allclose(found[p], marginals[pairs[:, 0], pairs[:, 1]], rtol=1e-10, atol=1e-15)
+        L = -np.square(pos[p, :, None] - points).sum(axis=2) / 2 / 0.5**2
+        if people <= 3:
+            maps = [tuple(enumerate(c)) for c in itertools.permutations(range(3), people)]
+        else:
+            maps = [tuple((i, j) for j, i in enumerate(c)) for c in itertools.permutations(range(people), 3)]
+        each = np.array([sum(L[i, j] for i, j in pairs) for pairs in maps])
+        assert logs[p, 0] == pytest.approx(np.logaddexp.reduce(each) + L[-1, -1], rel=1e-12)
+        share = np.exp(each - np.logaddexp.reduce(each))
+        for i, j in itertools.product(range(people), range(3)):
+            expected = sum(s for s, pairs in zip(share, maps, strict=True) if (i, j) in pairs)
+            assert found[p, 3 * i + j] == pytest.approx(expected, abs=1e-9)
+        assert found[p, -1] == 1.0
 
 
 def test_sums_of_people_are_those_of_all_mappings_with_the_others_averaged():
@@ -194,14 +214,12 @@ def reference_sum(W, miss):
     return exact_sum(W, miss, np.ones(W.shape[1]), found), found
 
 
-@pytest.mark.parametrize("weights", ["factorised", "joint"])
-def test_a_miss_leaves_weights_if_everybody_who_exists_is_detected(weights):
+def test_a_miss_leaves_weights_if_everybody_who_exists_is_detected():
     particles = three()
     particles.exist[:] = 1.0
-    config = ParticleConfig(detect_prob=1.0, weights=weights)
+    config = ParticleConfig(detect_prob=1.0)
     for _ in range(2):
-        said = sensor.weigh(particles, particles.pos[0, :2], sight([1.0] * 3), 0.08, config)
-        assert not said.vanished
+        sensor.weigh(particles, particles.pos[0, :2], sight([1.0] * 3), 0.08, config)
         np.testing.assert_allclose(particles.weights.sum(axis=0), 1.0, rtol=1e-9)
     np.testing.assert_allclose(particles.existence, 1.0, rtol=1e-6)  # who certainly exists is hidden
 

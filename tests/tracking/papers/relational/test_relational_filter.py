@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -53,6 +54,11 @@ def stepped(tracker, fps, *frames, seed=0):
         found = None if points is None else detections(k, *points)
         out.append(tracker.step(Frame(k, (k - 1) / fps), found))
     return out
+
+
+def first(sequence, length):
+    """The first frames of a sequence."""
+    return dataclasses.replace(sequence, frames=lambda: islice(sequence.frames(), length), bare=None, length=length)
 
 
 def placed(count, pos, vel=None, exist=1.0):
@@ -167,7 +173,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
         particles.pos[:, 1] = 1e6  # never near the detection
         if seen:
             sensor.weigh(particles, points, sight([0.9, 0.0], [False, True]), r, config)
-            particles.resample(1.0, 0.0, drawn(particles, rng))
+            particles.resample(1.0, drawn(particles, rng))
         out.append(particles.vel[:, 1].var(axis=0).mean())
     return np.array(out)
 
@@ -257,15 +263,14 @@ def test_a_pairs_relation_approaches_its_equilibrium_at_its_rate():
 # E8
 
 
-def test_the_papers_sensor_breaks_down_and_goes_on():
-    """A person who jumps has weight 0 in all particles; with missed people and false alarms this cannot be (E8)."""
-    walk = [[(0.1 * k, 0.0)] for k in range(10)] + [[(60.0 + 0.1 * k, 0.0)] for k in range(10)]
-    paper, ours = Particle(ParticleConfig(**CERTAIN)), Particle()
-    tracks = stepped(paper, 10.0, *walk)
-    assert paper.vanished > 0
-    assert any(np.abs(tracks[-1].pos - [60.9, 0]).max(axis=1) < 0.2), "the person is found again"
-    stepped(ours, 10.0, *walk)
-    assert ours.vanished == 0
+def test_with_the_papers_sensor_a_person_who_jumps_is_a_new_one():
+    """No particle explains the detection, so that a float has no weight for it; the other person stays (E8)."""
+    walk = [[(0.1 * k, 0.0), (0.1 * k, 5.0)] for k in range(10)]
+    walk += [[(60.0 + 0.1 * k, 0.0), (1.0 + 0.1 * k, 5.0)] for k in range(35)]
+    before, *_, last = stepped(Particle(ParticleConfig(**CERTAIN, noise_scale=1.0)), 10.0, *walk)[9:]
+    assert len(before.id) == len(last.id) == 2
+    assert len(set(before.id.tolist()) & set(last.id.tolist())) == 1
+    np.testing.assert_allclose(np.sort(last.pos[:, 0]), [4.4, 63.4], atol=0.2)
 
 
 # E9
@@ -300,6 +305,37 @@ def test_velocities_of_partners_approach_each_other_with_the_time_constant():
         np.testing.assert_allclose(a - b, np.array([2, -1]) / np.e, rtol=1e-12)
         np.testing.assert_allclose((a + b) / 2, [1, 0.5], rtol=1e-12)
         assert alone.tolist() == [1, 1]
+
+
+def test_all_members_of_a_particles_group_have_its_mean_velocity():
+    """Sec. 3.2; also those who are related by way of others, and in each particle by its own relations."""
+    particles = placed(3, [[0, 0], [0, 1], [0, 2], [0, 9]], [[3, 0], [0, 0], [0, 3], [1, 1]])
+    relate(particles, 0, 1, np.array([True, True, False]))
+    relate(particles, 1, 2, np.array([True, False, False]))
+    particles.close_groups()
+    assert particles.pairs.tolist() == [[0, 1], [0, 2], [1, 2]]
+    move(particles, np.zeros((3, 4, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), AT_ONCE, 1.0)
+    expected = np.array([
+        [[1, 1], [1, 1], [1, 1], [1, 1]], [[1.5, 0], [1.5, 0], [0, 3], [1, 1]], [[3, 0], [0, 0], [0, 3], [1, 1]],
+    ])  # fmt: skip
+    np.testing.assert_allclose(particles.vel, expected, rtol=1e-12)
+
+
+def test_the_preset_keeps_groups_closed():
+    """No member of a group is related to a part of it alone, after each frame."""
+    scene = simulate(load("queue", ["camera.fps=5"]), 40_002, 0, ())
+    config = RelationalConfig.preset("paper").with_set("particles=100")
+    ready = prepare("relational", first(scene, 40), detections="file", params=config)
+    ready.reset(0)
+    largest = 0
+    for frame in ready.frames():
+        ready.step(frame)
+        made = relations(ready.tracker.particles)
+        closed = made | np.eye(made.shape[1], dtype=bool)
+        steps = closed.astype(int) @ closed.astype(int) > 0
+        assert np.array_equal(steps, closed)
+        largest = max(largest, int(closed.sum(axis=2).max(initial=0)))
+    assert largest > 2
 
 
 def test_partners_count_by_how_alike_they_are():
