@@ -45,7 +45,7 @@ from tracking.grouping.grouped_tracks import derive, without_groups
 from tracking.grouping.grouping_choice import Grouping, grouping_of
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
-from tracking.grouping.pair_evidence import NAMES, QUANTITIES, TIMES
+from tracking.grouping.pair_evidence import NAMES, NOW, QUANTITIES, TIMES
 from tracking.scoring.evaluation import evaluate
 from tracking.stats import block_intervals, mean_interval
 
@@ -187,7 +187,7 @@ def calibration(names: Sequence[str], seeds: range, belief: Belief, out: Path | 
     panels = []
     for name in names:
         sample = sample_of(list(pair_scenes([name], seeds)))
-        log_odds = belief.log_odds(sample.values)
+        log_odds = belief.log_odds(sample.values)[:, 0]
         scores, bins = belief_scores(sample, log_odds), reliability(log_odds, sample.together, sample.weight)
         print(f"\n{Path(name).stem}: " + ", ".join(f"{key} {value:.4g}" for key, value in scores.items()) + "\n")
         head(["probability", "share of rows", "mean probability", "share of mates"])
@@ -202,7 +202,7 @@ def calibration(names: Sequence[str], seeds: range, belief: Belief, out: Path | 
 
 
 FAMILIES: Mapping[str, tuple[str, ...]] = {
-    **{name: (name,) for name in ("distance", *QUANTITIES)}, "arrival": ("arrival gap", "first distance"),
+    **{name: (name,) for name in (*QUANTITIES, *NOW)},
     **{f"means over {time:g} s": (f"{time:g} s",) for time in TIMES[1:]},
 }  # fmt: skip
 """Words of the names of tables that are left out together."""
@@ -214,8 +214,8 @@ def ablation(names: Sequence[str], seeds: range, check: range, data: Path) -> No
     head(["without", "log loss", "calibration error", "F1", *truths])
     for family, words in {"": (), **FAMILIES}.items():
         used = [name for name in NAMES if not {*name.split(", ")} & {*words}]
-        belief = fit_belief(train, used)
-        scores = belief_scores(test, belief.log_odds(test.values))
+        belief = fit_belief(train, used=used)
+        scores = belief_scores(test, belief.log_odds(test.values)[:, 0])
         real = []
         for truth in truths.values():
             i, j, same = pairs_in_frames(truth)
