@@ -129,7 +129,7 @@ class Blob:
 
     def _report(self, frame: Frame) -> Tracks:
         people = self.people
-        rows = people.rows_to_report(frame.t)
+        rows = people.rows_to_report()
         state, scale = people.bank.take(rows, 1), people.scale[rows]
         camera = self.context.camera
         place, alone = self.updater.reported_boxes(rows), np.full(len(rows), -1)
