@@ -41,7 +41,6 @@ CATALOGUE = ("merge", "split", "cross", "pass-by", "side-by-side", "pillar", "do
 FIELDS = ((20, 1.0, 0.0), (100, 1.0, 0.0), (20, 0.9, 5.0), (100, 0.9, 5.0))  # squares, detection probability, clutter
 VARIANTS = {
     "blob": {},
-    "blob, nearest": {"association": "nearest"},
     "blob, paper": BlobConfig.preset("paper").as_dict(),
 }
 Answer = list[tuple[np.ndarray, np.ndarray]]
@@ -123,7 +122,7 @@ def track_peer(python: str, name: str, det: Path, frames: int) -> tuple[Answer, 
 
 
 def all_answers(python: str, folder: Path, sequence: Recording) -> dict[str, Answer]:
-    """Returns the answers of blob (defaults, the paper's association, its preset) and of the peers."""
+    """Returns the answers of blob (defaults, the preset `paper`) and of the peers."""
     det = folder / "det.txt"
     write_mot(sequence, det)
     answers = {name: track_blob(sequence, params)[0] for name, params in VARIANTS.items()}

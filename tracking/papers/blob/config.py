@@ -25,24 +25,25 @@ class BlobConfig(BackgroundSettings):
     tracker: ClassVar[str] = "blob"
 
     # fmt: off
-    accel_noise: float = param(0.35, (0.05, 10.0), "m/s^1.5",
+    accel_noise: float = param(0.3, (0.05, 10.0), "m/s^1.5",
         "white acceleration of the centre: root of its spectral density", "log")
     size_accel_noise: float = param(0.1, (0.01, 5.0), "m/s^1.5",
         "white acceleration of height and width: root of its spectral density", "log")
     position_noise: float = param(0.12, (0.005, 1.0), "m", "standard deviation of a measured centre", "log")
-    size_noise: float = param(0.2, (0.005, 1.0), "m", "standard deviation of a measured height or width", "log")
+    size_noise: float = param(0.25, (0.005, 1.0), "m", "standard deviation of a measured height or width", "log")
     speed_prior: float = param(1.3, (0.1, 5.0), "m/s", "standard deviation of a new track's velocity, per axis", "log")
     gate: float = param(0.999, (0.5, 0.999999), "probability",
         "share of a track's own measurements that its gate holds")
     management: str = param("existence", ("rho", "existence"), "",
-        "rho: nearest gated track, tracks managed by rho (the paper); existence: by probabilities (ours)", "categorical")
+        "rho: nearest gated track, and tracks managed by rho (the paper); existence: by probabilities (ours)",
+        "categorical", online=False)
     detect_prob: float = param(0.9, (0.1, 0.999), "probability",
         "existence: a person who can be detected is detected in a frame (ours)")
     hidden_time: float = param(0.5, (0.05, 10.0), "s",
         "existence: mean time in which a person cannot be detected (ours)", "log")
     birth_rate: float = param(0.5, (0.001, 100.0), "1/s", "existence: new people (ours)", "log")
     clutter_rate: float = param(0.5, (0.001, 100.0), "1/frame", "existence: new false boxes (ours)", "log")
-    clutter_time: float = param(0.1, (0.001, 10.0), "s", "existence: mean time that a false box lasts (ours)", "log")
+    clutter_time: float = param(0.15, (0.001, 10.0), "s", "existence: mean time that a false box lasts (ours)", "log")
     confirm_ratio: float = param(1.5, (1.01, 2.0), "", "rho: a track is confirmed at or below this value of rho")
     coast_time: float = param(1.5, (0.0, 10.0), "s",
         "rho: a confirmed track is deleted after this time without measurement, from the steady state")

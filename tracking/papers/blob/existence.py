@@ -6,8 +6,8 @@ shown) or not (H, hidden), a false object (F) that the detector takes for a pers
 
     predict   S, H end at the rate 1 / LIFETIME, F at 1 / clutter_time; S -> H at 1 / SHOWN_TIME, H -> S at 1 /
               hidden_time
-    missed    S times 1 - p, F times 1 - P_D             p = P_D times the visible share of the person
-    measured  S times 1 - p + p g e^l, F times P_D g     g = N(z; z_pred, S) / density of false boxes
+    missed    S, F times 1 - p                           p = P_D times the visible share of the box
+    measured  S times 1 - p + p g e^l, F times 1 - p + p g      g = N(z; z_pred, S) / density of false boxes
     birth     S : F = U e^l : C                          U new people, C false boxes expected in a frame
 All states are normalised to the sum 1 afterwards. As the rates are per second, it is the same at each frame rate: boxes
 of a false object are no independent evidence within clutter_time. l is the log-likelihood ratio of the score.
@@ -44,12 +44,12 @@ def newborn(person: Array) -> Array:
     return np.stack([person, np.zeros_like(person), 1 - person])
 
 
-def update(states: Array, rows: Ints, p: Array, p_detect: float, g: Array, ratio: Array | float) -> None:
+def update(states: Array, rows: Ints, p: Array, g: Array, ratio: Array | float) -> None:
     """Updates the probabilities `states` (3, N) in place: tracks at `rows` (K,) were measured, all others missed."""
     likelihood = np.ones_like(states)
-    likelihood[SHOWN], likelihood[FALSE] = 1 - p, 1 - p_detect
+    likelihood[SHOWN] = likelihood[FALSE] = 1 - p
     likelihood[SHOWN, rows] += p[rows] * g * ratio
-    likelihood[FALSE, rows] = p_detect * g
+    likelihood[FALSE, rows] += p[rows] * g
     nothing = 1 - states.sum(0)
     states *= likelihood
     states /= states.sum(0) + nothing

@@ -42,8 +42,11 @@ LIKELY = 0.5  # least probability of a confirmed track, and of a reported box
 LEAST_EXISTENCE = 0.01  # a track with a lower existence probability is deleted, or not started
 BODY = 0.35  # m: a box is right if its middle is so near to the person
 IN_FRONT = 0.15  # m in the image: whose feet are lower by more stands in front
+SAME_BODY = 0.15  # m in the image: tracks whose feet are nearer are on one body
+DOUBLE_TIME = 3.0  # s: mean time after which two tracks on one body are one person
 SIZE_SPREAD = 0.3  # m: standard deviation of height and width of false boxes
-DOUBLES = 0.1  # boxes per frame that a person has beside the own one, on average
+LEAST_VIEW = 5.0  # m: least width and height of the field of view
+DOUBLES = 0.05  # boxes per frame that a person has beside the own one, on average
 DOUBLE_SPREAD = 0.3  # m: standard deviation of centre, height and width of such a box
 
 SCALE, RHO, BORN, SCORE = range(4)  # Rows of `numbers`, followed by the states of existence.
@@ -110,10 +113,17 @@ class TrackedPeople:
         self.confirmed, self.measured = flags
 
     def predict(self) -> None:
-        """Predict all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence."""
+        """Predict all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence; a
+        track on the body of another is merged with it, that is, deleted, unless it is likely another person."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
         self.rho[:] = self.compute_rho()
         self.states[:] = self.transition @ self.states
+        if self.by_existence:
+            doubled = self._doubled()
+            self.states[:, doubled] *= np.exp(-self.dynamics.dt / DOUBLE_TIME)
+            merged = doubled & (self.existence() < LIKELY)
+            if merged.any():
+                self.keep_only((~merged).nonzero()[0])
         self.detectable = self.config.detect_prob * self.visible_shares()
 
     def compute_rho(self) -> Array:
@@ -141,6 +151,16 @@ class TrackedPeople:
         covered = np.where(in_front, box_geometry.covered_share(place, place), 0.0) * self.existence()
         return 1 - covered.max(1) * self._well_placed()
 
+    def _doubled(self) -> Bools:
+        """Returns flags (N,): True where a track is on the body of a person who is more probable."""
+        if len(self.id) < 2:
+            return np.zeros(len(self.id), bool)
+        place, r = self.upright_boxes(), self.existence()
+        foot = np.column_stack([place[:, 0], place[:, 1] + place[:, 2] / 2])
+        near = np.square(foot[:, None] - foot).sum(2) < np.square(SAME_BODY * self.scale)
+        order = np.lexsort((self.id, -r)).argsort()
+        return np.asarray((near & (order < order[:, None])).any(1))
+
     def _well_placed(self) -> Array:
         from scipy.special import erf
 
@@ -153,18 +173,18 @@ class TrackedPeople:
 
     def evidence(self, d2: Array, log_det: Array) -> Array:
         """Returns ln N(z; z_pred, S) (N, M) over the density of false boxes, from d^2 and ln |2 pi S|."""
-        return np.asarray(-0.5 * (d2 + log_det) - np.log(self._false_density())[:, None])
+        return np.asarray(-0.5 * (d2 + log_det) - np.log(self._false_density(self.scale))[:, None])
 
-    def _false_density(self) -> Array:
-        area = np.prod(np.maximum(self.view_high - self.view_low, 1.0))
-        return np.asarray(self.config.clutter_rate * np.square(self.scale) / area / (2 * np.pi * SIZE_SPREAD**2))
+    def _false_density(self, scale: Array) -> Array:
+        area = np.prod(np.maximum(self.view_high - self.view_low, LEAST_VIEW * self.px_per_m))
+        return np.asarray(self.config.clutter_rate * np.square(scale) / area / (2 * np.pi * SIZE_SPREAD**2))
 
     def associate(self, d2: Array, evidence: Array, ratio: Array | float = 1.0) -> tuple[Ints, Ints]:
         """Returns rows and columns (K,) of associated tracks and measurements, one to one."""
         if not self.by_existence:
             return assignment.cheapest_per_track(*assignment.nearest(d2), d2)
         c, (shown, _, false) = self.config, self.states
-        person, object_ = shown * self.detectable, false * c.detect_prob
+        person, object_ = shown * self.detectable, false * self.detectable
         measured = person[:, None] * ratio + object_[:, None]
         missed = np.maximum(1 - person - object_, 1e-9)[:, None]
         unowned = 1 + self._new_people(ratio) / c.clutter_rate
@@ -185,7 +205,7 @@ class TrackedPeople:
         self.score[rows] = score
         self.scale[:] = self._scale_of(self.bank[kalman.PLACE])
         if self.by_existence:
-            existence.update(self.states, rows, self.detectable, self.config.detect_prob, np.exp(evidence), ratio)
+            existence.update(self.states, rows, self.detectable, np.exp(evidence), ratio)
             self.confirmed[:] = self.existence() >= LIKELY
         else:
             self.confirmed[rows] |= near & (self.rho[rows] <= self.config.confirm_ratio)
@@ -197,18 +217,20 @@ class TrackedPeople:
         size = np.maximum(place[:, 2], place[:, 3]) / PERSON_HEIGHT
         return np.asarray(np.clip(size, whole / LARGEST_SCALE, whole * LARGEST_SCALE))
 
-    def new_people(self, z: Array, ratio: Array | float = 1.0) -> Array:
+    def new_people(self, z: Array, free: Bools, ratio: Array | float = 1.0) -> Array:
         """Returns the probability (M,) that each box z (M, 4), as no track's, is of a person without a track.
 
-        It may also be false, or a second box of a measured person. Also counts the people without a track.
+        It may also be false, or a second box of a measured person or of an earlier one of the boxes `free` (M,), which
+        no track has. Also counts the people without a track.
         """
         c, new = self.config, self._new_people(ratio)
-        double = np.zeros(len(z))
-        if len(self.id) and len(z):
-            spread = np.full((1, 4), DOUBLE_SPREAD**2)
-            d2 = ((z[:, None] - self.bank[kalman.PLACE]) ** 2 / np.square(self.scale)[:, None]).sum(2) / spread[0, 0]
-            density = np.exp(-0.5 * d2) / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self._false_density()
-            double = c.clutter_rate * DOUBLES * (density * self.existence() * self.measured).sum(1)
+        person = new / (new + c.clutter_rate) * np.ones(len(z))
+        earlier = np.tri(len(z), k=-1) * np.where(free, person, 0.0)
+        owned = np.concatenate([np.tile(self.existence() * self.measured, (len(z), 1)), earlier], 1)
+        place, scale = np.concatenate([self.bank[kalman.PLACE], z]), np.concatenate([self.scale, self._scale_of(z)])
+        d2 = kalman.distances(np.stack([place, *[0 * place] * 4]), z, DOUBLE_SPREAD**2, scale).T
+        density = np.exp(-0.5 * d2) / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self._false_density(scale)
+        double = c.clutter_rate * DOUBLES * (density * owned).sum(1)
         if len(z) or len(self.id):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
             self.unseen = stay * (1 - c.detect_prob) * self.unseen + c.birth_rate * self.dynamics.dt

@@ -49,10 +49,12 @@ class BoxUpdater:
         terms = kalman.update(people.bank, rows, z[columns], people.noise)
         near = np.add.reduce(terms, 1) / np.square(people.scale[rows]) <= self.confirm_gate
         people.record_measured(rows, near, score[columns], evidence[rows, columns], ratio[columns])
-        person = people.new_people(z, ratio)
-        free = person >= LEAST_EXISTENCE if people.by_existence else ~inside.any(0)
-        free[columns], person[columns] = False, people.existence()[rows]
+        free = np.ones(len(z), bool) if people.by_existence else ~inside.any(0)
+        free[columns] = False
+        person = people.new_people(z, free, ratio)
+        person[columns] = people.existence()[rows]
         self.scores.add(score, person)
+        free &= (person >= LEAST_EXISTENCE) | (not people.by_existence)
         people.delete_tracks(frame.t)
         people.start_tracks(z[free], score[free], frame.t, person[free])
 

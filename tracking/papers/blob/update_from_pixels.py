@@ -196,7 +196,7 @@ class PixelUpdater:
             self._relax_sizes()
         near = away <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
         people.record_measured(made.rows, near, made.support, evidence)
-        person = people.new_people(unexplained[:, :4])
+        person = people.new_people(unexplained[:, :4], np.ones(len(unexplained), bool))
         people.delete_tracks(t)
         people.start_tracks(unexplained, np.ones(len(unexplained)), t, person)
 
