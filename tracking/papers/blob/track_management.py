@@ -1,13 +1,12 @@
 """The tracks of `blob`: filters, ages and flags, and which tracks are started, confirmed, deleted and reported.
 
-Two kinds of management (`management`):
+Two kinds of `management`:
 - rho, of Gonzalez et al. (2006), secs. 4.4, 4.5 and 5: by rho = sqrt|S| / its asymptote, S the covariance of the
   innovation: the uncertainty of a track, no unit, 1 in the steady state (tracking.filters.track_uncertainty).
-- existence (ours): by the probability that a track is a person (tracking.papers.blob.existence). A measurement is
-  associated where that is more likely than that it is false or new. A track is confirmed while it is more likely a
-  person than not. It is reported if the product of its existence and the probability that the person is where it is
-  predicted is at least 0.5. A missed person may be hidden by another whose feet are nearer to the camera. Two tracks on
-  one body do not hide each other, so that the one that is missed ends.
+- existence (ours): by the probability that a track is a person (existence). A measurement is associated where that is
+  more likely than that it is false or new. A track is reported if it is a person, and where predicted, with the
+  probability LIKELY. A person whose feet are nearer to the camera hides others. A track on the body of another is not
+  hidden, and merged with it.
 
 Also here: the tracks of `blob` from pixels: the table of tracks, with a direction and a nominal covariance for each
 track.
@@ -152,14 +151,14 @@ class TrackedPeople:
         return 1 - covered.max(1) * self._well_placed()
 
     def _doubled(self) -> Bools:
-        """Returns flags (N,): True where a track is on the body of a person who is more probable."""
+        """Returns flags (N,): True where a track, missed before, is on the body of a more probable person."""
         if len(self.id) < 2:
             return np.zeros(len(self.id), bool)
         place, r = self.upright_boxes(), self.existence()
         foot = np.column_stack([place[:, 0], place[:, 1] + place[:, 2] / 2])
         near = np.square(foot[:, None] - foot).sum(2) < np.square(SAME_BODY * self.scale)
         order = np.lexsort((self.id, -r)).argsort()
-        return np.asarray((near & (order < order[:, None])).any(1))
+        return np.asarray((near & (order < order[:, None])).any(1) & ~self.measured)
 
     def _well_placed(self) -> Array:
         from scipy.special import erf
@@ -184,9 +183,8 @@ class TrackedPeople:
         if not self.by_existence:
             return assignment.cheapest_per_track(*assignment.nearest(d2), d2)
         c, (shown, _, false) = self.config, self.states
-        person, object_ = shown * self.detectable, false * self.detectable
-        measured = person[:, None] * ratio + object_[:, None]
-        missed = np.maximum(1 - person - object_, 1e-9)[:, None]
+        measured = self.detectable[:, None] * (shown[:, None] * ratio + false[:, None])
+        missed = (1 - self.detectable * (shown + false))[:, None]
         unowned = 1 + self._new_people(ratio) / c.clutter_rate
         with np.errstate(divide="ignore"):
             cost = np.log(missed * unowned) - np.log(measured) - evidence
