@@ -38,12 +38,12 @@ class BlobConfig(BackgroundSettings):
         "rho: nearest gated track, and tracks managed by rho (the paper); existence: by probabilities (ours)",
         "categorical", online=False)
     detect_prob: float = param(0.9, (0.1, 0.999), "probability",
-        "existence: a person who can be detected is detected in a frame (ours)")
+        "existence: a person who can be detected is detected in a frame")
     hidden_time: float = param(0.5, (0.05, 10.0), "s",
-        "existence: mean time in which a person cannot be detected (ours)", "log")
-    birth_rate: float = param(0.5, (0.001, 100.0), "1/s", "existence: new people (ours)", "log")
-    clutter_rate: float = param(0.5, (0.001, 100.0), "1/frame", "existence: new false boxes (ours)", "log")
-    clutter_time: float = param(0.15, (0.001, 10.0), "s", "existence: mean time that a false box lasts (ours)", "log")
+        "existence: mean time in which a person cannot be detected", "log")
+    birth_rate: float = param(0.5, (0.001, 100.0), "1/s", "existence: new people", "log")
+    clutter_rate: float = param(0.5, (0.001, 100.0), "1/frame", "existence: new false boxes", "log")
+    clutter_time: float = param(0.15, (0.001, 10.0), "s", "existence: mean time that a false box lasts", "log")
     confirm_ratio: float = param(1.5, (1.01, 2.0), "", "rho: a track is confirmed at or below this value of rho")
     coast_time: float = param(1.5, (0.0, 10.0), "s",
         "rho: a confirmed track is deleted after this time without measurement, from the steady state")

@@ -71,9 +71,10 @@ class TrackedPeople:
         confirmed (N,)      True if confirmed; else the track is tentative
         measured (N,)       True if measured in this frame
         view_low, view_high (2,)   corners x, y of the field of view, px; inf and -inf before it is known
-    detectable (N,): probability that a person who exists and is shown is measured in this frame; unseen: number of
-    people expected in view without a track; px_per_m: the image's scale; from pixels that of the frame. Also config,
-    context, dynamics (the nominal filter), top (True from straight above), and what `follow` derives.
+    detectable (N,): probability that a person who exists and is shown is measured in this frame; unseen_time: s,
+    birth_rate times it is the expected number of people in view without a track; px_per_m: the image's scale; from
+    pixels that of the frame. Also config, context, dynamics (the nominal filter), top (True from straight above), and
+    what `follow` derives.
     """
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
@@ -81,7 +82,7 @@ class TrackedPeople:
         self.top = context.camera is not None and context.camera.kind == "top"
         self.view_low, self.view_high = np.full(2, np.inf), np.full(2, -np.inf)
         self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
-        self.detectable, self.unseen = np.zeros(0), config.birth_rate * existence.LIFETIME
+        self.detectable, self.unseen_time = np.zeros(0), existence.LIFETIME
         self._bind(np.zeros((7, 0)), np.zeros((2, 0), bool))
         self.follow(config, dynamics)
 
@@ -191,7 +192,7 @@ class TrackedPeople:
         return assignment.optimal(np.where(np.isfinite(d2), cost, np.inf), 0.0)
 
     def _new_people(self, ratio: Array | float) -> Array | float:
-        return self.unseen * self.config.detect_prob * ratio
+        return self.config.birth_rate * self.unseen_time * self.config.detect_prob * ratio
 
     def record_measured(
         self, rows: Ints, near: Bools, score: Array, evidence: Array, ratio: Array | float = 1.0
@@ -231,7 +232,7 @@ class TrackedPeople:
         double = c.clutter_rate * DOUBLES * (density * owned).sum(1)
         if len(z) or len(self.id):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
-            self.unseen = stay * (1 - c.detect_prob) * self.unseen + c.birth_rate * self.dynamics.dt
+            self.unseen_time = stay * (1 - c.detect_prob) * self.unseen_time + self.dynamics.dt
         return np.asarray(new / (new + c.clutter_rate + double))
 
     def delete_tracks(self, t: float) -> None:
