@@ -8,17 +8,13 @@ Two kinds of `management`:
   probability LIKELY. A person whose feet are nearer to the camera hides others. A track on the body of another is not
   hidden, and merged with it.
 
-Also here: the tracks of `blob` from pixels: the table of tracks, with a direction and a nominal covariance for each
-track.
+Also here: the tracks of `blob` from pixels, with a direction and a nominal covariance for each track.
 
 The state's h, w are the axes of the person's ellipse, the longer one first as measured, and theta is the direction of h
 from the abscissa, v down, modulo pi. theta is a random walk (Gonzalez et al. 2006, sec. 4.1). The box of a track is the
-bounding box of its ellipse.
-
-The paper's rho is sqrt|S| over its asymptote, S the covariance of the innovation (measurement less prediction). It
-counts measurements by the covariance (sec. 4.5). Here the covariance also knows that a partly hidden person
-is measured with more noise, and that axes return to expected ones (both ours). So rho is computed from a second,
-nominal covariance, which is updated with the nominal R (variance of a measurement) only.
+bounding box of its ellipse. The filter's covariance also knows that a partly hidden person is measured with more noise,
+and that axes return to expected ones (both ours). So rho, which counts measurements (sec. 4.5), is computed from a
+second, nominal covariance, which is updated with the nominal R (variance of a measurement) only.
 """
 
 from __future__ import annotations

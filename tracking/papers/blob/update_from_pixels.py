@@ -10,17 +10,10 @@ Order of a frame, with the paper's sections:
     rho: confirm, delete, start tracks                                        secs. 4.5, 5 (track_management)
     adapt the background, except where confirmed tracks are                   ours
 
-A blob that is associated with no track starts a track. With `split` it also does so inside the gate of a track that a
-nearer blob updates, since pieces of one person have been found by templates. Without `split` neither a blob inside any
-gate starts a track nor pieces of a person whose union is inside (blob_pieces; the paper's frame 367). Blobs do not use
-`orphan_gate`.
-
-Also here: blobs that are pieces of one person: several measurements of one track from pixels.
-
-At frame 367 of Gonzalez et al. (2006, sec. 5) a person is segmented into several pieces, which "still lie within the
-gate" and "are assigned to the existing tracker". The paper does not say how several measurements update one filter.
-Here they are one measurement, their union: the ellipse of all their pixels. The gate holds for the union, as half a
-person alone is far from the prediction in height and centre.
+A blob that is associated with no track may start one. Without `split` neither a blob inside any gate starts a track nor
+pieces of a person whose union is inside. At frame 367 of Gonzalez et al. (2006, sec. 5) pieces "still lie within the
+gate" and "are assigned to the existing tracker"; the paper does not say how. Here they are one measurement: the ellipse
+of all their pixels, for which the gate holds.
 """
 
 from __future__ import annotations
