@@ -83,5 +83,4 @@ class ScoreCalibration:
         person, false = (np.bincount(at, w, BINS) for w in (self.weight, 1 - self.weight))
         # prior boxes are divided among the ranges as all boxes are, so that equal scores have the ratio 1
         prior = np.bincount(at, minlength=BINS) / len(at) * DOUBT * BINS + 1e-9
-        person, false = person + prior, false + prior
-        self.table = (person / person.sum()) / (false / false.sum())
+        self.table = (person + prior) / (person + prior).sum() / (false + prior) * (false + prior).sum()

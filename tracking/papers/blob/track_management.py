@@ -145,7 +145,7 @@ class TrackedPeople:
         foot = place[:, 1] + place[:, 2] / 2
         in_front = foot - foot[:, None] > IN_FRONT * self.scale[:, None]
         covered = np.where(in_front, box_geometry.covered_share(place, place), 0.0) * self.existence()
-        return 1 - covered.max(1) * self._well_placed()
+        return np.asarray(1 - covered.max(1) * self._well_placed())
 
     def _doubled(self) -> Bools:
         """Returns flags (N,): True where a track, missed before, is on the body of a more probable person."""
