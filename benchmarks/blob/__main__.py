@@ -2,7 +2,7 @@
 
     python -m benchmarks.blob peers [speed] [train] [test] [generated] [real] --peer-python PYTHON [--data FOLDER]
         [--rounds 5] [--scenes 24]
-    python -m benchmarks.blob options [--scenes 30]
+    python -m benchmarks.blob options [--scenes 30] [--data FOLDER]
     python -m benchmarks.blob pixels [pets] [rendered] [above] [--data FOLDER] [--seeds 0:2]
 
 The docstrings of benchmarks/blob/*.py say what each mode prints. Without a part a mode does all its parts (`pixels`:
@@ -42,7 +42,7 @@ def main() -> None:
         boxes.peers(args.part or PARTS["peers"], settings)
     elif args.mode == "options":
         one_thread()
-        options.options(args.scenes or 30)
+        options.options(args.scenes or 30, args.data)
     else:
         pixels.pixels(args.part or ("pets", "rendered"), args.data / PETS, args.seeds)
 

@@ -7,7 +7,8 @@ train, test: scenes with occlusion (synthetic.walk), of the seeds on which defau
 nothing was. generated: the catalogue with its own sensor, test seeds; `blob` gets the camera. Printed: means over all
 scenes of HOTA, DetA, AssA, MOTA, IDSW, FP, FN, IDF1, and blob's HOTA minus that of each tracker, paired over scenes,
 with 95 % intervals. `blob, paper` is the preset `paper`.
-real: PETS09-S2L1-first200 and TUD-Campus with their det/det.txt; the intervals are by moving blocks of frames.
+real: AVG-TownCentre-first225, PETS09-S2L1-first200 and TUD-Campus with their det/det.txt; the intervals are by moving
+blocks of frames.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ import numpy as np
 
 from benchmarks.peers import synthetic
 from benchmarks.peers.scores import bootstrap, mot_scores
-from benchmarks.support.options import CAMPUS, PETS
+from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE
 from scenarios import load
 from sim.io.source import open_source
 from sim.sequence import simulate
@@ -41,7 +42,6 @@ CATALOGUE = ("merge", "split", "cross", "pass-by", "side-by-side", "pillar", "do
 FIELDS = ((20, 1.0, 0.0), (100, 1.0, 0.0), (20, 0.9, 5.0), (100, 0.9, 5.0))  # squares, detection probability, clutter
 VARIANTS = {
     "blob": {},
-    "blob, nearest": {"association": "nearest"},
     "blob, paper": BlobConfig.preset("paper").as_dict(),
 }
 Answer = list[tuple[np.ndarray, np.ndarray]]
@@ -123,7 +123,7 @@ def track_peer(python: str, name: str, det: Path, frames: int) -> tuple[Answer, 
 
 
 def all_answers(python: str, folder: Path, sequence: Recording) -> dict[str, Answer]:
-    """Returns the answers of blob (defaults, the paper's association, its preset) and of the peers."""
+    """Returns the answers of blob (defaults, the preset `paper`) and of the peers."""
     det = folder / "det.txt"
     write_mot(sequence, det)
     answers = {name: track_blob(sequence, params)[0] for name, params in VARIANTS.items()}
@@ -184,7 +184,7 @@ def compare_scenes(python: str, folder: Path, title: str, made: list[Scene]) -> 
 
 
 def real(run: PeerRun, folder: Path) -> None:
-    for path in (PETS, CAMPUS):
+    for path in (TOWN_CENTRE, PETS, CAMPUS):
         (sequence,) = open_source(run.data / path, images=False)
         scene, answers = with_truth(sequence), all_answers(run.python, folder, sequence)
         block = max(round(sequence.fps), sequence.length // 20)

@@ -30,7 +30,7 @@ KEYS = "HOTA", "DetA", "AssA", "MOTA", "IDF1"
 ABLATIONS: dict[str, dict[str, object]] = {
     "blob": {},
     "no splitting, no person size": {"split": False},
-    "nearest": {"association": "nearest"},
+    "managed by rho": {"management": "rho"},
     "preset `paper`": dict(BlobConfig.preset("paper").as_dict()),
 }
 SCENES = (("street", 15), ("street", 20), ("cross", 15), ("mixed", 15), ("pillar", 20), ("split", 15), ("crowd", 20))

@@ -129,8 +129,9 @@ def test_a_change_half_way_is_seen_from_there_on_and_not_before(name, points):
 
 def test_a_refused_change_leaves_blob_as_it_was(points):
     """Newborn tracks that would be confirmed at once."""
-    wrong = dataclasses.replace(find("blob").config_class(), confirm_ratio=2.0, speed_prior=0.1, accel_noise=10.0)
-    ready, plain = prepare("blob", points), answers("blob", points, "file", {})
+    paper = find("blob").config_class(management="rho")
+    wrong = dataclasses.replace(paper, confirm_ratio=2.0, speed_prior=0.1, accel_noise=10.0)
+    ready, plain = prepare("blob", points, params=paper), answers("blob", points, "file", {0: paper})
     ready.reset(0)
     good, made = ready.tracker.config, []
     for frame in ready.frames():

@@ -9,7 +9,6 @@ Also here: the content of run.json: which tracker ran, with which config and see
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Callable, Mapping
 from collections.abc import Sequence as SequenceOf
@@ -135,9 +134,6 @@ def input_name(info: Mapping[str, Any]) -> str:
 OF_TRACKS = ("sequence", "plane", "fps", "px_per_m", "px_per_m_frames", "frames")
 
 
-MOST = 0.5  # Share of weak detections from which on a warning is given.
-
-
 @dataclass(frozen=True, eq=False)
 class TrackingRun(SequenceOf[Tracks]):
     """The tracks of one run; as a sequence, one `Tracks` per frame in order: item 0 is frame 1.
@@ -213,9 +209,6 @@ def track(
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
     prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
-    weak = _weak_detections(prepared)
-    if weak is not None:
-        warnings.warn(weak, UserWarning, stacklevel=2)
     prepared.reset(seed)
     reported, spent, begun = [], 0.0, clock()
     for frame in prepared.frames():
@@ -246,24 +239,6 @@ def track(
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
     info = run_info(prepared, tracks, seed, sensor or {}, scale, speeds)
     return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
-
-
-def _weak_detections(prepared: PreparedTracker) -> str | None:
-    # A detector whose scores lie below score_start makes a run without tracks, though nothing is wrong.
-    least = getattr(prepared.config, "score_start", None)
-    found = [f.detections.score for f in prepared.frames_given or () if f.detections is not None]
-    score = np.concatenate([np.zeros(0), *found])
-    if least is None or not len(score):
-        return None
-    weak = int((score < least).sum())
-    if weak <= MOST * len(score):
-        return None
-    low, quarter, half, high = np.quantile(score, (0, 0.25, 0.5, 1))
-    return (
-        f"{prepared.sequence.name}: {weak} of {len(score)} detections score below score_start = {least:g}, so that "
-        f"they start no track. Scores are {low:.3g} to {high:.3g}, with median {half:.3g}, after any map named above. "
-        f"Lower it, as with --set score_start={math.floor(100 * quarter) / 100:g}, or give other scores"
-    )
 
 
 def group(

@@ -433,7 +433,7 @@ def made(tmp_path_factory) -> Path:
     (folder / "pair.txt").write_text("\n".join([*pair, ""]))
     bare = [f"{k},1,-1,-1,-1,-1,1,{5 + 0.2 * k},4,0" for k in range(1, 16)]
     (folder / "bare.txt").write_text("\n".join([*bare, ""]))
-    (folder / "params.toml").write_text("[params]\nassociation = 'nearest'\nconfirm_ratio = 1.9\n")
+    (folder / "params.toml").write_text("[params]\nmanagement = 'rho'\nconfirm_ratio = 1.9\n")
     return folder
 
 

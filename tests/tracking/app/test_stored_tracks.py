@@ -88,7 +88,7 @@ def test_an_unfinished_run(made, tracks, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("option", "words"),
     [
-        (["--set", "orphan_gate=0.8"], "blob (orphan_gate = "),
+        (["--set", "gate=0.8"], "blob (gate = "),
         (["--grouping", "{folder}/rule.toml"], "blob (near = 0.7"),
     ],
 )

@@ -92,9 +92,9 @@ def test_a_seed_repeats_everything(tracker, every):
 
 def test_options_choose_the_source_and_the_parameters():
     env = make()
-    options = {"scenario": "pass-by", "seed": 1, "params": {"report_delay": 3.0, "association": "nearest"}}
+    options = {"scenario": "pass-by", "seed": 1, "params": {"coast_time": 3.0, "management": "rho"}}
     _, info = env.reset(seed=0, options=options)
-    assert (info["scenario"], info["seed"], info["params"]["report_delay"]) == ("pass-by", 1, 3.0)
+    assert (info["scenario"], info["seed"], info["params"]["coast_time"]) == ("pass-by", 1, 3.0)
     start = encode(env.unwrapped.space, env.unwrapped.base)
     first = played(env, start, seed=0, options=options)
     again = played(env, start, options=options)

@@ -51,5 +51,5 @@ def test_rho_does_not_see_the_measured_values(seed):
 
 def test_a_newborn_that_would_be_confirmed_at_once_is_refused():
     with pytest.raises(InputError, match="confirm_ratio"):
-        BlobConfig(accel_noise=10.0, speed_prior=0.1).dynamics(2.5)
+        BlobConfig(management="rho", accel_noise=10.0, speed_prior=0.1).dynamics(2.5)
     assert BlobConfig().dynamics(2.5).dt == 0.4

@@ -279,23 +279,6 @@ def test_groups_named_late_are_replaced_with_a_warning():
     assert "grouping" in run.info
 
 
-def scored(score):
-    """The source with detections of this score."""
-
-    def weak():
-        for frame in frames():
-            yield frame.replace(detections=frame.detections.replace(score=np.full(2, score)))
-
-    return Sequence("made", FPS, LENGTH, weak, has_detections=True, image_size=(1000, 600))
-
-
-def test_detections_that_start_no_track() -> None:
-    with pytest.warns(UserWarning, match="60 of 60 detections score below score_start = 0.5") as told:
-        assert not any(len(t.id) for t in track("blob", scored(0.2)))
-    assert "--set score_start=0.2" in str(told[0].message)
-    assert any(len(t.id) for t in track("blob", scored(0.2), params={"score_start": 0.2}))
-
-
 def side_by_side(index: int) -> Tracks:
     """Two people at rest, 60 px apart in the image."""
     pos = np.array([[200.0, 200.0], [260.0, 200.0]])

@@ -1,4 +1,4 @@
-"""Geometry of boxes as `blob` measures them: conversion, overlap, and fusing the pieces of one person.
+"""Geometry of boxes as `blob` measures them: conversion and overlap.
 
 A centred box is (x, y, h, w): centre, height, width, px. A detection's box is (left, top, width, height), px.
 """
@@ -51,17 +51,6 @@ def centred(standing_box: Array) -> Array:
     return out
 
 
-def fuse_pieces(pieces: Array) -> Array:
-    """Returns one centred box (4,) with the area-weighted mean and variance of several filled boxes, pieces (K, 4), K
-    >= 1."""
-    centre, side = pieces[:, :2], pieces[:, :1:-1]
-    w = np.prod(side, 1)
-    w = w / w.sum()
-    mean = w @ centre
-    var = w @ (side**2 / 12 + (centre - mean) ** 2)
-    return np.concatenate([mean, np.sqrt(12 * var)[::-1]])
-
-
 def covered_share(place: Array, others: Array) -> Array:
     """Returns the share (N, M), 0 to 1, of each box of `place` (N, 4) that lies in each box of `others` (M, 4)."""
     shared = np.ones((len(place), len(others)))
@@ -77,13 +66,3 @@ def points_inside(points: Array, boxes: Array) -> Bools:
     """Returns flags (N, M): True where point n lies in box m or on its edge."""
     away = np.abs(points[:, None, :2] - boxes[:, :2]) <= boxes[:, :1:-1] / 2
     return np.asarray(away[..., 0] & away[..., 1])
-
-
-def hull_iou(places: Array, box: Array) -> float:
-    """Returns the IoU, 0 to 1, of the bounding box of several boxes `places` (K, 4), K at least 1, with another `box`
-    (4,)."""
-    low = (places[:, :2] - places[:, :1:-1] / 2).min(0)
-    high = (places[:, :2] + places[:, :1:-1] / 2).max(0)
-    whole = np.concatenate([(low + high) / 2, (high - low)[::-1]])[None]
-    shared = float(covered_share(whole, box[None])[0, 0]) * float(np.prod(whole[0, 2:]))
-    return shared / float(np.prod(whole[0, 2:]) + np.prod(box[2:]) - shared)

@@ -1,20 +1,20 @@
 """The tracks of `blob`: filters, ages and flags, and which tracks are started, confirmed, deleted and reported.
 
-Track management of Gonzalez et al. (2006), secs. 4.5 and 5, by rho = sqrt|S| / its asymptote, S the covariance of the
-innovation: the uncertainty of a track, no unit, 1 in the steady state (tracking.filters.track_uncertainty). Association
-by cost, explained misses, the rules of reporting and the field of view are ours.
+Two kinds of `management`:
+- rho, of Gonzalez et al. (2006), secs. 4.4, 4.5 and 5: by rho = sqrt|S| / its asymptote, S the covariance of the
+  innovation: the uncertainty of a track, no unit, 1 in the steady state (tracking.filters.track_uncertainty).
+- existence (ours): by the probability that a track is a person (existence). A measurement is associated where that is
+  more likely than that it is false or new. A track is reported if it is a person, and where predicted, with the
+  probability LIKELY. A person whose feet are nearer to the camera hides others. A track on the body of another is not
+  hidden, and merged with it.
 
-Also here: the tracks of `blob` from pixels: the table of tracks, with a direction and a nominal covariance for each
-track.
+Also here: the tracks of `blob` from pixels, with a direction and a nominal covariance for each track.
 
 The state's h, w are the axes of the person's ellipse, the longer one first as measured, and theta is the direction of h
 from the abscissa, v down, modulo pi. theta is a random walk (Gonzalez et al. 2006, sec. 4.1). The box of a track is the
-bounding box of its ellipse.
-
-The paper's rho is sqrt|S| over its asymptote, S the covariance of the innovation (measurement less prediction). It
-counts measurements by the covariance (sec. 4.5). Here the covariance also knows that a partly hidden person
-is measured with more noise, and that axes return to expected ones (both ours). So rho is computed from a second,
-nominal covariance, which is updated with the nominal R (variance of a measurement) only.
+bounding box of its ellipse. The filter's covariance also knows that a partly hidden person is measured with more noise,
+and that axes return to expected ones (both ours). So rho, which counts measurements (sec. 4.5), is computed from a
+second, nominal covariance, which is updated with the nominal R (variance of a measurement) only.
 """
 
 from __future__ import annotations
@@ -27,27 +27,34 @@ from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Context, Ints
 from tracking.detect.person_size import upright
 from tracking.filters import assignment, kalman, track_uncertainty
-from tracking.papers.blob import box_geometry
+from tracking.papers.blob import box_geometry, existence
 from tracking.papers.blob.config import BlobConfig
 
-HIDDEN = 0.4  # share of a predicted box that a track in front must cover to explain a miss
-SAME = 0.5  # IoU of a box with the hull of several predicted boxes from which on it is taken for all of them
-# Relative margin of rho: deletion comes earlier, the end of reporting later, so that filters near their steady state
-# count as in it. With the default noises a miss adds more than this up to 60 fps. Above 60 fps the times are off by a
-# frame or two.
+# Relative margin of rho, with which deletion comes earlier, so that filters near their steady state count as in it.
 SLACK = 0.02
 LARGEST_SCALE = 2.0  # largest scale of a track relative to the sequence's; the least is its inverse
+LIKELY = 0.5  # least probability of a confirmed track, and of a reported box
+LEAST_EXISTENCE = 0.01  # a track with a lower existence probability is deleted, or not started
+BODY = 0.35  # m: a box is right if its middle is so near to the person
+IN_FRONT = 0.15  # m in the image: whose feet are lower by more stands in front
+SAME_BODY = 0.15  # m in the image: tracks whose feet are nearer are on one body
+DOUBLE_TIME = 3.0  # s: mean time after which two tracks on one body are one person
+SIZE_SPREAD = 0.3  # m: standard deviation of height and width of false boxes
+LEAST_VIEW = 5.0  # m: least width and height of the field of view
+DOUBLES = 0.05  # boxes per frame that a person has beside the own one, on average
+DOUBLE_SPREAD = 0.3  # m: standard deviation of centre, height and width of such a box
 
-SCALE, RHO, BORN, SCORE, HITS, MISSES = range(6)  # Rows of `numbers`.
-CONFIRMED, MEASURED, MISS_EXPLAINED = range(3)  # Rows of `flags`.
+SCALE, RHO, BORN, SCORE = range(4)  # Rows of `numbers`, followed by the states of existence.
+STATES = slice(4, 7)
+CONFIRMED, MEASURED = range(2)  # Rows of `flags`.
 # Attributes that are views of the rows of `numbers` and `flags`.
-NUMBERS, FLAGS = ("scale", "rho", "born", "score", "hits", "misses"), ("confirmed", "measured", "miss_explained")
+VIEWS = ("scale", "rho", "born", "score", "states", "confirmed", "measured")
 
 
 class TrackedPeople:
     """The table of N tracks of `blob`: their filters, ages and flags. Tracks are columns of the stacked arrays.
 
-    Made from config, its nominal filter at the frame rate, and context. State; `numbers` (6, N) and `flags` (3, N)
+    Made from config, its nominal filter at the frame rate, and context. State; `numbers` (7, N) and `flags` (2, N)
     stack the named rows, so that few arrays change their length:
         bank (5, N, 4)      Kalman filters of x, y, h, w (tracking.filters.kalman); places px, covariances m^2
         id (N,)             never used again; next_id: that of the next track, from 1
@@ -56,14 +63,14 @@ class TrackedPeople:
                             in the frame of birth that of every new track
         born (N,)           time of the first measurement, s
         score (N,)          score of the last measurement, 0 to 1
-        hits (N,)           frames with a measurement
-        misses (N,)         frames since the last measurement
-        confirmed (N,)      True once confirmed; else the track is tentative
+        states (3, N)       probabilities of a person who is shown, who is not, and of a false object (existence)
+        confirmed (N,)      True if confirmed; else the track is tentative
         measured (N,)       True if measured in this frame
-        miss_explained (N,) True if another track or a merged box explained a miss since the last measurement
         view_low, view_high (2,)   corners x, y of the field of view, px; inf and -inf before it is known
-    px_per_m: the image's scale; from pixels that of the frame. Also config, context, dynamics (the nominal filter), top
-    (True from straight above), and thresholds of rho by `follow`.
+    detectable (N,): probability that a person who exists and is shown is measured in this frame; unseen_time: s,
+    birth_rate times it is the expected number of people in view without a track; px_per_m: the image's scale; from
+    pixels that of the frame. Also config, context, dynamics (the nominal filter), top (True from straight above), and
+    what `follow` derives.
     """
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
@@ -71,7 +78,8 @@ class TrackedPeople:
         self.top = context.camera is not None and context.camera.kind == "top"
         self.view_low, self.view_high = np.full(2, np.inf), np.full(2, -np.inf)
         self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
-        self._bind(np.zeros((6, 0)), np.zeros((3, 0), bool))
+        self.detectable, self.unseen_time = np.zeros(0), existence.LIFETIME
+        self._bind(np.zeros((7, 0)), np.zeros((2, 0), bool))
         self.follow(config, dynamics)
 
     def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
@@ -79,36 +87,40 @@ class TrackedPeople:
         they are."""
         self.config, self.dynamics = config, dynamics
         self.q, self.noise, self.asymptote = dynamics.q, dynamics.noise, dynamics.asymptote
+        self.by_existence = config.management == "existence"
+        self.transition = existence.transition(dynamics.dt, config.hidden_time, config.clutter_time)
         self.birth_rho = track_uncertainty.at_birth(dynamics)
         confirmation = track_uncertainty.time_to_confirm(dynamics, config.confirm_ratio)
         self.tentative_limit = max(config.tentative_time, confirmation)
-        self.death_rho = self._rho_after(config.coast_time)
-        self.explained_death_rho = max(self.death_rho, self._rho_after(config.merged_time))
-        self.largest_log_det = 2 * float(np.log(max(self.explained_death_rho, self.birth_rho)))
-        self.silence_rho = self._rho_after(config.report_coast)
-        self.explained_silence_rho = max(self.silence_rho, self._rho_after(config.report_hidden))
+        frames = int(np.ceil(config.coast_time * self.context.fps - 1e-6))
+        self.death_rho = track_uncertainty.after_misses(dynamics, frames - 1)
 
     def __getstate__(self) -> dict[str, Any]:
         # A copy of a view has memory of its own: the rows are bound anew in the copy.
-        return {name: value for name, value in self.__dict__.items() if name not in (*NUMBERS, *FLAGS)}
+        return {name: value for name, value in self.__dict__.items() if name not in VIEWS}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._bind(self.numbers, self.flags)
 
     def _bind(self, numbers: Array, flags: Bools) -> None:
-        self.numbers, self.flags = numbers, flags
-        self.scale, self.rho, self.born, self.score, self.hits, self.misses = numbers
-        self.confirmed, self.measured, self.miss_explained = flags
-
-    def _rho_after(self, seconds: float) -> float:
-        frames = int(np.ceil(seconds * self.context.fps - 1e-6))
-        return track_uncertainty.after_misses(self.dynamics, frames - 1)
+        self.numbers, self.flags, self.states = numbers, flags, numbers[STATES]
+        self.scale, self.rho, self.born, self.score = numbers[: STATES.start]
+        self.confirmed, self.measured = flags
 
     def predict(self) -> None:
-        """Predict all tracks one frame ahead, in place (eqs 1, 2), and compute their uncertainty rho."""
+        """Predict all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence; a
+        track on the body of another is merged with it, that is, deleted, unless it is likely another person."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
         self.rho[:] = self.compute_rho()
+        self.states[:] = self.transition @ self.states
+        if self.by_existence:
+            doubled = self._doubled()
+            self.states[:, doubled] *= np.exp(-self.dynamics.dt / DOUBLE_TIME)
+            merged = doubled & (self.existence() < LIKELY)
+            if merged.any():
+                self.keep_only((~merged).nonzero()[0])
+        self.detectable = self.config.detect_prob * self.visible_shares()
 
     def compute_rho(self) -> Array:
         """Returns rho (N,) of all tracks as predicted: sqrt|S| over its asymptote, S the innovation covariance; 1 in
@@ -120,18 +132,78 @@ class TrackedPeople:
         is."""
         return np.asarray(self.bank[kalman.PLACE])
 
-    def record_measured(self, rows: Ints, near: Bools, score: Array) -> None:
+    def existence(self) -> Array:
+        """Returns the existence probability (N,) of all tracks."""
+        return np.asarray(self.states[existence.SHOWN] + self.states[existence.HIDDEN])
+
+    def visible_shares(self) -> Array:
+        """Returns the share (N,) of each person's box that no other person in front covers, as far as places are
+        known."""
+        if self.top or len(self.id) < 2:
+            return np.ones(len(self.id))
+        place = self.upright_boxes()
+        foot = place[:, 1] + place[:, 2] / 2
+        in_front = foot - foot[:, None] > IN_FRONT * self.scale[:, None]
+        covered = np.where(in_front, box_geometry.covered_share(place, place), 0.0) * self.existence()
+        return np.asarray(1 - covered.max(1) * self._well_placed())
+
+    def _doubled(self) -> Bools:
+        """Returns flags (N,): True where a track, missed before, is on the body of a more probable person."""
+        if len(self.id) < 2:
+            return np.zeros(len(self.id), bool)
+        place, r = self.upright_boxes(), self.existence()
+        foot = np.column_stack([place[:, 0], place[:, 1] + place[:, 2] / 2])
+        near = np.square(foot[:, None] - foot).sum(2) < np.square(SAME_BODY * self.scale)
+        order = np.lexsort((self.id, -r)).argsort()
+        return np.asarray((near & (order < order[:, None])).any(1) & ~self.measured)
+
+    def _well_placed(self) -> Array:
+        from scipy.special import erf
+
+        return np.asarray(erf(BODY / np.sqrt(2 * self.bank[kalman.VAR, :, 0])))
+
+    def innovations(self, z: Array) -> tuple[Array, Array]:
+        """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N, 1), in m, of N tracks and M boxes z (M, 4)."""
+        s = self.bank[kalman.VAR] + self.noise
+        return kalman.distances(self.bank, z, self.noise, self.scale), np.log(2 * np.pi * s).sum(1)[:, None]
+
+    def evidence(self, d2: Array, log_det: Array) -> Array:
+        """Returns ln N(z; z_pred, S) (N, M) over the density of false boxes, from d^2 and ln |2 pi S|."""
+        return np.asarray(-0.5 * (d2 + log_det) - np.log(self._false_density(self.scale))[:, None])
+
+    def _false_density(self, scale: Array) -> Array:
+        area = np.prod(np.maximum(self.view_high - self.view_low, LEAST_VIEW * self.px_per_m))
+        return np.asarray(self.config.clutter_rate * np.square(scale) / area / (2 * np.pi * SIZE_SPREAD**2))
+
+    def associate(self, d2: Array, evidence: Array, ratio: Array | float = 1.0) -> tuple[Ints, Ints]:
+        """Returns rows and columns (K,) of associated tracks and measurements, one to one."""
+        if not self.by_existence:
+            return assignment.cheapest_per_track(*assignment.nearest(d2), d2)
+        c, (shown, _, false) = self.config, self.states
+        measured = self.detectable[:, None] * (shown[:, None] * ratio + false[:, None])
+        missed = (1 - self.detectable * (shown + false))[:, None]
+        unowned = 1 + self._new_people(ratio) / c.clutter_rate
+        with np.errstate(divide="ignore"):
+            cost = np.log(missed * unowned) - np.log(measured) - evidence
+        return assignment.optimal(np.where(np.isfinite(d2), cost, np.inf), 0.0)
+
+    def _new_people(self, ratio: Array | float) -> Array | float:
+        return self.config.birth_rate * self.unseen_time * self.config.detect_prob * ratio
+
+    def record_measured(
+        self, rows: Ints, near: Bools, score: Array, evidence: Array, ratio: Array | float = 1.0
+    ) -> None:
         """Record that the tracks at positions `rows` (K,) were measured in this frame and all others missed; confirm
         tracks."""
         self.measured[:] = False
         self.measured[rows] = True
-        self.hits += self.measured
-        self.misses += 1
-        self.misses[rows] = 0
-        self.miss_explained[rows] = False
         self.score[rows] = score
-        self.confirmed[rows] |= near & (self.rho[rows] <= self.config.confirm_ratio)
         self.scale[:] = self._scale_of(self.bank[kalman.PLACE])
+        if self.by_existence:
+            existence.update(self.states, rows, self.detectable, np.exp(evidence), ratio)
+            self.confirmed[:] = self.existence() >= LIKELY
+        else:
+            self.confirmed[rows] |= near & (self.rho[rows] <= self.config.confirm_ratio)
 
     def _scale_of(self, place: Array) -> Array:
         whole = self.px_per_m
@@ -140,63 +212,37 @@ class TrackedPeople:
         size = np.maximum(place[:, 2], place[:, 3]) / PERSON_HEIGHT
         return np.asarray(np.clip(size, whole / LARGEST_SCALE, whole * LARGEST_SCALE))
 
-    def associate(self, d2: Array, log_det: Array, gate: float) -> tuple[Ints, Ints]:
-        """Returns rows and columns (K,) of associated tracks and measurements, one to one."""
-        if self.config.association == "nearest":
-            return assignment.cheapest_per_track(*assignment.nearest(d2), d2)
-        return assignment.optimal(d2 + np.minimum(log_det, self.largest_log_det), gate + self.largest_log_det)
+    def new_people(self, z: Array, free: Bools, ratio: Array | float = 1.0) -> Array:
+        """Returns the probability (M,) that each box z (M, 4), as no track's, is of a person without a track.
 
-    def rho_log_det(self) -> Array:
-        """Returns 2 ln rho (N, 1): ln |S| of each track, in metres, less that of a track in the steady state."""
-        return np.asarray(2 * np.log(self.rho)[:, None])
-
-    def explain_misses(self) -> None:
-        """Set miss_explained of each missed confirmed track that is hidden: one measured track with a lower foot covers
-        at least the share HIDDEN = 0.4 of its box."""
-        lost = (self.confirmed & ~self.measured & ~self.miss_explained).nonzero()[0]
-        if not len(lost) or self.top:
-            return
-        place = self.upright_boxes()
-        foot, hidden = place[:, 1] + place[:, 2] / 2, place.take(lost, 0)
-        in_front = self.measured & (foot > foot[lost, None])
-        in_front &= np.abs(hidden[:, :1] - place[:, 0]) < (hidden[:, 3:] + place[:, 3]) / 2
-        if in_front.any():
-            share = np.where(in_front, box_geometry.covered_share(hidden, place), 0.0)
-            self.miss_explained[lost[share.max(1) >= HIDDEN]] = True
-
-    def cover_several(self, z: Array, unseen: Bools) -> Bools:
-        """Returns flags (M,): True for each box z (M, 4) that covers several confirmed tracks, at least one of them
-        unseen."""
-        found = np.zeros(len(z), bool)
-        if not self.config.merged_time or not len(z) or not unseen.any():
-            return found
-        place = self.bank[kalman.PLACE]
-        inside = box_geometry.points_inside(place, z) & self.confirmed[:, None]
-        several = np.add.reduce(inside, 0) > 1
-        if not several.any():
-            return found
-        for column in np.flatnonzero(several & inside[unseen].any(0)):
-            members = inside[:, column]
-            alone = max(box_geometry.hull_iou(one[None], z[column]) for one in place[members])
-            if box_geometry.hull_iou(place[members], z[column]) >= max(SAME, alone):
-                found[column] = True
-                self.miss_explained[members & unseen] = True
-        return found
+        It may also be false, or a second box of a measured person or of an earlier one of the boxes `free` (M,), which
+        no track has. Also counts the people without a track.
+        """
+        c, new = self.config, self._new_people(ratio)
+        person = new / (new + c.clutter_rate) * np.ones(len(z))
+        earlier = np.tri(len(z), k=-1) * np.where(free, person, 0.0)
+        owned = np.concatenate([np.tile(self.existence() * self.measured, (len(z), 1)), earlier], 1)
+        place, scale = np.concatenate([self.bank[kalman.PLACE], z]), np.concatenate([self.scale, self._scale_of(z)])
+        d2 = kalman.distances(np.stack([place, *[0 * place] * 4]), z, DOUBLE_SPREAD**2, scale).T
+        density = np.exp(-0.5 * d2) / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self._false_density(scale)
+        double = c.clutter_rate * DOUBLES * (density * owned).sum(1)
+        if len(z) or len(self.id):
+            stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
+            self.unseen_time = stay * (1 - c.detect_prob) * self.unseen_time + self.dynamics.dt
+        return np.asarray(new / (new + c.clutter_rate + double))
 
     def delete_tracks(self, t: float) -> None:
         """Delete tracks from the table at time t, s (sec. 5, and ours)."""
-        lost = (~(self.measured & self.confirmed)).nonzero()[0]
-        if not len(lost):
-            return
-        unseen, sure, rho = ~self.measured[lost], self.confirmed[lost], self.rho[lost]
-        limit = np.where(self.miss_explained[lost], self.explained_death_rho, self.death_rho) * (1 - SLACK)
-        over = unseen & (rho >= np.where(sure, limit, self.birth_rho * (1 - 1e-9)))
-        over |= ~sure & (t - self.born[lost] > self.tentative_limit + 1e-6)
-        over |= unseen & self._outside(self.bank[kalman.PLACE, lost])
+        unseen = ~self.measured
+        over = unseen & self._outside(self.bank[kalman.PLACE])
+        if self.by_existence:
+            over |= self.existence() < LEAST_EXISTENCE
+        else:
+            limit = np.where(self.confirmed, self.death_rho * (1 - SLACK), self.birth_rho * (1 - 1e-9))
+            over |= unseen & (self.rho >= limit)
+            over |= ~self.confirmed & (t - self.born > self.tentative_limit + 1e-6)
         if over.any():
-            stay = np.ones(len(self.id), bool)
-            stay[lost[over]] = False
-            self.keep_only(stay.nonzero()[0])
+            self.keep_only((~over).nonzero()[0])
 
     def keep_only(self, rows: Ints) -> None:
         """Delete all tracks except those at table positions `rows` (K,); they are in the order of `rows` afterwards."""
@@ -208,29 +254,27 @@ class TrackedPeople:
             return np.zeros(len(place), bool)
         return np.asarray(((place[:, :2] < 0) | (place[:, :2] > self.context.image_size)).any(1))
 
-    def start_tracks(self, z: Array, score: Array, t: float) -> None:
-        """Append a tentative track at rest for each box z (K, 4): centre x, y, height, width, px."""
+    def start_tracks(self, z: Array, score: Array, t: float, person: Array) -> None:
+        """Append a track at rest for each box z (K, 4): centre x, y, height, width, px; person (K,): probability that
+        it is one."""
         n = len(z)
         if not n:
             return
-        numbers, flags = np.zeros((6, n)), np.zeros((3, n), bool)
+        numbers, flags = np.zeros((7, n)), np.zeros((2, n), bool)
         numbers[SCALE], numbers[RHO], numbers[BORN] = self._scale_of(z), self.birth_rho, t
-        numbers[SCORE], numbers[HITS] = score, 1
-        flags[MEASURED] = True
+        numbers[SCORE], numbers[STATES] = score, existence.newborn(person)
+        flags[CONFIRMED], flags[MEASURED] = self.by_existence & (person >= LIKELY), True
         self.id = np.concatenate([self.id, np.arange(self.next_id, self.next_id + n)])
         self.next_id += n
         self._bind(np.concatenate([self.numbers, numbers], 1), np.concatenate([self.flags, flags], 1))
         self.bank = np.concatenate([self.bank, kalman.born(z, self.noise, self.dynamics.birth_rate_var)], 1)
 
-    def rows_to_report(self, t: float) -> Ints:
-        """Returns the table positions (K,), ascending, of the tracks to report at time t, s (ours)."""
-        reported = self.measured & (self.confirmed | (t - self.born >= self.config.report_delay - 1e-6))
-        lost = (self.confirmed & ~self.measured).nonzero()[0]
-        if len(lost):
-            limit = np.where(self.miss_explained[lost], self.explained_silence_rho, self.silence_rho) * (1 + SLACK)
-            fresh = (self.rho[lost] <= limit) & (self.misses[lost] <= self.config.report_credit * self.hits[lost])
-            reported[lost] = fresh & ~self._leaving(lost)
-        return np.asarray(reported.nonzero()[0])
+    def rows_to_report(self) -> Ints:
+        """Returns the table positions (K,), ascending, of the tracks to report (ours)."""
+        if not self.by_existence:
+            return np.asarray(self.confirmed.nonzero()[0])
+        right = self.existence() * np.where(self.measured, 1.0, self._well_placed()) >= LIKELY
+        return np.asarray((right & (self.measured | ~self._leaving())).nonzero()[0])
 
     def widen_view(self, z: Array) -> None:
         """Set the field of view to the image, or, if its size is unknown, widen it to hold the boxes z (M, 4)."""
@@ -240,8 +284,8 @@ class TrackedPeople:
             self.view_low = np.minimum(self.view_low, (z[:, :2] - z[:, :1:-1] / 2).min(0))
             self.view_high = np.maximum(self.view_high, (z[:, :2] + z[:, :1:-1] / 2).max(0))
 
-    def _leaving(self, rows: Ints) -> Bools:
-        place, rate = self.upright_boxes()[rows], self.bank[kalman.RATE, rows, :2]
+    def _leaving(self) -> Bools:
+        place, rate = self.upright_boxes(), self.bank[kalman.RATE, :, :2]
         centre, half = place[:, :2], place[:, :1:-1] / 2
         out = ((centre - half < self.view_low) & (rate < 0)) | ((centre + half > self.view_high) & (rate > 0))
         return np.asarray(out.any(1))
@@ -270,7 +314,6 @@ class TrackedEllipses(TrackedPeople):
         """Replace the config and its nominal filter `dynamics` (of the config at the frame rate); the tracks stay as
         they are."""
         super().follow(config, dynamics)
-        self.largest_log_det += 2 * dynamics.noise.size * np.log(LARGEST_SCALE)
         rate = ANGLE_RATE * (HEADING if self.top else 1.0)
         self.angle_var_per_step = np.radians(rate) ** 2 * dynamics.dt
 
@@ -295,10 +338,9 @@ class TrackedEllipses(TrackedPeople):
         self.angle, self.nominal = self.angle.take(rows, 1), self.nominal.take(rows, 1)
         super().keep_only(rows)
 
-    def start_tracks(self, z: Array, score: Array, t: float) -> None:
-        """Append a tentative track at rest for each ellipse z (K, 5): centre x, y, full axes h, w (px), direction theta
-        (rad)."""
-        super().start_tracks(z[:, :4], score, t)
+    def start_tracks(self, z: Array, score: Array, t: float, person: Array) -> None:
+        """Append a track at rest for each ellipse z (K, 5): centre x, y, full axes h, w (px), direction theta (rad)."""
+        super().start_tracks(z[:, :4], score, t, person)
         new = np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)])
         self.angle = np.concatenate([self.angle, new], 1)
         self.nominal = np.concatenate([self.nominal, self.bank[:, self.bank.shape[1] - len(z) :]], 1)
@@ -310,15 +352,12 @@ class TrackedEllipses(TrackedPeople):
         turn = kalman.angle_innovation(z, self.angle[kalman.DIRECTION][:, None])
         return np.where(kalman.directed(angle_var), turn * turn / s, 0.0)
 
-    def innovations(self, z: Array, angle_var: Array) -> tuple[Array, Array]:
-        """Returns d^2 (eq. 9) and ln |S| but for a constant, (N, M) each, of N tracks and M ellipses."""
-        d2 = kalman.distances(self.bank, z[:, :4], self.noise, self.scale) + self.direction_distances(
-            z[:, 4], angle_var
-        )
+    def directed_innovations(self, z: Array, angle_var: Array) -> tuple[Array, Array]:
+        """Returns d^2 (eq. 9) and ln |2 pi S|, (N, M) each, of N tracks and M ellipses; a direction counts relative to
+        a uniform one."""
+        d2, log_det = self.innovations(z[:, :4])
         angle_s = self.angle[kalman.DIRECTION_VAR][:, None] + np.where(kalman.directed(angle_var), angle_var, np.inf)
-        known = np.log((self.bank[kalman.VAR] + self.noise) / self.asymptote).sum(1)
-        known += 2 * self.noise.size * np.log(self.scale / self.context.px_per_m)
-        return d2, known[:, None] + np.log(np.minimum(2 / np.pi * angle_s, 1.0))
+        return d2 + self.direction_distances(z[:, 4], angle_var), log_det + np.log(np.minimum(2 / np.pi * angle_s, 1.0))
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
         """Update the tracks at table positions `rows` (K,), each at most once, with ellipses z (K, 5), in place (eqs 3

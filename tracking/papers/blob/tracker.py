@@ -18,28 +18,27 @@ blob's ellipse.
     update     K = P C' S^-1,  x = x + K y,  P = (I - K C) P   eqs 3 to 7      tracking.filters.kalman
     manage     rho = sqrt|S| / asymptote: confirmed if rho     secs. 4.5, 5    track_management,
                and d^2 are low, deleted if rho is high                         tracking.filters.track_uncertainty
+               or by existence                                 ours            existence
     pixels     five classes, cleaning, blobs, ellipses         secs. 3.2, 3.3  tracking.detect
 
 Readings: eq. 4 lacks brackets. Eq. 9 has row and column exchanged. The "Mahalanobis radius" of sec. 4.3 is the
 quantile of chi2.
 
-Departures, from boxes and from pixels. Time limits of missed tracks are values of rho; they hold in the steady state.
+Departures, from boxes and from pixels. Those from `management` on hold unless it is "rho".
 
 - input: also boxes, without θ. Paper: blobs. Why: detectors report boxes.
 - noises: in m at the person and per root second. Paper: no values. Why: any scale and frame rate.
-- association: one to one, least sum of d² + ln |S| (`association`). Paper: nearest gated track. Why: a wide gate
-  must not win.
-- weak boxes: update tracks last, start none (`score_continue`). Paper: none. Why: hidden people have low scores.
-- pieces: a box in the `orphan_gate` of a measured track, or inside a confirmed track's box, starts none; fused if
-  that fits better. Paper: a measurement in a gate starts no track. Why: people near others must start tracks.
-- merged boxes: a box over several confirmed tracks, one of them missed, starts none, and updates none if its size is
-  outside the gate (`merged_time`). Paper: none. Why: the box is no single person.
-- explained misses: a track behind another, or in a merged box, survives `merged_time`. Paper: none. Why: people
-  reappear.
-- deletion: also: tentative tracks by ρ of birth or `tentative_time`; missed tracks outside the image. Paper: ρ after
-  some misses. Why: false alarms end early.
-- report: tentative ones from `report_delay`; missed ones for `report_coast`, at most `report_credit`, unless they
-  leave the view. Paper: not stated. Why: fewer false positions.
+- deletion: also missed tracks outside the image, and at `tentative_time`. Paper: ρ. Why: false alarms end early.
+- `management`: by an existence probability (existence). Paper: ρ. Why: rates hold at any frame rate and detector.
+- association: one to one, most likely, against false and new boxes. Paper: nearest gated track. Why: a wide gate must
+  not win.
+- scores: likelihood ratios, learned from the existence of the boxes' tracks. Paper: none. Why: any unit.
+- births: by the odds of new people to false boxes and second boxes of people. Paper: a measurement in no gate. Why:
+  people near others must start tracks.
+- hidden people: detected as far as no other in front covers them, and not at all for `hidden_time`. Paper: none. Why:
+  misses come in rows.
+- tracks on one body: merged. Paper: they compete (frame 357). Why: one body is one person.
+- report: boxes that are right with a probability of at least 0.5. Paper: not stated. Why: fewer false positives.
 
 Departures from pixels only:
 
@@ -129,7 +128,7 @@ class Blob:
 
     def _report(self, frame: Frame) -> Tracks:
         people = self.people
-        rows = people.rows_to_report(frame.t)
+        rows = people.rows_to_report()
         state, scale = people.bank.take(rows, 1), people.scale[rows]
         camera = self.context.camera
         place, alone = self.updater.reported_boxes(rows), np.full(len(rows), -1)

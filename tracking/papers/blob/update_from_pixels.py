@@ -10,17 +10,10 @@ Order of a frame, with the paper's sections:
     rho: confirm, delete, start tracks                                        secs. 4.5, 5 (track_management)
     adapt the background, except where confirmed tracks are                   ours
 
-A blob that is associated with no track starts a track. With `split` it also does so inside the gate of a track that a
-nearer blob updates, since pieces of one person have been found by templates. Without `split` neither a blob inside any
-gate starts a track nor pieces of a person whose union is inside (blob_pieces; the paper's frame 367). Blobs do not use
-`orphan_gate`.
-
-Also here: blobs that are pieces of one person: several measurements of one track from pixels.
-
-At frame 367 of Gonzalez et al. (2006, sec. 5) a person is segmented into several pieces, which "still lie within the
-gate" and "are assigned to the existing tracker". The paper does not say how several measurements update one filter.
-Here they are one measurement, their union: the ellipse of all their pixels. The gate holds for the union, as half a
-person alone is far from the prediction in height and centre.
+A blob that is associated with no track may start one. Without `split` neither a blob inside any gate starts a track nor
+pieces of a person whose union is inside. At frame 367 of Gonzalez et al. (2006, sec. 5) pieces "still lie within the
+gate" and "are assigned to the existing tracker"; the paper does not say how. Here they are one measurement: the ellipse
+of all their pixels, for which the gate holds.
 """
 
 from __future__ import annotations
@@ -146,7 +139,7 @@ class PixelUpdater:
         if seen is None or not seen.plausible:
             if seen is not None:
                 foreground.adapt(seen, self._protected())
-            people.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0))
+            people.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0), np.zeros(0))
             people.delete_tracks(frame.t)
             return
         found = foreground.person_blobs(seen.mask)
@@ -188,14 +181,17 @@ class PixelUpdater:
                 made = made.joined(self._measure_by_templates(scene, expected, made.rows, confirmed))
             entered = box_geometry.centred(new_people.find_new_people(scene, self.size, ENTRY_SUPPORT))
             unexplained = np.concatenate([unexplained, self._person_ellipses(entered)])
+        d2, log_det = people.directed_innovations(made.z, made.angle_var)
+        each = np.arange(len(made.rows))
+        evidence = people.evidence(d2, log_det)[made.rows, each]
         away = people.update(made.rows, made.z, made.noise, made.angle_var)
         if split:
             self._relax_sizes()
         near = away <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
-        people.record_measured(made.rows, near, made.support)
-        people.explain_misses()
+        people.record_measured(made.rows, near, made.support, evidence)
+        person = people.new_people(unexplained[:, :4], np.ones(len(unexplained), bool))
         people.delete_tracks(t)
-        people.start_tracks(unexplained, np.ones(len(unexplained)), t)
+        people.start_tracks(unexplained, np.ones(len(unexplained)), t, person)
 
     def _relax_sizes(self) -> None:
         at = box_geometry.standing(self.people.upright_boxes())
@@ -219,8 +215,8 @@ class PixelUpdater:
         return np.asarray((box_geometry.covered_share(sure, blobs) >= SHARED).sum(0) > 1)
 
     def _associate(self, z: Array, angle_var: Array) -> tuple[Measured, Ints, Array]:
-        d2, log_det = self.people.innovations(z, self._gated_direction(angle_var))
-        rows, taken = self.people.associate(self._gated(d2, angle_var), log_det, self.gates[1])
+        d2, log_det = self.people.directed_innovations(z, self._gated_direction(angle_var))
+        rows, taken = self.people.associate(self._gated(d2, angle_var), self.people.evidence(d2, log_det))
         noise = np.tile(self.people.noise, (len(rows), 1))
         return Measured(rows, z[taken], noise, angle_var[taken], np.ones(len(rows))), taken, d2
 
@@ -241,7 +237,9 @@ class PixelUpdater:
             z, angle_var = whole[None], np.array([var + ANGLE_NOISE])
             if self.size.reliable and not self.size.one_person(hull(found.box[mine]), z)[0]:
                 continue
-            away = self._gated(self.people.innovations(z, self._gated_direction(angle_var))[0], angle_var)[row, 0]
+            away = self._gated(self.people.directed_innovations(z, self._gated_direction(angle_var))[0], angle_var)[
+                row, 0
+            ]
             if away < (d2[row, own[row]] if row in own else np.inf):
                 used |= mine
                 rest = made.rows != row

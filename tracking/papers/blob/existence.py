@@ -1,0 +1,86 @@
+"""The existence probability of a track, and what a detector's score says of it (ours).
+
+A track began with one box. That box, and the track with it, is in one of four states: a person who can be detected (S,
+shown) or not (H, hidden), a false object (F) that the detector takes for a person for a while, or nothing any more
+(0). r = P(S) + P(H) is the existence probability. As in IPDA (Musicki, Evans 1994, "Markov chain two") and JIPDA:
+
+    predict   S, H -> 0 at the rate 1 / LIFETIME, F -> 0 at 1 / clutter_time, S -> H at 1 / SHOWN_TIME, H -> S at
+              1 / hidden_time: the same at each frame rate, as boxes within clutter_time are no independent evidence
+    missed    S, F times 1 - p                                p = P_D times the visible share of the box
+    measured  S times 1 - p + p g e^l, F times 1 - p + p g    g = N(z; z_pred, S) / density of false boxes
+    birth     S : F = U e^l : C                               U new people, C false boxes expected in a frame
+All states are normalised to the sum 1 afterwards. l is the log-likelihood ratio of the score.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.types import Array, Ints
+
+SHOWN, HIDDEN, FALSE = range(3)  # Rows of probabilities.
+BINS = 5  # ranges of scores, of as many boxes each
+LEARNED = 2000  # boxes after which the calibration of scores is kept
+DOUBT = 10.0  # boxes of each kind that each range of scores has in advance
+LIFETIME = 15.0  # s: mean time that a person is in view
+SHOWN_TIME = 1.0  # s: mean time in which a person can be detected
+
+
+def transition(dt: float, hidden_time: float, clutter_time: float) -> Array:
+    """Returns the matrix (3, 3) from the probabilities of S, H, F to those a step of dt s later; the rest is 0."""
+    hide, show = 1 / SHOWN_TIME, 1 / hidden_time
+    left = (1 - np.exp(-(hide + show) * dt)) / (hide + show)
+    stay, false = np.exp(-dt / LIFETIME), np.exp(-dt / clutter_time)
+    return np.array([
+        [stay * (1 - hide * left), stay * show * left, 0],
+        [stay * hide * left, stay * (1 - show * left), 0],
+        [0, 0, false],
+    ])  # fmt: skip
+
+
+def newborn(person: Array) -> Array:
+    """Returns the probabilities (3, K) of new tracks, each a person with the probability person (K,), else false."""
+    return np.stack([person, np.zeros_like(person), 1 - person])
+
+
+def update(states: Array, rows: Ints, p: Array, g: Array, ratio: Array | float) -> None:
+    """Updates the probabilities `states` (3, N) in place: tracks at `rows` (K,) were measured, all others missed."""
+    likelihood = np.ones_like(states)
+    likelihood[SHOWN] = likelihood[FALSE] = 1 - p
+    likelihood[SHOWN, rows] += p[rows] * g * ratio
+    likelihood[FALSE, rows] += p[rows] * g
+    nothing = 1 - states.sum(0)
+    states *= likelihood
+    states /= states.sum(0) + nothing
+
+
+class ScoreCalibration:
+    """Log-likelihood ratios of scores, learned from the existence of the tracks that the boxes belong to.
+
+    State: score, weight (M,): of the first boxes, the weight is the existence probability of the box's track.
+    """
+
+    def __init__(self) -> None:
+        self.score, self.weight = np.zeros(0), np.zeros(0)
+        self._learn()
+
+    def ratios(self, score: Array) -> Array:
+        """Returns p(score | person) / p(score | false box), (M,), of scores (M,)."""
+        return np.asarray(self.table[np.searchsorted(self.edges, score)])
+
+    def add(self, score: Array, weight: Array) -> None:
+        """Add boxes with scores (M,) and weights (M,): the probability that each is a person."""
+        if len(self.score) < LEARNED and len(score):
+            self.score, self.weight = np.append(self.score, score), np.append(self.weight, weight)
+            self._learn()
+
+    def _learn(self) -> None:
+        if len(self.score) < 2:
+            self.edges, self.table = np.zeros(0), np.ones(1)
+            return
+        self.edges = np.quantile(self.score, np.arange(1, BINS) / BINS)
+        at = np.searchsorted(self.edges, self.score)
+        person, false = (np.bincount(at, w, BINS) for w in (self.weight, 1 - self.weight))
+        # prior boxes are divided among the ranges as all boxes are, so that equal scores have the ratio 1
+        prior = np.bincount(at, minlength=BINS) / len(at) * DOUBT * BINS + 1e-9
+        self.table = (person + prior) / (person + prior).sum() / (false + prior) * (false + prior).sum()
