@@ -27,7 +27,6 @@ for ever. For `coast_time` that is allowed, as hidden people come out again.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -41,14 +40,10 @@ from tracking.grouping.link_rule import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.association import thinned
 from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, alike_velocities, newborn
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
-# s before and after a moment over which a velocity is a chord. For a merge it is longer, as whole groups turn slowly
-# and bodies hide each other; a part leaves at once.
-MERGE_CHORD, SPLIT_CHORD = 0.7, 0.4
-# Factor on the velocity at which groups merge: a chord across the onset still contains motion from before it.
-MERGE_CHORD_MARGIN = 1.2
+SPLIT_CHORD = 0.4  # s before and after a moment over which the velocity of a part that leaves is a chord.
 # Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three.
 REACH = 1.1
 
@@ -67,25 +62,14 @@ class PairMoment(NamedTuple):
     gap: float
 
 
-@dataclass
-class PairHistory:
-    """The past of two groups that are near each other.
-
-    alike_since: time, s, since which they have also had like velocities; inf if the velocities differ now. moments: a
-    `PairMoment` (distances and places) for each frame of the last 5 s in which the two were near, oldest first.
-    """
-
-    alike_since: float
-    moments: list[PairMoment]
-
-    def merge_onset(self, merge_velocity: float) -> tuple[float, Array]:
-        """Returns when, in s, the groups came to be near with like velocities, and where (2,), in the points' unit:
-        half-way between the centroids."""
-        t, d = np.array([m.t for m in self.moments]), np.array([m.difference for m in self.moments])
-        before = (chords(t, d, MERGE_CHORD) > MERGE_CHORD_MARGIN * merge_velocity) & (t <= self.alike_since)
-        before |= np.array([m.gap for m in self.moments]) > MERGE_DISTANCE
-        k = min(int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0, len(t) - 1)
-        return float(t[k]), self.moments[k].middle
+def merge_onset(moments: list[PairMoment], window: float, most: float) -> tuple[float, Array]:
+    """Returns when, in s, two groups came to be near with velocities that differ by at most `most`, m/s, and where (2,),
+    in the points' unit: half-way between the centroids. window: s over which a velocity is a chord."""
+    t, d = np.array([m.t for m in moments]), np.array([m.difference for m in moments])
+    before = (chords(t, d, window / 2) > most) & (t < t[-1] - window / 2)
+    before |= np.array([m.gap for m in moments]) > MERGE_DISTANCE
+    k = min(int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0, len(t) - 1)
+    return float(t[k]), moments[k].middle
 
 
 def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Array:
@@ -138,26 +122,27 @@ Pair = tuple[int, int]  # Ids of two groups, the smaller first.
 class GroupMerging:
     """Merges groups that stay near with like velocities.
 
-    State: histories, a dict by pair of ids (the smaller first): the `PairHistory` of each pair of groups that are near
-    each other, or were within the last 1.5 s while one of them could not merge.
+    State: moments, a dict by pair of ids (the smaller first): a `PairMoment` for each frame of the last 5 s in which the
+    two groups were near each other, oldest first. A pair is kept while it is near, and for 1.5 s while one of the groups
+    cannot merge.
     """
 
     def __init__(self) -> None:
-        self.histories: dict[Pair, PairHistory] = {}
+        self.moments: dict[Pair, list[PairMoment]] = {}
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-        """Merge the groups for which R_x (near, with like velocities) has held for `merge_time`; yield their events. t:
-        s."""
+        """Merge the groups for which R_x (near, with like velocities) holds; yield their events. t: s."""
         able = np.flatnonzero(bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0))
-        near = {ids: self._extended(ids, alike, now) for ids, alike, now in _near_pairs(bank, able, scaled, t)}
+        near = {ids: self._extended(ids, now) for ids, now in _near_pairs(bank, able, scaled, t)}
         unable = {int(g) for g in bank.id[bank.confirmed]} - set(bank.id[able].tolist())
-        kept = {p: h for p, h in self.histories.items() if unable & set(p) and t - h.moments[-1].t <= PATIENCE}
-        self.histories = near | kept
-        due = [p for p, history in near.items() if t - history.alike_since >= scaled.config.merge_time - 1e-9]
+        kept = {p: past for p, past in self.moments.items() if unable & set(p) and t - past[-1].t <= PATIENCE}
+        self.moments = near | kept
+        due = [pair for pair, moments in near.items() if _alike(bank, pair, moments, scaled)]
         for ids in _connected(due):
             rows = np.flatnonzero(np.isin(bank.id, ids))
+            c = scaled.config
             onset, place = min(
-                (self.histories[p].merge_onset(scaled.config.merge_velocity) for p in due if p[0] in ids),
+                (merge_onset(self.moments[p], c.merge_time, c.merge_velocity) for p in due if p[0] in ids),
                 key=lambda found: found[0],
             )
             union = merged(bank, rows)
@@ -171,10 +156,22 @@ class GroupMerging:
             kind = "merge" if len(present) > 1 else "enter"
             yield WholeGroupEvent(kind, onset, tuple(sorted(ids)), (heir,), tuple(place.tolist()))
 
-    def _extended(self, pair: Pair, alike: bool, now: PairMoment) -> PairHistory:
-        before = self.histories.get(pair, PairHistory(np.inf, []))
-        moments = [m for m in before.moments if m.t > now.t - HISTORY_TIME]
-        return PairHistory(min(before.alike_since, now.t) if alike else np.inf, [*moments, now])
+    def _extended(self, pair: Pair, now: PairMoment) -> list[PairMoment]:
+        return [*(m for m in self.moments.get(pair, []) if m.t > now.t - HISTORY_TIME), now]
+
+
+def _alike(bank: GroupBank, pair: Pair, moments: list[PairMoment], scaled: ScaledParameters) -> bool:
+    now, c = moments[-1], scaled.config
+    if not c.corrections:
+        a, b = (int(np.flatnonzero(bank.id == id)[0]) for id in pair)
+        return bool(regions_overlap(bank.x[[a, b], 2:], bank.P[[a, b], 2:, 2:], c.gate)[0, 1])
+    if scaled.from_pixels and now.gap > SPLIT_DISTANCE:
+        return False  # regions overlap, as bodies cover the ground behind them
+    then = [m for m in moments if m.t <= now.t - c.merge_time + 1e-9]
+    if not then:
+        return False
+    way = now.difference - then[-1].difference
+    return bool(np.hypot(*way) <= c.merge_velocity * max(now.t - then[-1].t, 1e-9))
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
@@ -198,24 +195,17 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     )  # fmt: skip
 
 
-def _near_pairs(
-    bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float
-) -> Iterator[tuple[Pair, bool, PairMoment]]:
-    """Yields the pairs of groups whose search regions overlap or whose points are linked: ids, the smaller first;
-    whether their velocities are alike and, from pixels, their people are at most 2.5 m apart; the pair in this frame.
-    """
+def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float) -> Iterator[tuple[Pair, PairMoment]]:
+    """Yields the pairs of groups whose search regions overlap or whose points are linked: ids, the smaller first; the
+    pair in this frame."""
     close = regions_overlap(bank.x[rows, :2], bank.extent[rows], GATE_MARGIN * scaled.config.gate)
     close |= _linked(bank, rows, scaled)
-    v, cov = bank.x[rows, 2:], bank.P[rows, 2:, 2:]
-    alike = alike_velocities(v[:, None] - v, cov[:, None] + cov, 0.0, scaled)
     for i, j in np.argwhere(np.triu(close, 1)).tolist():
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
         d = (b - a) * scaled.metres_per_unit
         gap = _gap(bank, rows[i], rows[j], d, scaled)
-        far = scaled.from_pixels and gap > SPLIT_DISTANCE  # regions overlap, as bodies cover the ground behind them
-        ids = (int(bank.id[rows[i]]), int(bank.id[rows[j]]))
-        yield ids, bool(alike[i, j]) and not far, PairMoment(t, d, (a + b) / 2, gap)
+        yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), PairMoment(t, d, (a + b) / 2, gap)
 
 
 def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) -> float:
