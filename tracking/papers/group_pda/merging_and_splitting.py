@@ -43,6 +43,9 @@ from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
+# s before and after a moment over which the difference of two groups' velocities is a chord: two steps, so that the
+# sway of people has no part in it.
+MERGE_CHORD = 0.5
 SPLIT_CHORD = 0.4  # s before and after a moment over which the velocity of a part that leaves is a chord.
 # Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three.
 REACH = 1.1
@@ -62,14 +65,13 @@ class PairMoment(NamedTuple):
     gap: float
 
 
-def merge_onset(moments: list[PairMoment], window: float, most: float) -> tuple[float, Array]:
-    """Returns when, in s, two groups came to be near with velocities that differ by at most `most`, m/s, and where (2,),
-    in the points' unit: half-way between the centroids. window: s over which a velocity is a chord."""
+def merge_onset(moments: list[PairMoment], most: float) -> int:
+    """Returns the index of the moment from which two groups have been near with velocities that differ by at most `most`,
+    m/s; the number of moments if they are not."""
     t, d = np.array([m.t for m in moments]), np.array([m.difference for m in moments])
-    before = (chords(t, d, window / 2) > most) & (t < t[-1] - window / 2)
+    before = (chords(t, d, MERGE_CHORD) > most) & (t <= t[-1] - MERGE_CHORD)
     before |= np.array([m.gap for m in moments]) > MERGE_DISTANCE
-    k = min(int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0, len(t) - 1)
-    return float(t[k]), moments[k].middle
+    return int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0
 
 
 def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Array:
@@ -137,16 +139,12 @@ class GroupMerging:
         unable = {int(g) for g in bank.id[bank.confirmed]} - set(bank.id[able].tolist())
         kept = {p: past for p, past in self.moments.items() if unable & set(p) and t - past[-1].t <= PATIENCE}
         self.moments = near | kept
-        due = [pair for pair, moments in near.items() if _alike(bank, pair, moments, scaled)]
-        for ids in _connected(due):
+        onset = {pair: moments[k] for pair, moments in near.items() if (k := _onset(bank, pair, moments, scaled)) is not None}
+        for ids in _connected(list(onset)):
             rows = np.flatnonzero(np.isin(bank.id, ids))
-            c = scaled.config
-            onset, place = min(
-                (merge_onset(self.moments[p], c.merge_time, c.merge_velocity) for p in due if p[0] in ids),
-                key=lambda found: found[0],
-            )
+            first = min((m for pair, m in onset.items() if pair[0] in ids), key=lambda m: m.t)
             union = merged(bank, rows)
-            present = bank.id[rows][(onset - bank.first_seen[rows] > ARRIVAL) | (bank.parent[rows] != NO_ID)]
+            present = bank.id[rows][(first.t - bank.first_seen[rows] > ARRIVAL) | (bank.parent[rows] != NO_ID)]
             keep = np.ones(len(bank), bool)
             keep[rows] = False
             bank.keep(keep)
@@ -154,24 +152,20 @@ class GroupMerging:
             heir = int(union.id[0])
             bank.parent[np.isin(bank.parent, ids)] = heir
             kind = "merge" if len(present) > 1 else "enter"
-            yield WholeGroupEvent(kind, onset, tuple(sorted(ids)), (heir,), tuple(place.tolist()))
+            yield WholeGroupEvent(kind, first.t, tuple(sorted(ids)), (heir,), tuple(first.middle.tolist()))
 
     def _extended(self, pair: Pair, now: PairMoment) -> list[PairMoment]:
         return [*(m for m in self.moments.get(pair, []) if m.t > now.t - HISTORY_TIME), now]
 
 
-def _alike(bank: GroupBank, pair: Pair, moments: list[PairMoment], scaled: ScaledParameters) -> bool:
-    now, c = moments[-1], scaled.config
+def _onset(bank: GroupBank, pair: Pair, moments: list[PairMoment], scaled: ScaledParameters) -> int | None:
+    c = scaled.config
     if not c.corrections:
         a, b = (int(np.flatnonzero(bank.id == id)[0]) for id in pair)
-        return bool(regions_overlap(bank.x[[a, b], 2:], bank.P[[a, b], 2:, 2:], c.gate)[0, 1])
-    if scaled.from_pixels and now.gap > SPLIT_DISTANCE:
-        return False  # regions overlap, as bodies cover the ground behind them
-    then = [m for m in moments if m.t <= now.t - c.merge_time + 1e-9]
-    if not then:
-        return False
-    way = now.difference - then[-1].difference
-    return bool(np.hypot(*way) <= c.merge_velocity * max(now.t - then[-1].t, 1e-9))
+        alike = regions_overlap(bank.x[[a, b], 2:], bank.P[[a, b], 2:, 2:], c.gate)[0, 1]
+        return len(moments) - 1 if alike else None
+    k = merge_onset(moments, c.merge_velocity)
+    return k if k < len(moments) and moments[-1].t - moments[k].t >= c.merge_time - 1e-9 else None
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
