@@ -32,9 +32,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from sim.geometry.polygons import polygon_gap
 from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
-from sim.types import Array, Bools, Ints
+from sim.types import Array, Ints
 from tracking.filters.components import partition, regions_overlap
 from tracking.grouping.link_rule import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
@@ -66,20 +65,17 @@ class PairMoment(NamedTuple):
 
 
 def merge_onset(moments: list[PairMoment], most: float) -> int:
-    """Returns the index of the moment from which two groups have been near with velocities that differ by at most `most`,
-    m/s; the number of moments if they are not."""
+    """Returns the index of the moment since which two groups have been near with velocities that differ by at most
+    `most`, m/s; the number of moments if they are not."""
     t, d = np.array([m.t for m in moments]), np.array([m.difference for m in moments])
-    before = (chords(t, d, MERGE_CHORD) > most) & (t <= t[-1] - MERGE_CHORD)
-    before |= np.array([m.gap for m in moments]) > MERGE_DISTANCE
+    before = (chords(t, d, MERGE_CHORD) > most) | (np.array([m.gap for m in moments]) > MERGE_DISTANCE)
     return int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0
 
 
-def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Array:
+def chords(t: Array, d: Array, half: float) -> Array:
     """Returns speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords from `half` s before to
-    after."""
-    k, middle = np.arange(len(t)), t
-    if full_length:
-        middle = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
+    after, at both ends moved inwards so that they keep their length."""
+    k, middle = np.arange(len(t)), np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
     first = np.minimum(np.searchsorted(t, middle - half - 1e-9), np.maximum(k - 1, 0))
     last = np.maximum(np.searchsorted(t, middle + half + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
@@ -107,16 +103,14 @@ def split_onset(
         apart.append(middle[1] - middle[0])
     when, d = np.array(times[::-1]), np.array(apart[::-1])
     gap = np.hypot(*d.T) - reach
-    slow = chords(when, d, SPLIT_CHORD, full_length=True) < SPLIT_VELOCITY
+    slow = chords(when, d, SPLIT_CHORD) < SPLIT_VELOCITY
     together = (gap <= MERGE_DISTANCE) | ((gap <= SPLIT_DISTANCE) & slow)
     k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(when) - 1)
     return float(when[k]), before[k][1].mean(0) / metres_per_unit
 
 
 HISTORY_TIME = 5.0  # s of a pair's past that are kept.
-# Factor on gamma for merging: groups merge at a smaller distance than they split, as their extents are noisy.
-GATE_MARGIN = 0.9
-PATIENCE = 1.5  # s for which the history of a pair is kept while one of the groups cannot merge.
+PATIENCE = 1.5  # s for which the past of a pair is kept while the two are not near or one of them cannot merge.
 
 Pair = tuple[int, int]  # Ids of two groups, the smaller first.
 
@@ -124,9 +118,8 @@ Pair = tuple[int, int]  # Ids of two groups, the smaller first.
 class GroupMerging:
     """Merges groups that stay near with like velocities.
 
-    State: moments, a dict by pair of ids (the smaller first): a `PairMoment` for each frame of the last 5 s in which the
-    two groups were near each other, oldest first. A pair is kept while it is near, and for 1.5 s while one of the groups
-    cannot merge.
+    State: moments, a dict by pair of ids (the smaller first): a `PairMoment` for each frame of the last 5 s in which
+    the two groups were near and could merge, oldest first. A pair is kept for 1.5 s after the last of them.
     """
 
     def __init__(self) -> None:
@@ -136,10 +129,8 @@ class GroupMerging:
         """Merge the groups for which R_x (near, with like velocities) holds; yield their events. t: s."""
         able = np.flatnonzero(bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0))
         near = {ids: self._extended(ids, now) for ids, now in _near_pairs(bank, able, scaled, t)}
-        unable = {int(g) for g in bank.id[bank.confirmed]} - set(bank.id[able].tolist())
-        kept = {p: past for p, past in self.moments.items() if unable & set(p) and t - past[-1].t <= PATIENCE}
-        self.moments = near | kept
-        onset = {pair: moments[k] for pair, moments in near.items() if (k := _onset(bank, pair, moments, scaled)) is not None}
+        self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= PATIENCE} | near
+        onset = {pair: k for pair, moments in near.items() if (k := _onset(bank, pair, moments, scaled))}
         for ids in _connected(list(onset)):
             rows = np.flatnonzero(np.isin(bank.id, ids))
             first = min((m for pair, m in onset.items() if pair[0] in ids), key=lambda m: m.t)
@@ -158,14 +149,15 @@ class GroupMerging:
         return [*(m for m in self.moments.get(pair, []) if m.t > now.t - HISTORY_TIME), now]
 
 
-def _onset(bank: GroupBank, pair: Pair, moments: list[PairMoment], scaled: ScaledParameters) -> int | None:
+def _onset(bank: GroupBank, pair: Pair, moments: list[PairMoment], scaled: ScaledParameters) -> PairMoment | None:
     c = scaled.config
     if not c.corrections:
-        a, b = (int(np.flatnonzero(bank.id == id)[0]) for id in pair)
-        alike = regions_overlap(bank.x[[a, b], 2:], bank.P[[a, b], 2:, 2:], c.gate)[0, 1]
-        return len(moments) - 1 if alike else None
+        rows = np.array([int(np.flatnonzero(bank.id == id)[0]) for id in pair])
+        overlap = regions_overlap(bank.x[rows, 2:], bank.P[rows, 2:, 2:], c.gate)  # SR_v
+        return moments[-1] if overlap[0, 1] else None
     k = merge_onset(moments, c.merge_velocity)
-    return k if k < len(moments) and moments[-1].t - moments[k].t >= c.merge_time - 1e-9 else None
+    due = k < len(moments) and moments[-1].t - moments[k].t >= c.merge_time - 1e-9
+    return moments[k] if due else None
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
@@ -190,10 +182,8 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
 
 
 def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float) -> Iterator[tuple[Pair, PairMoment]]:
-    """Yields the pairs of groups whose search regions overlap or whose points are linked: ids, the smaller first; the
-    pair in this frame."""
-    close = regions_overlap(bank.x[rows, :2], bank.extent[rows], GATE_MARGIN * scaled.config.gate)
-    close |= _linked(bank, rows, scaled)
+    """Yields the pairs of groups whose search regions overlap: ids, the smaller first; the pair in this frame."""
+    close = regions_overlap(bank.x[rows, :2], bank.extent[rows], scaled.config.gate)
     for i, j in np.argwhere(np.triu(close, 1)).tolist():
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
@@ -220,20 +210,6 @@ def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) 
     people = ((n + n0) * factor * bank.extent[row] - n0 * scaled.constraint.prior) / n - scaled.body_cov
     along = scaled.metres_per_unit * way / max(float(np.hypot(*way)), 1e-9)
     return float(np.sqrt(max(along @ people @ along, 0.0)))
-
-
-def _linked(bank: GroupBank, rows: Ints, scaled: ScaledParameters) -> Bools:
-    found = np.eye(len(rows), dtype=bool)
-    place, link = [bank.positions(r) for r in rows.tolist()], scaled.constraint.link
-    low, high = (np.array([f(p, axis=0) for p in place]).reshape(-1, 2) for f in (np.min, np.max))
-    gap = np.maximum(low[:, None] - high, low - high[:, None]).max(2, initial=-np.inf)
-    for i, j in np.argwhere(np.triu(gap <= link, 1)).tolist():
-        if scaled.from_pixels:
-            d = polygon_gap(place[i], place[j]) if min(len(place[i]), len(place[j])) > 2 else gap[i, j]
-            found[i, j] = found[j, i] = d <= link
-        else:
-            found[i, j] = found[j, i] = _nearest(place[i], place[j]) <= link
-    return found
 
 
 def _connected(pairs: list[Pair]) -> list[list[int]]:
