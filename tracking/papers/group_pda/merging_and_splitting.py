@@ -42,9 +42,9 @@ from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
-# s before and after a moment over which the difference of two groups' velocities is a chord: two steps, so that the
-# sway of people has no part in it.
-MERGE_CHORD = 0.5
+# s before and after a moment over which the difference of two groups' velocities is averaged: the time of one step, so
+# that the sway of people has no part in it.
+STEP_TIME = 0.5
 SPLIT_CHORD = 0.4  # s before and after a moment over which the velocity of a part that leaves is a chord.
 # Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three.
 REACH = 1.1
@@ -53,31 +53,39 @@ REACH = 1.1
 class PairMoment(NamedTuple):
     """Two groups a and b at one time; a has the smaller id.
 
-    t: s. difference (2,): centroid of b less that of a, m on the ground. middle (2,): point half-way between the
-    centroids, in the unit of the points. gap: distance of their nearest people, m; negative if, from pixels, they
+    t: s. velocity (2,): that of b less that of a, as filtered, m/s on the ground. middle (2,): point half-way between
+    the centroids, in the unit of the points. gap: distance of their nearest people, m; negative if, from pixels, they
     overlap.
     """
 
     t: float
-    difference: Array
+    velocity: Array
     middle: Array
     gap: float
 
 
 def merge_onset(moments: list[PairMoment], most: float) -> int:
     """Returns the index of the moment since which two groups have been near with velocities that differ by at most
-    `most`, m/s; the number of moments if they are not."""
-    t, d = np.array([m.t for m in moments]), np.array([m.difference for m in moments])
-    before = (chords(t, d, MERGE_CHORD) > most) | (np.array([m.gap for m in moments]) > MERGE_DISTANCE)
+    `most`, m/s, on the mean of two steps; the number of moments if they are not."""
+    t, v = np.array([m.t for m in moments]), np.array([m.velocity for m in moments])
+    first, last = windows(t, STEP_TIME)
+    total = np.concatenate([np.zeros((1, 2)), np.cumsum(v, 0)])
+    mean = (total[last + 1] - total[first]) / (last + 1 - first)[:, None]
+    before = (np.hypot(*mean.T) > most) | (np.array([m.gap for m in moments]) > MERGE_DISTANCE)
     return int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0
 
 
+def windows(t: Array, half: float) -> tuple[Ints, Ints]:
+    """Returns the first and the last index (K,) of the times t (K,), s, ascending, that are at most `half` s from each
+    time; near both ends from the middle of the outermost window."""
+    middle = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
+    return np.searchsorted(t, middle - half - 1e-9), np.searchsorted(t, middle + half + 1e-9) - 1
+
+
 def chords(t: Array, d: Array, half: float) -> Array:
-    """Returns speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords from `half` s before to
-    after, at both ends moved inwards so that they keep their length."""
-    k, middle = np.arange(len(t)), np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
-    first = np.minimum(np.searchsorted(t, middle - half - 1e-9), np.maximum(k - 1, 0))
-    last = np.maximum(np.searchsorted(t, middle + half + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
+    """Returns speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords of their `windows`."""
+    k, (first, last) = np.arange(len(t)), windows(t, half)
+    first, last = np.minimum(first, np.maximum(k - 1, 0)), np.maximum(last, np.minimum(k + 1, len(t) - 1))
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
 
 
@@ -187,9 +195,9 @@ def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float)
     for i, j in np.argwhere(np.triu(close, 1)).tolist():
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
-        d = (b - a) * scaled.metres_per_unit
+        d, v = ((q[1] - q[0]) * scaled.metres_per_unit for q in ((a, b), bank.x[rows[[i, j]], 2:]))
         gap = _gap(bank, rows[i], rows[j], d, scaled)
-        yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), PairMoment(t, d, (a + b) / 2, gap)
+        yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), PairMoment(t, v, (a + b) / 2, gap)
 
 
 def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) -> float:
