@@ -3,15 +3,14 @@
 Merging (sec. 3.1, 3.2): which groups are near with like velocities, for how long, and their union. Input: the bank of
 groups after the update of a frame; output: the bank with merged groups, and the events. The relation R_x holds for two
 groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
-components of groups under R_x; each becomes one group. Departures: the velocity test is a physical difference
-(`merge_velocity`), R_x must hold for `merge_time`, and only groups that are measured well take part (see
-`GroupMerging.step`).
+components of groups under R_x; each becomes one group. With `corrections` velocities are alike if their difference, on
+the mean of two steps, is at most `merge_velocity`, people of both are at most 1.5 m apart, and R_x must hold for
+`merge_time`; without, if the regions SR_v overlap. Only groups that are measured well merge (see `GroupMerging.step`).
 
-Onsets (ours): when an event that is known now began. A split is known when its parts have long been apart, a merge when
-the filters' velocities have settled. Afterwards the onset can be measured better: from chords through earlier and later
-centroids, which do not lag, and from the group's earlier points, divided among the parts. Distances are metres on the
-ground (in an image depth is stretched to it). The distances and velocities of the truth's rules come from
-sim.truth.merge_split_rules.
+Onsets (ours): when an event that is known now began. A merge is known `merge_time` after its onset. A split is known
+when its parts have long been apart; its onset is measured from the group's earlier points, divided among the parts.
+Distances are metres on the ground (in an image depth is stretched to it). The distances and velocities of the truth's
+rules come from sim.truth.merge_split_rules.
 
 Splitting (sec. 3.3): a group without feasible associations falls apart. An association (a set of points that may be a
 group's) is feasible if its points form one group under the group constraint G_y (tracking.filters.components). `split`

@@ -44,17 +44,16 @@ Departures. Those marked (c) are off with `corrections` off.
 - divided points: those most probably the group's. Paper: all in the region. Why: others' people stay out.
 - ids: the largest part or merged group keeps its id. Paper: none. Why: tracks need ids.
 - walking out: a new group within reach of a member is a child. Paper: none. Why: splits without shared points.
-- like velocities: difference up to `merge_velocity`. Paper: SR_v overlap. Why: P does not measure likeness.
-- near groups: those of Σ at a smaller γ, or linked; from pixels not far apart. Paper: regions overlap. Why: no merge
-  after a split.
-- merge: after `merge_time`, of confirmed, measured, feasible groups. Paper: at once. Why: crossing groups.
+- like velocities, (c): difference up to `merge_velocity` on the mean of two steps. Paper: SR_v overlap. Why: P does not
+  measure likeness; people sway with each step.
+- near groups, (c): people at most 1.5 m apart, too. Paper: regions overlap. Why: no merge after a split.
+- merge: of confirmed, measured, feasible groups; (c) after `merge_time`. Paper: at once. Why: crossing groups.
 - enter: no merge if at most one group is older or a child. Paper: none. Why: they came together.
 - duplicates: of two groups on the same people for `coast_time` one is lost. Paper: none. Why: hidden groups follow
   others.
 - recapture: a newborn group takes a lost one's id (`recapture_time`). Paper: none. Why: occlusion.
 - onsets: dated back. Paper: none. Why: decisions lag.
 - depth: divided by the sine of the tilt. Paper: px. Why: oblique views.
-`association = "none"` is section 5.2.1: a group takes all points in its region.
 """
 
 from __future__ import annotations
@@ -100,7 +99,7 @@ class GroupPda:
     """The tracker `group-pda`: groups of people tracked as wholes, from points or from foreground pixels.
 
     State: config, which may be replaced between two frames; bank, the groups; ids, which gives the next id; merging,
-    the histories of pairs that may merge; duplicates, the clocks of duplicate groups; pixels: grid points and
+    the past of pairs that may merge; duplicates, the clocks of duplicate groups; pixels: grid points and
     background model, None from points; plane: "ground" or "image"; context. All but config exist after `reset` only.
     """
 
