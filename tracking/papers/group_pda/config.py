@@ -37,7 +37,7 @@ class GroupPdaConfig(BackgroundSettings):
     association: str = param("pda", ("pda", "nearest", "all", "none"), "",
         "pda: by masses (sec. 4.2); nearest, all: one association; none: no constraint (sec. 5.2.1)", "categorical")
     corrections: bool = param(True, (True, False), "",
-        "R, misses, rest and gate of extents, linked points, velocity of children (ours)", "categorical")
+        "R, misses, rest and gate of extents, velocities of merges and children (ours)", "categorical")
     appearance: float = param(0.5, (0.0, 5.0), "",
         "from pixels: weight of colours in the log masses (future work of sec. 6; ours)", sees="pixels")
     merge_velocity: float = param(0.5, (0.05, 3.0), "m/s",

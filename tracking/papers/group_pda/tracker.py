@@ -35,8 +35,6 @@ Departures. Those marked (c) are off with `corrections` off.
   considered. Why: detectors miss people.
 - Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated.
   Why: they would swell.
-- linked points, (c): a point outside all regions, linked to a group's, is the group's. Paper: free. Why: no births at
-  the edge.
 - pixels: each counts as a share of a person. Paper: each counts one. Why: N in people.
 - colours: a mass of shared points (`appearance`), from pixels. Paper: future work. Why: similar groups cross.
 - split: after `split_time`; measured frames count back; (c) parent's velocity. Paper: after infeasible frames, at
@@ -71,7 +69,6 @@ from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.association import (
     PointClaims,
     associate,
-    attached,
     claimed,
     gated_distances,
     remember,
@@ -231,8 +228,7 @@ class GroupPda:
         bank = self.bank
         region = search_regions(bank, scaled)
         d2 = gated_distances(bank, points, region, scaled, t)
-        owner = attached(points, d2, bank, scaled) if self.config.corrections else np.full(len(points), -1)
-        claims = with_missed_members(claimed(points, weights, d2, owner, t), bank, scaled, t)
+        claims = with_missed_members(claimed(points, weights, d2, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
         log_ratio = colour_log_ratio(bank, claims.d2, self.colours) if scaled.colour_bins else np.zeros((len(bank), 0))
         mine = associate(bank, claims, region, log_ratio, scaled, t)
