@@ -68,7 +68,7 @@ def trackers(name: str, mode: DetectionMode) -> tuple[Variant, ...]:
     ours = (
         Variant(name, name),
         Variant("preset paper", name, paper),
-        Variant('association="none"', name, {"association": "none"}),
+        Variant('preset paper, association="none"', name, {**paper, "association": "none"}),
     )
     return (*ours, *blob)
 

@@ -4,8 +4,8 @@ A track began with one box. That box, and the track with it, is in one of four s
 shown) or not (H, hidden), a false object (F) that the detector takes for a person for a while, or nothing any more
 (0). r = P(S) + P(H) is the existence probability. As in IPDA (Musicki, Evans 1994, "Markov chain two") and JIPDA:
 
-    predict   S, H -> 0 at the rate 1 / LIFETIME, F -> 0 at 1 / clutter_time, S -> H at 1 / SHOWN_TIME, H -> S at
-              1 / hidden_time: the same at each frame rate, as boxes within clutter_time are no independent evidence
+    predict   S, H -> 0 at the rate 1 / LIFETIME, F -> 0 at 1 / CLUTTER_TIME, S -> H at 1 / SHOWN_TIME, H -> S at
+              1 / hidden_time: the same at each frame rate, as boxes within CLUTTER_TIME are no independent evidence
     missed    S, F times 1 - p                                p = P_D times the visible share of the box
     measured  S times 1 - p + p g e^l, F times 1 - p + p g    g = N(z; z_pred, S) / density of false boxes
     birth     S : F = U e^l : C                               U new people, C false boxes expected in a frame
@@ -23,14 +23,15 @@ BINS = 5  # ranges of scores, of as many boxes each
 LEARNED = 2000  # boxes after which the calibration of scores is kept
 DOUBT = 10.0  # boxes of each kind that each range of scores has in advance
 LIFETIME = 15.0  # s: mean time that a person is in view
+CLUTTER_TIME = 0.05  # s: mean time that a false box lasts
 SHOWN_TIME = 1.0  # s: mean time in which a person can be detected
 
 
-def transition(dt: float, hidden_time: float, clutter_time: float) -> Array:
+def transition(dt: float, hidden_time: float) -> Array:
     """Returns the matrix (3, 3) from the probabilities of S, H, F to those a step of dt s later; the rest is 0."""
     hide, show = 1 / SHOWN_TIME, 1 / hidden_time
     left = (1 - np.exp(-(hide + show) * dt)) / (hide + show)
-    stay, false = np.exp(-dt / LIFETIME), np.exp(-dt / clutter_time)
+    stay, false = np.exp(-dt / LIFETIME), np.exp(-dt / CLUTTER_TIME)
     return np.array([
         [stay * (1 - hide * left), stay * show * left, 0],
         [stay * hide * left, stay * (1 - show * left), 0],

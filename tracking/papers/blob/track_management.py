@@ -88,7 +88,7 @@ class TrackedPeople:
         self.config, self.dynamics = config, dynamics
         self.q, self.noise, self.asymptote = dynamics.q, dynamics.noise, dynamics.asymptote
         self.by_existence = config.management == "existence"
-        self.transition = existence.transition(dynamics.dt, config.hidden_time, config.clutter_time)
+        self.transition = existence.transition(dynamics.dt, config.hidden_time)
         self.birth_rho = track_uncertainty.at_birth(dynamics)
         confirmation = track_uncertainty.time_to_confirm(dynamics, config.confirm_ratio)
         self.tentative_limit = max(config.tentative_time, confirmation)

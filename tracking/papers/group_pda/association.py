@@ -1,9 +1,8 @@
-"""Data association of `group-pda`: which points a group may have (gate, attachment), and its update by them (sec. 4).
+"""Data association of `group-pda`: which points a group may have (gate), and its update by them (sec. 4).
 
 Input: points (M, 2), in m on the ground or px, and the bank of G groups. Output: which points each group takes
-(`Associated`); the groups' states in the bank are updated in place. Order in a frame: `gated_distances`, `attached`,
-`claimed` (then tracking.papers.group_pda.association adds missed members), `associate`. The masses and the update
-are in association_kernels and association_mass_kernels.
+(`Associated`); the groups' states in the bank are updated in place. Order in a frame: `gated_distances`, `claimed`,
+`with_missed_members`, `associate`. The masses and the update are in association_kernels and association_mass_kernels.
 
 Members that the detector missed in a frame stand in at their predicted places (ours), so that misses do not move or
 split a group.
@@ -22,7 +21,6 @@ import numpy as np
 
 from sim.geometry.hull_kernels import convex_hulls
 from sim.types import Array, Bools, Ints
-from tracking.filters.components import linked
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
@@ -69,40 +67,14 @@ def gated_distances(bank: GroupBank, points: Array, region: Array, scaled: Scale
     return d2
 
 
-def attached(points: Array, d2: Array, bank: GroupBank, scaled: ScaledParameters) -> Ints:
-    """Returns for each point (M,) the row of the group that it is attached to, or -1 (ours)."""
-    link, owner = scaled.constraint.link, np.full(len(points), -1)
-    taken = np.isfinite(d2).any(0) if len(d2) else np.zeros(len(points), bool)
-    if taken.all() or not taken.any():
-        return owner
-    label = linked(points, link)
-    free = np.flatnonzero(~taken & np.isin(label, label[taken]))
-    for part in np.unique(label[free]).tolist():
-        mine, theirs = free[label[free] == part], np.flatnonzero(taken & (label == part))
-        nearest_group = d2[:, theirs].argmin(0)
-        if len(np.unique(nearest_group)) == 1:
-            owner[mine] = nearest_group[0]
-            continue
-        apart = np.square(points[mine][:, None] - points[theirs]).sum(2)
-        owner[mine] = nearest_group[apart.argmin(1)]
-    if not scaled.from_pixels:
-        for row in np.unique(owner[owner >= 0]).tolist():
-            mine = np.flatnonzero(owner == row)
-            if bank.confirmed[row]:
-                reach = float(walking_reach(scaled, np.array(scaled.dt)))
-                owner[mine[~kernels.any_within(points[mine], bank.positions(row), reach)]] = -1
-    return owner
-
-
 def walking_reach(scaled: ScaledParameters, elapsed: Array) -> Array:
     """Returns how far (K,), in the unit of the points, a member may be from its predicted place."""
     return np.asarray(scaled.scale * FASTEST * np.maximum(elapsed, scaled.dt) + 3 * scaled.point_sd)
 
 
-def claimed(points: Array, weights: Array, d2: Array, owner: Ints, t: float) -> PointClaims:
+def claimed(points: Array, weights: Array, d2: Array, t: float) -> PointClaims:
     """Returns the claims on the points (M, 2) of the frame at time t, s: who may have each point."""
-    claimants = np.where(owner >= 0, 1, np.isfinite(d2).sum(0))
-    return PointClaims(points, weights, np.full(len(points), t), d2, owner, claimants)
+    return PointClaims(points, weights, np.full(len(points), t), d2, np.full(len(points), -1), np.isfinite(d2).sum(0))
 
 
 def associate(

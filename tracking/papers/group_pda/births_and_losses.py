@@ -16,7 +16,7 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.association import walking_reach
-from tracking.papers.group_pda.group_bank import GroupBank, alike_velocities, newborn
+from tracking.papers.group_pda.group_bank import GroupBank, newborn
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
 # Squared Mahalanobis radius of a recapture: 99 % quantile of chi-square with 4 degrees of freedom.
@@ -94,7 +94,9 @@ def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters)
     S = bank.P[new][:, None] + bank.P[old]
     S[..., :2, :2] += bank.extent[old]
     d2 = np.einsum("nki,nki->nk", d, np.linalg.solve(S, d[..., None])[..., 0])
-    alike = alike_velocities(d[..., 2:], S[..., 2:, 2:], 1.0, scaled)
+    metres = scaled.metres_per_unit
+    doubt = np.sqrt(np.einsum("...aa,a->...", S[..., 2:, 2:], np.square(metres)) / 2)
+    alike = np.hypot(*np.moveaxis(d[..., 2:] * metres, -1, 0)) <= scaled.config.merge_velocity + doubt
     gone = bank.last_seen[old] < bank.first_seen[new][:, None]
     d2 = np.where(alike & gone & (d2 <= RECAPTURE_GATE), d2, np.inf)
     while np.isfinite(d2).any():

@@ -19,15 +19,15 @@ class GroupPdaConfig(BackgroundSettings):
     tracker: ClassVar[str] = "group-pda"
 
     # fmt: off
-    gate: float = param(9.21, (6.0, 20.0), "", "gamma: squared Mahalanobis radius of the search region (eq. 2.2)")
+    gate: float = param(12.0, (6.0, 20.0), "", "gamma: squared Mahalanobis radius of the search region (eq. 2.2)")
     radius: float = param(0.52, (0.1, 2.0), "m",
         "from points: r of the region round a point; points nearer than 2 r are linked (R_0, sec. 3.3)", sees="points")
-    person_spread: float = param(0.25, (0.05, 1.0), "m",
+    person_spread: float = param(0.35, (0.05, 1.0), "m",
         "from points: standard deviation of the prior that extents are shrunk to (ours)", "log", sees="points")
     spread_weight: float = param(3.0, (0.1, 20.0), "people", "weight of that prior, in people (ours)", "log")
     accel_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5",
         "standard deviation of the centroid's white acceleration, per root second", "log")
-    point_noise: float = param(0.06, (0.005, 1.0), "m",
+    point_noise: float = param(0.1, (0.005, 1.0), "m",
         "from points: standard deviation of a person's measured position, sensor and gait", "log", sees="points")
     extent_time: float = param(1.0, (0.05, 20.0), "s",
         "time constant of extent and number of people, alpha_s and alpha_N of eq. 2.4", "log")
@@ -37,13 +37,13 @@ class GroupPdaConfig(BackgroundSettings):
     association: str = param("pda", ("pda", "nearest", "all", "none"), "",
         "pda: by masses (sec. 4.2); nearest, all: one association; none: no constraint (sec. 5.2.1)", "categorical")
     corrections: bool = param(True, (True, False), "",
-        "R, misses, rest and gate of extents, linked points, velocity of children (ours)", "categorical")
+        "R, misses, rest and gate of extents, velocities of merges and children (ours)", "categorical")
     appearance: float = param(0.5, (0.0, 5.0), "",
         "from pixels: weight of colours in the log masses (future work of sec. 6; ours)", sees="pixels")
     merge_velocity: float = param(0.5, (0.05, 3.0), "m/s",
         "largest difference of velocities at which groups merge (ours, in place of SR_v)")
-    merge_time: float = param(0.5, (0.0, 3.0), "s",
-        "time for which groups must be near with like velocities before they merge (ours)")
+    merge_time: float = param(0.75, (0.0, 3.0), "s",
+        "time for which groups must be near, with like velocities on the mean of two steps, before they merge (ours)")
     split_time: float = param(0.5, (0.0, 3.0), "s",
         "time without a feasible association, less the measured frames in it, after which a group splits")
     confirm_time: float = param(0.3, (0.0, 3.0), "s",

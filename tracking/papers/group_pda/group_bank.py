@@ -108,15 +108,6 @@ class GroupBank:
         self.P = scaled.F @ self.P @ scaled.F.T + scaled.Q
 
 
-def alike_velocities(difference: Array, covariance: Array, doubt: float, scaled: ScaledParameters) -> Bools:
-    """Returns flags (...): True where two velocities differ by at most `merge_velocity` and `doubt` standard deviations
-    of the difference (ours, in place of SR_v of sec. 3.1)."""
-    metres = scaled.metres_per_unit
-    sd = np.sqrt(np.einsum("...aa,a->...", covariance, np.square(metres)) / 2)
-    most = scaled.config.merge_velocity + doubt * sd
-    return np.asarray(np.sqrt(np.square(difference * metres).sum(-1)) <= most)
-
-
 def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float) -> GroupBank:
     """Returns a bank of tentative groups made from points alone (sec. 3.3), with velocity 0, in order of group
     number."""

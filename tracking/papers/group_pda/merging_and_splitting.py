@@ -3,15 +3,14 @@
 Merging (sec. 3.1, 3.2): which groups are near with like velocities, for how long, and their union. Input: the bank of
 groups after the update of a frame; output: the bank with merged groups, and the events. The relation R_x holds for two
 groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
-components of groups under R_x; each becomes one group. Departures: the velocity test is a physical difference
-(`merge_velocity`), R_x must hold for `merge_time`, and only groups that are measured well take part (see
-`GroupMerging.step`).
+components of groups under R_x; each becomes one group. With `corrections` velocities are alike if their difference, on
+the mean of two steps, is at most `merge_velocity`, people of both are at most 1.5 m apart, and R_x must hold for
+`merge_time`; without, if the regions SR_v overlap. Only groups that are measured well merge (see `GroupMerging.step`).
 
-Onsets (ours): when an event that is known now began. A split is known when its parts have long been apart, a merge when
-the filters' velocities have settled. Afterwards the onset can be measured better: from chords through earlier and later
-centroids, which do not lag, and from the group's earlier points, divided among the parts. Distances are metres on the
-ground (in an image depth is stretched to it). The distances and velocities of the truth's rules come from
-sim.truth.merge_split_rules.
+Onsets (ours): when an event that is known now began. A merge is known `merge_time` after its onset. A split is known
+when its parts have long been apart; its onset is measured from the group's earlier points, divided among the parts.
+Distances are metres on the ground (in an image depth is stretched to it). The distances and velocities of the truth's
+rules come from sim.truth.merge_split_rules.
 
 Splitting (sec. 3.3): a group without feasible associations falls apart. An association (a set of points that may be a
 group's) is feasible if its points form one group under the group constraint G_y (tracking.filters.components). `split`
@@ -27,28 +26,25 @@ for ever. For `coast_time` that is allowed, as hidden people come out again.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from sim.geometry.polygons import polygon_gap
 from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
-from sim.types import Array, Bools, Ints
+from sim.types import Array, Ints
 from tracking.filters.components import partition, regions_overlap
 from tracking.grouping.link_rule import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.association import thinned
 from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, alike_velocities, newborn
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
-# s before and after a moment over which a velocity is a chord. For a merge it is longer, as whole groups turn slowly
-# and bodies hide each other; a part leaves at once.
-MERGE_CHORD, SPLIT_CHORD = 0.7, 0.4
-# Factor on the velocity at which groups merge: a chord across the onset still contains motion from before it.
-MERGE_CHORD_MARGIN = 1.2
+# s before and after a moment over which the difference of two groups' velocities is averaged: the time of one step, so
+# that the sway of people has no part in it.
+STEP_TIME = 0.5
+SPLIT_CHORD = 0.4  # s before and after a moment over which the velocity of a part that leaves is a chord.
 # Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three.
 REACH = 1.1
 
@@ -56,46 +52,39 @@ REACH = 1.1
 class PairMoment(NamedTuple):
     """Two groups a and b at one time; a has the smaller id.
 
-    t: s. difference (2,): centroid of b less that of a, m on the ground. middle (2,): point half-way between the
-    centroids, in the unit of the points. gap: distance of their nearest people, m; negative if, from pixels, they
+    t: s. velocity (2,): that of b less that of a, as filtered, m/s on the ground. middle (2,): point half-way between
+    the centroids, in the unit of the points. gap: distance of their nearest people, m; negative if, from pixels, they
     overlap.
     """
 
     t: float
-    difference: Array
+    velocity: Array
     middle: Array
     gap: float
 
 
-@dataclass
-class PairHistory:
-    """The past of two groups that are near each other.
-
-    alike_since: time, s, since which they have also had like velocities; inf if the velocities differ now. moments: a
-    `PairMoment` (distances and places) for each frame of the last 5 s in which the two were near, oldest first.
-    """
-
-    alike_since: float
-    moments: list[PairMoment]
-
-    def merge_onset(self, merge_velocity: float) -> tuple[float, Array]:
-        """Returns when, in s, the groups came to be near with like velocities, and where (2,), in the points' unit:
-        half-way between the centroids."""
-        t, d = np.array([m.t for m in self.moments]), np.array([m.difference for m in self.moments])
-        before = (chords(t, d, MERGE_CHORD) > MERGE_CHORD_MARGIN * merge_velocity) & (t <= self.alike_since)
-        before |= np.array([m.gap for m in self.moments]) > MERGE_DISTANCE
-        k = min(int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0, len(t) - 1)
-        return float(t[k]), self.moments[k].middle
+def merge_onset(moments: list[PairMoment], most: float) -> int:
+    """Returns the index of the moment since which two groups have been near with velocities that differ by at most
+    `most`, m/s, on the mean of two steps; the number of moments if they are not."""
+    t, v = np.array([m.t for m in moments]), np.array([m.velocity for m in moments])
+    first, last = windows(t, STEP_TIME)
+    total = np.concatenate([np.zeros((1, 2)), np.cumsum(v, 0)])
+    mean = (total[last + 1] - total[first]) / (last + 1 - first)[:, None]
+    before = (np.hypot(*mean.T) > most) | (np.array([m.gap for m in moments]) > MERGE_DISTANCE)
+    return int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0
 
 
-def chords(t: Array, d: Array, half: float, *, full_length: bool = False) -> Array:
-    """Returns speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords from `half` s before to
-    after."""
-    k, middle = np.arange(len(t)), t
-    if full_length:
-        middle = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
-    first = np.minimum(np.searchsorted(t, middle - half - 1e-9), np.maximum(k - 1, 0))
-    last = np.maximum(np.searchsorted(t, middle + half + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
+def windows(t: Array, half: float) -> tuple[Ints, Ints]:
+    """Returns the first and the last index (K,) of the times t (K,), s, ascending, that are at most `half` s from each
+    time; near both ends from the middle of the outermost window."""
+    middle = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
+    return np.searchsorted(t, middle - half - 1e-9), np.searchsorted(t, middle + half + 1e-9) - 1
+
+
+def chords(t: Array, d: Array, half: float) -> Array:
+    """Returns speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords of their `windows`."""
+    k, (first, last) = np.arange(len(t)), windows(t, half)
+    first, last = np.minimum(first, np.maximum(k - 1, 0)), np.maximum(last, np.minimum(k + 1, len(t) - 1))
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
 
 
@@ -121,16 +110,14 @@ def split_onset(
         apart.append(middle[1] - middle[0])
     when, d = np.array(times[::-1]), np.array(apart[::-1])
     gap = np.hypot(*d.T) - reach
-    slow = chords(when, d, SPLIT_CHORD, full_length=True) < SPLIT_VELOCITY
+    slow = chords(when, d, SPLIT_CHORD) < SPLIT_VELOCITY
     together = (gap <= MERGE_DISTANCE) | ((gap <= SPLIT_DISTANCE) & slow)
     k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(when) - 1)
     return float(when[k]), before[k][1].mean(0) / metres_per_unit
 
 
 HISTORY_TIME = 5.0  # s of a pair's past that are kept.
-# Factor on gamma for merging: groups merge at a smaller distance than they split, as their extents are noisy.
-GATE_MARGIN = 0.9
-PATIENCE = 1.5  # s for which the history of a pair is kept while one of the groups cannot merge.
+PATIENCE = 1.5  # s for which the past of a pair is kept while the two are not near or one of them cannot merge.
 
 Pair = tuple[int, int]  # Ids of two groups, the smaller first.
 
@@ -138,30 +125,24 @@ Pair = tuple[int, int]  # Ids of two groups, the smaller first.
 class GroupMerging:
     """Merges groups that stay near with like velocities.
 
-    State: histories, a dict by pair of ids (the smaller first): the `PairHistory` of each pair of groups that are near
-    each other, or were within the last 1.5 s while one of them could not merge.
+    State: moments, a dict by pair of ids (the smaller first): a `PairMoment` for each frame of the last 5 s in which
+    the two groups were near and could merge, oldest first. A pair is kept for 1.5 s after the last of them.
     """
 
     def __init__(self) -> None:
-        self.histories: dict[Pair, PairHistory] = {}
+        self.moments: dict[Pair, list[PairMoment]] = {}
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-        """Merge the groups for which R_x (near, with like velocities) has held for `merge_time`; yield their events. t:
-        s."""
+        """Merge the groups for which R_x (near, with like velocities) holds; yield their events. t: s."""
         able = np.flatnonzero(bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0))
-        near = {ids: self._extended(ids, alike, now) for ids, alike, now in _near_pairs(bank, able, scaled, t)}
-        unable = {int(g) for g in bank.id[bank.confirmed]} - set(bank.id[able].tolist())
-        kept = {p: h for p, h in self.histories.items() if unable & set(p) and t - h.moments[-1].t <= PATIENCE}
-        self.histories = near | kept
-        due = [p for p, history in near.items() if t - history.alike_since >= scaled.config.merge_time - 1e-9]
-        for ids in _connected(due):
+        near = {ids: self._extended(ids, now) for ids, now in _near_pairs(bank, able, scaled, t)}
+        self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= PATIENCE} | near
+        onset = {pair: k for pair, moments in near.items() if (k := _onset(bank, pair, moments, scaled))}
+        for ids in _connected(list(onset)):
             rows = np.flatnonzero(np.isin(bank.id, ids))
-            onset, place = min(
-                (self.histories[p].merge_onset(scaled.config.merge_velocity) for p in due if p[0] in ids),
-                key=lambda found: found[0],
-            )
+            first = min((m for pair, m in onset.items() if pair[0] in ids), key=lambda m: m.t)
             union = merged(bank, rows)
-            present = bank.id[rows][(onset - bank.first_seen[rows] > ARRIVAL) | (bank.parent[rows] != NO_ID)]
+            present = bank.id[rows][(first.t - bank.first_seen[rows] > ARRIVAL) | (bank.parent[rows] != NO_ID)]
             keep = np.ones(len(bank), bool)
             keep[rows] = False
             bank.keep(keep)
@@ -169,12 +150,21 @@ class GroupMerging:
             heir = int(union.id[0])
             bank.parent[np.isin(bank.parent, ids)] = heir
             kind = "merge" if len(present) > 1 else "enter"
-            yield WholeGroupEvent(kind, onset, tuple(sorted(ids)), (heir,), tuple(place.tolist()))
+            yield WholeGroupEvent(kind, first.t, tuple(sorted(ids)), (heir,), tuple(first.middle.tolist()))
 
-    def _extended(self, pair: Pair, alike: bool, now: PairMoment) -> PairHistory:
-        before = self.histories.get(pair, PairHistory(np.inf, []))
-        moments = [m for m in before.moments if m.t > now.t - HISTORY_TIME]
-        return PairHistory(min(before.alike_since, now.t) if alike else np.inf, [*moments, now])
+    def _extended(self, pair: Pair, now: PairMoment) -> list[PairMoment]:
+        return [*(m for m in self.moments.get(pair, []) if m.t > now.t - HISTORY_TIME), now]
+
+
+def _onset(bank: GroupBank, pair: Pair, moments: list[PairMoment], scaled: ScaledParameters) -> PairMoment | None:
+    c = scaled.config
+    if not c.corrections:
+        rows = np.array([int(np.flatnonzero(bank.id == id)[0]) for id in pair])
+        overlap = regions_overlap(bank.x[rows, 2:], bank.P[rows, 2:, 2:], c.gate)  # SR_v
+        return moments[-1] if overlap[0, 1] else None
+    k = merge_onset(moments, c.merge_velocity)
+    due = k < len(moments) and moments[-1].t - moments[k].t >= c.merge_time - 1e-9
+    return moments[k] if due else None
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
@@ -198,24 +188,15 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     )  # fmt: skip
 
 
-def _near_pairs(
-    bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float
-) -> Iterator[tuple[Pair, bool, PairMoment]]:
-    """Yields the pairs of groups whose search regions overlap or whose points are linked: ids, the smaller first;
-    whether their velocities are alike and, from pixels, their people are at most 2.5 m apart; the pair in this frame.
-    """
-    close = regions_overlap(bank.x[rows, :2], bank.extent[rows], GATE_MARGIN * scaled.config.gate)
-    close |= _linked(bank, rows, scaled)
-    v, cov = bank.x[rows, 2:], bank.P[rows, 2:, 2:]
-    alike = alike_velocities(v[:, None] - v, cov[:, None] + cov, 0.0, scaled)
+def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float) -> Iterator[tuple[Pair, PairMoment]]:
+    """Yields the pairs of groups whose search regions overlap: ids, the smaller first; the pair in this frame."""
+    close = regions_overlap(bank.x[rows, :2], bank.extent[rows], scaled.config.gate)
     for i, j in np.argwhere(np.triu(close, 1)).tolist():
         i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
         a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
-        d = (b - a) * scaled.metres_per_unit
+        d, v = ((q[1] - q[0]) * scaled.metres_per_unit for q in ((a, b), bank.x[rows[[i, j]], 2:]))
         gap = _gap(bank, rows[i], rows[j], d, scaled)
-        far = scaled.from_pixels and gap > SPLIT_DISTANCE  # regions overlap, as bodies cover the ground behind them
-        ids = (int(bank.id[rows[i]]), int(bank.id[rows[j]]))
-        yield ids, bool(alike[i, j]) and not far, PairMoment(t, d, (a + b) / 2, gap)
+        yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), PairMoment(t, v, (a + b) / 2, gap)
 
 
 def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) -> float:
@@ -236,20 +217,6 @@ def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) 
     people = ((n + n0) * factor * bank.extent[row] - n0 * scaled.constraint.prior) / n - scaled.body_cov
     along = scaled.metres_per_unit * way / max(float(np.hypot(*way)), 1e-9)
     return float(np.sqrt(max(along @ people @ along, 0.0)))
-
-
-def _linked(bank: GroupBank, rows: Ints, scaled: ScaledParameters) -> Bools:
-    found = np.eye(len(rows), dtype=bool)
-    place, link = [bank.positions(r) for r in rows.tolist()], scaled.constraint.link
-    low, high = (np.array([f(p, axis=0) for p in place]).reshape(-1, 2) for f in (np.min, np.max))
-    gap = np.maximum(low[:, None] - high, low - high[:, None]).max(2, initial=-np.inf)
-    for i, j in np.argwhere(np.triu(gap <= link, 1)).tolist():
-        if scaled.from_pixels:
-            d = polygon_gap(place[i], place[j]) if min(len(place[i]), len(place[j])) > 2 else gap[i, j]
-            found[i, j] = found[j, i] = d <= link
-        else:
-            found[i, j] = found[j, i] = _nearest(place[i], place[j]) <= link
-    return found
 
 
 def _connected(pairs: list[Pair]) -> list[list[int]]:

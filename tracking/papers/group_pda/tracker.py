@@ -35,8 +35,6 @@ Departures. Those marked (c) are off with `corrections` off.
   considered. Why: detectors miss people.
 - Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated.
   Why: they would swell.
-- linked points, (c): a point outside all regions, linked to a group's, is the group's. Paper: free. Why: no births at
-  the edge.
 - pixels: each counts as a share of a person. Paper: each counts one. Why: N in people.
 - colours: a mass of shared points (`appearance`), from pixels. Paper: future work. Why: similar groups cross.
 - split: after `split_time`; measured frames count back; (c) parent's velocity. Paper: after infeasible frames, at
@@ -44,17 +42,16 @@ Departures. Those marked (c) are off with `corrections` off.
 - divided points: those most probably the group's. Paper: all in the region. Why: others' people stay out.
 - ids: the largest part or merged group keeps its id. Paper: none. Why: tracks need ids.
 - walking out: a new group within reach of a member is a child. Paper: none. Why: splits without shared points.
-- like velocities: difference up to `merge_velocity`. Paper: SR_v overlap. Why: P does not measure likeness.
-- near groups: those of Σ at a smaller γ, or linked; from pixels not far apart. Paper: regions overlap. Why: no merge
-  after a split.
-- merge: after `merge_time`, of confirmed, measured, feasible groups. Paper: at once. Why: crossing groups.
+- like velocities, (c): difference up to `merge_velocity` on the mean of two steps. Paper: SR_v overlap. Why: P does not
+  measure likeness; people sway with each step.
+- near groups, (c): people at most 1.5 m apart, too. Paper: regions overlap. Why: no merge after a split.
+- merge: of confirmed, measured, feasible groups; (c) after `merge_time`. Paper: at once. Why: crossing groups.
 - enter: no merge if at most one group is older or a child. Paper: none. Why: they came together.
 - duplicates: of two groups on the same people for `coast_time` one is lost. Paper: none. Why: hidden groups follow
   others.
 - recapture: a newborn group takes a lost one's id (`recapture_time`). Paper: none. Why: occlusion.
 - onsets: dated back. Paper: none. Why: decisions lag.
 - depth: divided by the sine of the tilt. Paper: px. Why: oblique views.
-`association = "none"` is section 5.2.1: a group takes all points in its region.
 """
 
 from __future__ import annotations
@@ -72,7 +69,6 @@ from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.association import (
     PointClaims,
     associate,
-    attached,
     claimed,
     gated_distances,
     remember,
@@ -100,7 +96,7 @@ class GroupPda:
     """The tracker `group-pda`: groups of people tracked as wholes, from points or from foreground pixels.
 
     State: config, which may be replaced between two frames; bank, the groups; ids, which gives the next id; merging,
-    the histories of pairs that may merge; duplicates, the clocks of duplicate groups; pixels: grid points and
+    the past of pairs that may merge; duplicates, the clocks of duplicate groups; pixels: grid points and
     background model, None from points; plane: "ground" or "image"; context. All but config exist after `reset` only.
     """
 
@@ -232,8 +228,7 @@ class GroupPda:
         bank = self.bank
         region = search_regions(bank, scaled)
         d2 = gated_distances(bank, points, region, scaled, t)
-        owner = attached(points, d2, bank, scaled) if self.config.corrections else np.full(len(points), -1)
-        claims = with_missed_members(claimed(points, weights, d2, owner, t), bank, scaled, t)
+        claims = with_missed_members(claimed(points, weights, d2, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
         log_ratio = colour_log_ratio(bank, claims.d2, self.colours) if scaled.colour_bins else np.zeros((len(bank), 0))
         mine = associate(bank, claims, region, log_ratio, scaled, t)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sim.truth.merge_split_rules import SPLIT_VELOCITY
 from sim.types import Array, Context, Frame, Tracks
 from tests.tracking.papers.group_pda.test_tracker import FPS, GROUND, block, changes, events, ids, noisy, sizes, track
 from tracking.papers.group_pda.config import GroupPdaConfig
@@ -111,7 +112,8 @@ def parting(seed: int, along: float, apart: float, ranks: int = 1, who: int = 2)
         group = block(4, ranks, (0.0, along * k / FPS))
         group[group[:, 0] > 0.3 + 0.6 * (1 - who), 0] += apart * max(k - 40, 0) / FPS
         made.append(noisy([group], r))
-    return made, 41 + int(np.ceil(0.9 / apart * FPS))
+    # People 0.6 m apart have split 1.5 m apart, or, who leave slowly, 2 m apart.
+    return made, 41 + int(np.ceil((0.9 if apart > SPLIT_VELOCITY else 1.4) / apart * FPS))
 
 
 @pytest.mark.parametrize("seed", range(3))

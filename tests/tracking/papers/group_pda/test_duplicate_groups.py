@@ -85,7 +85,7 @@ def merges(made: list[Tracks]) -> int:
     return sum(e.kind == "merge" for t in made for e in t.events)
 
 
-@pytest.mark.parametrize(("apart", "expected"), [(2.2, 1), (2.65, 0)])
+@pytest.mark.parametrize(("apart", "expected"), [(1.3, 1), (2.2, 0)])
 def test_who_walks_far_behind_does_not_join_though_his_feet_touch_a_head(apart: float, expected: int) -> None:
     frames = []
     for k in range(70):

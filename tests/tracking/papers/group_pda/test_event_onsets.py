@@ -6,34 +6,37 @@ import numpy as np
 import pytest
 
 from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY
-from tracking.papers.group_pda.merging_and_splitting import PairHistory, PairMoment, split_onset
+from tracking.papers.group_pda.merging_and_splitting import PairMoment, merge_onset, split_onset
 
 FPS, SLOWS, LASTS = 10.0, 2.0, 1.0
 """Frames per second; when the difference of the velocities begins to fall from 2 m/s to nothing, and for how long."""
 
 
-def encounter(noise: float, seed: int, gap: float = 0.5) -> PairHistory:
-    """Two groups that turn into one direction 3 m from each other's middles, seen with so much noise, m."""
+def encounter(noise: float, seed: int, sway: float = 0.0) -> list[PairMoment]:
+    """Two groups that turn into one direction, whose velocities are known with so much noise, m/s, and sway at 1 Hz."""
     t = np.arange(50) / FPS
-    speed = 2 * np.clip((SLOWS + LASTS - t) / LASTS, 0, 1)
-    d = np.stack([3.0 + np.cumsum(speed[::-1])[::-1] / FPS, np.zeros(50)], axis=1)
-    d += np.random.default_rng(seed).normal(0, noise, d.shape)
-    moments = [PairMoment(time, place, place / 2, gap) for time, place in zip(t.tolist(), d, strict=True)]
-    return PairHistory(3.5, moments)
+    v = np.stack([2 * np.clip((SLOWS + LASTS - t) / LASTS, 0, 1), sway * np.sin(2 * np.pi * t)], axis=1)
+    v += np.random.default_rng(seed).normal(0, noise, v.shape)
+    return [PairMoment(time, vel, np.zeros(2), 0.5) for time, vel in zip(t.tolist(), v, strict=True)]
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.05, 0.1])
-def test_it_is_when_they_had_become_equally_fast(noise: float) -> None:
+@pytest.mark.parametrize(("noise", "sway"), [(0.0, 0.0), (0.2, 0.0), (0.4, 0.0), (0.0, 0.6)])
+def test_it_is_when_they_had_become_equally_fast(noise: float, sway: float) -> None:
     due = SLOWS + LASTS * (1 - MERGE_VELOCITY / 2)
-    found = np.array([encounter(noise, seed).merge_onset(MERGE_VELOCITY)[0] for seed in range(40)])
+    met = [encounter(noise, seed, sway) for seed in range(40)]
+    found = np.array([moments[merge_onset(moments, MERGE_VELOCITY)].t for moments in met])
     assert abs(found - due).max() <= 0.5
     assert found.mean() == pytest.approx(due, abs=0.25)
 
 
 def test_before_that_they_must_be_near() -> None:
-    met = encounter(0.0, 0)
-    far = [m._replace(gap=MERGE_DISTANCE + 0.1) if m.t < 4.2 else m for m in met.moments]
-    assert PairHistory(4.4, far).merge_onset(MERGE_VELOCITY)[0] == pytest.approx(4.2)
+    far = [m._replace(gap=MERGE_DISTANCE + 0.1) if m.t < 4.2 else m for m in encounter(0.0, 0)]
+    assert far[merge_onset(far, MERGE_VELOCITY)].t == pytest.approx(4.2)
+
+
+def test_groups_that_differ_have_no_onset() -> None:
+    apart = [m for m in encounter(0.0, 0) if m.t < SLOWS]
+    assert merge_onset(apart, MERGE_VELOCITY) == len(apart)
 
 
 def test_a_split_began_when_the_parts_were_apart_however_noisy_the_last_look() -> None:
