@@ -26,7 +26,6 @@ from tracking.stats import mean_interval
 RECORDINGS = (TOWN_CENTRE, PETS, CAMPUS)
 CHANGES: dict[str, dict[str, object]] = {
     "managed by ρ": {"management": "rho"},
-    "false boxes do not last": {"clutter_time": 0.001},
     "`hidden_time` 1 s": {"hidden_time": 1.0},
     "`detect_prob` 0.7": {"detect_prob": 0.7},
     "`birth_rate` 2 /s": {"birth_rate": 2.0},
@@ -35,6 +34,7 @@ CHANGES: dict[str, dict[str, object]] = {
 PARTS: dict[str, Replacement] = {
     "scores not learned": (existence, "LEARNED", 0),
     "no spells without detection": (existence, "SHOWN_TIME", 1e9),
+    "false boxes last 0.15 s": (existence, "CLUTTER_TIME", 0.15),
     "nobody hides anybody": (TrackedPeople, "visible_shares", lambda people: np.ones(len(people.id))),
     "no second boxes": (track_management, "DOUBLES", 0.0),
     "tracks on one body stay": (track_management, "SAME_BODY", 0.0),

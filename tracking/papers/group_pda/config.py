@@ -19,10 +19,10 @@ class GroupPdaConfig(BackgroundSettings):
     tracker: ClassVar[str] = "group-pda"
 
     # fmt: off
-    gate: float = param(12.0, (6.0, 20.0), "", "gamma: squared Mahalanobis radius of the search region (eq. 2.2)")
+    gate: float = param(9.21, (6.0, 20.0), "", "gamma: squared Mahalanobis radius of the search region (eq. 2.2)")
     radius: float = param(0.52, (0.1, 2.0), "m",
         "from points: r of the region round a point; points nearer than 2 r are linked (R_0, sec. 3.3)", sees="points")
-    person_spread: float = param(0.35, (0.05, 1.0), "m",
+    person_spread: float = param(0.3, (0.05, 1.0), "m",
         "from points: standard deviation of the prior that extents are shrunk to (ours)", "log", sees="points")
     spread_weight: float = param(3.0, (0.1, 20.0), "people", "weight of that prior, in people (ours)", "log")
     accel_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5",

@@ -17,7 +17,7 @@ def states(*rows):
 
 
 def test_many_short_steps_are_one_long_step():
-    short, long = existence.transition(0.04, 0.5, 0.15), existence.transition(0.4, 0.5, 0.15)
+    short, long = existence.transition(0.04, 0.5), existence.transition(0.4, 0.5)
     assert np.allclose(np.linalg.matrix_power(short, 10), long, atol=1e-12)
     assert np.allclose(long[:, :2].sum(0), np.exp(-0.4 / existence.LIFETIME))
 
