@@ -48,6 +48,7 @@ def test_every_command_with_its_options_is_tested() -> None:
         "--suite",
         "--objective",
         "--by",
+        "--events",
         "--vary",
     }
     assert {words[0] for words, *_ in OPTIONS} >= {"generate", "track", "score", "export", "fit", "tune", "demo"}
