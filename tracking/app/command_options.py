@@ -95,6 +95,9 @@ class TrackOptions:
     detections: Literal["image", "truth", "file"] | None = option(
         "Detections that the tracker gets. Default: the first of image, file, truth that it and the source allow.",
         None)
+    boxes: Path | None = option(
+        "Boxes of a detector on the source's pictures: MOT text, table with named columns, or COCO results.", None,
+        metavar="FILE")
     sensor: Path | None = SENSOR()
     grouping: Path | None = GROUPING()
     seed: int = option("The tracker's seed.", 0, low=0)

@@ -509,6 +509,7 @@ ELSEWHERE = {
     ("generate", "sensor"),  # commands/test_fit.py
     ("track", "sensor"),
     ("track", "grouping"),  # commands/test_fit.py
+    ("track", "boxes"),  # tests/sim/io/formats/test_detector_boxes.py
     ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("view", "by"),  # report/test_in_browser.py
     ("view", "workers"),

@@ -64,7 +64,7 @@ def track(options: TrackOptions) -> CommandResult:
     pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
     source = OpenedAs(
         options.source, options.fps, options.px_per_m, options.camera, pictures, options.background,
-        options.person_class, options.box_scale,
+        options.person_class, options.box_scale, options.boxes,
     )  # fmt: skip
     sequences = source.open()
     folders = run_folders(sequences, options.source, options.out)
@@ -121,7 +121,11 @@ def _setup(options: TrackOptions) -> TrackerSetup:
     rule = None if options.grouping is None else grouping_of(options.grouping)
     config = _config(options.tracker, options.params, own)
     limited = None if options.step_timeout is None else TimeLimited(options.tracker, options.step_timeout)
-    return TrackerSetup(options.tracker, config, options.detections, sensor, options.seed, rule, limited)
+    detections = options.detections or (None if options.boxes is None else "file")
+    if options.boxes is not None and detections != "file":
+        got, remedy = f"--detections {detections}", "leave --boxes or --detections out"
+        raise InputError(place="--boxes", got=got, expected="--detections file", remedy=remedy)
+    return TrackerSetup(options.tracker, config, detections, sensor, options.seed, rule, limited)
 
 
 def _config(tracker: str, params: str | None, settings: list[str]) -> Config | None:

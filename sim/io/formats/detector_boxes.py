@@ -1,0 +1,105 @@
+"""Boxes of a detector in a file of their own, put on the pictures of a video or of another sequence.
+
+The file is a MOT text (det.txt), a table whose first line names its columns, or the JSON of COCO results: a list of
+objects with image_id (the frame, from 1), category_id, bbox [left, top, width, height] and score.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import InputError
+from scenarios.limits import is_number
+from sim.io.formats import mot_text
+from sim.io.formats.options import BoxScale
+from sim.types import Frame, Sequence
+
+PERSON = 1  # COCO's category of people.
+OUTSIDE = 1.1  # Boxes that end farther right or lower than this share of the picture are of another picture size.
+
+
+def with_boxes(
+    sequence: Sequence, path: Path, person_class: int | None = None, box_scale: BoxScale | None = None
+) -> Sequence:
+    """Returns the sequence with the boxes of a file as its detections.
+
+    Raises InputError if the file cannot be read, has no boxes, or does not fit the sequence's frames and pictures.
+    """
+    results = path.suffix.lower() == ".json"
+    found = (_coco_results if results else mot_text.read_detections)(path, None, person_class, box_scale)
+    if found.plane != "image" or found.box is None:
+        raise InputError(file=path, got="points", expected="boxes, px", remedy="give the detector's boxes")
+    last = int(found.frame.max(initial=0))
+    if sequence.length is not None and last > sequence.length:
+        raise InputError(
+            file=path, got=f"frame {last}", expected=f"at most {sequence.length}, the frames of {sequence.name}",
+            remedy="give the boxes of this recording; frames count from 1",
+        )  # fmt: skip
+    if sequence.image_size is not None and len(found.box):
+        _check_size(path, found.box, sequence.image_size)
+
+    def joined(frames: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
+        for frame in frames():
+            yield frame.replace(detections=replace(found.at(frame.index, sequence.fps), t=frame.t))
+
+    bare, source = sequence.bare, {**sequence.source, "boxes": str(path)}
+    return replace(
+        sequence, frames=lambda: joined(sequence.frames), bare=None if bare is None else lambda: joined(bare),
+        has_detections=True, source=source,
+    )  # fmt: skip
+
+
+def _check_size(path: Path, box: np.ndarray, size: tuple[int, int]) -> None:
+    far = np.quantile(box[:, :2] + box[:, 2:], 0.95, axis=0) / size
+    if (far > OUTSIDE).any():
+        x, y = far * size
+        got, expected = f"boxes that end at {x:.0f}, {y:.0f} px", "boxes in pictures of {} × {} px".format(*size)
+        remedy = "if the detector saw another picture size, give --box-scale"
+        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
+
+
+def _coco_results(
+    path: Path, _: int | None, person_class: int | None, box_scale: BoxScale | None
+) -> mot_text.DetectionTable:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(file=path, got=str(error), expected="JSON", remedy="check the file") from None
+    if not isinstance(content, list) or not content:
+        raise InputError(
+            file=path, got=type(content).__name__ if content != [] else "no result", expected="a list of COCO results",
+            remedy="give the detector's results, with image_id, category_id, bbox and score",
+        )  # fmt: skip
+    wanted = PERSON if person_class is None else person_class
+    rows = [_row(path, k, each) for k, each in enumerate(content, 1)]
+    table = np.array([row[1:] for row in rows if row[0] == wanted], float).reshape(-1, 6)
+    if not len(table):
+        expected, remedy = f"people, of category {wanted}", "name the category of people with --class N"
+        raise InputError(file=path, got="other categories", expected=expected, remedy=remedy)
+    table = table[np.argsort(table[:, 0], kind="stable")]
+    box = table[:, 1:5] * np.tile(box_scale or (1.0, 1.0), 2)
+    score, _told = mot_text.unit_scores(table[:, 5])
+    frame = table[:, 0].astype(np.int64)
+    return mot_text.DetectionTable(frame, np.full(len(box), -1), "image", box[:, :2] + box[:, 2:] / 2, box, score)
+
+
+def _row(path: Path, number: int, result: Any) -> tuple[float, ...]:
+    """Returns category, frame, left, top, width, height and score of a result."""
+    result = result if isinstance(result, dict) else {}
+    frame, category, box, score = (result.get(key) for key in ("image_id", "category_id", "bbox", "score"))
+    box = box if isinstance(box, list) and len(box) == 4 else [None] * 4
+    values = (category, frame, *box, score)
+    good = all(is_number(value, -np.inf, np.inf) for value in values)
+    if not good or frame < 1 or frame != int(frame) or box[2] <= 0 or box[3] <= 0:
+        raise InputError(
+            file=path, place=f"result {number}", got=json.dumps(result)[:80],
+            expected="image_id (a frame, from 1), category_id, bbox [left, top, width, height] and score",
+            remedy="correct the result, or number the pictures from 1",
+        )  # fmt: skip
+    return values

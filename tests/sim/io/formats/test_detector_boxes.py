@@ -1,0 +1,87 @@
+"""Boxes of a detector beside a video: both forms give the same tracks, and what does not fit is refused."""
+
+import json
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.formats.detector_boxes import with_boxes
+from sim.io.source import open_source
+from tests.small_videos import picture, write_video
+from tracking.app.cli import run
+
+ROWS = [(k, 10.0 + 2 * k, 20.0, 12.0, 30.0, 0.9) for k in range(1, 13)]
+
+
+@pytest.fixture
+def video(tmp_path):
+    return write_video(tmp_path / "street.mp4", [picture(k) for k in range(12)])
+
+
+def mot(path, rows=ROWS):
+    path.write_text("".join(f"{k},-1,{x},{y},{w},{h},{s}\n" for k, x, y, w, h, s in rows))
+    return path
+
+
+def coco(path, rows=ROWS, **other):
+    found = [{"image_id": k, "category_id": 1, "bbox": box, "score": s, **other} for k, *box, s in rows]
+    path.write_text(json.dumps(found))
+    return path
+
+
+def test_both_forms_are_the_same_detections(tmp_path, video):
+    (plain,) = open_source(video)
+    one, other = (
+        with_boxes(plain, path)
+        for path in (mot(tmp_path / "det.txt"), coco(tmp_path / "det.json", [*ROWS[6:], *ROWS[:6]]))
+    )
+    assert one.has_images
+    assert one.has_detections
+    for a, b, frame in zip(one, other, plain, strict=True):
+        assert a.t == a.detections.t == frame.t
+        assert (a.image == frame.image).all()
+        for name in ("pos", "box", "score"):
+            np.testing.assert_array_equal(getattr(a.detections, name), getattr(b.detections, name))
+        assert a.detections.box.tolist() == [list(ROWS[a.index - 1][1:5])]
+    assert [f.image for f in one.without_pictures()] == [None] * 12
+
+
+def test_tracks_of_boxes_on_a_video(tmp_path, video):
+    boxes = coco(tmp_path / "det.json", category_id=3)
+    command = ["track", "blob", str(video), "--boxes", str(boxes), "--px-per-m", "18"]
+    assert run([*command, "--out", str(tmp_path / "a")]) == 2  # nobody is of category 1
+    assert run([*command, "--class", "3", "--out", str(tmp_path / "a")]) == 0
+    assert json.loads((tmp_path / "a" / "run.json").read_text())["detections"] == "file"
+    assert run(["overlay", str(video), str(tmp_path / "a"), "--out", str(tmp_path / "a.mp4")]) == 0
+    assert run([*command, "--detections", "image", "--out", str(tmp_path / "b")]) == 2
+
+
+@pytest.mark.parametrize(
+    ("rows", "got"),
+    [
+        ([(13, *ROWS[0][1:])], "frame 13"),
+        ([(k, 400.0, y, w, h, s) for k, _, y, w, h, s in ROWS], "boxes that end at"),
+        ([(0, *ROWS[0][1:])], '"image_id": 0'),
+        ([(1, 10.0, 20.0, 0.0, 30.0, 0.9)], '"bbox": \\[10.0, 20.0, 0.0'),
+        ([], "no result"),
+    ],
+)
+def test_what_does_not_fit_is_refused(tmp_path, video, rows, got):
+    (plain,) = open_source(video)
+    with pytest.raises(InputError, match=got):
+        with_boxes(plain, coco(tmp_path / "det.json", rows))
+
+
+def test_no_json_is_one_line(tmp_path, video):
+    (plain,) = open_source(video)
+    (tmp_path / "det.json").write_text("{")
+    with pytest.raises(InputError, match="expected JSON"):
+        with_boxes(plain, tmp_path / "det.json")
+
+
+def test_boxes_of_another_picture_size(tmp_path, video):
+    (plain,) = open_source(video)
+    large = [(k, 4 * x, 4 * y, 4 * w, 4 * h, s) for k, x, y, w, h, s in ROWS]
+    found = with_boxes(plain, coco(tmp_path / "det.json", large), box_scale=(0.25, 0.25))
+    assert next(iter(found)).detections.box.tolist() == [list(ROWS[0][1:5])]
