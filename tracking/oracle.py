@@ -25,6 +25,7 @@ from sim.types import (
     Frame,
     GroupEvent,
     Groups,
+    Plane,
     Sequence,
     Tracks,
     Truth,
@@ -128,7 +129,7 @@ def _visible(truth: Truth, index: int, places: bool) -> Tracks:
     who, none = (truth.id[rows], truth.group[rows]), np.full((len(rows), 2), np.nan)
     cov, score = np.full((len(rows), 4, 4), np.nan), np.ones(len(rows))
     t = (index - 1) / truth.fps
-    plane = "ground" if places else "image"
+    plane: Plane = "ground" if places else "image"
     return Tracks(index, t, plane, "person", *who, pos, none, cov, box, score, Groups.none(), derived=True)
 
 

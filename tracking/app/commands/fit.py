@@ -143,7 +143,7 @@ def fit_relational(options: FitRelationalOptions) -> CommandResult:
         entries = [entry for name in options.names for entry in resolve(name, relational.LABELS)]
         scenes = (simulate(entry.scenario, seed, entry.repeat, ()) for entry in entries for seed in seeds)
         ends = relational.PAPER_ENDS
-        params = {"speed_ends": list(ends)} | relational.fit_observed(scenes, ends)
+        params = {"speed_ends": list(ends), **relational.fit_observed(scenes, ends)}
     else:
         truths = (truth for _, truth in _simulated(options.names, seeds))
         params = relational.fit_relational(truths, RelationalConfig().speed_ends)

@@ -154,7 +154,8 @@ class ParticleSet:
 
     def close_groups(self) -> None:
         """Relate all members of each group, the connected components of a particle's relations, to each other."""
-        label, some, ever = self.labels(), np.empty((1, self.people), np.int64), self.related.any(axis=1)
+        label, some = self.labels(), np.empty((1, self.people), np.int64)
+        ever: Bools = np.asarray(self.related.any(axis=1))
         particle_set_kernels.group_labels(self.pairs, ever[:, None], some)
         self.hold(np.argwhere(np.triu(some == some.T, 1)))
         self.related[:] = (label[:, self.pairs[:, 0]] == label[:, self.pairs[:, 1]]).T

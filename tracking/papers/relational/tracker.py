@@ -238,7 +238,7 @@ class Particle(PointTracker):
         self._relate_newcomers(points)
 
     def _uniforms(self, people: Ints) -> Array:
-        return self.streams.uniforms(RESAMPLING, self.slots.key[people], 1, self.particles.count)[0]
+        return np.asarray(self.streams.uniforms(RESAMPLING, self.slots.key[people], 1, self.particles.count)[0])
 
     def _normals(self, people: Ints) -> Array:
         key, count = self.slots.key[people], self.particles.count
