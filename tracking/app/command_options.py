@@ -322,6 +322,20 @@ class WebdatasetOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CsvOptions:
+    """Write tables of people, groups, members, events and counts per minute as CSV, of tracks or of labels."""
+
+    source: Path = ARGUMENT("Output of `track` or `group`, or labelled people.", metavar="RUN|SOURCE")
+    out: Path = OUT()
+    fps: float | None = FPS()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParquetOptions(CsvOptions):
+    """Write tables of people, groups, members, events and counts per minute as Parquet, of tracks or of labels."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class FitSensorOptions:
     """Measure the errors of a detector, so that simulated detections have the same errors."""
 
