@@ -36,7 +36,7 @@ class TidyTable:
     """One tidy table; `to_arrow` and `to_pandas` give it to other libraries.
 
     Attributes:
-        columns: By name one value for each row: an array, in which nan is unknown, or a list of texts or of lists of ids.
+        columns: By name one value for each row: an array with nan for unknown, or a list of texts or of lists of ids.
     """
 
     columns: Mapping[str, Any]
@@ -45,11 +45,11 @@ class TidyTable:
         """Returns the table as a pyarrow.Table, which polars reads with `polars.from_arrow`; nan becomes null."""
         import pyarrow as pa
 
-        kinds = {"kind": pa.string(), **dict.fromkeys(("members", "before", "after", "groups"), pa.list_(pa.int64()))}
+        ids = pa.list_(pa.int64())
         arrays = {
             name: pa.array(values, from_pandas=True)
             if isinstance(values, np.ndarray)
-            else pa.array(values, kinds[name])
+            else pa.array(values, pa.string() if name == "kind" else ids)
             for name, values in self.columns.items()
         }
         return pa.table(arrays)

@@ -25,10 +25,12 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
-from sim.io.formats.labels import differentiate
+from sim.io.formats.biwi import read_groups
+from sim.io.formats.labels import differentiate, labelled_truth_fields, require_size
 from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable, corner_doubt, read_table, require_pixels
 from sim.io.formats.options import BoxScale
 from sim.scene.visibility import scale_of_all_boxes
+from sim.truth.group_hulls import box_groups
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth, Unscored
 
 # step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
@@ -44,6 +46,8 @@ MOVED = 0.5  # A box that moves by more than this share of its height belongs to
 # files beside a text, or in the folder above it, that vouch for positions in m
 VOUCHERS = ("manifest.json", "camera.json", "run.json")
 
+
+CHORD = 1.0  # s over which velocities of boxes are differences: boxes jitter
 
 FAST = 12.0  # m/s that nobody keeps up. Half of the steps above it are centimetres, or a wrong frame rate.
 
@@ -356,9 +360,18 @@ def read_truth(
     """Reads a gt.txt as truth of people without group labels, as MOTChallenge's own scoring counts them.
 
     length: None: up to the last frame kept. px_per_m: nan: the boxes' median height / 1.7 m. Boxes are None if a row
-    has none, positions (nan in rows without) and velocities if no row has one.
+    has none, positions (nan in rows without) and velocities if no row has one. Groups are those of a column `group`, or
+    of the file that `group_file` names.
     """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
+    return truth_of_table(table, name, fps, length, px_per_m, person_class)
+
+
+def truth_of_table(
+    table: MotTable, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan"),
+    person_class: int | None = None,
+) -> Truth:  # fmt: skip
+    """Returns a text's table as truth. See `read_truth`."""
     _check_boxes(table)
     require_metres(table, fps)
     ground = ground_positions(table)
@@ -379,7 +392,7 @@ def read_truth(
     if not np.isfinite(px_per_m) and boxed:
         px_per_m = scale_of_all_boxes(box[:, 3])
     frames = length if length is not None else int(frame.max(initial=0))
-    return Truth(
+    truth = Truth(
         name=name, fps=fps, length=frames, px_per_m=px_per_m, frame=frame, id=id,
         group=np.full(len(order), -1, np.int64),
         pos=None if place is None else place[:, :2],
@@ -388,3 +401,39 @@ def read_truth(
         z=None if place is None else place[:, 2],
         labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip
+    label = _labels(table, order)
+    return truth if label is None else _labelled(truth, label, table.rows.file)
+
+
+def group_file(path: Path) -> Path:
+    """Returns where the groups of a text are: groups.txt beside gt.txt, NAME.groups.txt beside another NAME.txt."""
+    return path.with_name("groups.txt" if path.name == LABELS else f"{path.stem}.groups.txt")
+
+
+def _labels(table: MotTable, order: Ints) -> Ints | None:
+    if table.group is not None:
+        table.rows.reject(table.group < -1, "groups from 0, or -1 for alone", "correct the group")
+        return table.group[order]
+    path = group_file(table.rows.file)
+    if not is_present(path):
+        return None
+    names = read_groups(path)
+    return np.array([names.get(int(i), -1) for i in table.id[order]], np.int64)
+
+
+def _labelled(truth: Truth, label: Ints, file: Path) -> Truth:
+    """Returns a truth with groups: measured on the ground if all positions are known, else from the boxes' centres."""
+    frame, id, box, pos, vel, scale = truth.frame, truth.id, truth.box, truth.pos, truth.vel, 1.0
+    require_size(file, truth.length, id)
+    truth = truth.replace(group=label)
+    if not len(id):
+        return truth
+    if pos is None or vel is None or not np.isfinite(pos).all():
+        assert box is not None  # a row without box has a position
+        pos, scale = box[:, :2] + box[:, 2:] / 2, truth.px_per_m
+        vel = differentiate(frame, id, pos, truth.fps, CHORD)
+    known = labelled_truth_fields(frame, id, label, pos, vel, fps=truth.fps, length=truth.length, px_per_m=scale)
+    if pos is truth.pos:
+        return truth.replace(**known)
+    shapes = box_groups(frame, id, label, pos, vel, box, 1, truth.length)
+    return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))
