@@ -19,6 +19,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.arrays import no_ids
 from sim.io.files.atomic import write_file
+from sim.io.files.own_files import refuse_foreign_file
 from sim.io.files.tables import FORMAT, KEY, json_text
 from sim.io.formats.labels import differentiate
 from sim.types import Array, GroupEvent, Groups, Ints, Tracks, Truth
@@ -155,13 +156,23 @@ def truth_tables(truth: Truth) -> TidyTables:
 
 
 def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[str, Any]) -> list[Path]:
-    """Writes each table as folder/NAME.csv or .parquet and returns the paths; `facts` is metadata of Parquet files."""
-    found = []
-    for field in fields(tables):
-        table, path = getattr(tables, field.name).to_arrow(), folder / f"{field.name}.{form}"
+    """Writes each table as folder/NAME.csv or .parquet and returns the paths; `facts` is metadata of Parquet files.
+
+    Raises InputError if a file of another program is in the way.
+    """
+    found = {folder / f"{f.name}.{form}": getattr(tables, f.name).to_arrow() for f in fields(tables)}
+    for path, table in found.items():
+        if not (form == "csv" and path.is_file() and _is_own_csv(path, table)):
+            refuse_foreign_file(path)
+    for path, table in found.items():
         write_file(path, _csv(table) if form == "csv" else _parquet(table, facts))
-        found.append(path)
-    return found
+    return list(found)
+
+
+def _is_own_csv(path: Path, table: pyarrow.Table) -> bool:
+    # The first columns have the same names for runs and truths, in m and in px.
+    with path.open("rb") as file:
+        return file.read(1000).startswith(",".join(table.column_names[:2]).encode() + b",")
 
 
 def _csv(table: pyarrow.Table) -> bytes:

@@ -1,9 +1,9 @@
-"""Reader for texts of trajectories on the ground in m: TrajNet++, the four columns of ETH and UCY, PedPy and JuPedSim.
+"""Reader for texts of trajectories on the ground in m: TrajNet++, four columns as of ETH and UCY, PedPy and JuPedSim.
 
-TrajNet++ (*.ndjson) has a JSON object a line: {"scene": {…, "fps": 2.5}} or {"track": {"f", "p", "x", "y"}}. ETH and UCY
-texts, as Social GAN and others distribute them, have `frame id x y`, separated by tabs or blanks, at 2.5 per s. In both
-frames are numbers of video frames in steps, which are counted from 1 as in BIWI. PedPy and JuPedSim texts have lines
-`id frame x y z …` below comments, of which one states the rate, `# framerate: 8.00`, and one may state cm, as `x/cm`.
+TrajNet++ (*.ndjson) has a JSON object a line: {"scene": {…, "fps": 2.5}} or {"track": {"f", "p", "x", "y"}}. ETH and
+UCY texts, as Social GAN and others distribute them, have `frame id x y`, separated by tabs or blanks, at 2.5 per s. In
+both, frames are numbers of video frames in steps, and are counted from 1 as in BIWI. PedPy and JuPedSim texts have
+lines `id frame x y z …` below comments: one states the rate, `# framerate: 8.00`, and one may state cm, as `x/cm`.
 """
 
 from __future__ import annotations
@@ -50,13 +50,7 @@ def is_trajectories(path: Path) -> bool:
 
 def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns a text of trajectories as Sequence with truth, without pictures and detections."""
-    rows, stated = _read(path)
-    rate = options.fps or stated
-    if rate is None:
-        warnings.warn(
-            f"{path}: no frame rate; taken at {ETH_FPS:g} fps, as ETH and UCY (--fps says otherwise)", stacklevel=3
-        )
-        rate = ETH_FPS
+    rows, rate = _read(path, options.fps)
     table = _table(rows)
     length = int(table.frame.max())
 
@@ -72,17 +66,21 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     )  # fmt: skip
 
 
-def _read(path: Path) -> tuple[NumericTable, float | None]:
-    """Returns the rows `frame, id, x, y`, frames from 1, x and y in m, and the frame rate that the text states."""
+def _read(path: Path, fps: float | None) -> tuple[NumericTable, float]:
+    """Returns the rows `frame, id, x, y`, frames from 1, x and y in m, and the frame rate; fps: that of the user."""
     if path.suffix.lower() == NDJSON:
-        rows, rate = _read_ndjson(path)
+        rows, stated = _read_ndjson(path)
     elif read_text(path).lstrip().startswith("#"):
-        return _read_pedpy(path)
+        return _read_pedpy(path, fps)
     else:
-        rows, rate = read_numbers(path, (4, 4), layout="frame id x y"), None
+        rows, stated = read_numbers(path, (4, 4), layout="frame id x y"), None
     _require_rows(rows)
+    rate = fps or stated
+    if rate is None:
+        text = f"trajectories without a frame rate are taken at {ETH_FPS:g} fps, as ETH and UCY (--fps says otherwise)"
+        warnings.warn(text, stacklevel=4)
     raw, id = rows.integers(0, "frame"), rows.integers(1, "id")
-    return _with_frames(rows, frame_numbers(raw, id)), rate
+    return _with_frames(rows, frame_numbers(raw, id)), rate or ETH_FPS
 
 
 def _require_rows(rows: NumericTable) -> None:
@@ -94,15 +92,14 @@ def _with_frames(rows: NumericTable, frame: Any) -> NumericTable:
     return replace(rows, values=np.column_stack([frame, rows.values[:, 1:]]))
 
 
-def _read_pedpy(path: Path) -> tuple[NumericTable, float | None]:
+def _read_pedpy(path: Path, fps: float | None) -> tuple[NumericTable, float]:
     comments = [line for line in read_text(path).splitlines() if line.startswith("#")]
     rates = [found[1] for line in comments if (found := FRAMERATE.search(line))]
-    rate = float(rates[0]) if rates and is_number_text(rates[0]) else None
-    if rate is not None and not is_number(rate, *FRAME_RATES):
-        raise InputError(
-            file=path, place="# framerate", got=rates[0], expected="frames per second from {:g} to {:g}".format(*FRAME_RATES),
-            remedy="correct it",
-        )  # fmt: skip
+    rate = fps or (float(rates[0]) if rates and is_number_text(rates[0]) else None)
+    if rate is None or not is_number(rate, *FRAME_RATES):
+        expected = "frames per second from {:g} to {:g}".format(*FRAME_RATES)
+        got = rates[0] if rates else "none"
+        raise InputError(file=path, place="# framerate", got=got, expected=expected, remedy="correct it, or give --fps")
     rows = read_numbers(path, (4, 12), layout="id frame x y z", comments=True)
     _require_rows(rows)
     raw = rows.integers(1, "frame")

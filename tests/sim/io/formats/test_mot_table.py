@@ -32,8 +32,8 @@ def test_units_of_positions(tmp_path, unit, factor):
 @pytest.mark.filterwarnings("always")
 def test_columns_without_a_meaning_are_named(tmp_path):
     path = tmp_path / "five.csv"
-    path.write_text("frame,id,x,y,group,mood\n1,1,0.5,1,1,3\n2,1,0.6,1,1,3\n")
-    with pytest.warns(UserWarning, match="line 1: columns that are not used: group, mood"):
+    path.write_text("frame,id,x,y,place,mood\n1,1,0.5,1,hall,\n2,1,0.6,1,hall,3\n")
+    with pytest.warns(UserWarning, match="line 1: columns that are not used: place, mood"):
         truth = open_source(path, fps=25)[0].truth
     assert truth.pos.tolist() == [[0.5, 1], [0.6, 1]]
 
@@ -72,7 +72,7 @@ def test_frame_rates_are_plain_numbers(tmp_path, rate):
         open_source(tmp_path)
 
 
-@pytest.mark.parametrize("body", ["1,1,0.1,1,1\n2,1,0.2,1,1\n", "# ID frame x/cm y/cm\n1 1 20 30 170\n"])
+@pytest.mark.parametrize("body", ["1,1,0.1,1,1\n2,1,0.2,1,1\n", "# x y of people\n1 1 20 30 170\n"])
 def test_unknown_columns_are_refused_with_the_way_to_name_them(tmp_path, body):
     path = tmp_path / "five.csv"
     path.write_text(body)
