@@ -8,7 +8,7 @@ frame; nothing is derived anew, so the tables agree with it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from collections.abc import Sequence as Series
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -315,8 +315,10 @@ def _events(rows: _Rows) -> dict[str, Any]:
 
 
 def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:
-    """Returns how many people, groups and events are in each minute of the frames that were observed."""
-    end = float(rows.seconds(rows.listed.max(initial=0) + 1)) if len(rows.listed) else 0.0
+    """Returns how many people, groups and events are in each minute; means are over the frames that were observed."""
+    # People may be labelled in frames whose groups are not.
+    observed = np.union1d(rows.listed, rows.frame)
+    end = float(rows.seconds(observed[-1] + 1)) if len(observed) else 0.0
     minutes = np.arange(math.ceil(end / MINUTE - 1e-9))
 
     def minute(frame: Ints) -> Ints:
@@ -326,24 +328,23 @@ def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:
         pairs = np.unique(np.stack([minute(frame), id], axis=1), axis=0)
         return _per(pairs[:, 0], minutes)
 
+    def mean(frame: Ints, frames: Ints) -> Array:
+        return np.asarray(_per(minute(frame), minutes) / np.maximum(_per(minute(frames), minutes), 1))
+
     def arrivals(frame: Ints, id: Ints) -> Ints:
         order = np.lexsort((frame, id))
         return _per(minute(frame[order][np.unique(id[order], return_index=True)[1]]), minutes)
 
-    frames = _per(minute(rows.listed), minutes)
     columns = {
         "minute": minutes, "t_start_s": minutes * MINUTE, "t_end_s": np.minimum((minutes + 1) * MINUTE, end),
         "people": distinct(rows.frame, rows.id), "people_new": arrivals(rows.frame, rows.id),
-        "people_mean": _per(minute(rows.frame), minutes) / np.maximum(frames, 1),
+        "people_mean": mean(rows.frame, observed),
     }  # fmt: skip
     if rows.groups is not None:
         columns["groups"] = distinct(number, group)
-        columns["groups_mean"] = _per(minute(number), minutes) / np.maximum(frames, 1)
-    return {**columns, "events": _per(minute(_starts(rows.events)), minutes)}
-
-
-def _starts(events: Iterable[GroupEvent]) -> Ints:
-    return np.array([e.start for e in events], np.int64)
+        columns["groups_mean"] = mean(number, rows.listed)
+    starts = np.array([e.start for e in rows.events], np.int64)
+    return {**columns, "events": _per(minute(starts), minutes)}
 
 
 def _per(minute: Ints, minutes: Ints) -> Ints:
