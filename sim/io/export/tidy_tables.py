@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping
 from collections.abc import Sequence as Series
 from dataclasses import dataclass, fields, replace
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -62,7 +63,7 @@ class TidyTable:
             InputError: pandas is not installed.
         """
         try:
-            import pandas  # noqa: F401
+            import_module("pandas")
         except ImportError:
             raise InputError(
                 place="to_pandas()", got="no pandas", expected="pandas installed",
@@ -146,7 +147,7 @@ def truth_tables(truth: Truth) -> TidyTables:
     listed = np.arange(1, truth.length + 1)
     if groups is not None and truth.labelled is not None and truth.labelled.any():
         listed = listed[truth.labelled]
-        groups = [groups[k - 1] for k in listed.tolist()]
+        groups = tuple(groups[k - 1] for k in listed.tolist())
     return _tables(
         _Rows(
             truth.fps, listed, unit, truth.frame, truth.id, truth.group, pos, vel, truth.heading, truth.box, None,
@@ -322,7 +323,7 @@ def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:
     minutes = np.arange(math.ceil(end / MINUTE - 1e-9))
 
     def minute(frame: Ints) -> Ints:
-        return np.floor(rows.seconds(frame) / MINUTE + 1e-9).astype(np.int64)
+        return np.asarray(rows.seconds(frame) / MINUTE + 1e-9).astype(np.int64)
 
     def distinct(frame: Ints, id: Ints) -> Ints:
         pairs = np.unique(np.stack([minute(frame), id], axis=1), axis=0)

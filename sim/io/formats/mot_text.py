@@ -423,17 +423,17 @@ def _labels(table: MotTable, order: Ints) -> Ints | None:
 
 def _labelled(truth: Truth, label: Ints, file: Path) -> Truth:
     """Returns a truth with groups: measured on the ground if all positions are known, else from the boxes' centres."""
-    frame, id, box, pos, vel, scale = truth.frame, truth.id, truth.box, truth.pos, truth.vel, 1.0
-    require_size(file, truth.length, id)
+    require_size(file, truth.length, truth.id)
     truth = truth.replace(group=label)
-    if not len(id):
+    if not len(label):
         return truth
-    if pos is None or vel is None or not np.isfinite(pos).all():
-        assert box is not None  # a row without box has a position
-        pos, scale = box[:, :2] + box[:, 2:] / 2, truth.px_per_m
-        vel = differentiate(frame, id, pos, truth.fps, CHORD)
-    known = labelled_truth_fields(frame, id, label, pos, vel, fps=truth.fps, length=truth.length, px_per_m=scale)
-    if pos is truth.pos:
-        return truth.replace(**known)
-    shapes = box_groups(frame, id, label, pos, vel, box, 1, truth.length)
+    rows, fps, length = (truth.frame, truth.id, label), truth.fps, truth.length
+    if truth.pos is not None and truth.vel is not None and np.isfinite(truth.pos).all():
+        return truth.replace(**labelled_truth_fields(*rows, truth.pos, truth.vel, fps=fps, length=length))
+    box = truth.box
+    assert box is not None, "a row without box has a position"
+    pos = box[:, :2] + box[:, 2:] / 2
+    vel = differentiate(truth.frame, truth.id, pos, fps, CHORD)
+    known = labelled_truth_fields(*rows, pos, vel, fps=fps, length=length, px_per_m=truth.px_per_m)
+    shapes = box_groups(*rows, pos, vel, box, 1, length)
     return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))

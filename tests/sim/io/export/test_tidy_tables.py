@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import builtins
 import csv
 import io
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -172,14 +172,7 @@ def test_people_are_counted_in_frames_without_labels_of_groups(make_sequence):
 
 
 def test_without_pandas_the_error_names_the_remedy(monkeypatch):
-    load = builtins.__import__
-
-    def missing(name, *rest):
-        if name == "pandas":
-            raise ImportError(name)
-        return load(name, *rest)
-
-    monkeypatch.setattr(builtins, "__import__", missing)
+    monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(InputError, match=r"to_pandas\(\): got no pandas; .*pip install pandas, or use to_arrow\(\)"):
         run_tables(walk(), 2.0).people.to_pandas()
 
