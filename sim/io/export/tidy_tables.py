@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from collections.abc import Sequence as Series
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -121,16 +121,14 @@ def run_tables(tracks: Series[Tracks], fps: float) -> TidyTables:
     from sim.io.store.track_files import flatten
 
     rows = flatten(list(tracks))
-    if rows.unit == "group":
-        rows = flatten([replace(t, unit="person", **_nobody(t)) for t in tracks])
-    known = any(t.groups is not None for t in tracks) or bool((rows.group >= 0).any())
-    groups = [_of_labels(t.id, t.group) if t.groups is None else t.groups for t in tracks]
+    people = slice(0, 0) if rows.unit == "group" else slice(None)
+    known = any(t.groups is not None for t in tracks)
     return _tables(
         _Rows(
             fps, np.array([t.index for t in tracks], np.int64), "px" if rows.plane == "image" else "m",
-            rows.frame, rows.id, rows.group, rows.pos, rows.vel, None,
-            None if rows.boxless.all() else rows.box, rows.score, groups if known else None,
-            [e for t in tracks for e in t.events],
+            rows.frame[people], rows.id[people], rows.group[people], rows.pos[people], rows.vel[people], None,
+            None if rows.boxless.all() else rows.box[people], rows.score[people],
+            [t.groups or Groups.none() for t in tracks] if known else None, [e for t in tracks for e in t.events],
         )
     )  # fmt: skip
 
@@ -203,26 +201,12 @@ def _parquet(table: pyarrow.Table, facts: Mapping[str, Any]) -> bytes:
     return bytes(sink.getvalue())
 
 
-def _nobody(tracks: Tracks) -> dict[str, Any]:
-    none = {name: getattr(tracks, name)[:0] for name in ("id", "group", "pos", "vel", "cov", "score")}
-    return {**none, "box": None}
-
-
-def _of_labels(id: Ints, group: Ints) -> Groups:
-    """Returns the groups of one frame that the labels of its people state, without places."""
-    names = np.unique(group[group >= 0])
-    members = tuple(id[group == name] for name in names)
-    n, two = len(names), np.full((len(names), 2), np.nan)
-    size = np.array([float(len(m)) for m in members])
-    return Groups(names, members, two, two, np.full((n, 2, 2), np.nan), size, ())
-
-
 def _tables(rows: _Rows) -> TidyTables:
     u = rows.unit
     speed = np.hypot(rows.vel[:, 0], rows.vel[:, 1])
-    heading = np.arctan2(rows.vel[:, 1], rows.vel[:, 0]) if rows.heading is None else rows.heading
     # Who stands has no direction of motion.
-    heading = heading if rows.heading is not None else np.where(speed > 0, heading, np.nan)
+    moving = np.where(speed > 0, np.arctan2(rows.vel[:, 1], rows.vel[:, 0]), np.nan)
+    heading = moving if rows.heading is None else rows.heading
     axes = {f"{axis}_{u}": rows.pos[:, k] for k, axis in zip(range(rows.pos.shape[1]), "xyz", strict=False)}
     people = {"frame": rows.frame, "t_s": rows.seconds(rows.frame), "id": rows.id, **axes}
     people |= {f"speed_{u}_s": speed, "heading_rad": heading}
@@ -260,11 +244,11 @@ def _span(rows: _Rows, first: Ints, last: Ints) -> dict[str, Any]:
 
 def _summary(rows: _Rows, speed: Array, members: tuple[Ints, Ints, Ints]) -> dict[str, Any]:
     order = np.lexsort((rows.frame, rows.id))
-    id, frame, pos = rows.id[order], rows.frame[order], rows.pos[order]
+    id, frame, pos = rows.id[order], rows.frame[order], rows.pos[order, :2]
     people, first, count = np.unique(id, return_index=True, return_counts=True)
     last, who = first + count - 1, np.repeat(np.arange(len(people)), count)
     step = np.zeros(len(id))
-    step[1:] = np.where(np.diff(who) == 0, np.sqrt((np.diff(pos, axis=0) ** 2).sum(axis=1)), 0.0)
+    step[1:] = np.where(np.diff(who) == 0, np.hypot(*np.diff(pos, axis=0).T), 0.0)
     known = np.isfinite(speed[order])
     total = np.bincount(who, np.where(known, speed[order], 0.0), len(people))
     number = np.bincount(who, known, len(people))
@@ -305,14 +289,10 @@ def _events(rows: _Rows) -> dict[str, Any]:
     start, end = (np.array([getattr(e, name) for e in events], np.int64) for name in ("start", "end"))
     place = np.array([e.pos[:2] for e in events], np.float64).reshape(-1, 2)
     ids = {name: [list(map(int, getattr(e, name))) for e in events] for name in ("members", "before", "after")}
-    span = _span(rows, start, end)
     return {
-        "kind": [e.kind for e in events],
-        **span,
-        **ids,
-        f"x_{rows.unit}": place[:, 0],
-        f"y_{rows.unit}": place[:, 1],
-    }
+        "kind": [e.kind for e in events], **_span(rows, start, end), **ids,
+        f"x_{rows.unit}": place[:, 0], f"y_{rows.unit}": place[:, 1],
+    }  # fmt: skip
 
 
 def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:

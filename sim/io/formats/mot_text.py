@@ -26,7 +26,7 @@ from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.biwi import read_groups
-from sim.io.formats.labels import differentiate, labelled_truth_fields, require_size
+from sim.io.formats.labels import CHORD, differentiate, labelled_truth_fields, require_size
 from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable, corner_doubt, read_table, require_pixels
 from sim.io.formats.options import BoxScale
 from sim.scene.visibility import scale_of_all_boxes
@@ -46,8 +46,6 @@ MOVED = 0.5  # A box that moves by more than this share of its height belongs to
 # files beside a text, or in the folder above it, that vouch for positions in m
 VOUCHERS = ("manifest.json", "camera.json", "run.json")
 
-
-CHORD = 1.0  # s over which velocities of boxes are differences: boxes jitter
 
 FAST = 12.0  # m/s that nobody keeps up. Half of the steps above it are centimetres, or a wrong frame rate.
 

@@ -10,9 +10,10 @@ from typing import Any
 from scenarios.errors import InputError
 from sim.io.export.tidy_tables import Form, TidyTables, run_tables, truth_tables, write_tables
 from sim.io.files.own_files import output_paths
+from sim.io.formats.mot_folder import frame_rate
 from sim.io.formats.options import RecordingOptions
 from sim.io.source import holds_sequences, open_source
-from sim.io.store.seal import WHOLE, run_folder
+from sim.io.store.seal import WHOLE, is_run, is_sequence, run_folder
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.app import option_parsing
@@ -38,6 +39,12 @@ def _export(options: CsvOptions, form: Form) -> CommandResult:
     own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)
     stored = own or (path.is_dir() and not holds_sequences(path))
     jobs = _of_runs(options, own) if stored else _of_sequences(options)
+    for folder, *_ in jobs:
+        if is_run(folder) or is_sequence(folder):
+            raise InputError(
+                file=folder, place="--out", got="a folder of tracks or of a sequence", expected="another folder",
+                remedy="choose another --out",
+            )  # fmt: skip
     rows, lines = [], []
     with ProgressMeter("export", len(jobs)) as meter:
         for folder, facts, make in jobs:
@@ -56,7 +63,9 @@ Job = tuple[Path, dict[str, Any], Callable[[], TidyTables]]
 
 def _of_runs(options: CsvOptions, own: bool) -> list[Job]:
     found = find_tracks(options.source)
-    for stored in found:
+    folders = [options.out] * own or output_paths(options.out, [str(s.name) for s in found], source=options.source)
+    jobs: list[Job] = []
+    for stored, target in zip(found, folders, strict=True):
         folder = stored.path if stored.path.is_dir() else stored.path.parent
         stored.check()
         if not stored.info:
@@ -64,15 +73,16 @@ def _of_runs(options: CsvOptions, own: bool) -> list[Job]:
                 file=stored.path, got="tracks of another program", expected="what `flockscope track` or `group` wrote",
                 remedy="give the text itself",
             )  # fmt: skip
-        RecordingOptions(fps=options.fps).reject(folder, "a run", "run.json states it", "fps")
-    names = [stored.info["sequence"] for stored in found]
-    folders = [options.out] if own else output_paths(options.out, names, source=options.source)
-    facts = [{"sequence": name, "fps": stored.info["fps"]} for name, stored in zip(names, found, strict=True)]
-    return [(f, about, partial(_run, s)) for f, about, s in zip(folders, facts, found, strict=True)]
+        if "fps" in stored.info:
+            RecordingOptions(fps=options.fps).reject(folder, "a run", "run.json states it", "fps")
+        fps = frame_rate(options.fps, stored.info.get("fps"))
+        facts = {"sequence": stored.info.get("sequence", folder.name), "fps": fps}
+        jobs.append((target, facts, partial(_run, stored, fps)))
+    return jobs
 
 
-def _run(stored: StoredTracks) -> TidyTables:
-    return run_tables(read_checked_tracks(stored.path), stored.info["fps"])
+def _run(stored: StoredTracks, fps: float) -> TidyTables:
+    return run_tables(read_checked_tracks(stored.path), fps)
 
 
 def _of_sequences(options: CsvOptions) -> list[Job]:
