@@ -78,3 +78,29 @@ def test_unknown_columns_are_refused_with_the_way_to_name_them(tmp_path, body):
     path.write_text(body)
     with pytest.raises(InputError, match=r"line 1: .*name the columns in the first line"):
         open_source(path, fps=25)
+
+
+ROWS = {
+    "frame,id,x,y,mood\n1,1,2,3\n2,1,2,3\n": "line 2: got 1,1,2,3 .*; expected 5 columns",
+    "frame,id,x,y,mood\n1,1,2,3,a\n2,1,2,3\n": "line 3: got 4 columns; expected 5 columns",
+    "frame,id,x,y,mood\n1,1,2,3,a\n2,1,here,3,b\n": "line 3: got 'here'; expected a number",
+}
+
+
+@pytest.mark.parametrize("text", ROWS)
+def test_rows_have_the_columns_that_are_named(tmp_path, text):
+    (tmp_path / "walk.csv").write_text(text)
+    with pytest.raises(InputError, match=ROWS[text]):
+        open_source(tmp_path / "walk.csv", fps=5)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_box_and_a_position_with_its_unit(tmp_path):
+    """Without a unit in the name, x and y may be anything, so that they are not used."""
+    row = "\n1,1,0.5,2,100,50,20,40\n2,1,0.6,2,104,50,20,40\n"
+    for unit, known in (("_m", True), ("", False)):
+        (tmp_path / "walk.csv").write_text(f"frame,id,x{unit},y{unit},left,top,width,height{row}")
+        truth = open_source(tmp_path / "walk.csv", fps=5)[0].truth
+        assert truth.box.tolist() == [[100, 50, 20, 40], [104, 50, 20, 40]]
+        assert (truth.pos is not None) == known
+        assert not known or truth.pos.tolist() == [[0.5, 2], [0.6, 2]]
