@@ -16,7 +16,7 @@ from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.reading import is_present, require_regular
 from sim.io.files.own_files import is_hidden
-from sim.io.formats import biwi, caviar, mot_folder, video
+from sim.io.formats import biwi, caviar, mot_folder, trajectories, video
 from sim.io.formats.calibration import read_calibration
 from sim.io.formats.options import RecordingOptions, parse_box_scale
 from sim.io.pictures.background_sample import parse_choice
@@ -24,7 +24,9 @@ from sim.io.store import sequence_folder
 from sim.io.store.seal import is_sequence
 from sim.types import Camera, Sequence
 
-KINDS = "a generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video"
+KINDS = (
+    "a generated sequence or dataset, a MOTChallenge folder or text, trajectories, a BIWI folder, a CAVIAR XML, a video"
+)
 VIDEOS = f"{KINDS} ({' '.join(video.SUFFIXES)})"
 DEPTH = 3
 
@@ -43,8 +45,9 @@ def open_source(
     """Opens a path that holds sequences or recordings, in any known format.
 
     Args:
-        path: A generated sequence or dataset, a MOTChallenge folder or text, a BIWI folder, a CAVIAR XML, a video, or a
-            folder with some of these (but no MOT texts) at most 3 levels down. Hidden names are skipped.
+        path: A generated sequence or dataset, a MOTChallenge folder or text, a text of trajectories (TrajNet++, ETH and
+            UCY, PedPy), a BIWI folder, a CAVIAR XML, a video, or a folder with some of these (of texts only *.ndjson)
+            at most 3 levels down. Hidden names are skipped.
         fps: Frames per second, in place of those that the recording states.
         px_per_m: Image scale, px per m.
         camera: Calibration, or the path of its file.
@@ -135,6 +138,10 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     if suffix in video.SUFFIXES:
         options.reject(path, "a video", "it has no text", "person_class box_scale")
         return video.open_video(path, options)
+    if suffix in (".txt", ".csv", trajectories.NDJSON) and trajectories.is_trajectories(path):
+        no = "px_per_m camera background person_class box_scale"
+        options.reject(path, "a text of trajectories", "it is in metres, without pictures", no)
+        return trajectories.open_text(path, options)
     if suffix in (".txt", ".csv"):
         options.reject(path, "a text", "it has no pictures", "background")
         return mot_folder.open_text(path, options)
@@ -162,7 +169,7 @@ def _find(folder: Path, depth: int) -> list[Path]:
 
 def _is_recording(path: Path) -> bool:
     suffix = path.suffix.lower()
-    return suffix in video.SUFFIXES or (suffix == ".xml" and caviar.is_caviar(path))
+    return suffix in (*video.SUFFIXES, trajectories.NDJSON) or (suffix == ".xml" and caviar.is_caviar(path))
 
 
 def _open_folder(path: Path, options: RecordingOptions) -> Sequence:

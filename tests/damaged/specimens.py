@@ -126,6 +126,14 @@ ROWS = "".join(f"{f},{i},{10 * i + f},10,8,20,1,1,0.9\n" for f in (1, 2, 3, 4) f
 TEN = "".join(f"{f},{i},{10 * i + f},10,8,20,0.9,{i}.5,2.25,0\n" for f in (1, 2, 3, 4) for i in (1, 2))
 DETECTIONS = "".join(f"{f},-1,{10 * i + f},10,8,20,0.9,{i}.5,2.25,0\n" for f in (1, 2, 3, 4) for i in (1, 2))
 OBSMAT = "".join(f"{f} {i} {i}.5 0 {f / 10} 1.0 0 0.1\n" for f in (1, 11, 21, 41) for i in (1, 2, 3))
+NDJSON = '{"scene": {"id": 0, "p": 1, "s": 10, "e": 40, "fps": 2.5, "tag": [1, []]}}\n' + "".join(
+    f'{{"track": {{"f": {f}, "p": {i}, "x": {i}.5, "y": {f / 10}}}}}\n' for f in (10, 20, 40) for i in (1, 2)
+)
+ETH = "".join(f"{f}.0\t{i}.0\t{i}.5\t{f / 10}\n" for f in (10, 20, 40) for i in (1, 2))
+PEDPY = "# framerate: 8.00\n# id frame x/m y/m z/m\n" + "".join(
+    f"{i} {f} {i}.5 {f / 10} 0\n" for i in (1, 2) for f in (0, 1, 2)
+)
+LABELLED = "frame,id,x_m,y_m,group,mood\n" + "".join(f"{f},{i},{i}.5,{f / 10},1,\n" for f in (1, 2) for i in (1, 2))
 EVENTS = (
     '{"format": 1, "events": [\n{"kind": "merge", "start": 1, "end": 3, "emitted": 2, "before": [-1, 2], "after": [2], '
     '"members": [1, 2], "pos": [1.5, null], "frame": 2}\n]}\n'
@@ -158,6 +166,10 @@ TEXTS: dict[str, dict[str, str]] = {
     "caviar": {"walk.xml": CAVIAR},
     "mot": {"seqinfo.ini": SEQINFO, "gt/gt.txt": ROWS, "det/det.txt": DETECTIONS},
     "mot text": {"people.txt": TEN},
+    "trajnet": {"walk.ndjson": NDJSON},
+    "eth": {"walk.txt": ETH, "walk.groups.txt": "1 2\n"},
+    "pedpy": {"walk.txt": PEDPY},
+    "labelled text": {"people.csv": LABELLED},
     "tracks text": {"tracks.txt": TEN, "groups.csv": GROUPS_CSV, "events.json": EVENTS},
     "events": {"events.json": EVENTS},
     "groups": {"groups.csv": GROUPS_CSV},

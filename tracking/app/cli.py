@@ -38,11 +38,13 @@ COMMANDS: dict[str, tuple[Any, str]] = {
     "sheet": (options.SheetOptions, "view:sheet"),
     "overlay": (options.OverlayOptions, "view:overlay"),
     "validate": (options.ValidateOptions, "datasets:validate"),
+    "export csv": (options.CsvOptions, "tables:export_csv"),
+    "export parquet": (options.ParquetOptions, "tables:export_parquet"),
     "export coco": (options.CocoOptions, "datasets:export_coco"),
     "export kitti": (options.KittiOptions, "datasets:export_kitti"),
     "export webdataset": (options.WebdatasetOptions, "datasets:export_webdataset"),
 }
-GROUPS = {"export": "Convert a dataset to another format.", "fit": "Fit a model to recordings."}
+GROUPS = {"export": "Convert a dataset, or tracks, to another format.", "fit": "Fit a model to recordings."}
 
 app = typer.Typer(
     add_completion=False,

@@ -18,7 +18,7 @@ OUT = partial(option, "Folder to write to.", metavar="DIR")
 TOML = partial(option, metavar="FILE.toml", flag="--out")
 FILE = partial(option, flag="--out")
 NAMES = partial(ARGUMENT, "Scenarios, *.toml files or suites.", metavar="NAME…")
-SOURCE = partial(ARGUMENT, "Sequence or dataset: generated, MOT, video, BIWI, CAVIAR.", metavar="SOURCE")
+SOURCE = partial(ARGUMENT, "Sequence or dataset: generated, MOT, video, trajectories, BIWI, CAVIAR.", metavar="SOURCE")
 SIMILARITY = partial(option, "How true and tracked people are compared. Default: by the data.", None)
 TRACKS = partial(ARGUMENT, "Output of `track`, or MOT text.", None, metavar="TRACKS")
 FPS = partial(option, "Frames per second of a recording, in place of its own. Not for generated sequences.", None)
@@ -322,6 +322,20 @@ class WebdatasetOptions:
     shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
     samples: Literal["sequence", "frame"] = option(
         "A sample: a sequence with all its files, or a labelled frame.", "sequence")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CsvOptions:
+    """Write tables of people, groups, members, events and counts per minute as CSV, of tracks or of labels."""
+
+    source: Path = ARGUMENT("Output of `track` or `group`, or labelled people.", metavar="RUN|SOURCE")
+    out: Path = OUT()
+    fps: float | None = FPS()
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParquetOptions(CsvOptions):
+    """Write tables of people, groups, members, events and counts per minute as Parquet, of tracks or of labels."""
 
 
 @dataclass(frozen=True, kw_only=True)

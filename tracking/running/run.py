@@ -29,6 +29,7 @@ from tracking.running.prepare import Params, PreparedTracker, prepare
 from tracking.running.time_limit import TimeLimited
 
 if TYPE_CHECKING:
+    from sim.io.export.tidy_tables import TidyTables
     from tracking.grouping.belief import PairProbabilities
 
 
@@ -155,6 +156,15 @@ class TrackingRun(SequenceOf[Tracks]):
 
     def __len__(self) -> int:
         return len(self.tracks)
+
+    def tables(self) -> TidyTables:
+        """Returns people, people_summary, groups, members, events and counts as tidy tables.
+
+        `run.tables().people.to_arrow()` gives a table of pyarrow, `to_pandas()` a data frame.
+        """
+        from sim.io.export.tidy_tables import run_tables
+
+        return run_tables(self.tracks, self.info["fps"])
 
     def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
         """Stores the tracks in the folder as `flockscope track` does, and return the folder."""

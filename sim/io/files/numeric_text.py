@@ -75,25 +75,32 @@ def whole_number(text: str) -> int:
 
 
 def read_numbers(
-    path: Path, columns: tuple[int, int], also: int | None = None, *, header: bool = False, layout: str = ""
-) -> NumericTable:
+    path: Path, columns: tuple[int, int], also: int | None = None, *, header: bool = False, layout: str = "",
+    use: list[int] | None = None, comments: bool = False,
+) -> NumericTable:  # fmt: skip
     """Reads a text's rows of numbers, separated by commas if the first line has one, else by blanks.
 
-    columns: (least, greatest) number of columns, and `also` another one. header: True skips the first line.
+    columns: (least, greatest) number of columns, and `also` another one. header: True skips the first line. use: the
+    columns to read, from 0, of which only these must hold numbers; None: all. comments: True skips lines with #.
     """
-    numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()][header:]
+    lines_of_text = enumerate(read_text(path).splitlines(), 1)
+    numbered = [(k, line) for k, line in lines_of_text if line.strip() and not (comments and line[:1] == "#")][header:]
     if not numbered:
         return NumericTable(path, np.zeros((0, columns[0])), np.zeros(0, np.int64), layout)
     lines = np.array([k for k, _ in numbered], np.int64)
     separator = "," if "," in numbered[0][1] else None
+    width, (low, high) = len(numbered[0][1].split(separator)), columns
+    if use is not None and width != low:
+        use = None  # the columns are others than those named: an error below
     try:
         text = io.StringIO("\n".join(line for _, line in numbered))
-        values = np.loadtxt(text, delimiter=separator, comments=None, ndmin=2, dtype=np.float64)
+        values = np.loadtxt(text, delimiter=separator, comments=None, ndmin=2, dtype=np.float64, usecols=use)
+        if use is not None and any(len(line.split(separator)) != width for _, line in numbered):
+            raise ValueError("lines of different lengths")
     except ValueError:
-        raise _first_bad_line(path, numbered, separator) from None
+        raise _first_bad_line(path, numbered, separator, use) from None
     rows = NumericTable(path, values, lines, layout)
-    low, high = columns
-    if not low <= values.shape[1] <= high and values.shape[1] != also:
+    if use is None and not low <= values.shape[1] <= high and values.shape[1] != also:
         span = (str(low) if low == high else f"{low} to {high}") + ("" if also is None else f" or {also}")
         remedy = layout and f"the columns are {layout}"
         rows.reject(np.ones(len(lines), bool), f"{span} columns", remedy, remedy)
@@ -101,11 +108,14 @@ def read_numbers(
     return rows
 
 
-def _first_bad_line(path: Path, numbered: list[tuple[int, str]], separator: str | None) -> InputError:
+def _first_bad_line(
+    path: Path, numbered: list[tuple[int, str]], separator: str | None, use: list[int] | None
+) -> InputError:
     width = len(numbered[0][1].split(separator))
     for k, line in numbered:
         cells = line.split(separator)
-        bad = next((c for c in cells if not is_number_text(c)), None)
+        read = cells if use is None or len(cells) != width else [cells[k] for k in use]
+        bad = next((c for c in read if not is_number_text(c)), None)
         if bad is not None or len(cells) != width:
             got = repr(bad.strip()) if bad is not None else f"{len(cells)} columns"
             expected = "a number" if bad is not None else f"{width} columns, as in the first line"

@@ -23,7 +23,7 @@ from scenarios.limits import COORDINATE, FRAMES, XML_BYTES
 from scenarios.reading import read_regular
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import read_number, whole_number
-from sim.io.formats.labels import differentiate, labelled_truth_fields, require_size
+from sim.io.formats.labels import CHORD, differentiate, labelled_truth_fields, require_size
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.scene.visibility import scale_of_all_boxes, scale_of_first_boxes
 from sim.truth.group_hulls import box_groups
@@ -32,7 +32,6 @@ from sim.types import Array, Frame, Ints, Sequence, Truth
 FPS = 25.0
 LAST_ID = 10**15 - 1  # ids pass through float64
 IMAGE_SIZE = (384, 288)
-CHORD = 1.0  # s, for velocities: labels rest for some frames and then jump by pixels, which shorter windows pick up
 
 
 @dataclass(frozen=True)

@@ -107,6 +107,8 @@ def scale_groups(groups: Groups, factor: float) -> Groups:
 
 
 WINDOW = 0.5  # s, length of the time window
+# s, that of labelled boxes: they rest for some frames and then jump by pixels, which shorter windows pick up
+CHORD = 1.0
 
 
 def differentiate(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:

@@ -123,14 +123,15 @@ NAMES = {
     "id": ("id", "track_id", "trackid", "person_id", "ped_id", "target_id"),
     "score": ("score", "conf", "confidence"),
     "class": ("class", "class_id", "cls", "category", "category_id", "object_category"),
-    "left": ("left", "bb_left", "xmin", "x1"),
-    "top": ("top", "bb_top", "ymin", "y1"),
+    "left": ("left", "bb_left", "box_left_px", "xmin", "x1"),
+    "top": ("top", "bb_top", "box_top_px", "ymin", "y1"),
     "right": ("right", "xmax", "x2"),
     "bottom": ("bottom", "ymax", "y2"),
-    "width": ("width", "w", "bb_width"),
-    "height": ("height", "h", "bb_height"),
+    "width": ("width", "w", "bb_width", "box_width_px"),
+    "height": ("height", "h", "bb_height", "box_height_px"),
     "cx": ("cx", "xc", "x_center", "center_x"),
     "cy": ("cy", "yc", "y_center", "center_y"),
+    "group": ("group", "group_id", "groupid"),
     "x": ("x", *(f"x_{unit}" for unit in UNITS)),
     "y": ("y", *(f"y_{unit}" for unit in UNITS)),
 }
@@ -147,9 +148,11 @@ def column_names(path: Path) -> list[str] | None:
     return cells if cells and not line.startswith("#") and not any(map(is_number_text, cells)) and cells[0] else None
 
 
-def read_named(path: Path, names: list[str]) -> NumericTable:
-    """Reads a text with named columns as 8 columns of a MOTChallenge text, or as 4: frame, id, x, y in m."""
-    rows = read_numbers(path, (len(names), len(names)), header=True, layout="those that line 1 names")
+def read_named(path: Path, names: list[str]) -> tuple[NumericTable, Ints | None]:
+    """Reads a text with named columns as 8 or 10 columns of a MOTChallenge text, or as 4: frame, id, x, y in m.
+
+    Returns the rows, and the labels of a column `group`, (N,), -1 for alone; None without that column.
+    """
     found: dict[str, int] = {}
     for k, name in enumerate(names):
         meaning = next((key for key, some in NAMES.items() if name in some), None)
@@ -157,19 +160,25 @@ def read_named(path: Path, names: list[str]) -> NumericTable:
             _refuse(path, names)
         if meaning is not None:
             found[meaning] = k
+    use, count = list(found.values()), len(names)
+    rows = read_numbers(path, (count, count), header=True, layout="those that line 1 names", use=use)
     if not len(rows.line):
-        return replace(rows, values=np.zeros((0, 6)))
+        return replace(rows, values=np.zeros((0, 6))), None
 
     def column(name: str, default: float = -1.0) -> Column:
-        return rows.values[:, found[name]] if name in found else np.full(len(rows.line), default)
+        return rows.values[:, use.index(found[name])] if name in found else np.full(len(rows.line), default)
 
     have, id = found.keys(), column("id")
     if "frame" not in have:
         _refuse(path, names)
     frame = column("frame")
+    units = [names[found[axis]].partition("_")[2] for axis in "xy" if axis in found]
+    ground = [column(axis) * UNITS.get(unit, 1.0) for axis, unit in zip("xy", units, strict=False)]
     if have >= {"id", "x", "y"} and not have & {"width", "height", "left", "cx"}:
-        x, y = (column(axis) * UNITS.get(names[found[axis]].partition("_")[2], 1.0) for axis in ("x", "y"))
-        columns = [frame, id, x, y]
+        columns = [frame, id, *ground]
+    elif have >= {"id", "left", "top", "width", "height"} and "class" not in have and len(units) == 2 and all(units):
+        box = (column(name) for name in ("left", "top", "width", "height"))
+        columns = [frame, id, *box, column("score", 1.0), *ground, np.zeros_like(frame)]
     else:
         left, top, w, h = _box(column, have) or _refuse(path, names)
         columns = [frame, id, left, top, w, h, column("score", 1.0), column("class")]
@@ -179,7 +188,8 @@ def read_named(path: Path, names: list[str]) -> NumericTable:
     if frame.min() == 0:
         columns[0] = frame + 1
         warnings.warn(f"{path}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
-    return replace(rows, values=np.stack(columns, axis=1))
+    group = replace(rows, values=column("group")[:, None]).integers(0, "group") if "group" in have else None
+    return replace(rows, values=np.stack(columns, axis=1)), group
 
 
 def _box(column: Callable[[str], Column], have: Set[str]) -> tuple[Column, Column, Column, Column] | None:
@@ -215,6 +225,7 @@ class MotTable:
     id: Ints  # (N,) of the person or track, usually -1 for detections
     box: Array  # (N, 4) left, top, width, height in px, all -1 for no box
     rest: Array  # (N, 0 to 4) the columns after the box: confidence or flag; then class and visibility, or x, y, z in m
+    group: Ints | None = None  # (N,) labels of a column `group`, -1 for alone
 
     def boxes(self) -> Array:
         """Returns the boxes of the rows that have one, (B, 4)."""
@@ -234,13 +245,17 @@ def read_table(
     boxes pixels. Rows stay in the order of the file.
     """
     named = column_names(path)
-    rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS, layout=LAYOUT) if named is None else read_named(path, named)
+    rows, group = (
+        (read_numbers(path, (6, 10), also=GROUND_COLUMNS, layout=LAYOUT), None)
+        if named is None
+        else read_named(path, named)
+    )
     frame, id, count = rows.integers(0, "frame"), rows.integers(1, "id"), len(rows.line)
     box, rest = rows.values[:, 2:6], rows.values[:, 6:]
     if rows.values.shape[1] == GROUND_COLUMNS:
         # A text of positions: no box, confidence 1, z = 0.
         box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
-    table = MotTable(rows, frame, id, box, rest)
+    table = MotTable(rows, frame, id, box, rest, group)
     last = FRAMES if length is None else length
     rows.reject(frame == 0, f"frames from 1 to {last}", "add 1 to all frames, if the file counts them from 0")
     remedy = "check that this text belongs to this recording, and its seqLength"

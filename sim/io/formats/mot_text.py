@@ -25,10 +25,12 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
-from sim.io.formats.labels import differentiate
+from sim.io.formats.biwi import read_groups
+from sim.io.formats.labels import CHORD, differentiate, labelled_truth_fields, require_size
 from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable, corner_doubt, read_table, require_pixels
 from sim.io.formats.options import BoxScale
 from sim.scene.visibility import scale_of_all_boxes
+from sim.truth.group_hulls import box_groups
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth, Unscored
 
 # step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
@@ -356,9 +358,18 @@ def read_truth(
     """Reads a gt.txt as truth of people without group labels, as MOTChallenge's own scoring counts them.
 
     length: None: up to the last frame kept. px_per_m: nan: the boxes' median height / 1.7 m. Boxes are None if a row
-    has none, positions (nan in rows without) and velocities if no row has one.
+    has none, positions (nan in rows without) and velocities if no row has one. Groups are those of a column `group`, or
+    of the file that `group_file` names.
     """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
+    return truth_of_table(table, name, fps, length, px_per_m, person_class)
+
+
+def truth_of_table(
+    table: MotTable, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan"),
+    person_class: int | None = None,
+) -> Truth:  # fmt: skip
+    """Returns a text's table as truth. See `read_truth`."""
     _check_boxes(table)
     require_metres(table, fps)
     ground = ground_positions(table)
@@ -379,7 +390,7 @@ def read_truth(
     if not np.isfinite(px_per_m) and boxed:
         px_per_m = scale_of_all_boxes(box[:, 3])
     frames = length if length is not None else int(frame.max(initial=0))
-    return Truth(
+    truth = Truth(
         name=name, fps=fps, length=frames, px_per_m=px_per_m, frame=frame, id=id,
         group=np.full(len(order), -1, np.int64),
         pos=None if place is None else place[:, :2],
@@ -388,3 +399,39 @@ def read_truth(
         z=None if place is None else place[:, 2],
         labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip
+    label = _labels(table, order)
+    return truth if label is None else _labelled(truth, label, table.rows.file)
+
+
+def group_file(path: Path) -> Path:
+    """Returns where the groups of a text are: groups.txt beside gt.txt, NAME.groups.txt beside another NAME.txt."""
+    return path.with_name("groups.txt" if path.name == LABELS else f"{path.stem}.groups.txt")
+
+
+def _labels(table: MotTable, order: Ints) -> Ints | None:
+    if table.group is not None:
+        table.rows.reject(table.group < -1, "groups from 0, or -1 for alone", "correct the group")
+        return table.group[order]
+    path = group_file(table.rows.file)
+    if not is_present(path):
+        return None
+    names = read_groups(path)
+    return np.array([names.get(int(i), -1) for i in table.id[order]], np.int64)
+
+
+def _labelled(truth: Truth, label: Ints, file: Path) -> Truth:
+    """Returns a truth with groups: measured on the ground if all positions are known, else from the boxes' centres."""
+    require_size(file, truth.length, truth.id)
+    truth = truth.replace(group=label)
+    if not len(label):
+        return truth
+    rows, fps, length = (truth.frame, truth.id, label), truth.fps, truth.length
+    if truth.pos is not None and truth.vel is not None and np.isfinite(truth.pos).all():
+        return truth.replace(**labelled_truth_fields(*rows, truth.pos, truth.vel, fps=fps, length=length))
+    box = truth.box
+    assert box is not None, "a row without box has a position"
+    pos = box[:, :2] + box[:, 2:] / 2
+    vel = differentiate(truth.frame, truth.id, pos, fps, CHORD)
+    known = labelled_truth_fields(*rows, pos, vel, fps=fps, length=length, px_per_m=truth.px_per_m)
+    shapes = box_groups(*rows, pos, vel, box, 1, length)
+    return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))

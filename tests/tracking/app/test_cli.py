@@ -155,6 +155,9 @@ COMMANDS = {
     "sheet": ("sheet {one} --out {out}/sheet.png", "sheet {out}/nothing --out {out}/sheet.png"),
     "tune": (TUNE + " --trials 2 --seeds 0", TUNE + " --trials 2 --seeds 0:20000"),
     "validate": ("validate {data}", "validate {out}/nothing"),
+    "export csv": ("export csv {data} --out {out}", "export csv {out}/nothing --out {out}/x"),
+    "export csv RUN": ("export csv {tracks} --out {out}", "export csv {tracks} --fps 5 --out {out}"),
+    "export parquet": ("export parquet {tracks}/scene-s40000 --out {out}", "export parquet {scene} --out {out}"),
     "export coco": ("export coco {data} --out {out}/coco.json", "export coco {out}/nothing --out {out}/coco.json"),
     "export kitti": ("export kitti {seen} --out {out}", "export kitti {one} --out {out}"),
     "export webdataset": (

@@ -489,6 +489,11 @@ FLIPS = {
     "export webdataset {0}/data --out {1}": {
         "folder": ("{0}/data", ONE), "shard_size": "--shard-size 1kB", "samples": "--samples frame",
     },
+    **{
+        f"export {form} {{0}}/{source} --out {{1}}": flip
+        for form in ("csv", "parquet")
+        for source, flip in {"data": {"source": ("data", "tracks")}, "mot": {"fps": "--fps 5"}}.items()
+    },
     "export coco {0}/data --out {1}/c.json": {"folder": ("data", "mot")},
 }  # fmt: skip
 OPTIONS = {

@@ -35,6 +35,8 @@ COMMANDS = {
     "track": ("track blob {0}/data/flockscope-test/scene-s20000 --out {1}", "groups.csv"),
     "export webdataset": ("export webdataset {0}/data --out {1}", "index.json"),
     "export webdataset, a shard": ("export webdataset {0}/data --out {1}", "shard-000000.json"),
+    "export csv": ("export csv {0}/data --out {1}", "scene-s20000/events.csv"),
+    "export parquet": ("export parquet {0}/data --out {1}", "scene-s20000/people.parquet"),
     "tune": ("tune {2}/tests/toy_tracker.py:Toy --suite {0}/scene.toml --check none --trials 1 --out {1}/toy.toml",
              "toy.json"),
     "generate, a manifest": (
@@ -65,7 +67,18 @@ def test_a_file_of_others_stays(name: str, data: Path, tmp_path: Path, capsys: p
 
 
 @pytest.mark.parametrize(
-    "name", ["generate", "export webdataset", "track", "view", "view, the film", "sheet", "overlay"]
+    "name",
+    [
+        "generate",
+        "export csv",
+        "export parquet",
+        "export webdataset",
+        "track",
+        "view",
+        "view, the film",
+        "sheet",
+        "overlay",
+    ],
 )
 def test_own_files_are_replaced(name: str, data: Path, tmp_path: Path) -> None:
     line = [word.format(data, tmp_path / "out", ROOT) for word in COMMANDS[name][0].split()]

@@ -42,6 +42,7 @@ def commands(source: Path, out: Path) -> list[list[str]]:
         ["sheet", str(source), "--out", str(out / "sheets")],
         ["overlay", str(source), str(tracks), "--out", str(out / "films")],
         ["export", "coco", str(source), "--out", str(out / "coco.json")],
+        ["export", "parquet", str(source), "--out", str(out / "tables")],
     ]
 
 

@@ -88,6 +88,7 @@ NUMBERS = {
     "track blob x --out y --seed {}": ("--seed", "1_0", "7"),
     "track blob x --out y --fps {}": ("--fps", "1_0", "2_5.5", "25"),
     "track blob x --out y --background {}": ("--background", "first:1_0", "first:10"),
+    "export csv x --out y --fps {}": ("--fps", "1_0", "25"),
     "export webdataset x --out y --shard-size {}": ("--shard-size", "1_0MB", "10MB"),
     "tune blob --out x --suite quick --trials {}": ("--trials", "1_0"),
 }

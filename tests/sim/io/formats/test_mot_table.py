@@ -32,8 +32,8 @@ def test_units_of_positions(tmp_path, unit, factor):
 @pytest.mark.filterwarnings("always")
 def test_columns_without_a_meaning_are_named(tmp_path):
     path = tmp_path / "five.csv"
-    path.write_text("frame,id,x,y,group,mood\n1,1,0.5,1,1,3\n2,1,0.6,1,1,3\n")
-    with pytest.warns(UserWarning, match="line 1: columns that are not used: group, mood"):
+    path.write_text("frame,id,x,y,place,mood\n1,1,0.5,1,hall,\n2,1,0.6,1,hall,3\n")
+    with pytest.warns(UserWarning, match="line 1: columns that are not used: place, mood"):
         truth = open_source(path, fps=25)[0].truth
     assert truth.pos.tolist() == [[0.5, 1], [0.6, 1]]
 
@@ -72,9 +72,35 @@ def test_frame_rates_are_plain_numbers(tmp_path, rate):
         open_source(tmp_path)
 
 
-@pytest.mark.parametrize("body", ["1,1,0.1,1,1\n2,1,0.2,1,1\n", "# ID frame x/cm y/cm\n1 1 20 30 170\n"])
+@pytest.mark.parametrize("body", ["1,1,0.1,1,1\n2,1,0.2,1,1\n", "# x y of people\n1 1 20 30 170\n"])
 def test_unknown_columns_are_refused_with_the_way_to_name_them(tmp_path, body):
     path = tmp_path / "five.csv"
     path.write_text(body)
     with pytest.raises(InputError, match=r"line 1: .*name the columns in the first line"):
         open_source(path, fps=25)
+
+
+ROWS = {
+    "frame,id,x,y,mood\n1,1,2,3\n2,1,2,3\n": "line 2: got 1,1,2,3 .*; expected 5 columns",
+    "frame,id,x,y,mood\n1,1,2,3,a\n2,1,2,3\n": "line 3: got 4 columns; expected 5 columns",
+    "frame,id,x,y,mood\n1,1,2,3,a\n2,1,here,3,b\n": "line 3: got 'here'; expected a number",
+}
+
+
+@pytest.mark.parametrize("text", ROWS)
+def test_rows_have_the_columns_that_are_named(tmp_path, text):
+    (tmp_path / "walk.csv").write_text(text)
+    with pytest.raises(InputError, match=ROWS[text]):
+        open_source(tmp_path / "walk.csv", fps=5)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_box_and_a_position_with_its_unit(tmp_path):
+    """Without a unit in the name, x and y may be anything, so that they are not used."""
+    row = "\n1,1,0.5,2,100,50,20,40\n2,1,0.6,2,104,50,20,40\n"
+    for unit, known in (("_m", True), ("", False)):
+        (tmp_path / "walk.csv").write_text(f"frame,id,x{unit},y{unit},left,top,width,height{row}")
+        truth = open_source(tmp_path / "walk.csv", fps=5)[0].truth
+        assert truth.box.tolist() == [[100, 50, 20, 40], [104, 50, 20, 40]]
+        assert (truth.pos is not None) == known
+        assert not known or truth.pos.tolist() == [[0.5, 2], [0.6, 2]]

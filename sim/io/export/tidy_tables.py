@@ -1,0 +1,332 @@
+"""Tidy tables of a run or a truth: people, people_summary, groups, members, events and counts, as CSV or Parquet.
+
+A tidy table has one observation a row. The names of its columns end with their unit: `x_m`, `speed_m_s`, `t_s`; what is
+in the image is in px. Unknown values are empty cells. Groups and members are those that the run or truth states in each
+frame; nothing is derived anew, so the tables agree with it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from collections.abc import Sequence as Series
+from dataclasses import dataclass, fields
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.arrays import no_ids
+from sim.io.files.atomic import write_file
+from sim.io.files.own_files import refuse_foreign_file
+from sim.io.files.tables import FORMAT, KEY, json_text
+from sim.io.formats.labels import differentiate
+from sim.types import Array, GroupEvent, Groups, Ints, Tracks, Truth
+
+if TYPE_CHECKING:
+    import pyarrow
+
+Form = Literal["csv", "parquet"]
+MINUTE = 60.0  # s
+BOX = ("box_left_px", "box_top_px", "box_width_px", "box_height_px")
+
+
+@dataclass(frozen=True, eq=False)
+class TidyTable:
+    """One tidy table; `to_arrow` and `to_pandas` give it to other libraries.
+
+    Attributes:
+        columns: By name one value for each row: an array with nan for unknown, or a list of texts or of lists of ids.
+    """
+
+    columns: Mapping[str, Any]
+
+    def to_arrow(self) -> pyarrow.Table:
+        """Returns the table as a pyarrow.Table, which polars reads with `polars.from_arrow`; nan becomes null."""
+        import pyarrow as pa
+
+        ids = pa.list_(pa.int64())
+        arrays = {
+            name: pa.array(values, from_pandas=True)
+            if isinstance(values, np.ndarray)
+            else pa.array(values, pa.string() if name == "kind" else ids)
+            for name, values in self.columns.items()
+        }
+        return pa.table(arrays)
+
+    def to_pandas(self) -> Any:
+        """Returns the table as a data frame of pandas.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        try:
+            import_module("pandas")
+        except ImportError:
+            raise InputError(
+                place="to_pandas()", got="no pandas", expected="pandas installed",
+                remedy="pip install pandas, or use to_arrow()",
+            ) from None  # fmt: skip
+        return self.to_arrow().to_pandas()
+
+
+@dataclass(frozen=True, eq=False)
+class TidyTables:
+    """The tidy tables of one sequence.
+
+    Attributes:
+        people: One row per person and frame.
+        people_summary: One row per person.
+        groups: One row per group.
+        members: One row per group, person, and interval of frames in which the person belongs to the group.
+        events: One row per event.
+        counts: One row per minute.
+    """
+
+    people: TidyTable
+    people_summary: TidyTable
+    groups: TidyTable
+    members: TidyTable
+    events: TidyTable
+    counts: TidyTable
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """What a run and a truth have in common: R rows of people, G rows of groups in frames, events."""
+
+    fps: float
+    listed: Ints  # frames that were observed; frames between them break no interval
+    unit: str  # of positions: "m" or "px"
+    # people, (R,) or (R, D), sorted by (frame, id); vel is nan, group -1 where unknown
+    frame: Ints
+    id: Ints
+    group: Ints
+    pos: Array
+    vel: Array
+    heading: Array | None  # (R,) rad, None: the direction of vel
+    box: Array | None  # (R, 4) px
+    score: Array | None
+    groups: Series[Groups] | None  # of each listed frame; None: not labelled
+    events: Series[GroupEvent]
+
+    def seconds(self, frame: Any) -> Any:
+        return (frame - 1) / self.fps
+
+
+def run_tables(tracks: Series[Tracks], fps: float) -> TidyTables:
+    """Returns the tidy tables of a run: one `Tracks` per frame. Of a tracker of whole groups, people are empty."""
+    from sim.io.store.track_files import flatten
+
+    rows = flatten(list(tracks))
+    people = slice(0, 0) if rows.unit == "group" else slice(None)
+    known = any(t.groups is not None for t in tracks)
+    return _tables(
+        _Rows(
+            fps, np.array([t.index for t in tracks], np.int64), "px" if rows.plane == "image" else "m",
+            rows.frame[people], rows.id[people], rows.group[people], rows.pos[people], rows.vel[people], None,
+            None if rows.boxless.all() else rows.box[people], rows.score[people],
+            [t.groups or Groups.none() for t in tracks] if known else None, [e for t in tracks for e in t.events],
+        )
+    )  # fmt: skip
+
+
+def truth_tables(truth: Truth) -> TidyTables:
+    """Returns the tidy tables of a truth, in m if it has positions on the ground, else of the boxes' centres in px."""
+    pos, vel, unit = truth.pos, truth.vel, "m"
+    if pos is None:
+        assert truth.box is not None
+        pos, unit = truth.box[:, :2] + truth.box[:, 2:] / 2, "px"
+    if vel is None:
+        vel = differentiate(truth.frame, truth.id, pos, truth.fps)
+    groups = truth.groups if truth.groups is not None else truth.groups_px
+    listed = np.arange(1, truth.length + 1)
+    if groups is not None and truth.labelled is not None and truth.labelled.any():
+        listed = listed[truth.labelled]
+        groups = tuple(groups[k - 1] for k in listed.tolist())
+    return _tables(
+        _Rows(
+            truth.fps, listed, unit, truth.frame, truth.id, truth.group, pos, vel, truth.heading, truth.box, None,
+            groups, truth.events or (),
+        )
+    )  # fmt: skip
+
+
+def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[str, Any]) -> list[Path]:
+    """Writes each table as folder/NAME.csv or .parquet and returns the paths; `facts` is metadata of Parquet files.
+
+    Raises InputError if a file of another program is in the way.
+    """
+    found = {folder / f"{f.name}.{form}": getattr(tables, f.name).to_arrow() for f in fields(tables)}
+    for path, table in found.items():
+        if not (form == "csv" and path.is_file() and _is_own_csv(path, table)):
+            refuse_foreign_file(path)
+    for path, table in found.items():
+        write_file(path, _csv(table) if form == "csv" else _parquet(table, facts))
+    return list(found)
+
+
+def _is_own_csv(path: Path, table: pyarrow.Table) -> bool:
+    # The first columns have the same names for runs and truths, in m and in px.
+    with path.open("rb") as file:
+        return file.read(1000).startswith(",".join(table.column_names[:2]).encode() + b",")
+
+
+def _csv(table: pyarrow.Table) -> bytes:
+    import pyarrow as pa
+    from pyarrow import csv
+
+    columns = [
+        pa.array([" ".join(map(str, ids)) for ids in column.to_pylist()], pa.string())
+        if pa.types.is_list(column.type)
+        else column
+        for column in table.columns
+    ]
+    sink = pa.BufferOutputStream()
+    # pyarrow would quote the header.
+    options = csv.WriteOptions(include_header=False, quoting_style="needed")
+    csv.write_csv(pa.table(columns, names=table.column_names), sink, options)
+    return (",".join(table.column_names) + "\n").encode() + bytes(sink.getvalue())
+
+
+def _parquet(table: pyarrow.Table, facts: Mapping[str, Any]) -> bytes:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    sink = pa.BufferOutputStream()
+    marked = table.replace_schema_metadata({KEY: json_text({"format": FORMAT, **facts}).encode()})
+    pq.write_table(marked, sink, compression="zstd", write_page_checksum=True)
+    return bytes(sink.getvalue())
+
+
+def _tables(rows: _Rows) -> TidyTables:
+    u = rows.unit
+    speed = np.hypot(rows.vel[:, 0], rows.vel[:, 1])
+    # Who stands has no direction of motion.
+    moving = np.where(speed > 0, np.arctan2(rows.vel[:, 1], rows.vel[:, 0]), np.nan)
+    heading = moving if rows.heading is None else rows.heading
+    axes = {f"{axis}_{u}": rows.pos[:, k] for k, axis in zip(range(rows.pos.shape[1]), "xyz", strict=False)}
+    people = {"frame": rows.frame, "t_s": rows.seconds(rows.frame), "id": rows.id, **axes}
+    people |= {f"speed_{u}_s": speed, "heading_rad": heading}
+    people |= {} if rows.box is None else {name: rows.box[:, k] for k, name in enumerate(BOX)}
+    people |= {} if rows.score is None else {"score": rows.score}
+    people |= {} if rows.groups is None else {"group": rows.group}
+    number, group, size, members = _group_rows(rows)
+    return TidyTables(
+        TidyTable(people), TidyTable(_summary(rows, speed, members)), TidyTable(_groups(rows, number, group, size)),
+        TidyTable(_intervals(rows, *members)), TidyTable(_events(rows)), TidyTable(_counts(rows, number, group)),
+    )  # fmt: skip
+
+
+def _group_rows(rows: _Rows) -> tuple[Ints, Ints, Array, tuple[Ints, Ints, Ints]]:
+    """Returns frame, id and size of each group in each frame (G,), and (frame, group, id) of each member (M,)."""
+    every = list(zip(rows.listed.tolist(), rows.groups or (), strict=False))
+    frame = np.repeat(np.array([k for k, _ in every], np.int64), [len(g.id) for _, g in every])
+    group = _joined([g.id for _, g in every], np.int64)
+    size = _joined([g.size for _, g in every], np.float64)
+    listed = [(k, name, m) for k, g in every for name, m in zip(g.id.tolist(), g.members, strict=False)]
+    counts = [len(m) for *_, m in listed]
+    when, name = (np.repeat(np.array([item[k] for item in listed], np.int64), counts) for k in (0, 1))
+    return frame, group, size, (when, name, _joined([m for *_, m in listed], np.int64))
+
+
+def _joined(parts: list[Any], kind: type) -> Any:
+    return np.concatenate([np.zeros(0, kind), *parts]).astype(kind)
+
+
+def _span(rows: _Rows, first: Ints, last: Ints) -> dict[str, Any]:
+    """Returns the columns of intervals of frames, both ends inclusive: frames and seconds."""
+    times = {"t_start_s": rows.seconds(first), "t_end_s": rows.seconds(last)}
+    return {"start_frame": first, "end_frame": last, **times}
+
+
+def _summary(rows: _Rows, speed: Array, members: tuple[Ints, Ints, Ints]) -> dict[str, Any]:
+    order = np.lexsort((rows.frame, rows.id))
+    id, frame, pos = rows.id[order], rows.frame[order], rows.pos[order, :2]
+    people, first, count = np.unique(id, return_index=True, return_counts=True)
+    last, who = first + count - 1, np.repeat(np.arange(len(people)), count)
+    step = np.zeros(len(id))
+    step[1:] = np.where(np.diff(who) == 0, np.hypot(*np.diff(pos, axis=0).T), 0.0)
+    known = np.isfinite(speed[order])
+    total = np.bincount(who, np.where(known, speed[order], 0.0), len(people))
+    number = np.bincount(who, known, len(people))
+    belongs: dict[int, set[int]] = {}
+    for name, person in np.unique(np.stack(members[1:], axis=1), axis=0).tolist():
+        belongs.setdefault(person, set()).add(name)
+    return {
+        "id": people, **_span(rows, frame[first], frame[last]), "frames": count,
+        f"path_{rows.unit}": np.bincount(who, np.nan_to_num(step), len(people)),
+        f"speed_mean_{rows.unit}_s": np.where(number > 0, total / np.maximum(number, 1), np.nan),
+        "groups": [sorted(belongs.get(person, ())) for person in people.tolist()],
+    }  # fmt: skip
+
+
+def _groups(rows: _Rows, frame: Ints, group: Ints, size: Array) -> dict[str, Any]:
+    order = np.lexsort((frame, group))
+    names, first, count = np.unique(group[order], return_index=True, return_counts=True)
+    who = np.repeat(np.arange(len(names)), count)
+    most = np.maximum.reduceat(size[order], first) if len(first) else np.zeros(0)
+    mean = np.bincount(who, size[order], len(names)) / np.maximum(count, 1)
+    span = _span(rows, frame[order][first], frame[order][first + count - 1])
+    return {"id": names, **span, "frames": count, "size_mean": mean, "size_max": most}
+
+
+def _intervals(rows: _Rows, frame: Ints, group: Ints, id: Ints) -> dict[str, Any]:
+    order = np.lexsort((frame, id, group))
+    frame, group, id = frame[order], group[order], id[order]
+    place = np.searchsorted(rows.listed, frame)
+    new = np.ones(len(frame), bool)
+    new[1:] = (np.diff(group) != 0) | (np.diff(id) != 0) | (np.diff(place) != 1)
+    first = np.flatnonzero(new)
+    last = np.append(first[1:], len(frame)) - 1 if len(first) else no_ids()
+    return {"group": group[first], "id": id[first], **_span(rows, frame[first], frame[last])}
+
+
+def _events(rows: _Rows) -> dict[str, Any]:
+    events = sorted(rows.events, key=lambda e: (e.start, e.end, e.kind, e.members))
+    start, end = (np.array([getattr(e, name) for e in events], np.int64) for name in ("start", "end"))
+    place = np.array([e.pos[:2] for e in events], np.float64).reshape(-1, 2)
+    ids = {name: [list(map(int, getattr(e, name))) for e in events] for name in ("members", "before", "after")}
+    return {
+        "kind": [e.kind for e in events], **_span(rows, start, end), **ids,
+        f"x_{rows.unit}": place[:, 0], f"y_{rows.unit}": place[:, 1],
+    }  # fmt: skip
+
+
+def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:
+    """Returns how many people, groups and events are in each minute; means are over the frames that were observed."""
+    # People may be labelled in frames whose groups are not.
+    observed = np.union1d(rows.listed, rows.frame)
+    end = float(rows.seconds(observed[-1] + 1)) if len(observed) else 0.0
+    minutes = np.arange(math.ceil(end / MINUTE - 1e-9))
+
+    def minute(frame: Ints) -> Ints:
+        return np.asarray(rows.seconds(frame) / MINUTE + 1e-9).astype(np.int64)
+
+    def distinct(frame: Ints, id: Ints) -> Ints:
+        pairs = np.unique(np.stack([minute(frame), id], axis=1), axis=0)
+        return _per(pairs[:, 0], minutes)
+
+    def mean(frame: Ints, frames: Ints) -> Array:
+        return np.asarray(_per(minute(frame), minutes) / np.maximum(_per(minute(frames), minutes), 1))
+
+    def arrivals(frame: Ints, id: Ints) -> Ints:
+        order = np.lexsort((frame, id))
+        return _per(minute(frame[order][np.unique(id[order], return_index=True)[1]]), minutes)
+
+    columns = {
+        "minute": minutes, "t_start_s": minutes * MINUTE, "t_end_s": np.minimum((minutes + 1) * MINUTE, end),
+        "people": distinct(rows.frame, rows.id), "people_new": arrivals(rows.frame, rows.id),
+        "people_mean": mean(rows.frame, observed),
+    }  # fmt: skip
+    if rows.groups is not None:
+        columns["groups"] = distinct(number, group)
+        columns["groups_mean"] = mean(number, rows.listed)
+    starts = np.array([e.start for e in rows.events], np.int64)
+    return {**columns, "events": _per(minute(starts), minutes)}
+
+
+def _per(minute: Ints, minutes: Ints) -> Ints:
+    return np.bincount(minute, minlength=len(minutes))[: len(minutes)]

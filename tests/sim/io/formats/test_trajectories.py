@@ -1,0 +1,127 @@
+"""Texts of trajectories as TrajNet++, ETH and UCY, PedPy and JuPedSim have them, and group labels of texts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.source import open_source
+from sim.types import Sequence
+
+PLACES = [(780, 1, 8.46, 3.59), (790, 1, 9.57, 3.79), (790, 2, 9.57, 4.79), (810, 2, 10.57, 4.79)]
+TRAJNET = '{"scene": {"id": 0, "p": 1, "s": 780, "e": 810, "fps": 2.5, "tag": [1, []]}}\n' + "".join(
+    f'{{"track": {{"f": {f}, "p": {p}, "x": {x}, "y": {y}}}}}\n' for f, p, x, y in PLACES
+)
+ETH = "".join(f"{f:.1f}\t{p:.1f}\t{x}\t{y}\n" for f, p, x, y in PLACES)
+PETRACK = (
+    "# PeTrack project: hall.pet\n# framerate: 16.00 fps\n# id frame x/cm y/cm z/cm\n1 0 846 359 170\n1 1 957 379 170\n"
+    "2 1 957 479 170\n2 3 1057 479 170\n"
+)
+JUPEDSIM = (
+    "# description: jpscore\n# framerate: 8.00\n# geometry: hall.xml\n# ID\tFR\tX\tY\tZ\tA\tB\tANGLE\tCOLOR\n"
+    + "".join(f"{p}\t{f // 10}\t{x}\t{y}\t0.00\t0.30\t0.30\t12.0\t255\n" for f, p, x, y in PLACES)
+)
+TEXTS = {"walk.ndjson": TRAJNET, "walk.txt": ETH, "hall.txt": PETRACK, "room.txt": JUPEDSIM}
+RATES = {"walk.ndjson": 2.5, "walk.txt": 2.5, "hall.txt": 16.0, "room.txt": 8.0}
+
+
+def opened(folder: Path, name: str, text: str, **options) -> Sequence:
+    (folder / name).write_text(text, encoding="utf-8")
+    return open_source(folder / name, **options)[0]
+
+
+@pytest.mark.filterwarnings("ignore:trajectories without a frame rate")
+@pytest.mark.parametrize("name", TEXTS)
+def test_frames_positions_and_rate(tmp_path, name):
+    sequence = opened(tmp_path, name, TEXTS[name])
+    truth = sequence.truth
+    assert (sequence.fps, sequence.length, truth.fps) == (RATES[name], 4, RATES[name])
+    assert truth.frame.tolist() == [1, 2, 2, 4]
+    assert truth.id.tolist() == [1, 1, 2, 2]
+    assert truth.pos == pytest.approx(np.array([p[2:] for p in PLACES]))
+    assert not truth.labelled.any()
+
+
+def test_the_rate_of_eth_is_assumed_with_a_warning(tmp_path):
+    with pytest.warns(UserWarning, match=r"taken at 2\.5 fps, as ETH and UCY"):
+        opened(tmp_path, "walk.txt", ETH)
+    assert opened(tmp_path, "walk.txt", ETH, fps=5).fps == 5
+    assert opened(tmp_path, "walk.txt", ETH.replace("\t", " "), fps=5).truth.frame.tolist() == [1, 2, 2, 4]
+
+
+def test_a_folder_of_ndjson_is_a_dataset(tmp_path):
+    for name in ("a.ndjson", "b.ndjson"):
+        (tmp_path / name).write_text(TRAJNET)
+    assert [s.name for s in open_source(tmp_path)] == ["a", "b"]
+
+
+BAD = {
+    "no JSON": ("a.ndjson", TRAJNET + "{\n", "line 6: got no JSON"),
+    "no track": ("a.ndjson", TRAJNET + '{"row": 1}\n', "line 6: got"),
+    "no number": ("a.ndjson", TRAJNET.replace("8.46", '"8.46"'), "line 2: got"),
+    "a bool": ("a.ndjson", TRAJNET.replace("8.46", "true"), "line 2: got"),
+    "two rates": ("a.ndjson", TRAJNET + TRAJNET.replace("2.5", "10"), "line 6: got fps 10; expected 2.5"),
+    "no row": ("a.ndjson", "", "got no row"),
+    "half a person": ("a.ndjson", TRAJNET.replace('"p": 2', '"p": 2.5'), "line 4: .*a whole number as id"),
+    "a word": ("a.txt", ETH + "820 x 1 1\n", "line 5: got 'x'; expected a number"),
+    "a column less": ("a.txt", ETH + "820 1 1\n", "line 5: got 3 columns"),
+    "negative": ("a.txt", ETH + "820 -1 1 1\n", "line 5: .*ids from 0"),
+    "far away": ("a.txt", ETH + "820 1 1e9 1\n", "line 5: .*numbers within"),
+    "no rate": ("a.txt", PETRACK.replace("16.00 fps", ""), "# framerate: got none"),
+    "rate 0": ("a.txt", PETRACK.replace("16.00", "0"), "# framerate: got 0"),
+    "NaN": ("a.txt", PETRACK + "3 1 nan 1 1\n", "line 8: .*finite"),
+    "twice": ("a.txt", PETRACK + "1 1 2 2 2\n", "line 8: .*each id once in a frame"),
+}
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_line(tmp_path, case):
+    name, text, words = BAD[case]
+    with pytest.raises(InputError, match=words) as error:
+        opened(tmp_path, name, text).truth  # noqa: B018
+    assert str(tmp_path / name) in str(error.value)
+
+
+def test_options_without_effect_are_refused(tmp_path):
+    with pytest.raises(InputError, match="got --px-per-m; expected none for a text of trajectories"):
+        opened(tmp_path, "walk.ndjson", TRAJNET, px_per_m=20)
+
+
+WALK = [(k, p, 0.2 * k, float(p)) for k in range(1, 41) for p in (1, 2, 3)]
+BOXES = "".join(f"{k},{p},{40 * x:.1f},{40 * y:.1f},20,68,1,1,1\n" for k, p, x, y in WALK)
+PAIR = {1: 5, 2: 5, 3: -1}
+
+
+def pairs(truth) -> set[tuple[int, int]]:
+    return set(zip(truth.id.tolist(), truth.group.tolist(), strict=True))
+
+
+def test_a_column_of_groups(tmp_path):
+    text = "frame,id,x_m,y_m,group\n" + "".join(f"{k},{p},{x},{y},{PAIR[p]}\n" for k, p, x, y in WALK)
+    truth = opened(tmp_path, "walk.csv", text, fps=5).truth
+    assert pairs(truth) == set(PAIR.items())
+    assert truth.labelled.all()
+    assert all(some.id.tolist() == [5] and some.members[0].tolist() == [1, 2] for some in truth.groups)
+    wrong = text.replace("\n1,1,0.2,1.0,5", "\n1,1,0.2,1.0,-2")
+    with pytest.raises(InputError, match=r"line 2: .*groups from 0, or -1 for alone"):
+        opened(tmp_path, "wrong.csv", wrong, fps=5).truth  # noqa: B018
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_file_of_group_labels(tmp_path):
+    """groups.txt beside gt.txt, NAME.groups.txt beside NAME.txt: one group a line, as in BIWI."""
+    (tmp_path / "mot" / "gt").mkdir(parents=True)
+    (tmp_path / "mot" / "gt" / "gt.txt").write_text(BOXES)
+    (tmp_path / "mot" / "gt" / "groups.txt").write_text("1 2\n3\n")
+    (tmp_path / "walk.groups.txt").write_text("1, 2\n")
+    for truth in (open_source(tmp_path / "mot", fps=5)[0].truth, opened(tmp_path, "walk.txt", BOXES, fps=5).truth):
+        assert pairs(truth) == {(1, 1), (2, 1), (3, -1)}
+        assert truth.groups is None
+        assert all(some.members[0].tolist() == [1, 2] for some in truth.groups_px)
+    (tmp_path / "walk.groups.txt").write_text("1 two\n")
+    with pytest.raises(InputError, match=r"walk\.groups\.txt: line 1: got 1 two; expected ids of people"):
+        open_source(tmp_path / "walk.txt", fps=5)[0].truth  # noqa: B018
