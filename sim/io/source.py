@@ -46,7 +46,7 @@ def open_source(
 
     Args:
         path: A generated sequence or dataset, a MOTChallenge folder or text, a text of trajectories (TrajNet++, ETH and
-            UCY, PedPy), a BIWI folder, a CAVIAR XML, a video, or a folder with some of these (of texts only *.ndjson)
+            UCY, PedPy), a BIWI folder, a CAVIAR XML, a video, or a folder with some of these (of texts only .ndjson)
             at most 3 levels down. Hidden names are skipped.
         fps: Frames per second, in place of those that the recording states.
         px_per_m: Image scale, px per m.
