@@ -67,5 +67,7 @@ class BoxUpdater:
         if detections is None or detections.box is None or not len(detections.box):
             return np.zeros((0, 4)), np.zeros(0)
         score = detections.score if len(detections.score) else np.ones(len(detections.box))
-        good = (detections.box[:, 2:] > 0).all(1)
-        return box_geometry.centred_from_ltwh(detections.box[good]), score[good]
+        good = np.flatnonzero((detections.box[:, 2:] > 0).all(1))
+        # of two boxes on one body the second is the one with the lower score, whatever their order in the file
+        order = good[np.lexsort((*detections.box[good].T, -score[good]))]
+        return box_geometry.centred_from_ltwh(detections.box[order]), score[order]
