@@ -290,7 +290,7 @@ def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, c
     monkeypatch.chdir(tmp_path)
     Path("scene.toml").write_text(SCENE)
     assert run(["generate", "scene.toml", "--seeds", "4", "--streams", "none", "--out", "data"]) == 0
-    sequence = "data/flockscope-train/scene-s00006"
+    sequence = "data/flockscope-train/scene-s00004"
     given = "--detections truth --set sensor.detect_prob=0.6 --set coast_time=1.0 --seed 2"
     assert run(f"track blob {sequence} --out tracks {given}".split()) == 0
     capsys.readouterr()
