@@ -90,7 +90,7 @@ def _fit_column(sample: PairSample, knots_of: Mapping[str, Array]) -> Array:
 def best_threshold(log_odds: Array) -> float:
     """Returns the probability above which a pair is to count as together, for the greatest expected F1 of rows (R,).
 
-    It is half of the greatest expected F1 (Lipton, Elkan & Naryanaswamy 2014).
+    It is half of the greatest expected F1 (Lipton, Elkan & Narayanaswamy 2014).
     """
     probability = np.sort(1 / (1 + np.exp(-log_odds)))[::-1]
     hits = np.cumsum(probability)

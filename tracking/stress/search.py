@@ -15,7 +15,7 @@ was stopped draws the same scenes again, takes stored episodes from the store, a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,7 @@ import numpy as np
 from scenarios.loading.resolve import Entry, SuiteEntry, load, rows
 from tracking.environment.episode_cache import Source
 from tracking.stress.episodes import ORACLE
-from tracking.stress.sweep import Plan, Scene, Sweep
+from tracking.stress.sweep import Plan, Scene, Sweep, last_of_each_key
 
 if TYPE_CHECKING:
     import optuna
@@ -144,17 +144,12 @@ def _drawn(plan: Plan, entries: Sequence[SuiteEntry], trial: optuna.Trial, seed:
     entry: SuiteEntry = entries[trial.params[SCENARIO]]
     # Four digits, so that the scene's command is short; what was drawn and what is played differ by less than 0.1 %.
     values = tuple(float(f"{axis.at(trial.params[axis.name]):.4g}") for axis in plan.axes)
-    settings = tuple(_last_of_each_key((*entry.settings, *plan.settings_at(values))))
+    settings = last_of_each_key((*entry.settings, *plan.settings_at(values)))
     scenario = load(entry.scenario, settings).model_copy(update={"name": entry.name})
     of_scene = int(np.random.default_rng([seed, trial.number]).choice(plan.seeds))
     source = Source(entry.name, of_scene, entry=Entry(entry.name, scenario))
     place = tuple(trial.params[axis.name] for axis in plan.axes)
     return Failure(trial.number, Scene(source, values), place, entry.scenario, settings, sampled)
-
-
-def _last_of_each_key(settings: Sequence[str]) -> Iterator[str]:
-    """Yields the settings that count, each key once, as `--set` wants them."""
-    yield from {text.partition("=")[0].strip(): text for text in settings}.values()
 
 
 def _novelty(played: Failure, found: Sequence[Failure]) -> float:

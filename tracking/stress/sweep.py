@@ -274,11 +274,15 @@ def _width(point: BreakingPoint) -> float:
     return point.high - point.low if np.isfinite(point.low) else 0.0
 
 
+def last_of_each_key(settings: Iterable[str]) -> tuple[str, ...]:
+    """Returns the settings that count, each key once, as `--set` wants them."""
+    return tuple({text.partition("=")[0].strip(): text for text in settings}.values())
+
+
 def generate_command(scenario: str, seed: int, settings: Iterable[str], out: str) -> str:
     """Returns the command that generates one scene; of several settings of a key the last one counts."""
-    last = {text.partition("=")[0].strip(): text for text in settings}
     words = ["flockscope", "generate", scenario, "--seeds", f"{seed}:{seed + 1}", "--out", out]
-    return shlex.join([*words, *(word for text in last.values() for word in ("--set", text))])
+    return shlex.join([*words, *(word for text in last_of_each_key(settings) for word in ("--set", text))])
 
 
 def _content(source: Source) -> bytes:
