@@ -16,7 +16,7 @@ from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.reading import is_present, require_regular
 from sim.io.files.own_files import is_hidden
-from sim.io.formats import biwi, caviar, mot_folder, trajectories, video
+from sim.io.formats import biwi, caviar, kitti_tracking, mot_folder, trajectories, video
 from sim.io.formats.calibration import read_calibration
 from sim.io.formats.options import RecordingOptions, parse_box_scale
 from sim.io.pictures.background_sample import parse_choice
@@ -41,13 +41,14 @@ def open_source(
     background: str | None = None,
     person_class: int | None = None,
     box_scale: str | None = None,
+    min_score: float | None = None,
 ) -> list[Sequence]:
     """Opens a path that holds sequences or recordings, in any known format.
 
     Args:
         path: A generated sequence or dataset, a MOTChallenge folder or text, a text of trajectories (TrajNet++, ETH and
-            UCY, PedPy), a BIWI folder, a CAVIAR XML, a video, or a folder with some of these (of texts only .ndjson)
-            at most 3 levels down. Hidden names are skipped.
+            UCY, PedPy) or of KITTI's tracking, a BIWI folder, a CAVIAR XML, a video, or a folder with some of these (of
+            texts only .ndjson) at most 3 levels down. Hidden names are skipped.
         fps: Frames per second, in place of those that the recording states.
         px_per_m: Image scale, px per m.
         camera: Calibration, or the path of its file.
@@ -55,6 +56,7 @@ def open_source(
         background: Frames for background models, "first:N" or "spread:N"; None: spread:50, or the stored empty frames.
         person_class: Class of people in MOTChallenge texts that have classes; None: 1, with a warning about others.
         box_scale: Factor of the boxes of MOTChallenge texts that are not in pixels of the pictures, "X" or "X,Y".
+        min_score: Detections of MOTChallenge texts with a lower score, as it stands there, are left out.
 
     Returns:
         The Sequences: of a folder sorted by path, subfolders first. Truth and pictures are read later.
@@ -71,7 +73,7 @@ def open_source(
         camera = read_calibration(Path(camera))
     options = RecordingOptions(
         fps, px_per_m, camera, images, None if background is None else parse_choice(background), person_class,
-        None if box_scale is None else parse_box_scale(box_scale),
+        None if box_scale is None else parse_box_scale(box_scale), min_score,
     )  # fmt: skip
     if not os.path.exists(path):
         raise InputError(file=path, got="nothing there", expected=KINDS, remedy="check the path")
@@ -130,18 +132,22 @@ def split_and_name(folder: Path) -> str:
 def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     suffix = path.suffix.lower()
     if suffix == ".xml":
-        no = "camera background person_class box_scale"
+        no = "camera background person_class box_scale min_score"
         options.reject(path, "a CAVIAR recording", "its truth is in the image, without pictures", no)
         return caviar.open_file(path, options)
     if path.name == "obsmat.txt":
         return _open_folder(path.parent, options)
     if suffix in video.SUFFIXES:
-        options.reject(path, "a video", "it has no text", "person_class box_scale")
+        options.reject(path, "a video", "it has no text", "person_class box_scale min_score")
         return video.open_video(path, options)
     if suffix in (".txt", ".csv", trajectories.NDJSON) and trajectories.is_trajectories(path):
-        no = "px_per_m camera background person_class box_scale"
+        no = "px_per_m camera background person_class box_scale min_score"
         options.reject(path, "a text of trajectories", "it is in metres, without pictures", no)
         return trajectories.open_text(path, options)
+    if suffix == ".txt" and kitti_tracking.is_kitti_tracking(path):
+        no = "camera background person_class box_scale min_score"
+        options.reject(path, "a text of KITTI", "its camera drives, and it has labels of people only", no)
+        return kitti_tracking.open_text(path, options)
     if suffix in (".txt", ".csv"):
         options.reject(path, "a text", "it has no pictures", "background")
         return mot_folder.open_text(path, options)
@@ -177,11 +183,11 @@ def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
         return _open_file(path, options)
     match _kind(path):
         case "generated":
-            no = "fps px_per_m camera person_class box_scale"
+            no = "fps px_per_m camera person_class box_scale min_score"
             options.reject(path, "a generated sequence", "it knows its own", no)
             return sequence_folder.open_sequence(path, background=options.background)
         case "biwi":
-            no = "px_per_m camera background person_class box_scale"
+            no = "px_per_m camera background person_class box_scale min_score"
             options.reject(path, "a BIWI recording", "it is in metres, without pictures", no)
             return biwi.open_folder(path, options)
         case _:

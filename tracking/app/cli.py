@@ -40,6 +40,8 @@ COMMANDS: dict[str, tuple[Any, str]] = {
     "validate": (options.ValidateOptions, "datasets:validate"),
     "export csv": (options.CsvOptions, "tables:export_csv"),
     "export parquet": (options.ParquetOptions, "tables:export_parquet"),
+    "export trajnet": (options.TrajnetOptions, "tables:export_trajnet"),
+    "export pedpy": (options.PedpyOptions, "tables:export_pedpy"),
     "export coco": (options.CocoOptions, "datasets:export_coco"),
     "export kitti": (options.KittiOptions, "datasets:export_kitti"),
     "export webdataset": (options.WebdatasetOptions, "datasets:export_webdataset"),

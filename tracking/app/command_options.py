@@ -108,6 +108,7 @@ class TrackOptions:
     step_timeout: float | None = STEP_TIMEOUT()
     person_class: int | None = PERSON_CLASS()
     box_scale: str | None = BOX_SCALE()
+    min_score: float | None = option("Leave out boxes with a lower score, as it stands in their file.", None)
     workers: int = PROCESSES()
 
 
@@ -325,12 +326,26 @@ class WebdatasetOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CsvOptions:
-    """Write tables of people, groups, members, events and counts per minute as CSV, of tracks or of labels."""
+class TrajnetOptions:
+    """Write the positions of people, of tracks or of labels, as TrajNet++ (*.ndjson)."""
 
     source: Path = ARGUMENT("Output of `track` or `group`, or labelled people.", metavar="RUN|SOURCE")
     out: Path = OUT()
     fps: float | None = FPS()
+
+
+@dataclass(frozen=True, kw_only=True)
+class PedpyOptions(TrajnetOptions):
+    """Write the positions of people, of tracks or of labels, as a text of PedPy and JuPedSim."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CsvOptions(TrajnetOptions):
+    """Write tables of people, groups, members, events and counts per minute as CSV, of tracks or of labels."""
+
+    line: list[str] = option("Count who crosses a line. Can be given several times.", [], metavar="NAME=X1,Y1,X2,Y2")
+    zone: list[str] = option(
+        "Count who is in a polygon. Can be given several times.", [], metavar="NAME=X1,Y1,X2,Y2,X3,Y3,…")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -32,18 +32,19 @@ class OpenedAs:
     background: str | None = None
     person_class: int | None = None
     box_scale: str | None = None
+    min_score: float | None = None
     boxes: Path | None = None
 
     def open(self) -> list[Sequence]:
         """Returns the sequences of the source, of `boxes` with these. Raises InputError as `open_source`."""
         if self.boxes is None:
             return self._opened()
-        sequences = replace(self, boxes=None, person_class=None, box_scale=None)._opened()
+        sequences = replace(self, boxes=None, person_class=None, box_scale=None, min_score=None)._opened()
         if len(sequences) > 1:
             got, remedy = f"{len(sequences)} sequences", "give one of them"
             raise InputError(place="--boxes", got=got, expected="one sequence", remedy=remedy)
         scale = None if self.box_scale is None else parse_box_scale(self.box_scale)
-        return [with_boxes(sequences[0], self.boxes, self.person_class, scale)]
+        return [with_boxes(sequences[0], self.boxes, self.person_class, scale, self.min_score)]
 
     def _opened(self) -> list[Sequence]:
         options = asdict(self)

@@ -157,14 +157,19 @@ class TrackingRun(SequenceOf[Tracks]):
     def __len__(self) -> int:
         return len(self.tracks)
 
-    def tables(self) -> TidyTables:
+    def tables(self, places: Mapping[str, Any] | None = None) -> TidyTables:
         """Returns people, people_summary, groups, members, events and counts as tidy tables.
 
         `run.tables().people.to_arrow()` gives a table of pyarrow, `to_pandas()` a data frame.
+
+        Args:
+            places: By name the two ends of a line, or the corners (K, 2) of a zone, m or px: `counts` then has columns
+                of those who cross the line, or are in the zone.
         """
         from sim.io.export.tidy_tables import run_tables
 
-        return run_tables(self.tracks, self.info["fps"])
+        found = {name: np.asarray(corners, float) for name, corners in (places or {}).items()}
+        return run_tables(self.tracks, self.info["fps"], found)
 
     def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
         """Stores the tracks in the folder as `flockscope track` does, and return the folder."""

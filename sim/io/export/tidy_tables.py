@@ -19,6 +19,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.arrays import no_ids
+from sim.io.export.places import Places, crossings, inside
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import refuse_foreign_file
 from sim.io.files.tables import FORMAT, KEY, json_text
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 Form = Literal["csv", "parquet"]
 MINUTE = 60.0  # s
+LINE = 2  # corners of a line
+NOWHERE: Places = {}
 BOX = ("box_left_px", "box_top_px", "box_width_px", "box_height_px")
 
 
@@ -111,13 +114,17 @@ class _Rows:
     score: Array | None
     groups: Series[Groups] | None  # of each listed frame; None: not labelled
     events: Series[GroupEvent]
+    places: Places
 
     def seconds(self, frame: Any) -> Any:
         return (frame - 1) / self.fps
 
 
-def run_tables(tracks: Series[Tracks], fps: float) -> TidyTables:
-    """Returns the tidy tables of a run: one `Tracks` per frame. Of a tracker of whole groups, people are empty."""
+def run_tables(tracks: Series[Tracks], fps: float, places: Places = NOWHERE) -> TidyTables:
+    """Returns the tidy tables of a run: one `Tracks` per frame. Of a tracker of whole groups, people are empty.
+
+    places: lines and zones by name, which `counts` then has columns of.
+    """
     from sim.io.store.track_files import flatten
 
     rows = flatten(list(tracks))
@@ -129,12 +136,16 @@ def run_tables(tracks: Series[Tracks], fps: float) -> TidyTables:
             rows.frame[people], rows.id[people], rows.group[people], rows.pos[people], rows.vel[people], None,
             None if rows.boxless.all() else rows.box[people], rows.score[people],
             [t.groups or Groups.none() for t in tracks] if known else None, [e for t in tracks for e in t.events],
+            places,
         )
     )  # fmt: skip
 
 
-def truth_tables(truth: Truth) -> TidyTables:
-    """Returns the tidy tables of a truth, in m if it has positions on the ground, else of the boxes' centres in px."""
+def truth_tables(truth: Truth, places: Places = NOWHERE) -> TidyTables:
+    """Returns the tidy tables of a truth, in m if it has positions on the ground, else of the boxes' centres in px.
+
+    places: lines and zones by name, which `counts` then has columns of.
+    """
     pos, vel, unit = truth.pos, truth.vel, "m"
     if pos is None:
         assert truth.box is not None
@@ -149,7 +160,7 @@ def truth_tables(truth: Truth) -> TidyTables:
     return _tables(
         _Rows(
             truth.fps, listed, unit, truth.frame, truth.id, truth.group, pos, vel, truth.heading, truth.box, None,
-            groups, truth.events or (),
+            groups, truth.events or (), places,
         )
     )  # fmt: skip
 
@@ -325,7 +336,18 @@ def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:
         columns["groups"] = distinct(number, group)
         columns["groups_mean"] = mean(number, rows.listed)
     starts = np.array([e.start for e in rows.events], np.int64)
-    return {**columns, "events": _per(minute(starts), minutes)}
+    columns["events"] = _per(minute(starts), minutes)
+    for name, corners in rows.places.items():
+        if len(corners) == LINE:
+            ways = crossings(rows.frame, rows.id, rows.pos, corners, downwards=rows.unit == "px")
+            columns |= {
+                f"{name}_to_{side}": _per(minute(k), minutes) for side, k in zip(("left", "right"), ways, strict=True)
+            }
+        else:
+            there = inside(rows.pos, corners)
+            columns[f"{name}_people"] = distinct(rows.frame[there], rows.id[there])
+            columns[f"{name}_people_mean"] = mean(rows.frame[there], observed)
+    return columns
 
 
 def _per(minute: Ints, minutes: Ints) -> Ints:

@@ -25,14 +25,15 @@ OUTSIDE = 1.1  # Boxes that end farther right or lower than this share of the pi
 
 
 def with_boxes(
-    sequence: Sequence, path: Path, person_class: int | None = None, box_scale: BoxScale | None = None
-) -> Sequence:
+    sequence: Sequence, path: Path, person_class: int | None = None, box_scale: BoxScale | None = None,
+    min_score: float | None = None,
+) -> Sequence:  # fmt: skip
     """Returns the sequence with the boxes of a file as its detections.
 
     Raises InputError if the file cannot be read, has no boxes, or does not fit the sequence's frames and pictures.
     """
     results = path.suffix.lower() == ".json"
-    found = (_coco_results if results else mot_text.read_detections)(path, None, person_class, box_scale)
+    found = (_coco_results if results else mot_text.read_detections)(path, None, person_class, box_scale, min_score)
     if found.plane != "image" or found.box is None:
         raise InputError(file=path, got="points", expected="boxes, px", remedy="give the detector's boxes")
     last = int(found.frame.max(initial=0))
@@ -65,7 +66,7 @@ def _check_size(path: Path, box: np.ndarray, size: tuple[int, int]) -> None:
 
 
 def _coco_results(
-    path: Path, _: int | None, person_class: int | None, box_scale: BoxScale | None
+    path: Path, _: int | None, person_class: int | None, box_scale: BoxScale | None, min_score: float | None
 ) -> mot_text.DetectionTable:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -82,11 +83,12 @@ def _coco_results(
     if not len(table):
         expected, remedy = f"people, of category {wanted}", "name the category of people with --class N"
         raise InputError(file=path, got="other categories", expected=expected, remedy=remedy)
-    table = table[np.argsort(table[:, 0], kind="stable")]
+    good = mot_text.good_scores(path, table[:, 5], min_score)
+    table[:, 5] = mot_text.told_scores(path, table[:, 5])
+    table = table[good][np.argsort(table[good, 0], kind="stable")]
     box = table[:, 1:5] * np.tile(box_scale or (1.0, 1.0), 2)
-    score, _told = mot_text.unit_scores(table[:, 5])
     frame = table[:, 0].astype(np.int64)
-    return mot_text.DetectionTable(frame, np.full(len(box), -1), "image", box[:, :2] + box[:, 2:] / 2, box, score)
+    return mot_text.DetectionTable(frame, np.full(len(box), -1), "image", box[:, :2] + box[:, 2:] / 2, box, table[:, 5])
 
 
 def _row(path: Path, number: int, result: Any) -> tuple[float, ...]:

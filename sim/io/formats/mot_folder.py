@@ -117,9 +117,10 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     person_class, box_scale = options.person_class, options.box_scale
     rate = frame_rate(options.fps, info.fps, path)
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
-    found = mot_text.read_detections(det, info.length, person_class, box_scale) if is_present(det) else None
+    least = options.min_score
+    found = mot_text.read_detections(det, info.length, person_class, box_scale, least) if is_present(det) else None
     if found is None:
-        options.reject(path, "a recording without det/det.txt", "labels are not scaled", "box_scale")
+        options.reject(path, "a recording without det/det.txt", "labels are not scaled", "box_scale min_score")
     pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
     length = info.length or max(_labelled_frames(path).max(initial=0).item(), pictures.last)
@@ -212,7 +213,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     table = read_table(path, boxless=True)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
-    found = mot_text.read_detections(path, None, person_class, box_scale)
+    found = mot_text.read_detections(path, None, person_class, box_scale, options.min_score)
     length = int(table.frame.max(initial=0))
     only_detections = bool((table.id == -1).all())
 
@@ -239,5 +240,5 @@ def _labelled_frames(path: Path) -> Ints:
 
 
 def _named(options: RecordingOptions) -> dict[str, Any]:
-    given = {"class": options.person_class, "box_scale": options.box_scale}
+    given = {"class": options.person_class, "box_scale": options.box_scale, "min_score": options.min_score}
     return {key: value for key, value in given.items() if value is not None}

@@ -288,6 +288,25 @@ def unit_scores(score: Array) -> tuple[Array, str]:
     return mapped, f"{span} are mapped into 0 to 1 by 1 / (1 + exp(-(score - {c:g}) / {d:g}))"
 
 
+def told_scores(path: Path, score: Array) -> Array:
+    """Returns `unit_scores` of a file's scores (N,), with a warning if they were mapped."""
+    found, told = unit_scores(score)
+    if told:
+        warnings.warn(f"{path}: {told}", stacklevel=3)
+    return found
+
+
+def good_scores(path: Path, score: Array, least: float | None) -> Bools:
+    """Returns flags (N,) of scores that are not below the least one. Raises InputError if none is left."""
+    good = np.asarray(score >= (-np.inf if least is None else least))
+    if len(score) and not good.any():
+        raise InputError(
+            file=path, place="--min-score", got=least, expected=f"at most {score.max():g}, the greatest score",
+            remedy="lower it",
+        )  # fmt: skip
+    return good
+
+
 # remedy if most rows have the id of another row of their frame
 NO_ID = "check that column 2 is the id: name the columns in the first line, as frame,left,top,width,height,score"
 
@@ -319,20 +338,23 @@ class DetectionTable:
 
 
 def read_detections(
-    path: Path, length: int | None, person_class: int | None = None, box_scale: BoxScale | None = None
-) -> DetectionTable:
-    """Reads a det.txt: points on the ground (m) if every row has one, else the boxes' centres (px)."""
+    path: Path, length: int | None, person_class: int | None = None, box_scale: BoxScale | None = None,
+    min_score: float | None = None,
+) -> DetectionTable:  # fmt: skip
+    """Reads a det.txt: points on the ground (m) if every row has one, else the boxes' centres (px).
+
+    min_score: rows with a lower score in the file are left out.
+    """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
     _check_boxes(table)
     ground = ground_positions(table)
     boxless = _reject_placeless(table, ground)
-    score, told = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)))
-    if told:
-        warnings.warn(f"{path}: {told}", stacklevel=2)
+    raw = table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame))
+    score, good = told_scores(path, raw), good_scores(path, raw, min_score)
     plane: Plane = "image" if ground is None or np.isnan(ground).any() else "ground"
     pos = ground[:, :2] if plane == "ground" and ground is not None else table.box[:, :2] + table.box[:, 2:] / 2
     order = np.argsort(table.frame, kind="stable")
-    order = order[of_class(table, np.ones(len(order), bool), person_class)[order]]
+    order = order[of_class(table, good, person_class)[order]]
     box = None if boxless.any() else table.box[order]
     return DetectionTable(table.frame[order], table.id[order], plane, pos[order], box, score[order])
 

@@ -25,6 +25,7 @@ class RecordingOptions:
     background: BackgroundChoice | None = None  # which frames are the sample for background models
     person_class: int | None = None  # the class of people in MOTChallenge texts
     box_scale: BoxScale | None = None  # factors of x and y of the boxes of these
+    min_score: float | None = None  # least score of their detections, as it stands there
 
     @property
     def scale(self) -> float:

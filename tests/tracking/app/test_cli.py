@@ -158,6 +158,8 @@ COMMANDS = {
     "export csv": ("export csv {data} --out {out}", "export csv {out}/nothing --out {out}/x"),
     "export csv RUN": ("export csv {tracks} --out {out}", "export csv {tracks} --fps 5 --out {out}"),
     "export parquet": ("export parquet {tracks}/scene-s40000 --out {out}", "export parquet {scene} --out {out}"),
+    "export trajnet": ("export trajnet {data} --out {out}", "export trajnet {out}/nothing --out {out}/x"),
+    "export pedpy": ("export pedpy {tracks}/scene-s40000 --out {out}", "export pedpy {scene} --out {out}"),
     "export coco": ("export coco {data} --out {out}/coco.json", "export coco {out}/nothing --out {out}/coco.json"),
     "export kitti": ("export kitti {seen} --out {out}", "export kitti {one} --out {out}"),
     "export webdataset": (

@@ -492,6 +492,14 @@ FLIPS = {
     **{
         f"export {form} {{0}}/{source} --out {{1}}": flip
         for form in ("csv", "parquet")
+        for source, flip in {
+            "data": {"source": ("data", "tracks"), "line": "--line a=1,1,2,2", "zone": "--zone a=1,1,2,2,1,2"},
+            "mot": {"fps": "--fps 5"},
+        }.items()
+    },
+    **{
+        f"export {form} {{0}}/{source} --out {{1}}": flip
+        for form in ("trajnet", "pedpy")
         for source, flip in {"data": {"source": ("data", "tracks")}, "mot": {"fps": "--fps 5"}}.items()
     },
     "export coco {0}/data --out {1}/c.json": {"folder": ("data", "mot")},
@@ -514,7 +522,7 @@ ELSEWHERE = {
     ("generate", "sensor"),  # commands/test_fit.py
     ("track", "sensor"),
     ("track", "grouping"),  # commands/test_fit.py
-    ("track", "boxes"),  # tests/sim/io/formats/test_detector_boxes.py
+    *(("track", option) for option in ("boxes", "min_score")),  # tests/sim/io/formats/test_detector_boxes.py
     ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("view", "by"),  # report/test_in_browser.py
     ("view", "workers"),

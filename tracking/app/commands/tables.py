@@ -1,4 +1,4 @@
-"""`flockscope export csv` and `export parquet`: tidy tables of stored runs and of the truth of sequences."""
+"""`flockscope export csv`, `parquet`, `trajnet` and `pedpy`: tables of stored runs and of the truth of sequences."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
+from sim.io.export.places import Places, parse_places
 from sim.io.export.tidy_tables import Form, TidyTables, run_tables, truth_tables, write_tables
+from sim.io.export.trajectory_texts import TextForm, write_text
 from sim.io.files.own_files import output_paths
 from sim.io.formats.mot_folder import frame_rate
 from sim.io.formats.options import RecordingOptions
@@ -17,7 +19,7 @@ from sim.io.store.seal import WHOLE, is_run, is_sequence, run_folder
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.app import option_parsing
-from tracking.app.command_options import CsvOptions, ParquetOptions
+from tracking.app.command_options import CsvOptions, ParquetOptions, PedpyOptions, TrajnetOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.app.stored_tracks import StoredTracks, find_tracks, run_folders
@@ -25,15 +27,37 @@ from tracking.app.stored_tracks import StoredTracks, find_tracks, run_folders
 
 def export_csv(options: CsvOptions) -> CommandResult:
     """Writes the tables of every run or sequence as CSV."""
-    return _export(options, "csv")
+    return _export_tables(options, "csv")
 
 
 def export_parquet(options: ParquetOptions) -> CommandResult:
     """Writes the tables of every run or sequence as Parquet."""
-    return _export(options, "parquet")
+    return _export_tables(options, "parquet")
 
 
-def _export(options: CsvOptions, form: Form) -> CommandResult:
+def export_trajnet(options: TrajnetOptions) -> CommandResult:
+    """Writes the people of every run or sequence as TrajNet++."""
+    return _export_text(options, "trajnet")
+
+
+def export_pedpy(options: PedpyOptions) -> CommandResult:
+    """Writes the people of every run or sequence as a text of PedPy and JuPedSim."""
+    return _export_text(options, "pedpy")
+
+
+def _export_tables(options: CsvOptions, form: Form) -> CommandResult:
+    places = parse_places(options.line, options.zone)
+    return _export(options, places, lambda tables, folder, facts: write_tables(tables, folder, form, facts))
+
+
+def _export_text(options: TrajnetOptions, form: TextForm) -> CommandResult:
+    return _export(options, {}, lambda tables, folder, facts: write_text(tables, folder, form, facts["fps"]))
+
+
+Write = Callable[[TidyTables, Path, dict[str, Any]], list[Path]]
+
+
+def _export(options: TrajnetOptions, places: Places, write: Write) -> CommandResult:
     option_parsing.output_folder(options.out)
     path = options.source
     own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)
@@ -48,8 +72,8 @@ def _export(options: CsvOptions, form: Form) -> CommandResult:
     rows, lines = [], []
     with ProgressMeter("export", len(jobs)) as meter:
         for folder, facts, make in jobs:
-            tables = make()
-            files = write_tables(tables, folder, form, facts)
+            tables = make(places)
+            files = write(tables, folder, facts)
             sizes = {name: len(table.to_arrow()) for name, table in vars(tables).items()}
             rows.append({**facts, "folder": folder, "files": files, "rows": sizes})
             people, groups, events = (sizes[name] for name in ("people_summary", "groups", "events"))
@@ -58,10 +82,10 @@ def _export(options: CsvOptions, form: Form) -> CommandResult:
     return CommandResult({"tables": rows}, "\n".join(lines))
 
 
-Job = tuple[Path, dict[str, Any], Callable[[], TidyTables]]
+Job = tuple[Path, dict[str, Any], Callable[[Places], TidyTables]]
 
 
-def _of_runs(options: CsvOptions, own: bool) -> list[Job]:
+def _of_runs(options: TrajnetOptions, own: bool) -> list[Job]:
     found = find_tracks(options.source)
     folders = [options.out] * own or output_paths(options.out, [str(s.name) for s in found], source=options.source)
     jobs: list[Job] = []
@@ -81,11 +105,11 @@ def _of_runs(options: CsvOptions, own: bool) -> list[Job]:
     return jobs
 
 
-def _run(stored: StoredTracks, fps: float) -> TidyTables:
-    return run_tables(read_checked_tracks(stored.path), fps)
+def _run(stored: StoredTracks, fps: float, places: Places) -> TidyTables:
+    return run_tables(read_checked_tracks(stored.path), fps, places)
 
 
-def _of_sequences(options: CsvOptions) -> list[Job]:
+def _of_sequences(options: TrajnetOptions) -> list[Job]:
     sequences = open_source(options.source, fps=options.fps, images=False)
     for sequence in sequences:
         if sequence.load_truth is None:
@@ -98,6 +122,6 @@ def _of_sequences(options: CsvOptions) -> list[Job]:
     return [(f, about, partial(_truth, s)) for f, about, s in zip(folders, facts, sequences, strict=True)]
 
 
-def _truth(sequence: Sequence) -> TidyTables:
+def _truth(sequence: Sequence, places: Places) -> TidyTables:
     assert sequence.truth is not None
-    return truth_tables(sequence.truth)
+    return truth_tables(sequence.truth, places)

@@ -64,7 +64,7 @@ def track(options: TrackOptions) -> CommandResult:
     pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
     source = OpenedAs(
         options.source, options.fps, options.px_per_m, options.camera, pictures, options.background,
-        options.person_class, options.box_scale, options.boxes,
+        options.person_class, options.box_scale, options.min_score, options.boxes,
     )  # fmt: skip
     sequences = source.open()
     folders = run_folders(sequences, options.source, options.out)

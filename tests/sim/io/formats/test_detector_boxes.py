@@ -1,6 +1,7 @@
 """Boxes of a detector beside a video: both forms give the same tracks, and what does not fit is refused."""
 
 import json
+import warnings
 
 import numpy as np
 import pytest
@@ -85,3 +86,25 @@ def test_boxes_of_another_picture_size(tmp_path, video):
     large = [(k, 4 * x, 4 * y, 4 * w, 4 * h, s) for k, x, y, w, h, s in ROWS]
     found = with_boxes(plain, coco(tmp_path / "det.json", large), box_scale=(0.25, 0.25))
     assert next(iter(found)).detections.box.tolist() == [list(ROWS[0][1:5])]
+
+
+def test_least_score_is_that_of_the_file(tmp_path, video):
+    (plain,) = open_source(video)
+    rows = [(*row[:5], score) for row in ROWS for score in (-2.0, 4.0, 9.0)]  # which are mapped into 0 to 1
+    for path in (mot(tmp_path / "det.txt", rows), coco(tmp_path / "det.json", rows)):
+        with pytest.warns(UserWarning, match="mapped"):
+            every, some = (with_boxes(plain, path, min_score=least) for least in (None, 4.0))
+        for all_of, kept in zip(every, some, strict=True):
+            np.testing.assert_array_equal(kept.detections.score, all_of.detections.score[1:])
+        with warnings.catch_warnings(), pytest.raises(InputError, match="at most 9, the greatest score"):
+            warnings.simplefilter("ignore")
+            with_boxes(plain, path, min_score=10.0)
+
+
+def test_least_score_of_a_recording(tmp_path):
+    (tmp_path / "det").mkdir()
+    mot(tmp_path / "det" / "det.txt", [(*row[:5], score) for row in ROWS for score in (0.3, 0.8)])
+    (sequence,) = open_source(tmp_path, fps=10, min_score=0.5)
+    assert [frame.detections.score.tolist() for frame in sequence] == [[0.8]] * 12
+    with pytest.raises(InputError, match="--min-score"):
+        open_source(write_video(tmp_path / "street.mp4", [picture(0)]), min_score=0.5)

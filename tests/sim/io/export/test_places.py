@@ -1,0 +1,62 @@
+"""Lines and zones: who crosses to which side, who is inside, and the columns of counts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.io.export.places import crossings, inside, parse_places
+from sim.io.export.tidy_tables import run_tables
+from tests.sim.io.export.test_tidy_tables import rows, walk
+
+DOOR = np.array([[0.0, 0.0], [2.0, 0.0]])  # who looks from its first to its second corner has +y on the left
+WAYS = {  # by id (frame, x, y)
+    1: [(1, 1, -1), (2, 1, 1)],  # through the door, to the left
+    2: [(1, 1, 1), (2, 1, 0.5), (5, 1, -1)],  # to the right, unseen for some frames
+    3: [(1, 3, -1), (2, 3, 1)],  # beside the door
+    4: [(1, 1, 1), (2, 1.5, 2)],  # along it
+    5: [(1, 1, -1), (2, 1, 0), (3, 1, 1)],  # by way of the line itself: once
+}
+
+
+def counted(line: np.ndarray, downwards: bool = False) -> tuple[list[int], list[int]]:
+    table = np.array([(frame, who, x, y) for who, way in WAYS.items() for frame, x, y in way], float)
+    table = table[np.random.default_rng(0).permutation(len(table))]
+    left, right = crossings(table[:, 0].astype(int), table[:, 1].astype(int), table[:, 2:], line, downwards)
+    return sorted(left.tolist()), sorted(right.tolist())
+
+
+def test_crossings_have_a_side():
+    left, right = counted(DOOR)
+    assert (len(left), right) == (2, [5])
+    assert counted(DOOR[::-1])[0] == [5], "the line from its other end"
+    assert counted(DOOR, downwards=True)[0] == [5], "in the image y points down"
+
+
+def test_zones_may_have_any_shape():
+    corner = np.array([[0, 0], [4, 0], [4, 1], [1, 1], [1, 4], [0, 4]], float)  # an L
+    points = np.array([[0.5, 3.0], [3.0, 0.5], [3.0, 3.0], [-1.0, 0.5], [5.0, 0.5], [0.5, 0.5]])
+    for zone in (corner, corner[::-1], np.roll(corner, 3, axis=0)):
+        assert inside(points, zone).tolist() == [True, True, False, False, False, True]
+
+
+def test_counts_have_columns_of_places():
+    places = parse_places(["door=3.5,-1,3.5,5"], ["hall=4.5,-1,20,-1,20,20,4.5,20"])
+    first, second = rows(run_tables(walk(), 2.0, places).counts)
+    assert (first["door_to_left"], first["door_to_right"]) == (0, 2), "two people walk along +x over it"
+    assert (first["hall_people"], second["hall_people"]) == (2, 1)
+    assert second["hall_people_mean"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("lines", "zones"),
+    [
+        (["door=1,2,3"], []), (["door=1,2,3,4,5,6"], []), (["1,2,3,4"], []), (["door=1,2,3,x"], []),
+        (["a b=1,2,3,4"], []), (["a=1,2,3,inf"], []), ([], ["hall=1,2,3,4"]), ([], ["hall=1,2,3,4,5,6,7"]),
+        (["a=1,2,3,4"], ["a=0,0,1,0,1,1"]),
+    ],
+)  # fmt: skip
+def test_what_is_no_place_is_refused(lines, zones):
+    with pytest.raises(InputError, match="NAME="):
+        parse_places(lines, zones)
