@@ -1,15 +1,13 @@
-"""`group-pda`: scores by scene, its decisions one by one, events, ids against the difference of velocities.
+"""`group-pda`: scores by scene, and its decisions one by one.
 
     python -m benchmarks.group_pda MODE [--seeds a:b] [--detections file|truth|image] [--only A,B] [--json FILE] …
 
 scenarios    merging, splitting, crossing, queueing, side by side: lineage, ids, group scores; beside the paper's
              ablation and the rule and the belief over `blob`
 decisions    each decision of the tracker switched off: paired differences
-events       merges and splits of the suites standard and friends-meet
-difference   groups that pass and cross: ids kept against the difference of their velocities; a chart
 
-The docstrings of scenes.py (the first three modes) and velocity_difference.py say what the columns mean. Detections
-"file" and "truth" are points, "image" the tracker's own foreground pixels. Groups from pixels are scored in the image,
+The docstring of scenes.py says what the columns mean. Detections "file" and "truth" are points, "image" the tracker's
+own foreground pixels. Groups from pixels are scored in the image,
 all others on the ground. Intervals are 95 % intervals: of means by Student's t over sequences, of shares by Wilson.
 """
 
@@ -21,14 +19,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.group_pda import scenes, velocity_difference
+from benchmarks.group_pda import scenes
 from benchmarks.support.options import add_seeds, new_parser, one_thread, seeds_text
 
 MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "scenarios": scenes.scenarios,
     "decisions": scenes.decisions,
-    "events": scenes.events,
-    "difference": velocity_difference.difference,
 }
 
 
@@ -36,16 +32,14 @@ def main() -> None:
     parser = new_parser(__doc__)
     parser.add_argument("mode", choices=MODES)
     add_seeds(parser, "20000:20100")
-    add_seeds(parser, "20000:20025", option="--image-seeds", what="difference, curves from pixels: ")
     parser.add_argument("--detections", choices=("file", "truth", "image"), default="file")
     parser.add_argument("--points", choices=("own", "seen", "foot"), help="sensor.points of scenes and suites")
     parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="keys of scenes and suites")
-    parser.add_argument("--only", help="scenes, suites, parts, kinds or differences, separated by commas")
+    parser.add_argument("--only", help="scenes, separated by commas")
     parser.add_argument("--each", action="store_true", help="decisions: scene by scene, too")
-    parser.add_argument("--alone", action="store_true", help="scenarios, events: without the ablation and the baseline")
+    parser.add_argument("--alone", action="store_true", help="scenarios: without the ablation and the baseline")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--tracker", default="group-pda", help="another tracker with the same parameters")
-    parser.add_argument("--out", type=Path, help="difference: the chart, *.svg")
     parser.add_argument("--json", type=Path, help="writes what was measured, sequence by sequence")
     args = parser.parse_args()
     one_thread()

@@ -1,11 +1,11 @@
-"""Do two groups keep their ids through an encounter? The definition that every mode of `benchmarks.group_pda` uses.
+"""Do two groups keep their ids through an encounter? For `benchmarks.group_pda`.
 
 An encounter of two true groups lasts from the first to the last frame in which their hulls are within 1 m of each other
 on the ground. The estimated id of a true group is the id that it is matched with, by the overlap of hulls, in more than
 half of the frames of a second. Before the encounter that second is the last one before it, or, if there is no whole
 second before it, the first one in which both groups are matched. After the encounter it is the first one after it, or,
-if there is no whole second, the last one in which both groups are present. Two groups that never come within 1 m have
-the first and the last of these seconds. The ids are kept if each group has the same id before and after, and the two
+if there is no whole second, the last one in which both groups are present. The ids are kept if each group has the same id
+before and after, and the two
 ids differ. The people in an estimated hull are found by position, for all trackers alike. Hulls with one person inside
 are left out, as in the scores.
 """
@@ -23,20 +23,16 @@ from sim.geometry.polygons import gap_pairs, pack
 from sim.truth.crossing_events import CROSS_GAP
 from sim.types import Array, Groups, Ints, Tracks, Truth
 from tracking.scoring.evaluation import labelled_frames
-from tracking.scoring.group_scores import hull_pairs, matched_groups, shared_members
+from tracking.scoring.group_scores import hull_pairs, matched_groups
 from tracking.scoring.people_and_groups import group_rows, people_inside, true_people
 from tracking.scoring.people_comparison import plane_of
 
 SECOND = 1.0
-NEVER = (2**31, 0)
 
 
 @dataclass(frozen=True)
 class Encounter:
-    """Ids of two true groups, the frames (from 1) in which both are present, and the first and last near frame.
-
-    If the groups are never near, first exceeds last.
-    """
+    """Ids of two true groups, the frames (from 1) in which both are present, and the first and last near frame."""
 
     a: int
     b: int
@@ -45,37 +41,24 @@ class Encounter:
     last: int
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """Result of an encounter.
-
-    kept: both groups kept their ids; merged: for a second in all, one estimated hull held more than half of both.
-    """
-
-    kept: bool
-    merged: bool
-
-
-def encounter_of(truth: Truth, a: int, b: int) -> Encounter:
-    """Returns the encounter of two groups, whether they come near or not."""
-    frames, gap = _gaps(truth, a, b)
-    near = frames[gap <= CROSS_GAP].tolist()
-    return Encounter(a, b, tuple(frames.tolist()), *((near[0], near[-1]) if near else NEVER))
-
-
 def encounters(truth: Truth) -> list[Encounter]:
     """Returns the encounters of a sequence: the two groups of each true crossing.
 
     Without a crossing: every two groups that come within 1 m and take part in no common merge or split.
     """
-    crossed = [(encounter_of(truth, *e.before), e) for e in truth.events or () if e.kind == "cross"]
+    crossed = [e for e in truth.events or () if e.kind == "cross"]
     if crossed:
-        return [Encounter(m.a, m.b, m.frames, e.start, e.end) for m, e in crossed]
+        return [Encounter(*e.before, tuple(_gaps(truth, *e.before)[0].tolist()), e.start, e.end) for e in crossed]
     assert truth.groups is not None
     names = sorted({g for here in truth.groups for g in here.id.tolist()})
     kin = [set(side) for e in truth.events or () for side in (e.before, e.after)]
-    apart = [(a, b) for a, b in combinations(names, 2) if not any({a, b} <= side for side in kin)]
-    return [e for pair in apart if (e := encounter_of(truth, *pair)).first <= e.last]
+    found = []
+    for a, b in combinations(names, 2):
+        frames, gap = _gaps(truth, a, b)
+        near = frames[gap <= CROSS_GAP].tolist()
+        if near and not any({a, b} <= side for side in kin):
+            found.append(Encounter(a, b, tuple(frames.tolist()), near[0], near[-1]))
+    return found
 
 
 def _gaps(truth: Truth, a: int, b: int) -> tuple[Ints, Array]:
@@ -95,11 +78,7 @@ def _hulls(groups: Sequence[Groups], name: int) -> dict[int, Array]:
 
 
 class GroupMatches:
-    """Estimated groups of each true group in each frame, by (frame, true id).
-
-    id: the id of the matched estimated group; absent if there is no match. holders: rows of the estimated hulls that
-    hold more than half of the group's people.
-    """
+    """The id of the estimated group that is matched with each true group, by (frame, true id)."""
 
     def __init__(self, truth: Truth, tracks: Sequence[Tracks]) -> None:
         image = plane_of(truth, tracks) == "image"
@@ -117,28 +96,19 @@ class GroupMatches:
         pairs = matched_groups(true.pos, est.pos, hull_pairs(true, est))
         key = list(zip(true.rows.frame.tolist(), true.rows.id.tolist(), strict=True))
         self.id = {key[i]: g for i, g in zip(pairs.i.tolist(), est.rows.id[pairs.j].tolist(), strict=True)}
-        shared = shared_members(true, est, est.member, len(people.rows))
-        i, j = np.divmod(shared.key, max(shared.width, 1))
-        most = 2 * shared.count > true.count[i]
-        self.holders: dict[tuple[int, int], set[int]] = {}
-        for row, hull in zip(i[most].tolist(), j[most].tolist(), strict=True):
-            self.holders.setdefault(key[row], set()).add(hull)
 
-    def outcome(self, e: Encounter, fps: float) -> Outcome:
-        """Returns the outcome of an encounter."""
+    def keep_ids(self, e: Encounter, fps: float) -> bool:
+        """Returns True if both groups have the same id before and after an encounter."""
         before, after = self._seconds(e, round(SECOND * fps))
         ids = [(self._most(group, before), self._most(group, after)) for group in (e.a, e.b)]
-        kept = all(x is not None and x == y for x, y in ids) and ids[0][0] != ids[1][0]
-        none: set[int] = set()
-        together = sum(bool(self.holders.get((f, e.a), none) & self.holders.get((f, e.b), none)) for f in e.frames)
-        return Outcome(kept, together >= SECOND * fps)
+        return all(x is not None and x == y for x, y in ids) and ids[0][0] != ids[1][0]
 
     def _seconds(self, e: Encounter, n: int) -> tuple[Sequence[int], Sequence[int]]:
         """Returns the frames that decide the ids before and after an encounter; n: frames of a second."""
         before, after = ([f for f in e.frames if f < e.first][-n:], [f for f in e.frames if f > e.last][:n])
-        if e.first > e.last or len(before) < n:
+        if len(before) < n:
             before = [f for f in e.frames if (f, e.a) in self.id and (f, e.b) in self.id][:n]
-        if e.first > e.last or len(after) < n:
+        if len(after) < n:
             after = list(e.frames[-n:])
         return before, after
 
@@ -148,8 +118,8 @@ class GroupMatches:
         return seen[0][0] if seen and 2 * seen[0][1] > len(frames) else None
 
 
-def outcomes(truth: Truth, tracks: Sequence[Tracks]) -> list[Outcome]:
-    """Returns the outcome of every encounter of a sequence."""
+def ids_kept(truth: Truth, tracks: Sequence[Tracks]) -> list[bool]:
+    """Returns for every encounter of a sequence whether both groups keep their ids."""
     found = encounters(truth)
     matches = GroupMatches(truth, tracks) if found else None
-    return [] if matches is None else [matches.outcome(e, truth.fps) for e in found]
+    return [] if matches is None else [matches.keep_ids(e, truth.fps) for e in found]

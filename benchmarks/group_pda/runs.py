@@ -1,8 +1,7 @@
 """Sequences that are made once and tracked by several trackers, for the modes of `benchmarks.group_pda`.
 
-A row holds every score of the catalogue by key, and three counts: "pairs", encounters of two groups; "kept", encounters
-after which both groups have their ids; "merged", encounters in which they were one estimated group
-(benchmarks/group_pda/encounters.py).
+A row holds every score of the catalogue by key, and two counts: "pairs", encounters of two groups, and "kept",
+encounters after which both groups have their ids (benchmarks/group_pda/encounters.py).
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from unittest import mock
 
-from benchmarks.group_pda.encounters import outcomes
+from benchmarks.group_pda.encounters import ids_kept
 from benchmarks.support.in_memory import in_memory
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import Entry
@@ -145,6 +144,5 @@ def trained_once() -> Iterator[None]:
 
 def row(truth: Truth, answers: Sequence[Tracks]) -> Row:
     """Returns the row of one tracker's answers."""
-    found = outcomes(truth, answers)
-    own = {"pairs": len(found), "kept": sum(f.kept for f in found), "merged": sum(f.merged for f in found)}
-    return {**evaluate(truth, answers), **own}
+    kept = ids_kept(truth, answers)
+    return {**evaluate(truth, answers), "pairs": len(kept), "kept": sum(kept)}
