@@ -1,13 +1,12 @@
 """Do two groups keep their ids through an encounter? For `benchmarks.group_pda`.
 
-An encounter of two true groups lasts from the first to the last frame in which their hulls are within 1 m of each other
-on the ground. The estimated id of a true group is the id that it is matched with, by the overlap of hulls, in more than
-half of the frames of a second. Before the encounter that second is the last one before it, or, if there is no whole
-second before it, the first one in which both groups are matched. After the encounter it is the first one after it, or,
-if there is no whole second, the last one in which both groups are present. The ids are kept if each group has the same id
-before and after, and the two
-ids differ. The people in an estimated hull are found by position, for all trackers alike. Hulls with one person inside
-are left out, as in the scores.
+An encounter of two true groups lasts from the first to the last frame in which their hulls are within 1 m of each
+other on the ground. The estimated id of a true group is the id that it is matched with, by the overlap of hulls, in
+more than half of the frames of a second. Before the encounter that second is the last one before it, or, if there is
+no whole second before it, the first one in which both groups are matched. After the encounter it is the first one
+after it, or, if there is no whole second, the last one in which both groups are present. The ids are kept if each
+group has the same id before and after, and the two ids differ. The people in an estimated hull are found by position,
+for all trackers alike. Hulls with one person inside are left out, as in the scores.
 """
 
 from __future__ import annotations
