@@ -1,7 +1,7 @@
 """`blob`: on boxes beside other trackers, what its options are worth, from pixels.
 
-    python -m benchmarks.blob peers [speed] [train] [test] [generated] [real] --peer-python PYTHON [--data FOLDER]
-        [--rounds 5] [--scenes 24]
+    python -m benchmarks.blob peers [scenes] [rates] [real] [speed] --peer-python PYTHON [--data FOLDER] [--rounds 5]
+        [--scenes 24] [--chart FILE.svg]
     python -m benchmarks.blob options [--scenes 30] [--data FOLDER]
     python -m benchmarks.blob pixels [pets] [rendered] [above] [--data FOLDER] [--seeds 0:2]
 
@@ -11,11 +11,13 @@ all but `above`). The speed of `blob` by parts: `python -m benchmarks.speed trac
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from benchmarks.blob import boxes, options, pixels
 from benchmarks.support.options import PETS, add_data, add_seeds, new_parser, one_thread
 
 PARTS = {
-    "peers": ("speed", "train", "test", "generated", "real"),
+    "peers": ("scenes", "rates", "real", "speed"),
     "options": (),
     "pixels": ("pets", "rendered", "above"),
 }
@@ -27,7 +29,8 @@ def main() -> None:
     parser.add_argument("part", nargs="*", help="parts of the mode")
     parser.add_argument("--peer-python", help="peers: interpreter of an environment with `trackers` and `supervision`")
     parser.add_argument("--rounds", type=int, default=5, help="peers: rounds of the timing")
-    parser.add_argument("--scenes", type=int, help="synthetic scenes; peers: 24 of train and of test, else 30")
+    parser.add_argument("--scenes", type=int, help="scenes with occlusion; peers: 24, else 30")
+    parser.add_argument("--chart", type=Path, help="peers: picture of `rates`")
     add_seeds(parser, "0:2", what="pixels: ")
     add_data(parser)
     args = parser.parse_intermixed_args()
@@ -38,7 +41,7 @@ def main() -> None:
         if args.peer_python is None:
             parser.error("mode peers needs --peer-python")
         one_thread()
-        settings = boxes.PeerRun(args.peer_python, args.data, args.rounds, args.scenes or 24)
+        settings = boxes.PeerRun(args.peer_python, args.data, args.rounds, args.scenes or 24, args.chart)
         boxes.peers(args.part or PARTS["peers"], settings)
     elif args.mode == "options":
         one_thread()

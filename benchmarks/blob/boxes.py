@@ -1,14 +1,12 @@
-"""Mode `peers` of `benchmarks.blob`: `blob` on boxes beside roboflow's SORT, ByteTrack and OC-SORT, on the same files.
+"""Mode `peers` of `benchmarks.blob`: `blob` on boxes beside roboflow's SORT, ByteTrack and OC-SORT, on the same texts.
 
-speed: 20 and 100 squares with constant velocity (benchmarks/peers/synthetic.py), without and with misses and clutter.
-Printed: frames per CPU second of one thread, its ratio to SORT, HOTA. Each tracker is timed in turn in every round,
-after a warm-up, its input read before; the best round counts.
-train, test: scenes with occlusion (synthetic.walk), of the seeds on which defaults were chosen and of others on which
-nothing was. generated: the catalogue with its own sensor, test seeds; `blob` gets the camera. Printed: means over all
-scenes of HOTA, DetA, AssA, MOTA, IDSW, FP, FN, IDF1, and blob's HOTA minus that of each tracker, paired over scenes,
-with 95 % intervals. `blob, paper` is the preset `paper`.
-real: AVG-TownCentre-first225, PETS09-S2L1-first200 and TUD-Campus with their det/det.txt; the intervals are by moving
-blocks of frames.
+scenes: scenes with occlusion (benchmarks/peers/synthetic.py), of seeds on which nothing was chosen: means, and blob's
+HOTA minus that of the tracker, paired over scenes.
+rates: HOTA, mean of RATED, over the frame rate and the probability of detection; with --chart a picture.
+real: AVG-TownCentre-first225, PETS09-S2L1-first200 and TUD-Campus with their det/det.txt: one recording each, so
+indicative.
+speed: 20 and 100 squares with constant velocity, without and with misses and clutter: frames per CPU second of one
+thread. All trackers are timed in turn in every round, after a warm-up, their input read before; the best round counts.
 """
 
 from __future__ import annotations
@@ -17,35 +15,37 @@ import json
 import subprocess
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.peers import synthetic
-from benchmarks.peers.scores import bootstrap, mot_scores
+from benchmarks.support import chart
 from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE
+from benchmarks.support.tables import head, row, signed
 from scenarios import load
 from sim.io.source import open_source
 from sim.sequence import simulate
-from sim.types import Detections, Frame
+from sim.types import Array, Detections, Frame
 from sim.types import Sequence as Recording
 from tracking.papers.blob.config import BlobConfig
 from tracking.running.prepare import prepare
+from tracking.scoring import score_arrays
 from tracking.stats import mean_interval
 
-PEERS = ("sort", "bytetrack", "ocsort")
+PEERS = {"SORT": "sort", "ByteTrack": "bytetrack", "OC-SORT": "ocsort"}
 RUNNER = Path(__file__).parents[1] / "peers" / "run_roboflow.py"
 WARM = 30  # frames tracked before the clock starts
 CATALOGUE = ("merge", "split", "cross", "pass-by", "side-by-side", "pillar", "door", "crowd", "clutter", "party")
+RATED = ("cross", "crowd", "street", "party")
+RATES, DETECTED = (2.5, 5.0, 10.0, 25.0), (0.5, 0.7, 0.9)  # frames/s; probability of detection
 FIELDS = ((20, 1.0, 0.0), (100, 1.0, 0.0), (20, 0.9, 5.0), (100, 0.9, 5.0))  # squares, detection probability, clutter
-VARIANTS = {
-    "blob": {},
-    "blob, paper": BlobConfig.preset("paper").as_dict(),
-}
-Answer = list[tuple[np.ndarray, np.ndarray]]
-"""Per frame ids (N,) and boxes (N, 4) left, top, width, height, px."""
+VARIANTS = {"`blob`": {}, "`blob`, paper": BlobConfig.preset("paper").as_dict()}
+SHOWN = ("HOTA", "DetA", "AssA", "MOTA", "IDF1", "IDSW")
+Table = dict[str, Array]
+"""Columns frame, id and box of the rows of people."""
 
 
 @dataclass(frozen=True)
@@ -56,53 +56,66 @@ class PeerRun:
     data: Path
     rounds: int
     scenes: int
+    chart: Path | None
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A sequence with detections, and per frame its true ids and boxes."""
+    """A sequence with detections, and its true people."""
 
     sequence: Recording
-    ids: list[np.ndarray]
-    boxes: list[np.ndarray]
+    truth: Table
 
 
-def as_sequence(boxes: synthetic.Boxes) -> Recording:
-    """Returns the detected boxes as a sequence."""
+def table_of(ids: Iterable[Array], boxes: Iterable[Array]) -> Table:
+    """Returns the rows of people by frame."""
+    ids, boxes = list(ids), list(boxes)
+    frame = np.repeat(np.arange(1, len(ids) + 1), [len(each) for each in ids])
+    return {"frame": frame, "id": np.concatenate(ids), "box": np.concatenate(boxes).reshape(-1, 4)}
+
+
+def of_boxes(boxes: synthetic.Boxes) -> Scene:
+    """Returns the detected boxes as a scene."""
     frames = []
     for k, rows in enumerate(boxes.found):
         box = np.ascontiguousarray(rows[:, :4])
         found = Detections(k + 1, k / boxes.fps, "image", box[:, :2] + box[:, 2:] / 2, None, box, rows[:, 4].copy())
         frames.append(Frame(k + 1, k / boxes.fps, detections=found))
-    size = boxes.size
-    return Recording(boxes.name, boxes.fps, len(frames), lambda: iter(frames), image_size=size, has_detections=True)
+    made = Recording(
+        boxes.name, boxes.fps, len(frames), lambda: iter(frames), image_size=boxes.size, has_detections=True
+    )
+    return Scene(made, table_of(boxes.ids, boxes.truth))
 
 
-def write_mot(sequence: Recording, path: Path) -> None:
+def with_truth(sequence: Recording) -> Scene:
+    truth = sequence.truth
+    return Scene(sequence, {"frame": truth.frame, "id": truth.id, "box": truth.box})
+
+
+def synthetic_scenes(seeds: range) -> list[Scene]:
+    return [of_boxes(synthetic.walk(seed, seconds=20)) for seed in seeds]
+
+
+def simulated_scenes(names: Sequence[str], seeds: range, settings: Sequence[str] = ()) -> list[Scene]:
+    return [with_truth(simulate(load(name, set=settings), seed, streams=())) for name in names for seed in seeds]
+
+
+def scores(scene: Scene, answer: Table) -> dict[str, float]:
+    """Returns the scores of an answer."""
+    return dict(score_arrays(scene.truth, answer, fps=scene.sequence.fps))
+
+
+def write_mot(sequence: Recording, path: Path) -> Path:
     """Writes the detections of a sequence as MOTChallenge text."""
     with path.open("w") as file:
         for frame in sequence:
             d = frame.detections
             for box, score in zip(d.box, d.score, strict=True) if d is not None and d.box is not None else ():
                 file.write(f"{frame.index},-1," + ",".join(f"{v:.4f}" for v in (*box, score)) + ",-1,-1,-1\n")
+    return path
 
 
-def synthetic_scenes(seeds: range) -> list[Scene]:
-    made = [synthetic.walk(seed, seconds=20) for seed in seeds]
-    return [Scene(as_sequence(b), b.ids, b.truth) for b in made]
-
-
-def catalogue_scenes(seeds: range) -> list[Scene]:
-    return [with_truth(simulate(load(name), seed, streams=())) for name in CATALOGUE for seed in seeds]
-
-
-def with_truth(sequence: Recording) -> Scene:
-    truth = sequence.truth
-    rows = [truth.rows(k) for k in range(1, truth.length + 1)]
-    return Scene(sequence, [truth.id[r] for r in rows], [truth.box[r] for r in rows])
-
-
-def track_blob(sequence: Recording, params: dict | None = None, *, checked: bool = True) -> tuple[Answer, float]:
+def track_blob(sequence: Recording, params: dict | None = None, *, checked: bool = True) -> tuple[Table, float]:
     """Returns blob's answer and its CPU seconds; checked: with the checks that `track` does around each step."""
     ready = prepare("blob", sequence, params=params)
     frames = list(ready.frames())
@@ -110,88 +123,95 @@ def track_blob(sequence: Recording, params: dict | None = None, *, checked: bool
         ready.reset(0)
         begun = time.process_time()
         made = [ready.step(f) if checked else ready.tracker.step(f, f.detections) for f in part]
-    return [(t.id, t.box) for t in made], time.process_time() - begun
+    return table_of([t.id for t in made], [t.box for t in made]), time.process_time() - begun
 
 
-def track_peer(python: str, name: str, det: Path, frames: int) -> tuple[Answer, float]:
-    """Returns the answer and CPU seconds of a peer, which runs in its own environment on the file `det`."""
-    out = det.with_name("out.txt")
-    answer = subprocess.run([python, RUNNER, name, det, out], capture_output=True, text=True, check=True)
-    rows = np.loadtxt(out, delimiter=",", ndmin=2) if out.stat().st_size else np.zeros((0, 10))
-    parts = [rows[rows[:, 0] == k] for k in range(1, frames + 1)]
-    return [(p[:, 1].astype(np.int64), p[:, 2:6]) for p in parts], json.loads(answer.stdout.splitlines()[-1])["seconds"]
+def track_peer(python: str, name: str, texts: Sequence[Path]) -> list[tuple[Table, float]]:
+    """Returns the answers and CPU seconds of a peer, which runs in its own environment on the texts."""
+    command = [python, str(RUNNER), PEERS[name], *map(str, texts)]
+    seconds = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[-1])
+    answers = []
+    for text in texts:
+        out = text.with_name(f"{text.name}.{PEERS[name]}")
+        rows = np.loadtxt(out, delimiter=",", ndmin=2) if out.stat().st_size else np.zeros((0, 10))
+        answers.append({"frame": rows[:, 0].astype(int), "id": rows[:, 1].astype(int), "box": rows[:, 2:6]})
+    return list(zip(answers, seconds, strict=True))
 
 
-def all_answers(python: str, folder: Path, sequence: Recording) -> dict[str, Answer]:
-    """Returns the answers of blob (defaults, the preset `paper`) and of the peers."""
-    det = folder / "det.txt"
-    write_mot(sequence, det)
-    answers = {name: track_blob(sequence, params)[0] for name, params in VARIANTS.items()}
-    return answers | {name: track_peer(python, name, det, sequence.length)[0] for name in PEERS}
+def all_scores(python: str, scenes: Sequence[Scene]) -> dict[str, list[dict[str, float]]]:
+    """Returns the scores of blob (defaults, the preset `paper`) and of the peers on each scene."""
+    found = {
+        name: [scores(scene, track_blob(scene.sequence, params)[0]) for scene in scenes]
+        for name, params in VARIANTS.items()
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        texts = [write_mot(scene.sequence, Path(folder) / f"{k}.txt") for k, scene in enumerate(scenes)]
+        for name in PEERS:
+            answers = track_peer(python, name, texts)
+            found[name] = [scores(scene, answer) for scene, (answer, _) in zip(scenes, answers, strict=True)]
+    return found
 
 
 def peers(parts: Sequence[str], run: PeerRun) -> None:
     """Prints the chosen parts."""
-    made = {
-        "train": ("scenes with occlusion, training seeds", lambda: synthetic_scenes(range(300, 300 + run.scenes))),
-        "test": ("scenes with occlusion, test seeds", lambda: synthetic_scenes(range(20_000, 20_000 + run.scenes))),
-        "generated": ("the catalogue, test seeds", lambda: catalogue_scenes(range(20_000, 20_002))),
-    }
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for part in parts:
-            if part == "speed":
-                speed(run, folder)
-            elif part == "real":
-                real(run, folder)
-            else:
-                title, make = made[part]
-                compare_scenes(run.python, folder, title, make())
+    for part in parts:
+        {"scenes": occluded, "rates": rates, "real": real, "speed": speed}[part](run)
 
 
-def speed(run: PeerRun, folder: Path) -> None:
-    print(f"speed, frames per CPU second (best of {run.rounds} rounds) and ratio to SORT; HOTA")
-    for n, p_detect, clutter in FIELDS:
-        boxes = synthetic.plain(n, p_detect=p_detect, clutter=clutter)
-        sequence, det = as_sequence(boxes), folder / f"{boxes.name}.txt"
-        write_mot(sequence, det)
-        spent, answers = {name: [] for name in ("blob", "blob, step only", *PEERS)}, {}
-        for _ in range(run.rounds):
-            for name, seconds in spent.items():
-                if name in PEERS:
-                    answers[name], once = track_peer(run.python, name, det, len(boxes.found))
-                else:
-                    answers[name], once = track_blob(sequence, checked=name == "blob")
-                seconds.append(once)
-        for name, seconds in spent.items():
-            ratio, rate = min(spent["sort"]) / min(seconds), len(boxes.found) / min(seconds)
-            hota = mot_scores(boxes.ids, boxes.truth, answers[name])["HOTA"]
-            print(f"  {boxes.name:16s} {name:16s} {rate:8.0f} frames/s  x{ratio:5.2f}  HOTA {hota:.3f}", flush=True)
+def occluded(run: PeerRun) -> None:
+    scenes = synthetic_scenes(range(20_000, 20_000 + run.scenes))
+    print(f"\nScenes with occlusion, test seeds, mean of {len(scenes)}\n")
+    head(["tracker", *SHOWN, "HOTA of `blob` minus this"])
+    found = all_scores(run.python, scenes)
+    own = np.array([s["HOTA"] for s in found["`blob`"]])
+    for name, each in found.items():
+        difference = (own - [s["HOTA"] for s in each])[:, None]
+        cells = [f"{np.mean([s[key] for s in each]):.3f}" for key in SHOWN]
+        row([name, *cells, signed(*(float(end[0]) for end in mean_interval(difference)))])
 
 
-def compare_scenes(python: str, folder: Path, title: str, made: list[Scene]) -> None:
-    print(f"{title}: {len(made)} scenes, means; HOTA of blob minus the tracker's, 95 %")
-    rows: dict[str, list[dict[str, float]]] = {}
-    for scene in made:
-        for name, answer in all_answers(python, folder, scene.sequence).items():
-            rows.setdefault(name, []).append(mot_scores(scene.ids, scene.boxes, answer))
-    own = np.array([r["HOTA"] for r in rows["blob"]])
-    for name, found in rows.items():
-        difference = (own - [r["HOTA"] for r in found])[:, None]
-        mean, low, high = (float(v[0]) for v in mean_interval(difference))
-        means = "  ".join(f"{k} {np.mean([r[k] for r in found]):.3f}" for k in found[0])
-        print(f"  {name:14s} {means}  blob minus this: {mean:+.3f} [{low:+.3f}, {high:+.3f}]", flush=True)
+def rates(run: PeerRun) -> None:
+    print(f"\nHOTA, mean of {', '.join(RATED)}, seed 20000\n")
+    head(["detected", "frames/s", *VARIANTS, *PEERS])
+    panels = []
+    for detected in DETECTED:
+        means: dict[str, list[float]] = {}
+        for fps in RATES:
+            settings = (f"camera.fps={fps}", f"sensor.detect_prob={detected}")
+            found = all_scores(run.python, simulated_scenes(RATED, range(20_000, 20_001), settings))
+            for name, each in found.items():
+                means.setdefault(name, []).append(float(np.mean([s["HOTA"] for s in each])))
+            row([f"{detected:g}", f"{fps:g}", *(f"{values[-1]:.3f}" for values in means.values())])
+        ticks = [f"{fps:g}" for fps in RATES]
+        x = np.log2(RATES).tolist()
+        panels.append(chart.Panel(f"HOTA, {detected:.0%} detected", x, means, "frames/s", y_range=(0, 1), ticks=ticks))
+    if run.chart:
+        chart.lines(panels, run.chart, columns=3)
 
 
-def real(run: PeerRun, folder: Path) -> None:
+def real(run: PeerRun) -> None:
+    print("\nRecordings, det.txt\n")
+    head(["recording", "tracker", *SHOWN])
     for path in (TOWN_CENTRE, PETS, CAMPUS):
-        (sequence,) = open_source(run.data / path, images=False)
-        scene, answers = with_truth(sequence), all_answers(run.python, folder, sequence)
-        block = max(round(sequence.fps), sequence.length // 20)
-        print(f"{Path(path).name}: {sequence.length} frames, {sequence.fps:g} fps;", end=" ")
-        print(f"HOTA of blob minus the tracker's, 95 % by blocks of {block}")
-        for name, made in answers.items():
-            scores = "  ".join(f"{k} {v:.3f}" for k, v in mot_scores(scene.ids, scene.boxes, made).items())
-            r = np.random.default_rng(0)
-            low, high = bootstrap(scene.ids, scene.boxes, answers["blob"], made, block, r)
-            print(f"  {name:14s} {scores}  blob minus this: [{low:+.3f}, {high:+.3f}]", flush=True)
+        for name, (found,) in all_scores(
+            run.python, [with_truth(open_source(run.data / path, images=False)[0])]
+        ).items():
+            row([Path(path).name, name, *(f"{found[key]:.3f}" for key in SHOWN)])
+
+
+def speed(run: PeerRun) -> None:
+    print(f"\nFrames per CPU second, best of {run.rounds} rounds, and times SORT\n")
+    head(["squares, detected, false boxes", "`blob`", "`blob`, step only", *PEERS])
+    for n, p_detect, clutter in FIELDS:
+        scene = of_boxes(synthetic.plain(n, p_detect=p_detect, clutter=clutter))
+        spent: dict[str, list[float]] = {}
+        with tempfile.TemporaryDirectory() as folder:
+            text = write_mot(scene.sequence, Path(folder) / "det.txt")
+            for _ in range(run.rounds):
+                for name, checked in (("`blob`", True), ("`blob`, step only", False)):
+                    spent.setdefault(name, []).append(track_blob(scene.sequence, checked=checked)[1])
+                for name in PEERS:
+                    spent.setdefault(name, []).append(track_peer(run.python, name, [text])[0][1])
+        best = {name: min(seconds) for name, seconds in spent.items()}
+        cells = (f"{scene.sequence.length / s:.0f}, × {best['SORT'] / s:.2f}" for s in best.values())
+        row([f"{n}, {p_detect:g}, {clutter:g}", *cells])

@@ -13,8 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.blob.boxes import Scene, catalogue_scenes, synthetic_scenes, track_blob, with_truth
-from benchmarks.peers.scores import mot_scores
+from benchmarks.blob.boxes import (
+    CATALOGUE,
+    Scene,
+    scores,
+    simulated_scenes,
+    synthetic_scenes,
+    track_blob,
+    with_truth,
+)
 from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE
 from benchmarks.support.replaced_code import Replacement, replaced_code
 from benchmarks.support.tables import head, row, signed
@@ -44,7 +51,7 @@ PARTS: dict[str, Replacement] = {
 
 def options(count: int, data: Path) -> None:
     """Prints what each change is worth, with `count` scenes with occlusion."""
-    made = [synthetic_scenes(range(400, 400 + count)), catalogue_scenes(range(11, 13))]
+    made = [synthetic_scenes(range(400, 400 + count)), simulated_scenes(CATALOGUE, range(11, 13))]
     made += [[with_truth(open_source(data / path, images=False)[0])] for path in RECORDINGS]
     base = [hota(scenes, {}) for scenes in made]
     head(["", "scenes with occlusion", "the catalogue", *(Path(path).name for path in RECORDINGS)])
@@ -68,6 +75,4 @@ def differences(made: Sequence[list[Scene]], base: Sequence[np.ndarray], change:
 
 def hota(scenes: list[Scene], change: dict[str, object]) -> np.ndarray:
     """Returns HOTA of each scene."""
-    return np.array(
-        [mot_scores(s.ids, s.boxes, track_blob(s.sequence, change, checked=False)[0])["HOTA"] for s in scenes]
-    )
+    return np.array([scores(s, track_blob(s.sequence, change, checked=False)[0])["HOTA"] for s in scenes])

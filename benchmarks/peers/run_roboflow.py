@@ -1,10 +1,10 @@
-"""Run roboflow `trackers` over MOT text; for an environment of its own (pip install trackers supervision).
+"""Run roboflow `trackers` over MOT texts; for an environment of its own (pip install trackers supervision).
 
-usage: python run_roboflow.py TRACKER DET.txt OUT.txt      TRACKER: sort, bytetrack, ocsort; their defaults throughout
+usage: python run_roboflow.py TRACKER DET.txt …      TRACKER: sort, bytetrack, ocsort; their defaults throughout
 
-Needs nothing of flockscope. Writes rows `frame,id,left,top,width,height,score,-1,-1,-1` and prints one JSON object
-{"frames", "seconds"}: the CPU time inside the tracker's update, its input type ready made; reading, writing and a first
-run over WARM frames, in which libraries load, are left out.
+Needs nothing of flockscope. Writes rows `frame,id,left,top,width,height,score,-1,-1,-1` into DET.txt.TRACKER and prints
+a JSON list: for each text the CPU seconds inside the tracker's update, its input type ready made; reading, writing and
+a first run over WARM frames, in which libraries load, are left out.
 """
 
 import json
@@ -26,17 +26,20 @@ def read(path):
     return [rows[rows[:, 0] == frame][:, 2:7] for frame in range(1, last + 1)]
 
 
-def main(name, det, out):
+def main(name, *texts):
     import supervision
     import trackers
 
     kinds = {"sort": "SORTTracker", "bytetrack": "ByteTrackTracker", "ocsort": "OCSORTTracker"}
     kind = getattr(trackers, kinds[name])
+    print(json.dumps([run(kind, supervision.Detections, det, f"{det}.{name}") for det in texts]))
+
+
+def run(kind, form, det, out):
     given = []
     for box in read(det):
         corners = np.c_[box[:, :2], box[:, :2] + box[:, 2:4]]
-        none = np.zeros(len(box), int)
-        given.append(supervision.Detections(xyxy=corners, confidence=box[:, 4].copy(), class_id=none))
+        given.append(form(xyxy=corners, confidence=box[:, 4].copy(), class_id=np.zeros(len(box), int)))
     scratch = kind()
     for detections in given[:WARM]:
         scratch.update(detections)
@@ -51,7 +54,7 @@ def main(name, det, out):
                     left, top, right, bottom = corners
                     box = ",".join(f"{v:.3f}" for v in (left, top, right - left, bottom - top, score))
                     file.write(f"{frame},{id},{box},-1,-1,-1\n")
-    print(json.dumps({"frames": len(given), "seconds": seconds}))
+    return seconds
 
 
 if __name__ == "__main__":
