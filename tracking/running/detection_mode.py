@@ -90,8 +90,6 @@ def frames_with_detections(
     if mode == "file":
         found: list[Detections | None] = [f.detections for f in sequence.without_pictures()]
     else:
-        from tracking.running.detection_mode import from_truth
-
         found = list(from_truth(sequence, sensor, seed))
     nonempty = [d for d in found if d is not None and len(d.pos)]
     if nonempty and "points" not in needs and all(d.box is None for d in nonempty):

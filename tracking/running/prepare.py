@@ -87,8 +87,7 @@ class PreparedTracker:
 
 
 def _with_file(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
-    path = sequence.source.get("path", sequence.name)
-    return error if error.file else type(error)(**{**error.as_dict(), "file": path})
+    return error if error.file else error.replaced(file=sequence.source.get("path", sequence.name))
 
 
 def prepare(

@@ -37,7 +37,8 @@ from optuna.trial import FrozenTrial, TrialState
 
 from scenarios.errors import FlockscopeError, InputError
 from tracking.environment.episodes import Episode
-from tracking.tuning.comparison import Goal, TrialRecord, finite_mean
+from tracking.stats import finite_mean
+from tracking.tuning.comparison import Goal, TrialRecord
 from tracking.tuning.options import Progress
 from tracking.tuning.parallel_episodes import PlayEpisodes
 from tracking.tuning.sampler import (
@@ -65,44 +66,42 @@ class TrialLocks:
     def __init__(self, path: Path) -> None:
         self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
 
-    @contextmanager
-    def locked(self, byte: int) -> Iterator[None]:
-        """Holds the lock on a byte (offset in the file) for the time of the context; waits until it is free."""
+    def lock(self, byte: int, wait: bool = True) -> None:
+        """Locks a byte (offset in the file) for this process. Raises OSError if it is taken and `wait` is False."""
         import fcntl
 
-        fcntl.lockf(self._file, fcntl.LOCK_EX, 1, byte)
+        fcntl.lockf(self._file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte)
+
+    def release(self, byte: int) -> None:
+        """Releases this process's lock on a byte; does nothing if it holds none."""
+        import fcntl
+
+        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, byte)
+
+    @contextmanager
+    def locked(self, byte: int) -> Iterator[None]:
+        """Holds the lock on a byte for the time of the context; waits until it is free."""
+        self.lock(byte)
         try:
             yield
         finally:
-            fcntl.lockf(self._file, fcntl.LOCK_UN, 1, byte)
-
-    @contextmanager
-    def choosing(self) -> Iterator[None]:
-        """Holds the lock under which a trial is chosen for the time of the context; waits until it is free."""
-        with self.locked(CHOOSING):
-            yield
+            self.release(byte)
 
     def hold_trial(self, number: int) -> None:
         """Locks trial `number` (from 0) for this process until `release_trial` or `close`."""
-        import fcntl
-
-        fcntl.lockf(self._file, fcntl.LOCK_EX, 1, FIRST_TRIAL + number)
+        self.lock(FIRST_TRIAL + number)
 
     def release_trial(self, number: int) -> None:
         """Releases this process's lock on trial `number` (from 0); does nothing if it holds none."""
-        import fcntl
-
-        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST_TRIAL + number)
+        self.release(FIRST_TRIAL + number)
 
     def is_abandoned(self, number: int) -> bool:
         """Returns True if no other process holds the lock on trial `number` (from 0)."""
-        import fcntl
-
         try:
-            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, FIRST_TRIAL + number)
+            self.lock(FIRST_TRIAL + number, wait=False)
         except OSError:
             return False
-        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST_TRIAL + number)
+        self.release_trial(number)
         return True
 
     def close(self) -> None:
@@ -238,7 +237,7 @@ class SearchStudy:
         return self._locks is not None
 
     def _choosing(self) -> AbstractContextManager[None]:
-        return nullcontext() if self._locks is None else self._locks.choosing()
+        return nullcontext() if self._locks is None else self._locks.locked(CHOOSING)
 
     def _repeat(self, abandoned: FrozenTrial) -> None:
         number = abandoned.user_attrs.get(AGAIN, abandoned.number)
