@@ -18,6 +18,7 @@ a limit. It then gets an estimate of its value.
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import time
@@ -64,18 +65,15 @@ class TrialLocks:
     """
 
     def __init__(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
         self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
 
     def lock(self, byte: int, wait: bool = True) -> None:
         """Locks a byte (offset in the file) for this process. Raises OSError if it is taken and `wait` is False."""
-        import fcntl
-
         fcntl.lockf(self._file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte)
 
     def release(self, byte: int) -> None:
         """Releases this process's lock on a byte; does nothing if it holds none."""
-        import fcntl
-
         fcntl.lockf(self._file, fcntl.LOCK_UN, 1, byte)
 
     @contextmanager
@@ -253,7 +251,7 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
     """Opens or creates the study `name` for the time of the context, and yields it as a `SearchStudy`."""
     with quiet_optuna():
         place = storage if storage is None or "://" in str(storage) else Path(storage)
-        locks = _trial_locks(place) if isinstance(place, Path) else None
+        locks = TrialLocks(place.with_name(place.name + SUFFIX)) if isinstance(place, Path) else None
         try:
             study = _create(plan, place, _optuna_storage(place, locks), name)
             yield SearchStudy(plan, study, locks, storage)
@@ -301,25 +299,14 @@ def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> N
         )  # fmt: skip
 
 
-def _trial_locks(journal: Path) -> TrialLocks | None:
-    try:
-        import fcntl  # noqa: F401
-    except ImportError:
-        return None
-    journal.parent.mkdir(parents=True, exist_ok=True)
-    return TrialLocks(journal.with_name(journal.name + SUFFIX))
-
-
 def _optuna_storage(place: str | Path | None, locks: TrialLocks | None) -> BaseStorage | str | None:
     from optuna.storages import GrpcStorageProxy, JournalStorage
-    from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock, JournalRedisBackend
+    from optuna.storages.journal import JournalRedisBackend
 
     try:
         if isinstance(place, Path):
-            lock = JournalFileOpenLock(str(place))
-            return JournalStorage(
-                LockedJournal(place, locks) if locks else JournalFileBackend(str(place), lock_obj=lock)
-            )
+            assert locks is not None, "a journal file has locks"
+            return JournalStorage(LockedJournal(place, locks))
         if place is not None and place.startswith("redis"):
             return JournalStorage(JournalRedisBackend(place))
         if place is not None and place.startswith("grpc://"):

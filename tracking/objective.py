@@ -1,4 +1,6 @@
-"""`ObjectiveScorer`: HOTA, group_F1 and their mean, for tuning and rewards that score one truth again and again.
+"""The tuning objective alone, computed quickly and repeatedly on one truth; equal to the objective of `evaluate`.
+
+`ObjectiveScorer`: HOTA, group_F1 and their mean, for tuning and rewards that score one truth again and again.
 
 The scores equal those of `tracking.scoring.evaluate`, by the same functions of tracking.scoring. The truth's side is
 prepared once. Only one step is replaced: of groups that must be derived from tracks, only the members are computed
