@@ -34,6 +34,12 @@ def finite_mean(values: Iterable[float]) -> float:
     return sum(known) / len(known) if known else float("nan")
 
 
+def mean_of_finite(values: Array) -> float:
+    """Returns the mean of the values that are neither nan nor infinite, nan if there are none."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
 def mean_interval(values: Array) -> tuple[Array, Array, Array]:
     """Returns mean, low end and high end, (K,) each, of Student's 95 % intervals of the mean over S sequences."""
     known = np.isfinite(values)

@@ -83,11 +83,8 @@ class PreparedTracker:
             with user_code(lambda error: tracker_failed(self.name, part, place, error)):
                 yield
         except FlockscopeError as error:
-            raise _with_file(error, self.sequence) from error.__cause__
-
-
-def _with_file(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
-    return error if error.file else error.replaced(file=sequence.source.get("path", sequence.name))
+            path = self.sequence.source.get("path", self.sequence.name)
+            raise (error if error.file else error.replaced(file=path)) from error.__cause__
 
 
 def prepare(

@@ -210,13 +210,17 @@ class StoredPictures:
             raise error
         return path
 
+    def body(self, name: str) -> bytes:
+        """Returns the bytes of a file, checked as by `checked`."""
+        return self.checked(name).read_bytes()
+
     def one(self, stream: str, index: int) -> NDArray[Any]:
         """Returns picture `index` (from 1) of a stream of picture files: BGR, or codes of ids and disparity."""
         import cv2
 
         name = streams.file_name(stream, self.images, index)
         mode = cv2.IMREAD_UNCHANGED if stream in streams.EXACT else cv2.IMREAD_COLOR
-        body = self.checked(name).read_bytes()
+        body = self.body(name)
         picture = cv2.imdecode(np.frombuffer(body, np.uint8), mode) if body else None  # OpenCV refuses no bytes
         if picture is None or picture.dtype != (np.uint16 if stream in streams.EXACT else np.uint8):
             raise InputError(file=self.folder / name, got="no readable picture", expected="a picture", remedy=REDO)

@@ -20,7 +20,7 @@ from sim import hashing
 from sim.io.files import tables
 from sim.io.files.own_files import Marks, is_ours
 from sim.io.files.tables import Count, FrameNumber, Id, Rate, Scale, validated
-from sim.streams import IMAGES, STREAMS, check_streams, coding, file_name, is_picture
+from sim.streams import IMAGES, STREAMS, check_streams, coding, file_name
 from sim.types import BACKGROUNDS, Sequence
 
 MANIFEST, RUN = "manifest.json", "run.json"
@@ -188,11 +188,6 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         expected = "the size of the pictures"
         raise InputError(file=path, place="sequence.image_size", got="null", expected=expected, remedy=REDO)
     return manifest
-
-
-def pictures_of(manifest: dict[str, Any]) -> tuple[str, ...]:
-    """Returns the files of a manifest that hold pictures; their hash is checked when they are read."""
-    return tuple(filter(is_picture, manifest["files"]))
 
 
 def read_whole_manifest(folder: Path) -> dict[str, Any]:
