@@ -7,6 +7,7 @@ files, names and command lines is made safe to print: no control characters, and
 from __future__ import annotations
 
 import unicodedata
+from functools import partial
 from typing import ClassVar, Self
 
 # the parts of an error, and how many characters of each its line shows at most
@@ -51,7 +52,7 @@ class FlockscopeError(Exception):
         return {name: getattr(self, name) for name in PARTS}
 
     def __reduce__(self) -> tuple[object, ...]:
-        return (_rebuild, (type(self), self.as_dict()))
+        return partial(type(self), **self.as_dict()), ()
 
 
 class InputError(FlockscopeError):
@@ -68,10 +69,6 @@ class OrderError(WorkError):
     """An order of a scenario's script did not come true with one seed; the scenario may work with others."""
 
 
-def _rebuild(kind: type[FlockscopeError], parts: dict[str, str]) -> FlockscopeError:
-    return kind(**parts)
-
-
 # unicode categories that are never printed: control (as ESC), format (as right-to-left marks), surrogates, and
 # separators of lines and paragraphs
 CONTROL = ("Cc", "Cf", "Cs", "Zl", "Zp")
@@ -81,16 +78,13 @@ def printable(text: str, keep: str = "") -> str:
     """Returns the text with each control character, but those of `keep`, as an escape that a terminal shows."""
     if text.isprintable():
         return text
-    return "".join([c if c.isprintable() or c in keep or not is_control(c) else _escape(c) for c in text])
+    hidden = {c for c in text if not c.isprintable() and c not in keep and is_control(c)}
+    return "".join(c.encode("unicode_escape").decode() if c in hidden else c for c in text)
 
 
 def is_control(character: str) -> bool:
     """Returns True for a character that is never printed."""
     return unicodedata.category(character) in CONTROL
-
-
-def _escape(character: str) -> str:
-    return character.encode("unicode_escape").decode("ascii")
 
 
 def counted(number: int, noun: str) -> str:

@@ -23,6 +23,7 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer, Scores, weighted_scorers
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.people_comparison import IncomparableError, Similarity
+from tracking.stats import mean_of_finite
 
 if TYPE_CHECKING:
     import pyarrow
@@ -100,7 +101,7 @@ class ComparedRuns:
             ends = np.concatenate([*(getattr(one, part) for one in of_oracles), getattr(ranking, part)])
             columns[part] = np.clip(ends, CATALOGUE[key].low, CATALOGUE[key].high).tolist()
         for each in CATALOGUE:
-            means = [_mean(_values(rows[name], each)) for name in columns["run"]]
+            means = [mean_of_finite(_values(rows[name], each)) for name in columns["run"]]
             if np.isfinite(means).any():
                 columns[each] = means
         return pa.table(columns)
@@ -112,11 +113,6 @@ class ComparedRuns:
 
 def _values(scores: SequenceOf[Scores | None], key: str) -> Array:
     return np.array([float("nan") if one is None else one[key] for one in scores])
-
-
-def _mean(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else float("nan")
 
 
 def compare(

@@ -7,7 +7,7 @@ The random numbers are fixed, so that the same input gives the same interval.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from math import ceil, sqrt
 from typing import Literal
 
@@ -26,6 +26,18 @@ SURE = 60.0  # s: the interval of a shorter recording is only indicative.
 
 # What values a score can have: 0 to 1; up to 1; numbers of things; above 0; any.
 Scale = Literal["share", "below one", "count", "length", "plain"]
+
+
+def finite_mean(values: Iterable[float]) -> float:
+    """Returns the mean of the values that are not nan, nan if there are none. Infinite values are kept."""
+    known = [v for v in values if v == v]
+    return sum(known) / len(known) if known else float("nan")
+
+
+def mean_of_finite(values: Array) -> float:
+    """Returns the mean of the values that are neither nan nor infinite, nan if there are none."""
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")
 
 
 def mean_interval(values: Array) -> tuple[Array, Array, Array]:

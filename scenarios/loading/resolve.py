@@ -177,7 +177,7 @@ def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
 
     Settings are applied to each entry, after the entry's own.
     """
-    settings, suite = tuple(set), _suite_file(name)
+    settings, suite = tuple(set), suite_file(name)
     if suite is not None:
         return _entries(suite, settings)
     scenario = load(name, settings)
@@ -189,7 +189,7 @@ def rows(name: str) -> list[SuiteEntry]:
 
     The scenario of each can be given to `load`, whatever the working folder of the suite's file.
     """
-    suite = _suite_file(name)
+    suite = suite_file(name)
     if suite is None:
         return [SuiteEntry(name=load(name).name, scenario=name)]
     found: dict[tuple[str, tuple[str, ...]], SuiteEntry] = {}
@@ -204,7 +204,12 @@ def rows(name: str) -> list[SuiteEntry]:
     return list(found.values())
 
 
-def _suite_file(name: str) -> Path | None:
+def is_catalogued(name: str) -> bool:
+    """Returns True if `resolve` takes the name for a scenario or suite, and not for a folder of that name."""
+    return name.endswith(".toml") or name.startswith("suite:") or name in (*names(), *suite_names())
+
+
+def suite_file(name: str) -> Path | None:
     """Returns the file of the suite that a name stands for, None for a scenario."""
     if name.startswith("suite:"):
         return find_suite(name.removeprefix("suite:"))

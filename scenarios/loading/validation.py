@@ -21,11 +21,6 @@ EXPECTED = {
     "string_pattern_mismatch": "a name: a letter, then letters, digits, '_', '.' or '-'",
 }
 TAGS = {"number", "distribution", "point", "word"}  # of the discriminators of values, in pydantic's locations
-# remedies for keys that other keys have replaced
-REPLACED = {
-    "noise_px": "errors of boxes are shares of their height: set box_noise.scale (1 = default, 0 = none), or across, "
-    "foot, top and width of box_noise"
-}
 
 M = typing.TypeVar("M", bound=BaseModel)
 
@@ -85,7 +80,7 @@ def _words(error: Any, path: KeyPath) -> tuple[str, str, str]:
         return ctx["got"], ctx["expected"], ctx["remedy"]
     if kind == "unknown_key":
         key = str(ctx["key"])
-        return f"unknown key {key!r}", "a known key", REPLACED.get(key) or did_you_mean(key, ctx["known"])
+        return f"unknown key {key!r}", "a known key", did_you_mean(key, ctx["known"])
     if kind == "missing" and isinstance(path[-1], int):
         return got, f"at least {path[-1] + 1} numbers", "correct the list"
     if kind == "missing":

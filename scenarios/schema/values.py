@@ -74,7 +74,10 @@ class Distribution(Model):
         if self.choice is not None:
             return sum(v < x if strictly else v <= x for v in self.choice) / len(self.choice)
         if self.poisson is not None:
-            return poisson_share(self.poisson, math.ceil(x) - 1 if strictly else math.floor(x)) if x >= 0 else 0.0
+            from scipy.special import pdtr
+
+            k = math.ceil(x) - 1 if strictly else math.floor(x)
+            return float(pdtr(k, self.poisson)) if k >= 0 else 0.0
         if self.exponential is not None:
             return -math.expm1(-max(x, 0.0) / self.exponential)
         low, high = self.uniform if self.uniform is not None else (0.0, 0.0)
@@ -127,13 +130,6 @@ def within(low: float, high: float, unit: str = "") -> AfterValidator:
         return value
 
     return AfterValidator(check)
-
-
-def poisson_share(mean: float, k: int) -> float:
-    """Returns the probability that a Poisson distribution of this mean gives at most k."""
-    last = min(k, math.ceil(mean + 40 * math.sqrt(mean) + 40))  # what lies above has no share
-    logs = (n * math.log(mean) - mean - math.lgamma(n + 1) for n in range(last + 1))
-    return min(1.0, math.fsum(map(math.exp, logs)))
 
 
 def share_within(value: Value, low: float, high: float) -> float:

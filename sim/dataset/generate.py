@@ -256,8 +256,6 @@ def generate(
         InputError: An argument is wrong, a folder holds another sequence, or all failures are InputErrors.
         WorkError: Sequences failed, more than 5 % were left out, or workers were lost. The other sequences are made.
     """
-    if workers.count < 1:
-        raise InputError(place="workers", got=workers.count, expected="1 or more", remedy="correct --workers")
     split, root = split_of(seeds), Path(out) if workers.cluster is None else Path(out).absolute()
     folder = root / f"flockscope-{split}"
     settings, stride, images = tuple(set), stored.get("stride", 1), stored.get("images", "jpg")

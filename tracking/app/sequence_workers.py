@@ -15,6 +15,7 @@ from sim.io.formats.detector_boxes import with_boxes
 from sim.io.formats.options import parse_box_scale
 from sim.io.source import open_source
 from sim.types import Sequence
+from tracking.app.progress import ProgressMeter
 
 J = TypeVar("J")
 R = TypeVar("R")
@@ -67,6 +68,23 @@ class _Outcome:
     warnings: tuple[str, ...] = ()
 
 
+def results_over_sequences(
+    what: str,
+    function: Callable[[Sequence, J], R],
+    sequences: SequenceOf[Sequence],
+    jobs: SequenceOf[J],
+    source: OpenedAs,
+    workers: int,
+) -> list[R]:
+    """Returns function(sequence, job) for each sequence and its job, and shows the progress as `what`."""
+    found: list[R] = []
+    with ProgressMeter(what, len(sequences)) as meter:
+        for result in over_sequences(function, sequences, jobs, source, workers):
+            meter.step(sequences[len(found)].name)
+            found.append(result)
+    return found
+
+
 def over_sequences(
     function: Callable[[Sequence, J], R],
     sequences: SequenceOf[Sequence],
@@ -84,7 +102,7 @@ def over_sequences(
     tasks = [_Task(source, k, function, job) for k, job in enumerate(jobs)]
 
     def lost(task: _Task, error: WorkError) -> _Outcome:
-        return _Outcome(error=WorkError(**{**error.as_dict(), "place": sequences[task.index].name}))
+        return _Outcome(error=error.replaced(place=sequences[task.index].name))
 
     with start_workers(workers) as run:
         for outcome in results_in_order(partial(run, on_loss=lost), _outcome, tasks):  # type: ignore[arg-type]

@@ -117,11 +117,10 @@ def _sources_of(
         return [item]
     if isinstance(item, Sequence):
         return [Source(item.name, int(item.source.get("seed", 0)), sequence=item)]
-    from scenarios.loading.resolve import names, resolve, suite_names
+    from scenarios.loading.resolve import is_catalogued, resolve
 
     text = str(item)
-    known = text.endswith(".toml") or text.startswith("suite:") or text in (*names(), *suite_names())
-    if not known and Path(item).exists():
+    if not is_catalogued(text) and Path(item).exists():
         return _stored(Path(item))
     return [Source(e.name, seed, entry=e) for e in resolve(text, settings) for seed in seeds]
 

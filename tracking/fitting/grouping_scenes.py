@@ -28,12 +28,9 @@ MOST_PAIRS = 300  # Pairs of a scene that are kept, drawn at random: bounds memo
 
 @dataclass(frozen=True)
 class PairScene:
-    """One scene as rows of pairs, sorted by pair, then step (`pair_evidence`)."""
+    """One scene as R rows of pairs, sorted by pair, then step (`pair_evidence`)."""
 
-    name: str  # of the suite or scenario
-    seconds: float  # length of a step, s
     pair: Ints
-    step: Ints
     values: np.ndarray  # (R, len(NAMES)), float32
     together: Bools  # (R,): True if the two are in one true group in the step's last frame
 
@@ -51,15 +48,14 @@ class Walkers:
 
 def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScene]:
     """Yields two scenes for each entry of the named scenarios, suites or *.toml files and each seed."""
-    for name, entries in [(name, resolve(name)) for name in names]:
-        for entry in entries:
-            for seed in seeds:
-                truth = simulated(entry, seed)
-                begin = BEGINS[seed % len(BEGINS)] if truth.length / truth.fps >= LEAST + max(BEGINS) else 0.0
-                for rough in (False, True):
-                    found = pair_scene(name, walkers(truth, seed, entry.repeat, rough=rough, begin=begin))
-                    if len(found.pair):
-                        yield found
+    for entry in [entry for name in names for entry in resolve(name)]:
+        for seed in seeds:
+            truth = simulated(entry, seed)
+            begin = BEGINS[seed % len(BEGINS)] if truth.length / truth.fps >= LEAST + max(BEGINS) else 0.0
+            for rough in (False, True):
+                found = pair_scene(walkers(truth, seed, entry.repeat, rough, begin))
+                if found is not None:
+                    yield found
 
 
 def simulated(entry: Entry, seed: int) -> Truth:
@@ -69,11 +65,11 @@ def simulated(entry: Entry, seed: int) -> Truth:
     return truth
 
 
-def walkers(truth: Truth, seed: int, repeat: int, *, rough: bool, begin: float = 0.0, every: int = 0) -> Walkers:
+def walkers(truth: Truth, seed: int, repeat: int, rough: bool, begin: float) -> Walkers:
     """Returns the people of a truth from `begin` s on; rough: with a detector's errors, else those of labels."""
     erring = with_label_errors(truth, DETECTED if rough else SURVEYED, seed, repeat)
     assert erring.pos is not None
-    every = every or (1 if rough else max(1, round(truth.fps / SLOW)))
+    every = 1 if rough else max(1, round(truth.fps / SLOW))
     since = round(begin * truth.fps)
     ids, column = np.unique(truth.id, return_inverse=True)
     frame = truth.frame - 1 - since
@@ -87,19 +83,19 @@ def walkers(truth: Truth, seed: int, repeat: int, *, rough: bool, begin: float =
     return Walkers(frame[kept] // every, column[kept], erring.pos[kept], labels, truth.fps / every)
 
 
-def pair_scene(name: str, people: Walkers) -> PairScene:
-    """Returns the rows of pairs of people, with the truth of each."""
+def pair_scene(people: Walkers) -> PairScene | None:
+    """Returns the rows of pairs of people, with the truth of each; None without pairs."""
     size = frames_per_step(people.fps)
     length, count = people.labels.shape
-    seconds = size / people.fps
     places, times = step_positions(people.frame, people.column, people.pos, length, count, people.fps)
-    parts = [(r.pair, r.step, r.a, r.b, r.values.astype(np.float32)) for r in evidence(places, times, seconds)]
+    parts = [
+        (r.pair, r.step, r.a, r.b, r.values.astype(np.float32)) for r in evidence(places, times, size / people.fps)
+    ]
     if not parts:
-        none = np.zeros(0, np.int64)
-        return PairScene(name, seconds, none, none, np.zeros((0, 0), np.float32), none.astype(bool))
+        return None
     pair, step, a, b, values = (np.concatenate(x) for x in zip(*parts, strict=True))
     first, second = (people.labels[step * size, p] for p in (a, b))
     kept = np.flatnonzero(rng(len(pair), "label", 1).permutation(int(pair.max()) + 1)[pair] < MOST_PAIRS)
     order = kept[np.lexsort((step[kept], pair[kept]))]
     together = (first >= 0) & (first == second)
-    return PairScene(name, seconds, pair[order], step[order], values[order], together[order])
+    return PairScene(pair[order], values[order], together[order])

@@ -38,19 +38,15 @@ class EventRows:
     features: Array  # (R, 6): as group_events_kernels
     event: Ints  # (R,): MERGE, SPLIT or NONE
     possible: Bools  # (R, 3): one person does not split, a group without another one does not merge
-    seconds: float  # time that the partitions cover
 
     @classmethod
     def joined(cls, parts: Iterable[EventRows]) -> EventRows:
         """Returns all rows together."""
-        given = [*parts, cls(np.zeros((0, FEATURES)), np.zeros(0, np.int64), np.zeros((0, 3), bool), 0.0)]
-        features, event, possible = (
-            np.concatenate([getattr(p, name) for p in given]) for name in ("features", "event", "possible")
-        )
-        return cls(features, event, possible, sum(p.seconds for p in given))
+        given = [*parts, cls(np.zeros((0, FEATURES)), np.zeros(0, np.int64), np.zeros((0, 3), bool))]
+        return cls(*(np.concatenate([getattr(p, name) for p in given]) for name in ("features", "event", "possible")))
 
 
-def event_rows(truth: Truth, lag: float, seed: int, *, wrong: bool = True) -> EventRows:
+def event_rows(truth: Truth, lag: float, seed: int) -> EventRows:
     """Returns the rows of a sequence; lag: s between the two times of the features; seed: of the errors."""
     assert truth.pos is not None
     assert truth.vel is not None
@@ -62,11 +58,10 @@ def event_rows(truth: Truth, lag: float, seed: int, *, wrong: bool = True) -> Ev
         i, j = i + a.start, j + b.start
         states = [_erring(np.concatenate([truth.pos[r], truth.vel[r]], axis=1), draws) for r in (i, j)]
         found.append(partition_rows(states[0], states[1], truth.group[i], truth.group[j]))
-        if wrong and (early - 1) // stride % WRONG == 0 and len(i) > 1:
+        if (early - 1) // stride % WRONG == 0 and len(i) > 1:
             copy = wrong_partition(truth.group[i], states[0], draws)
             found.append(partition_rows(states[0], states[1], copy, truth.group[j]))
-    parts = EventRows.joined(found)
-    return EventRows(parts.features, parts.event, parts.possible, truth.length / truth.fps)
+    return EventRows.joined(found)
 
 
 def wrong_partition(group: Ints, state: Array, draws: np.random.Generator) -> Ints:
@@ -111,7 +106,7 @@ def partition_rows(early: Array, late: Array, before: Ints, after: Ints) -> Even
             event[g] = SPLIT
         elif other >= 0 and own[0] >= 0 and (after[members[other]] == own[0]).any():
             event[g] = MERGE
-    return EventRows(features[:count], event, possible, 0.0)
+    return EventRows(features[:count], event, possible)
 
 
 def fit_events(rows: EventRows) -> dict[str, list[float]]:

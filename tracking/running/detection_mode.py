@@ -29,11 +29,6 @@ from tracking.running.tracks_check import finite
 InputKind = Literal["points", "boxes", "pixels", "stereo"]
 
 
-def runs_own_detector(needs: tuple[str, ...], sequence: Sequence) -> bool:
-    """Returns True if a tracker with these needs can run its own detector on the sequence's pictures."""
-    return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
-
-
 def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: DetectionMode | None) -> DetectionMode:
     """Returns the requested mode if it can work; without one the first of image, file, truth that can."""
     able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
@@ -51,7 +46,7 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
 
 def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
     if mode == "image":
-        return runs_own_detector(needs, sequence)
+        return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
     takes = {"boxes", "points"} & set(needs)
     return bool(takes) and (sequence.has_detections if mode == "file" else sequence.load_truth is not None)
 
@@ -90,8 +85,6 @@ def frames_with_detections(
     if mode == "file":
         found: list[Detections | None] = [f.detections for f in sequence.without_pictures()]
     else:
-        from tracking.running.detection_mode import from_truth
-
         found = list(from_truth(sequence, sensor, seed))
     nonempty = [d for d in found if d is not None and len(d.pos)]
     if nonempty and "points" not in needs and all(d.box is None for d in nonempty):

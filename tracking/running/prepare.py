@@ -83,12 +83,8 @@ class PreparedTracker:
             with user_code(lambda error: tracker_failed(self.name, part, place, error)):
                 yield
         except FlockscopeError as error:
-            raise _with_file(error, self.sequence) from error.__cause__
-
-
-def _with_file(error: FlockscopeError, sequence: Sequence) -> FlockscopeError:
-    path = sequence.source.get("path", sequence.name)
-    return error if error.file else type(error)(**{**error.as_dict(), "file": path})
+            path = self.sequence.source.get("path", self.sequence.name)
+            raise (error if error.file else error.replaced(file=path)) from error.__cause__
 
 
 def prepare(

@@ -13,8 +13,8 @@ import numpy as np
 
 from sim.types import Bools, Groups, Ints, Tracks, Truth
 from tracking.scoring.annotated_frames import first_seen, widest_step
-from tracking.scoring.events import COUNTS_AS, HEADLINE, LATE, MatchedEvents, match_events
-from tracking.scoring.events_by_true_people import HULL_TIME, events_of_hulls, tracked_events, true_events
+from tracking.scoring.events import LATE, MatchedEvents, match_events
+from tracking.scoring.events_by_true_people import CHANGES, HULL_TIME, events_of_hulls, tracked_events, true_events
 from tracking.scoring.people_and_groups import GroupRows, PersonRows, Surface, group_rows, people_inside
 
 CORE = 1.0  # s around the start of each true merge or split that the core scores leave out
@@ -96,8 +96,7 @@ def _true_rows(groups: GroupRows, mapping: Ints) -> Ints:
 
 def near_changes(truth: Truth) -> Bools:
     """Returns which frame numbers 0 … length are at most 1 s from the start of a true merge or split, (length + 1,)."""
-    kinds = {*HEADLINE, *(kind for kind, counts_as in COUNTS_AS.items() if counts_as in HEADLINE)}
-    starts = np.array([e.start for e in truth.events or () if e.kind in kinds], float)
+    starts = np.array([e.start for e in truth.events or () if e.kind in CHANGES], float)
     frame = np.arange(truth.length + 1)
     away = np.abs(frame[:, None] - starts[None]).min(axis=1, initial=np.inf)
     return np.asarray(away <= CORE * truth.fps + 1e-9)

@@ -17,7 +17,7 @@ from scenarios.errors import InputError, counted
 from scenarios.loading.toml_files import closest
 from tracking.config import Config
 from tracking.environment.episodes import Episode
-from tracking.stats import paired
+from tracking.stats import finite_mean, paired
 
 SPEED = "frames/s"  # Key of the tracker's speed. It is the only goal that differs between two runs of the same episode.
 
@@ -48,12 +48,6 @@ class Goal:
     def gain(self, before: float, after: float) -> float:
         """Returns by how much the value `after` is better than `before`, negative if worse, nan if one is nan."""
         return after - before if self.higher else before - after
-
-
-def finite_mean(values: Iterable[float]) -> float:
-    """Returns the mean of the values that are not nan, nan if there are none. Infinite values are kept."""
-    known = [v for v in values if v == v]
-    return sum(known) / len(known) if known else float("nan")
 
 
 def goals_of(keys: Iterable[str]) -> tuple[Goal, ...]:

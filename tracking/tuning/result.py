@@ -63,7 +63,7 @@ def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: C
     for changed, ink, words in ((True, ORANGE, "changed by the winner"), (False, BLUE, "left at its default")):
         names = [name for name in ranked if (getattr(plan.base, name) != getattr(config, name)) == changed]
         bars = axes.barh([ranked.index(name) for name in names], [importance[n] for n in names], color=ink, label=words)
-        ends = [dict.fromkeys(_short(getattr(one, name)) for one in (plan.base, config)) for name in names]
+        ends = [dict.fromkeys(short(getattr(one, name)) for one in (plan.base, config)) for name in names]
         axes.bar_label(bars, [f"{' → '.join(e)} {units[n]}" for e, n in zip(ends, names, strict=True)], padding=4)
     axes.set_yticks(range(len(ranked)), ranked)
     axes.set_xlim(right=1.4 * max(importance.values()))
@@ -108,7 +108,8 @@ def _title(plan: SearchPlan) -> str:
     return f"{plan.tracker_name} on {plan.suite_name}"
 
 
-def _short(value: object) -> str:
+def short(value: object) -> str:
+    """Returns the value of a parameter as text, a number with four digits."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 

@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.loading import resolve, toml_files
+from scenarios.loading.resolve import is_catalogued, read_suite, suite_file
+from scenarios.loading.toml_files import find
 from sim.dataset.splits import SPLITS, split_of
 from sim.hashing import runtime
 from sim.types import DetectionMode
@@ -66,21 +67,16 @@ def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
 def count_scenes(names: Sequence[str], settings: Sequence[str], option: str) -> int:
     """Returns the number of scenes that the suites, scenarios and files `names` contain, each counted with one seed."""
     for name in names:
-        if not name.endswith(".toml") and not _is_known(name) and Path(name).exists():
+        if not is_catalogued(name) and Path(name).exists():
             raise InputError(
                 file=name, place=option, got="a recording or stored data",
                 expected="scenes to simulate: nothing is tuned on what was recorded",
                 remedy="give a suite or scenario; `flockscope fit sensor` imitates the detector of a recording",
             )  # fmt: skip
     try:
-        return len(sources(list(names), (0,), tuple(settings)))
+        return len(sources(names, (0,), settings))
     except InputError as error:
-        raise error if error.place else InputError(**{**error.as_dict(), "place": option}) from None
-
-
-def episode_sources(names: Sequence[str], seeds: range, settings: Sequence[str]) -> tuple[Source, ...]:
-    """Returns one source for every scene of the suites `names` with every seed."""
-    return sources(list(names), seeds, tuple(settings))
+        raise error if error.place else error.replaced(place=option) from None
 
 
 def default_check_suite(names: Sequence[str]) -> str | None:
@@ -95,21 +91,10 @@ def shared_scenarios(names: Sequence[str], others: Sequence[str]) -> list[str]:
 
 
 def _files(name: str) -> list[str]:
-    bare = name.removeprefix("suite:")
-    if bare != name or (bare in toml_files.suite_names() and bare not in toml_files.names()) or _is_suite(bare):
-        path = resolve.find_suite(bare)
-        return [
-            str(toml_files.find(line.scenario, beside=path.parent).resolve()) for line in resolve.read_suite(path).entry
-        ]
-    return [str(toml_files.find(bare).resolve())]
-
-
-def _is_suite(name: str) -> bool:
-    return name.endswith(".toml") and "entry" in toml_files.parse(toml_files.find(name))
-
-
-def _is_known(name: str) -> bool:
-    return name.startswith("suite:") or name in (*toml_files.names(), *toml_files.suite_names())
+    suite = suite_file(name)
+    if suite is None:
+        return [str(find(name).resolve())]
+    return [str(find(row.scenario, beside=suite.parent).resolve()) for row in read_suite(suite).entry]
 
 
 @dataclass(frozen=True)
@@ -170,20 +155,20 @@ class SearchPlan:
     @cached_property
     def training(self) -> tuple[Source, ...]:
         """The sources of the training episodes of each trial: every scene of the suite with every training seed."""
-        return episode_sources(self.suite, self.seeds.training, self.scene_settings)
+        return sources(self.suite, self.seeds.training, self.scene_settings)
 
     @cached_property
     def validation(self) -> tuple[Source, ...]:
         """The sources of the episodes that choose among the best trials."""
-        return episode_sources(self.suite, self.seeds.validation, self.scene_settings)
+        return sources(self.suite, self.seeds.validation, self.scene_settings)
 
     @cached_property
     def tests(self) -> dict[str, tuple[Source, ...]]:
         """The sources of the test episodes, by `suite_name` and `check_name`."""
-        found = {self.suite_name: episode_sources(self.suite, self.seeds.test, self.scene_settings)}
+        found = {self.suite_name: sources(self.suite, self.seeds.test, self.scene_settings)}
         if self.check is not None and self.check_name is not None:
             sensor = [setting for setting in self.scene_settings if setting.startswith("sensor.")]
-            found[self.check_name] = episode_sources((self.check,), self.seeds.check, sensor)
+            found[self.check_name] = sources((self.check,), self.seeds.check, sensor)
         return found
 
     def identity(self) -> dict[str, Any]:

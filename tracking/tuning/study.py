@@ -18,6 +18,7 @@ a limit. It then gets an estimate of its value.
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import time
@@ -37,7 +38,8 @@ from optuna.trial import FrozenTrial, TrialState
 
 from scenarios.errors import FlockscopeError, InputError
 from tracking.environment.episodes import Episode
-from tracking.tuning.comparison import Goal, TrialRecord, finite_mean
+from tracking.stats import finite_mean
+from tracking.tuning.comparison import Goal, TrialRecord
 from tracking.tuning.options import Progress
 from tracking.tuning.parallel_episodes import PlayEpisodes
 from tracking.tuning.sampler import (
@@ -63,46 +65,41 @@ class TrialLocks:
     """
 
     def __init__(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
         self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+
+    def lock(self, byte: int, wait: bool = True) -> None:
+        """Locks a byte (offset in the file) for this process. Raises OSError if it is taken and `wait` is False."""
+        fcntl.lockf(self._file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte)
+
+    def release(self, byte: int) -> None:
+        """Releases this process's lock on a byte; does nothing if it holds none."""
+        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, byte)
 
     @contextmanager
     def locked(self, byte: int) -> Iterator[None]:
-        """Holds the lock on a byte (offset in the file) for the time of the context; waits until it is free."""
-        import fcntl
-
-        fcntl.lockf(self._file, fcntl.LOCK_EX, 1, byte)
+        """Holds the lock on a byte for the time of the context; waits until it is free."""
+        self.lock(byte)
         try:
             yield
         finally:
-            fcntl.lockf(self._file, fcntl.LOCK_UN, 1, byte)
-
-    @contextmanager
-    def choosing(self) -> Iterator[None]:
-        """Holds the lock under which a trial is chosen for the time of the context; waits until it is free."""
-        with self.locked(CHOOSING):
-            yield
+            self.release(byte)
 
     def hold_trial(self, number: int) -> None:
         """Locks trial `number` (from 0) for this process until `release_trial` or `close`."""
-        import fcntl
-
-        fcntl.lockf(self._file, fcntl.LOCK_EX, 1, FIRST_TRIAL + number)
+        self.lock(FIRST_TRIAL + number)
 
     def release_trial(self, number: int) -> None:
         """Releases this process's lock on trial `number` (from 0); does nothing if it holds none."""
-        import fcntl
-
-        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST_TRIAL + number)
+        self.release(FIRST_TRIAL + number)
 
     def is_abandoned(self, number: int) -> bool:
         """Returns True if no other process holds the lock on trial `number` (from 0)."""
-        import fcntl
-
         try:
-            fcntl.lockf(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, FIRST_TRIAL + number)
+            self.lock(FIRST_TRIAL + number, wait=False)
         except OSError:
             return False
-        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, FIRST_TRIAL + number)
+        self.release_trial(number)
         return True
 
     def close(self) -> None:
@@ -238,7 +235,7 @@ class SearchStudy:
         return self._locks is not None
 
     def _choosing(self) -> AbstractContextManager[None]:
-        return nullcontext() if self._locks is None else self._locks.choosing()
+        return nullcontext() if self._locks is None else self._locks.locked(CHOOSING)
 
     def _repeat(self, abandoned: FrozenTrial) -> None:
         number = abandoned.user_attrs.get(AGAIN, abandoned.number)
@@ -254,7 +251,7 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
     """Opens or creates the study `name` for the time of the context, and yields it as a `SearchStudy`."""
     with quiet_optuna():
         place = storage if storage is None or "://" in str(storage) else Path(storage)
-        locks = _trial_locks(place) if isinstance(place, Path) else None
+        locks = TrialLocks(place.with_name(place.name + SUFFIX)) if isinstance(place, Path) else None
         try:
             study = _create(plan, place, _optuna_storage(place, locks), name)
             yield SearchStudy(plan, study, locks, storage)
@@ -302,25 +299,14 @@ def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> N
         )  # fmt: skip
 
 
-def _trial_locks(journal: Path) -> TrialLocks | None:
-    try:
-        import fcntl  # noqa: F401
-    except ImportError:
-        return None
-    journal.parent.mkdir(parents=True, exist_ok=True)
-    return TrialLocks(journal.with_name(journal.name + SUFFIX))
-
-
 def _optuna_storage(place: str | Path | None, locks: TrialLocks | None) -> BaseStorage | str | None:
     from optuna.storages import GrpcStorageProxy, JournalStorage
-    from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock, JournalRedisBackend
+    from optuna.storages.journal import JournalRedisBackend
 
     try:
         if isinstance(place, Path):
-            lock = JournalFileOpenLock(str(place))
-            return JournalStorage(
-                LockedJournal(place, locks) if locks else JournalFileBackend(str(place), lock_obj=lock)
-            )
+            assert locks is not None, "a journal file has locks"
+            return JournalStorage(LockedJournal(place, locks))
         if place is not None and place.startswith("redis"):
             return JournalStorage(JournalRedisBackend(place))
         if place is not None and place.startswith("grpc://"):

@@ -3,12 +3,13 @@
 What is written gets a temporary name, then the name of its target. An OSError becomes a WorkError if the disk is full,
 else an InputError. Killed runs leave files with names .partial-…-<12 hex digits>, which `remove_partials` deletes. A
 power failure may damage files; their hashes in the seals tell. A lock on an output folder makes a second command fail
-at once. On systems and file systems without such locks, nothing is locked.
+at once. On file systems without such locks, nothing is locked.
 """
 
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import re
 import shutil
@@ -49,12 +50,6 @@ def hold_lock(root: Path) -> AbstractContextManager[None]:
 
 @contextmanager
 def _lock(root: Path) -> Iterator[None]:
-    try:
-        import fcntl
-    except ImportError:
-        root.mkdir(parents=True, exist_ok=True)
-        yield
-        return
     while True:
         root.mkdir(parents=True, exist_ok=True)
         try:

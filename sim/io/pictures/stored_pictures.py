@@ -25,7 +25,7 @@ from sim.io.files.tables import Column, StoredTable, read_table, table_bytes
 from sim.io.pictures import video_files
 from sim.io.pictures.picture_folder import require_size
 from sim.io.pictures.video_files import VideoWriter, write_video
-from sim.io.store.seal import REDO, file_facts
+from sim.io.store.seal import REDO, damaged_files, file_facts
 from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
 
 JPG_QUALITY = 95
@@ -200,20 +200,19 @@ class StoredPictures:
         """File type of the pictures; "png" without pictures or with 16-bit streams only."""
         return self.manifest.get("images") or "png"
 
-    def body(self, name: str) -> bytes:
-        """Returns the bytes of a file; raises InputError if they are not those that the manifest names."""
+    def checked(self, name: str) -> Path:
+        """Returns the path of a file; raises InputError if its content is not that which the manifest names."""
         path, facts = self.folder / name, self.manifest["files"].get(name)
-        wanted = "a file that manifest.json names" if facts is None else f"the {facts['bytes']} bytes of manifest.json"
-        try:
-            size = path.stat().st_size if path.is_file() else None  # a FIFO would block its reader
-            body = path.read_bytes() if size is not None and facts is not None and size == facts["bytes"] else b""
-        except OSError:
-            size = None
-        if size is None:
-            raise InputError(file=path, got="missing", expected=wanted, remedy=REDO)
-        if facts is None or size != facts["bytes"] or hashing.file_hash(body) != facts["sha256"]:
-            raise InputError(file=path, got=f"altered: {size} bytes", expected=wanted, remedy=REDO)
-        return body
+        if facts is None:
+            got, expected = "a manifest that does not name it", "a file that manifest.json names"
+            raise InputError(file=path, got=got, expected=expected, remedy=REDO)
+        for error in damaged_files(self.folder, {name: facts}):
+            raise error
+        return path
+
+    def body(self, name: str) -> bytes:
+        """Returns the bytes of a file, checked as by `checked`."""
+        return self.checked(name).read_bytes()
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
         """Returns picture `index` (from 1) of a stream of picture files: BGR, or codes of ids and disparity."""
@@ -238,9 +237,7 @@ class StoredPictures:
         if streams.suffix(stream, self.images) != "mp4":
             yield from (self.one(stream, k) for k in wanted or range(1, count + 1))
             return
-        name = streams.file_name(stream, self.images, 1)
-        self.body(name)
-        path, found = self.folder / name, 0
+        path, found = self.checked(streams.file_name(stream, self.images, 1)), 0
         for found, (_, picture) in enumerate(
             video_files.decode_frames(path, video_files.index_packets(path), wanted), 1
         ):

@@ -20,11 +20,11 @@ from sim import hashing
 from sim.io.files import tables
 from sim.io.files.own_files import Marks, is_ours
 from sim.io.files.tables import Count, FrameNumber, Id, Rate, Scale, validated
-from sim.streams import IMAGES, STREAMS, check_streams, coding, file_name, is_picture
+from sim.streams import IMAGES, STREAMS, check_streams, coding, file_name
 from sim.types import BACKGROUNDS, Sequence
 
 MANIFEST, RUN = "manifest.json", "run.json"
-# what every manifest.json and run.json of ours has, also of an older version, and no other program writes
+# what every manifest.json and run.json of ours has, and no other program writes
 MARKS: Marks = {"scenario_hash": str, "content_hash": str}
 RUN_MARKS: Marks = {"boxes": str}
 
@@ -121,12 +121,9 @@ def with_hash(document: dict[str, Any]) -> dict[str, Any]:
 
 def _read(path: Path, kind: type[_Sealed], remedy: str) -> dict[str, Any]:
     document = tables.read_document(path, OLD if kind is _Run else remedy)
-    if "sha256" not in document:
-        expected = "one that names each file with its hash"
-        raise InputError(file=path, got="no hashes: an older version", expected=expected, remedy=OLD)
     # A manifest may be reformatted; run.json is compared down to the last blank.
     changed = kind is _Run and path.read_bytes() != tables.json_document(document)
-    if changed or document["sha256"] != with_hash(document)["sha256"]:
+    if changed or document.get("sha256") != with_hash(document)["sha256"]:
         raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=remedy)
     validated(path, document, kind, remedy)
     return document
@@ -188,11 +185,6 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         expected = "the size of the pictures"
         raise InputError(file=path, place="sequence.image_size", got="null", expected=expected, remedy=REDO)
     return manifest
-
-
-def pictures_of(manifest: dict[str, Any]) -> tuple[str, ...]:
-    """Returns the files of a manifest that hold pictures; their hash is checked when they are read."""
-    return tuple(filter(is_picture, manifest["files"]))
 
 
 def read_whole_manifest(folder: Path) -> dict[str, Any]:

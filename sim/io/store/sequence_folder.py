@@ -25,7 +25,7 @@ from sim.io.store import seal, truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.group_files import read_script
 from sim.io.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
-from sim.streams import check_streams
+from sim.streams import check_streams, is_picture
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, Image, Sequence, Truth
 
 
@@ -141,7 +141,8 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     read.
     """
     manifest = read_manifest(folder)
-    for error in seal.damaged_files(folder, manifest["files"], size_only=seal.pictures_of(manifest)):
+    pictured = tuple(filter(is_picture, manifest["files"]))  # their hash is checked when they are read
+    for error in seal.damaged_files(folder, manifest["files"], size_only=pictured):
         raise error
     about, has, pictures = manifest["sequence"], manifest["files"].keys(), StoredPictures(folder, manifest)
     size, length, fps = about["image_size"], about["length"], about["fps"]

@@ -62,12 +62,12 @@ def _table(truth: Truth) -> bytes:
     columns += [Column(name, array, unit) for name, unit, array in singles if array is not None]
     facts = {
         "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": tables.nan_to_none(truth.px_per_m),
-        "labelled": None if truth.labelled is None else _spans(truth.labelled),
+        "labelled": None if truth.labelled is None else spans(truth.labelled),
     }  # fmt: skip
     return table_bytes(columns, facts)
 
 
-def _spans(flags: Bools) -> list[list[int]]:
+def spans(flags: Bools) -> list[list[int]]:
     """Returns [first frame, last frame], from 1 and inclusive, of each run of True in flags (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [[int(a) + 1, int(b)] for a, b in edges.reshape(-1, 2)]

@@ -71,8 +71,8 @@ def content_hash(folder: str | Path) -> str:
     return hashing.dataset_hash(found)
 
 
-def _problem(path: Path, got: object, expected: object, place: str = "", remedy: str = seal.REDO) -> InputError:
-    return InputError(file=path, place=place, got=got, expected=expected, remedy=remedy)
+def _problem(path: Path, got: object, expected: object, remedy: str = seal.REDO) -> InputError:
+    return InputError(file=path, got=got, expected=expected, remedy=remedy)
 
 
 def _left_behind(root: Path) -> Iterator[InputError]:

@@ -197,7 +197,7 @@ def test_settings_after_it_win_and_hiding_stays(tmp_path: Path) -> None:
     [
         ("", "'sensor'"), ("[sensor]\ndetect_prop = 0.5", "detect_prob"),
         ("[sensor]\ndetect_prob = 1.5", "sensor.detect_prob"), ("[camera]\nfps = 5\n[sensor]\n", "'camera'"),
-        ("[sensor]\nnoise_px = 3", "set box_noise.scale"), ("[sensor]\nbox_noise = { acros = [0, 1] }", "'across'"),
+        ("[sensor]\nnoise_px = 3", "or 'box_noise'"), ("[sensor]\nbox_noise = { acros = [0, 1] }", "'across'"),
         ("[sensor]\nmiss_memory = [{ share = 0.5, time = 1.0 }]\npersistence = 0.5", "miss_memory or persistence"),
         ("[sensor]\nmiss_memory = [{ share = 0.6, time = 1.0 }, { share = 0.6, time = 2.0 }]", "at most 1"),
         ("[sensor]\ntrue_scores = [0.5, 0.4]", "do not decrease"), ("schema = 2\n[sensor]\n", "schema"),

@@ -50,7 +50,7 @@ def test_the_fit_finds_its_weights():
     true = {"merge_weights": [-1, 0.5, 0, -1, 1, 0, 0.5], "split_weights": [0.5, 0, -1, 0, 0.5, 1, -1]}
     possible = np.ones((150_000, 3), bool)
     possible[:50_000, SPLIT] = False
-    rows = EventRows(features, np.zeros(150_000, np.int64), possible, 0.0)
+    rows = EventRows(features, np.zeros(150_000, np.int64), possible)
     p = np.exp(log_probabilities(rows, true))
     event = (rng.random((150_000, 1)) > np.cumsum(p, axis=1)).sum(axis=1)
     fitted = fit_events(dataclasses.replace(rows, event=event))

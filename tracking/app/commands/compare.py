@@ -22,7 +22,7 @@ from sim.io.files.atomic import write_file
 from sim.io.files.tables import json_document, read_json
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import checked_key, empty_table, with_title
+from tracking.app.commands.score_tables import checked_key, new_table, with_title
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import paired
 
@@ -125,11 +125,7 @@ def _verdict(mean: float, low: float, high: float, tolerance: float) -> str:
 
 
 def _table(rows: list[dict[str, Any]], sequences: int) -> Any:
-    table = empty_table()
-    table.add_column("score")
-    for name in ("baseline", "now", "difference", "95 % interval"):
-        table.add_column(name, justify="right")
-    table.add_column("verdict")
+    table = new_table(["score"], ["baseline", "now", "difference", "95 % interval"], ["verdict"])
     for row in rows:
         ends = f"{row['low']:+.4f} to {row['high']:+.4f}"
         numbers = f"{row['baseline']:.4f}", f"{row['now']:.4f}", f"{row['difference']:+.4f}", ends

@@ -10,13 +10,13 @@ from sim.types import Sequence
 from tracking.app.command_options import ErrorsOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score import matched_tracks
-from tracking.app.commands.score_tables import empty_table, with_title
-from tracking.app.progress import ProgressMeter
-from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.commands.score_tables import new_table, with_title
+from tracking.app.sequence_workers import OpenedAs, results_over_sequences
 from tracking.app.stored_tracks import StoredTracks
 from tracking.errors.found import CauseRow, RunErrors, errors_of_run, sums_by_cause
 from tracking.errors.repairs import SHOWN
 from tracking.scoring.people_comparison import Similarity
+from tracking.stats import finite_mean
 
 Job = tuple[StoredTracks, Similarity | None, BoxScale | None]
 
@@ -29,11 +29,7 @@ def errors(options: ErrorsOptions) -> CommandResult:
     sequences = source.open()
     stored, box_scale = matched_tracks(sequences, options.tracks, options.box_scale)
     jobs: list[Job] = [(one, options.similarity, box_scale) for one in stored]
-    found: list[RunErrors] = []
-    with ProgressMeter("errors", len(sequences)) as meter:
-        for one in over_sequences(errors_of, sequences, jobs, source, options.workers):
-            meter.step(sequences[len(found)].name)
-            found.append(one)
+    found = results_over_sequences("errors", errors_of, sequences, jobs, source, options.workers)
     names = [sequence.name for sequence in sequences]
     fps = [sequence.fps for sequence in sequences]
     causes = sums_by_cause(found)
@@ -64,23 +60,16 @@ def errors_of(sequence: Sequence, job: Job) -> RunErrors:
 def _tables(names: list[str], fps: list[float], found: list[RunErrors], causes: list[CauseRow], limit: int) -> Any:
     from rich.console import Group
 
-    lost = empty_table()
-    for name in ("kind", "cause"):
-        lost.add_column(name)
-    for name in ("errors", "seconds", *SHOWN):
-        lost.add_column(name, justify="right")
+    lost = new_table(["kind", "cause"], ["errors", "seconds", *SHOWN])
     for row in causes:
         gains = (_number(row.gains[k], "+.3f") for k in SHOWN)
         lost.add_row(row.kind, row.cause, str(row.errors), f"{row.seconds:.1f}", *gains)
-    left = {k: _mean([run.left[k] for run in found]) for k in SHOWN}
+    left = {k: finite_mean(run.left[k] for run in found) for k in SHOWN}
     lost.add_row("position", "", "", "", *(_number(left[k], "+.3f") for k in SHOWN))
-    now = "  ".join(f"{k} {_number(_mean([run.scores[k] for run in found]), '.3f')}" for k in SHOWN)
+    now = "  ".join(f"{k} {_number(finite_mean(run.scores[k] for run in found), '.3f')}" for k in SHOWN)
     every = [(name, rate, error) for name, rate, run in zip(names, fps, found, strict=True) for error in run.errors]
     dearest = sorted(every, key=lambda item: -(item[2].cost or 0.0))[:limit]
-    listed = empty_table()
-    for name in ("sequence", "frames", "kind", "who", "cause"):
-        listed.add_column(name, overflow="fold")
-    listed.add_column("cost", justify="right")
+    listed = new_table(["sequence", "frames", "kind", "who", "cause"], ["cost"])
     for name, rate, error in dearest:
         facts = error.facts(rate)
         span = f"{facts['start']}–{facts['end']}"
@@ -98,8 +87,3 @@ def _tables(names: list[str], fps: list[float], found: list[RunErrors], causes: 
 
 def _number(value: float | None, form: str) -> str:
     return "–" if value is None or value != value else format(value, form)
-
-
-def _mean(values: list[float]) -> float:
-    known = [value for value in values if value == value]
-    return sum(known) / len(known) if known else float("nan")

@@ -33,6 +33,7 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     from tracking.fitting.detection_matching import match_sequence
     from tracking.fitting.error_statistics import error_statistics, simulated_detections
     from tracking.fitting.sensor import fit_matched
+    from tracking.stats import mean_of_finite
 
     out = option_parsing.output_file(options.out, ".toml")
     recordings = _open(options.sources, options.fps)
@@ -40,7 +41,7 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     profile = fit_matched(matched)
     measured = error_statistics(matched)
     per_seed = [error_statistics([simulated_detections(m, profile, seed) for m in matched]) for seed in CHECK_SEEDS]
-    simulated = {name: _mean([drawn[name] for drawn in per_seed]) for name in measured}
+    simulated = {name: mean_of_finite(np.array([drawn[name] for drawn in per_seed])) for name in measured}
     people = sum(len(m.match) for m in matched)
     names = ", ".join(printable(recording.name) for recording in recordings)
     write_file(out, dump_sensor(profile, f"A detector's profile, of {people} labelled people in {names}").encode())
@@ -57,11 +58,6 @@ def _open(sources: Sequence[Path], fps: float | None) -> list[Recording]:
     from sim.io.source import open_source
 
     return [sequence for source in sources for sequence in open_source(source, fps=fps, images=False)]
-
-
-def _mean(values: list[float]) -> float:
-    known = [v for v in values if np.isfinite(v)]
-    return float(np.mean(known)) if known else float("nan")
 
 
 def fit_grouping(options: FitGroupingOptions) -> CommandResult:

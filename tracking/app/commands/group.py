@@ -24,7 +24,7 @@ from sim.types import EVENT_KINDS, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import GroupOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import empty_table, with_title
+from tracking.app.commands.score_tables import new_table, with_title
 from tracking.app.progress import ProgressMeter
 from tracking.app.stored_tracks import StoredTracks, find_tracks, run_folders
 from tracking.grouping.belief import Belief, pair_probabilities
@@ -79,10 +79,7 @@ def group_tables(rows: SequenceOf[Row]) -> Any:
 
 
 def _counts_table(title: str, rows: SequenceOf[Row], cells: Callable[[SequenceOf[Row]], dict[str, object]]) -> Any:
-    table = empty_table()
-    table.add_column("sequence", overflow="fold")
-    for name in cells(rows):
-        table.add_column(name, justify="right", no_wrap=True)
+    table = new_table(["sequence"], cells(rows))
     for row in rows:
         table.add_row(printable(row["sequence"]), *map(str, cells([row]).values()))
     if len(rows) > 1:
@@ -107,10 +104,7 @@ def _group_counts(rows: SequenceOf[Row]) -> dict[str, object]:
 
 def _longest(row: Row) -> list[Any]:
     kept = sorted(row["groups"], key=lambda g: -g["seconds"])[:LISTED]
-    table = empty_table()
-    for name in ("group", "from, s", "to, s", "most at a time"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("members", overflow="fold")
+    table = new_table((), ["group", "from, s", "to, s", "most at a time"], ["members"])
     for g in (g for g in row["groups"] if g in kept):
         times = [f"{frame / row['fps']:.1f}" for frame in (g["start"] - 1, g["end"])]
         members = shortened(" ".join(map(str, g["members"])), LONGEST_LIST)

@@ -16,7 +16,7 @@ from sim.io.files.own_files import refuse_foreign_file
 from tracking.app import option_parsing
 from tracking.app.command_options import MinimizeOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import empty_table, number
+from tracking.app.commands.score_tables import new_table, number
 from tracking.app.progress import ProgressMeter
 from tracking.stress.failures import CRASH, EpisodeOf, Outcome, Subject, parse_failure, play_episode
 from tracking.stress.minimize import Search
@@ -266,11 +266,9 @@ def _text(data: dict[str, Any]) -> Any:
     lines = [f"{', '.join(changes)}; {confirmed}; {counted(data['episodes'], 'episode')}; {state}"]
     left = "difficulties that it needs" if data["complete"] else "difficulties that are left"
     lines += [f"{left}: {', '.join(data['needed'])}"] if data["needed"] else []
-    table = empty_table()
     scored = data["while"].split("<")[0].split(">")[0]
     keys = list(dict.fromkeys([*LISTED, *([scored] if scored in data["seeds"][0]["scores"] else [])]))
-    for name in ("seed", data["while"], *keys):
-        table.add_column(name, justify="right")
+    table = new_table((), ["seed", data["while"], *keys])
     for row in data["seeds"]:
         cells = (number(key, row["scores"].get(key, float("nan"))) for key in keys)
         table.add_row(str(row["seed"]), "yes" if row["fails"] else "no", *cells)

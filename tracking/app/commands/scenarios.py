@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.loading import toml_files
-from scenarios.loading.resolve import Entry, dump, find_suite, load, names, read_suite, resolve, suite_names
+from scenarios.loading.resolve import Entry, dump, find_suite, load, names, read_suite, resolve, suite_file, suite_names
 from scenarios.schema.scenario import Scenario
 from tracking.app.command_options import ScenariosOptions
 from tracking.app.command_result import CommandResult
@@ -43,19 +42,13 @@ def catalogue() -> CommandResult:
 def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResult:
     """Returns a scenario in words with its plan, which it writes to `drawing` (SVG), or a suite's entries."""
     entries = resolve(name, scenario_settings(settings))
-    if not _is_suite(name):
+    if suite_file(name) is None:
         return _explain_scenario(entries[0].scenario, drawing)
     if drawing is not None:
         raise InputError(
             place="--out", got=f"the suite {name}", expected="one scenario", remedy="name one of its entries"
         )
     return _list_entries(name, entries)
-
-
-def _is_suite(name: str) -> bool:
-    if name.endswith(".toml"):
-        return not name.startswith("suite:") and "entry" in toml_files.parse(toml_files.find(name))
-    return name.startswith("suite:") or name not in names()
 
 
 def _explain_scenario(scenario: Scenario, drawing: Path | None) -> CommandResult:

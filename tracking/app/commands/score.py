@@ -11,13 +11,13 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.formats.options import BoxScale, parse_box_scale
 from sim.io.store.seal import tracked_hash
-from sim.types import Array, Sequence
+from sim.types import Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_ranking import is_class, ranking, short_notes, sparse_notes
 from tracking.app.commands.score_tables import Means, SequenceScores, tables
-from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequences
-from tracking.app.sequence_workers import OpenedAs
+from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequence
+from tracking.app.sequence_workers import OpenedAs, results_over_sequences
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.comparison import check_blocks
 from tracking.scoring.catalogue import ALL, CATALOGUE
@@ -51,7 +51,7 @@ def _score_all(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence
     found, box_scale = matched_tracks(sequences, Path(options.tracks[0]), options.box_scale)
     how = (options.similarity, options.group_match, options.blocks)
     jobs = [ScoringJob((stored,), *how, box_scale=box_scale) for stored in found]
-    return score_sequences(sequences, jobs, source, options.workers)
+    return results_over_sequences("score", score_sequence, sequences, jobs, source, options.workers)
 
 
 def matched_tracks(
@@ -100,16 +100,7 @@ def _row_data(row: SequenceScores) -> dict[str, Any]:
 
 def summary(rows: list[SequenceScores]) -> Means:
     """Returns the mean over sequences of each score by key, with its 95 % interval, within the score's range."""
-    mean, low, high = mean_interval(_values(rows))
+    mean, low, high = mean_interval(np.array([[row.scores[key] for key in CATALOGUE] for row in rows]))
     least, most = (np.array([getattr(score, end) for score in ALL]) for end in ("low", "high"))
-    return _by_key((mean, np.maximum(low, least), np.minimum(high, most)))
-
-
-def _values(rows: list[SequenceScores]) -> Array:
-    """Returns the scores as an array (sequences, K), columns in the catalogue's order, nan where unknown."""
-    return np.array([[row.scores[key] for key in CATALOGUE] for row in rows])
-
-
-def _by_key(ends: tuple[Array, Array, Array]) -> Means:
-    columns = zip(CATALOGUE, *(end.tolist() for end in ends), strict=True)
-    return {key: {"mean": mean, "low": low, "high": high} for key, mean, low, high in columns}
+    ends = (end.tolist() for end in (mean, np.maximum(low, least), np.minimum(high, most)))
+    return {key: {"mean": m, "low": a, "high": b} for key, m, a, b in zip(CATALOGUE, *ends, strict=True)}

@@ -30,12 +30,12 @@ from tracking.app.commands.score_tables import (
     arrow,
     chance,
     checked_key,
-    empty_table,
+    new_table,
     number,
     with_title,
 )
-from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequences
-from tracking.app.sequence_workers import OpenedAs
+from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequence
+from tracking.app.sequence_workers import OpenedAs, results_over_sequences
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.comparison import ComparedRuns, joined
 from tracking.ranking import Ranking, rank
@@ -140,7 +140,7 @@ def ranking(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) 
     runs = stored_runs(names, sequences)
     how = (options.similarity, options.group_match, options.blocks)
     jobs = [ScoringJob(sources, *how, oracles=True) for sources in zip(*runs, strict=True)]
-    found = score_sequences(sequences, jobs, source, options.workers)
+    found = results_over_sequences("score", score_sequence, sequences, jobs, source, options.workers)
     notes = short_notes(sequences[0], found[0].scores[0]) if options.blocks else []
     every = ranked_runs(list(names), sequences, found, options.by, notes)
     if options.csv is not None:
@@ -296,13 +296,8 @@ def _text(every: RankedRuns, all_sequences: bool) -> Any:
 def _ranking_table(every: RankedRuns) -> Any:
     keys = shown_columns(every.table, every.key)
     inputs = {row["input"] for row in every.table[len(every.comparison.oracles) :]}
-    table = empty_table()
-    for name in ("rank", "run"):
-        table.add_column(name, no_wrap=True)
-    for name in (arrow(every.key), "95 % interval", *keys):
-        table.add_column(name, justify="right", no_wrap=True)
-    if len(inputs) > 1:
-        table.add_column("input", overflow="fold")
+    numbers = [arrow(every.key), "95 % interval", *keys]
+    table = new_table(["rank", "run"], numbers, ["input"] if len(inputs) > 1 else [])
     for row in every.table:
         cells = [rank_words(row), printable(shortened(row["run"], 2 * LONGEST_INPUT))]
         cells += [number(every.key, row["mean"], mean=True), _interval(every.key, row)]
@@ -336,11 +331,8 @@ def _interval(key: str, ends: Mapping[str, Any]) -> str:
 
 def _scenario_table(every: RankedRuns) -> Any:
     """Returns a table of the mean of the ranking score by scenario, oracle and run; the best run has a star if sure."""
-    c, table = every.comparison, empty_table()
-    shown = [row["run"] for row in every.table]
-    for name in ("scenario", "sequences", *shown):
-        title = printable(shortened(name, LONGEST_INPUT))
-        table.add_column(title, justify="left" if name == "scenario" else "right", no_wrap=True)
+    c, shown = every.comparison, [row["run"] for row in every.table]
+    table = new_table(["scenario"], ["sequences", *(printable(shortened(name, LONGEST_INPUT)) for name in shown)])
     scores = c.rows()
     for scenario, found in every.by_scenario.items():
         rows = every.scenarios[scenario]
@@ -356,9 +348,7 @@ def _scenario_table(every: RankedRuns) -> Any:
 
 
 def _sequence_table(c: ComparedRuns) -> Any:
-    table, rows = empty_table(), c.rows()
-    for name in ("sequence", "run", *map(arrow, SHOWN)):
-        table.add_column(name, justify="left" if name in ("sequence", "run") else "right", no_wrap=True)
+    table, rows = new_table(["sequence", "run"], map(arrow, SHOWN)), c.rows()
     for k, sequence in enumerate(c.sequences):
         for name, row in rows.items():
             if (one := row[k]) is not None:
@@ -386,9 +376,7 @@ def _pair_differences(every: RankedRuns) -> Any:
 
 
 def _difference_table(first: str, rows: Mapping[str, tuple[str, Mapping[str, Any]]]) -> Any:
-    table = empty_table()
-    for name in (first, "difference", "95 % interval", ""):
-        table.add_column(name, justify="left" if name in (first, "") else "right", no_wrap=True)
+    table = new_table([first], ["difference", "95 % interval"], [""])
     for name, (key, d) in rows.items():
         sure = f"surely {d['sure']}" if d["sure"] else ""  # of the run named first
         table.add_row(name, number(key, d["mean"], mean=True), _interval(key, d), sure)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,10 +79,7 @@ def _any_known(keys: Sequence[str], means: Means) -> bool:
 
 
 def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> Any:
-    table = empty_table()
-    table.add_column("sequence", overflow="fold")
-    for key in keys:
-        table.add_column(_heading(key, rows), justify="right", no_wrap=True)
+    table = new_table(["sequence"], [_heading(key, rows) for key in keys])
     for row in rows:
         table.add_row(printable(row.sequence), *(number(key, row.scores[key]) for key in keys))
     if any(math.isfinite(means[key]["low"]) for key in keys):
@@ -109,11 +106,18 @@ def checked_key(key: str, better: Sequence[str] = ("higher", "lower")) -> str:
     return key
 
 
-def empty_table() -> Any:
-    """Returns a table of rich without columns and frame."""
+def new_table(words: Iterable[str] = (), numbers: Iterable[str] = (), more: Iterable[str] = ()) -> Any:
+    """Returns a table of rich without frame and rows: columns of words, then of numbers, then of words again."""
     from rich.table import Table
 
-    return Table(box=None, pad_edge=False, header_style="bold")
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for name in words:
+        table.add_column(name, overflow="fold")
+    for name in numbers:
+        table.add_column(name, justify="right", no_wrap=True)
+    for name in more:
+        table.add_column(name, overflow="fold")
+    return table
 
 
 def with_title(title: str, table: Any, foot: str = "") -> Any:

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
 from typing import Any
 
 from sim.io.formats.options import BoxScale
 from sim.types import Sequence
 from tracking.app.commands.track import TrackerSetup
-from tracking.app.progress import ProgressMeter
-from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.app.stored_tracks import StoredTracks
 from tracking.comparison import ComparedSequence, compare_one
 from tracking.running.run import TrackingRun, input_summary
@@ -54,18 +51,6 @@ class ScoredSequence:
     def given(self) -> list[str]:
         """The detections that each run got, in words; "" without run.json."""
         return [input_summary(info) for info in self.infos]
-
-
-def score_sequences(
-    sequences: SequenceOf[Sequence], jobs: SequenceOf[ScoringJob], source: OpenedAs, workers: int
-) -> list[ScoredSequence]:
-    """Returns the scores of each sequence with its job, and shows the progress."""
-    found: list[ScoredSequence] = []
-    with ProgressMeter("score", len(sequences)) as meter:
-        for one in over_sequences(score_sequence, sequences, jobs, source, workers):
-            meter.step(sequences[len(found)].name)
-            found.append(one)
-    return found
 
 
 def score_sequence(sequence: Sequence, job: ScoringJob) -> ScoredSequence:

@@ -16,7 +16,7 @@ from sim.types import Array, DetectionMode
 from tracking.app import option_parsing
 from tracking.app.command_options import StressOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import checked_key, empty_table, with_title
+from tracking.app.commands.score_tables import checked_key, new_table, with_title
 from tracking.app.progress import ProgressMeter
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval
@@ -229,11 +229,7 @@ def _notes(data: dict[str, Any]) -> Iterator[str]:
 
 
 def _table(first: str, columns: Iterable[str]) -> Any:
-    table = empty_table()
-    table.add_column(first, justify="right")
-    for name in columns:
-        table.add_column(printable(name), justify="right")
-    return table
+    return new_table((), [first, *map(printable, columns)])
 
 
 def _number(value: float | None) -> str:

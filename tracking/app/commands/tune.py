@@ -52,6 +52,7 @@ CommandLine.__doc__ = "Search a tracker's parameters on simulated scenes; measur
 def tune(options: Any) -> CommandResult:
     """Searches parameters as `tracking.tune` does, and returns what was gained."""
     from tracking.tuning import tune as search
+    from tracking.tuning.result import short
 
     given = {f.name: getattr(options, f.name) for f in fields(options)}
     sensor = option_parsing.sensor_settings(given.pop("sensor"))
@@ -66,12 +67,8 @@ def tune(options: Any) -> CommandResult:
         result = search(**given, progress=meter.update)
     params = type(result.config).params()
     changed = [
-        f"{name}: {_short(old)} → {_short(new)} {params[name].unit}".rstrip()
+        f"{name}: {short(old)} → {short(new)} {params[name].unit}".rstrip()
         for name, (old, new) in result.changed.items()
     ]
     text = "\n".join([*result.lines(), *changed, f"{options.out}, all figures and plots beside it"])
     return CommandResult({**result.as_dict(), "file": options.out}, text)
-
-
-def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from sim.io.files.atomic import write_file
+from sim.io.store.truth_files import spans
 from sim.types import Array, Camera, GroupEvent, Scene, Sequence, Tracks, Truth
 from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
 from tracking.app.replay_page.video import PageVideo
@@ -197,10 +198,7 @@ def _points(rows: PageRows) -> list[Array]:
 
 def _unlabelled(truth: Truth | None) -> list[list[int]]:
     """Returns [first, last], frames from 1 and both inclusive, of each stretch of frames without group labels."""
-    if truth is None or truth.labelled is None or truth.labelled.all():
-        return []
-    edge = np.flatnonzero(np.diff(np.r_[True, truth.labelled, True].astype(int)))
-    return [[int(a) + 1, int(b)] for a, b in edge.reshape(-1, 2)]
+    return [] if truth is None or truth.labelled is None else spans(~truth.labelled)
 
 
 def _near_strangers(truth: Truth | None) -> list[list[int]]:

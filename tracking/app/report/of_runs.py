@@ -14,11 +14,10 @@ from sim.types import Sequence
 from tracking.app.commands.score_ranking import RankedRuns, rank_words, ranked_runs, stored_runs, verdict
 from tracking.app.commands.score_tables import SIMILARITY
 from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, read_runs, score_runs
-from tracking.app.progress import ProgressMeter
 from tracking.app.replay_page.page import Run
 from tracking.app.report.content import HeatCell, HeatMap, RankedRow, Report, Speed
 from tracking.app.report.moments import COSTS, Candidate, cause_bars, moments, shown_errors
-from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.sequence_workers import OpenedAs, results_over_sequences
 from tracking.errors.found import RunErrors
 
 
@@ -37,12 +36,7 @@ def judged_runs(
     """Returns scores and errors of runs, by name the text of the command line: stored tracks or a tracker class."""
     runs = stored_runs(names, sequences)
     jobs = [ScoringJob(sources, oracles=True) for sources in zip(*runs, strict=True)]
-    found: list[JudgedRuns] = []
-    with ProgressMeter("report", len(sequences)) as meter:
-        for one in over_sequences(_judge, sequences, jobs, source, workers):
-            meter.step(sequences[len(found)].name)
-            found.append(one)
-    return found
+    return results_over_sequences("report", _judge, sequences, jobs, source, workers)
 
 
 def report_of_runs(

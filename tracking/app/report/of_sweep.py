@@ -20,7 +20,7 @@ from tracking.errors.found import RunErrors
 from tracking.ranking import rank
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import mean_interval
+from tracking.stats import mean_interval, mean_of_finite
 from tracking.stress.episodes import ORACLE
 from tracking.stress.sweep import Scene, Sweep, generate_command
 from tracking.tuning.parallel_episodes import opened_sources
@@ -79,12 +79,7 @@ def _ranking(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[RankedRow]:
 
 
 def _means(sweep: Sweep, name: str, scenes: SequenceOf[Scene]) -> dict[str, float]:
-    return {key: _mean(_values(sweep, name, scenes, key)) for key in CATALOGUE}
-
-
-def _mean(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else math.nan
+    return {key: mean_of_finite(_values(sweep, name, scenes, key)) for key in CATALOGUE}
 
 
 def _ranking_words(sweep: Sweep, scenes: SequenceOf[Scene]) -> list[str]:
@@ -93,7 +88,7 @@ def _ranking_words(sweep: Sweep, scenes: SequenceOf[Scene]) -> list[str]:
 
 
 def _cell(sweep: Sweep, name: str, scenes: SequenceOf[Scene]) -> HeatCell:
-    score, best = _mean(_values(sweep, name, scenes)), _mean(_values(sweep, ORACLE, scenes))
+    score, best = (mean_of_finite(_values(sweep, each, scenes)) for each in (name, ORACLE))
     rows = [row for scene in scenes if (row := sweep.row(name, scene)) is not None]
     why = "not played" if not rows else "left out" if all(row["left_out"] for row in rows) else "not scored"
     return HeatCell(score, best, "" if math.isfinite(score) else why)

@@ -80,11 +80,11 @@ def test_a_deleted_or_cut_file_is_named(tmp_path, make_tracks, name):
     assert error.value.file == str(folder / name)
 
 
-def test_a_run_of_an_older_version_is_one_line(tmp_path, make_tracks):
+def test_a_run_without_hashes_is_one_line(tmp_path, make_tracks):
     folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
     (folder / "run.json").write_bytes(tables.json_document({"format": 1, **INFO, "boxes": "measured"}))
     for _ in range(2):
-        with pytest.raises(InputError, match=r"older version.*track again"):
+        with pytest.raises(InputError, match=r"altered fields.*track again"):
             read_tracks(folder)
         (folder / "tracks.parquet").unlink(missing_ok=True)
 

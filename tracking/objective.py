@@ -1,4 +1,6 @@
-"""`ObjectiveScorer`: HOTA, group_F1 and their mean, for tuning and rewards that score one truth again and again.
+"""The tuning objective alone, computed quickly and repeatedly on one truth; equal to the objective of `evaluate`.
+
+`ObjectiveScorer`: HOTA, group_F1 and their mean, for tuning and rewards that score one truth again and again.
 
 The scores equal those of `tracking.scoring.evaluate`, by the same functions of tracking.scoring. The truth's side is
 prepared once. Only one step is replaced: of groups that must be derived from tracks, only the members are computed
@@ -20,7 +22,7 @@ from sim.types import Bools, Ints, Tracks, Truth
 from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import names_groups, with_groups
 from tracking.grouping.grouping_choice import groups_now
-from tracking.grouping.tracks_table import TracksTable, tabulate
+from tracking.grouping.tracks_table import tabulate
 from tracking.scoring.evaluation import Scorer, objective_of
 from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
 from tracking.scoring.group_scores import f1, groups_found, shared_members
@@ -38,7 +40,8 @@ def derived_members(tracks: Sequence[Tracks], fps: float, px_per_m: float, label
     Both are sorted by group, groups by frame. labelled (length + 1,): bool by frame number.
     """
     table = tabulate(tracks, fps, px_per_m, default_belief().smooth)
-    group = _group_of_rows(table, fps, names_groups(tracks))
+    # a label for each row, equal for members of one group in a frame, -1 alone
+    group = table.group if names_groups(tracks) else groups_now(table, fps, default_belief())
     order = np.lexsort((group, table.frame))
     order = order[(group[order] >= 0) & labelled[table.frame[order] + 1]]
     frame, label = table.frame[order], group[order]
@@ -47,11 +50,6 @@ def derived_members(tracks: Sequence[Tracks], fps: float, px_per_m: float, label
     several = np.bincount(number, minlength=1)[number] > 1
     order, new = order[several], new[several]
     return FrameRows(table.frame[order] + 1, table.id[order]), np.cumsum(new) - 1
-
-
-def _group_of_rows(table: TracksTable, fps: float, named: bool) -> Ints:
-    """Returns a label for each of the R table rows, equal for members of one group in a frame, -1 alone."""
-    return table.group if named else groups_now(table, fps, default_belief())
 
 
 class ObjectiveScorer:
