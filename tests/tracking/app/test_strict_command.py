@@ -44,6 +44,8 @@ def test_an_option_given_twice_is_refused(words: tuple[str, ...], option: str, f
 
 def test_every_command_with_its_options_is_tested() -> None:
     assert {option for _, option, _, several in OPTIONS if several} == {
+        "--line",
+        "--zone",
         "--set",
         "--suite",
         "--objective",
