@@ -46,13 +46,6 @@ def test_truth_of_a_script_that_did_not_come_true_is_refused(monkeypatch: pytest
     assert observe(scenario(), motion, check=False).truth is not None
 
 
-def test_simulation_is_repeatable_and_hides_by_name() -> None:
-    hide = {"hide": [{"start": 0.5, "end": 1.5, "group": "b"}]}
-    a, b = (sim.sequence.simulate(scenario(duration=2.0, sensor=hide), 3) for _ in range(2))
-    for x, y in zip(a, b, strict=True):
-        assert np.array_equal(x.detections.pos, y.detections.pos)
-
-
 SMALL = {"image": [160, 120], "focal_px": 125}
 
 

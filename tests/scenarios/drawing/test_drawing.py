@@ -50,10 +50,3 @@ def test_every_catalogue_scenario_is_drawn() -> None:
         scenario = load(name)
         assert scenario.about in text(scenario)
         assert name in words_of(svg(scenario))
-
-
-def test_stops_and_scatter_in_words(path: Path) -> None:
-    stops = "[{ at = [9, 4], until = [4, 8], stay = 1 }, { at = [8, 4], stay = { uniform = [2, 3] }, members = 1 }]"
-    said = text(load(path, [f"group.a.stops={stops}", "group.a.scatter=0.5", "group.a.enter=-1"]))
-    assert "stopping at (9, 4) [until 4, 8 s, for 1 s], (8, 4) [for 2 to 3 s, only 1 member]" in said
-    assert "scattered by 0.5 m, entering at -1 s" in said

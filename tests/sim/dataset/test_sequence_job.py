@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from scenarios.errors import InputError, WorkError
+from scenarios.errors import InputError
 from scenarios.loading.resolve import Entry
 from sim.dataset import generate as jobs
 from sim.dataset.generate import (
     JobOutcome,
     SequenceJob,
     is_stored,
-    lost_job,
     run_job,
     stored_manifest,
 )
@@ -86,20 +84,6 @@ def test_who_does_not_see_the_mark_writes_nothing(
     assert run_job(elsewhere) == JobOutcome()
 
 
-@pytest.mark.parametrize("error", [KeyError("k"), WorkError(got="a", expected="b", remedy="c")])
-def test_an_error_of_one_is_not_that_of_all(
-    job: SequenceJob, monkeypatch: pytest.MonkeyPatch, made: FakeSimulator, error: Exception
-) -> None:
-    def simulate(*_: object) -> None:
-        raise error
-
-    monkeypatch.setattr(sys.modules["sim.sequence"], "simulate", simulate)
-    outcome = run_job(job)
-    assert isinstance(outcome.error, WorkError)
-    assert outcome.error.file == "x-s00001"
-    assert not outcome.fatal
-
-
 @pytest.mark.parametrize("name", ["", "thesis.tex", "a/b/thesis.tex"])
 def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: FakeSimulator, name: str) -> None:
     """Before: a folder or file with the name of the sequence was deleted. name: "" for a file."""
@@ -135,9 +119,3 @@ def test_what_differs_is_named(
             (job.folder / "scenario.toml").write_text(unreadable)
         with pytest.raises(InputError, match="scenario_hash"):
             stored_manifest(other)
-
-
-def test_given_up(job: SequenceJob) -> None:
-    outcome = lost_job(job, WorkError(got="an item that killed 3 workers", expected="b", remedy="c"))
-    assert outcome == JobOutcome(outcome.error)
-    assert str(outcome.error).startswith("x-s00001: got an item that killed 3 workers")

@@ -42,18 +42,6 @@ def test_an_option_given_twice_is_refused(words: tuple[str, ...], option: str, f
     assert place == option
 
 
-def test_every_command_with_its_options_is_tested() -> None:
-    assert {option for _, option, _, several in OPTIONS if several} == {
-        "--set",
-        "--suite",
-        "--objective",
-        "--by",
-        "--events",
-        "--vary",
-    }
-    assert {words[0] for words, *_ in OPTIONS} >= {"generate", "track", "score", "export", "fit", "tune", "demo"}
-
-
 def test_an_error_names_the_option_and_its_last_value(capsys) -> None:
     assert run(["generate", "cross", "--seeds", "1:3", "--seeds=4:6", "--out", "x"]) == 2
     assert capsys.readouterr().err == (
@@ -104,12 +92,6 @@ def test_a_number_is_written_in_digits_0_to_9(line: str, text: str, tmp_path: Pa
     assert NUMBERS[line][0] in shown
     assert "expected no exception" not in shown
     assert shown.count("\n") == 1
-
-
-@pytest.mark.parametrize("text", ["1_0", "٣"])
-def test_a_number_of_a_setting_is_written_in_digits_0_to_9(text: str, capsys) -> None:
-    assert run(["track", "blob", "x", "--out", "y", "--set", f"gate={text}"]) == 2
-    assert f"got '{text}'" in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,6 @@ import pytest
 
 import scenarios
 from scenarios.loading.resolve import load
-from sim.io.source import open_source
-from sim.io.store.sequence_folder import write_sequence
-from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
 from sim.types import EVENT_KINDS, Tracks, Truth
 from tests.hand_made import Scene, event, tracks, truth
@@ -69,22 +66,6 @@ def assert_perfect(found: Scores, without: Set[str] = frozenset()) -> None:
         best = CATALOGUE[key].best
         if np.isfinite(value) and np.isfinite(best):
             assert value == pytest.approx(best, abs=1e-6), (key, found.surface, found.group_match)
-
-
-@pytest.mark.parametrize("detections", ["file", "truth"])
-def test_files_are_memory(tmp_path: Path, detections: str) -> None:
-    sequence = simulate(load("party"), 5, streams=())
-    run = track("blob", sequence, detections=detections)
-    write_sequence(tmp_path / "data", sequence, scenario="party", seed=5)
-    write_tracks(tmp_path / "tracks", run, fps=sequence.fps, camera=sequence.camera, info=run.info)
-    (stored,) = open_source(tmp_path / "data")
-    again = read_tracks(tmp_path / "tracks", fps=stored.fps, length=stored.length)
-    for by in ("hull", "members"):
-        was = evaluate(sequence.truth, run, group_match=by)
-        now = evaluate(stored.truth, again, group_match=by)
-        assert (was.similarity, was.surface) == (now.similarity, now.surface)
-        for key, value in was.items():
-            assert now[key] == pytest.approx(value, abs=1e-12, nan_ok=True), key
 
 
 def test_every_score_lies_in_its_range() -> None:
