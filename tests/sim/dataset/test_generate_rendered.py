@@ -12,6 +12,7 @@ import pytest
 from scenarios.loading.resolve import resolve
 from sim.dataset.generate import generate
 from sim.io.store.validate import validate
+from tests.fake_simulator import content
 
 pytestmark = pytest.mark.slow
 
@@ -28,10 +29,6 @@ group = [
     { id = "alone", size = 1, start = [{ uniform = [6, 10] }, 2], goal = [8, 6], repeat = 3 },
 ]
 """
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 def test_however_it_is_made(tmp_path: Path) -> None:

@@ -115,8 +115,6 @@ COMMANDS = {
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
     "group": ("group {data} --out {out}", "group {out}/nothing --out {out}/x"),
     "score": ("score {data} {tracks}", "score {data} {out}/nothing"),
-    "score one": ("score {one} {tracks}/scene-s40000", "score {one} {tracks}/scene-s40001"),
-    "score text": ("score {one} {tracks}/scene-s40000/tracks.mot.txt", "score {one} {one}/gt/groups.csv"),
     "errors": ("errors {data} {tracks}", "errors {data} {out}/nothing"),
     "stress": (
         "stress " + FAKE + " --vary detection --suite {scene} --seeds 0:2 --start 2 --by HOTA --out {out}",
@@ -125,14 +123,6 @@ COMMANDS = {
     "minimize": (
         "minimize {scene} --tracker " + FAKE + " --while HOTA<=1 --confirm 1 --episodes 6 --out {out}/small.toml",
         "minimize {scene} --tracker " + FAKE + " --while HOTTA<0.7 --out {out}/small.toml",
-    ),
-    "minimize RUN": (
-        "minimize {one} {tracks}/scene-s40000 --while HOTA<=1 --confirm 0 --episodes 6 --out {out}/small.toml",
-        "minimize {data} {tracks}/scene-s40000 --while HOTA<=1 --out {out}/small.toml",
-    ),
-    "stress search": (
-        "stress " + FAKE + " --vary detection --search 3 --suite {scene} --seeds 0:2 --by HOTA --out {out}",
-        "stress " + FAKE + " --vary detection --search 3 --episodes 3 --suite {scene} --out {out}/x",
     ),
     "compare": (
         "compare {tracks}/../scores.json {tracks}/../scores.json", "compare {tracks}/../scores.json {out}/nothing.json",
@@ -151,12 +141,10 @@ COMMANDS = {
         "overlay {seen} {tracks}-seen --out {out}/film.mp4",
         "overlay {one} {tracks}/scene-s40000 --out {out}/film.mp4",
     ),
-    "view truth": ("view {one} --out {out}/page.html", "view {scene} --out {out}/page.html"),
     "sheet": ("sheet {one} --out {out}/sheet.png", "sheet {out}/nothing --out {out}/sheet.png"),
     "tune": (TUNE + " --trials 2 --seeds 0", TUNE + " --trials 2 --seeds 0:20000"),
     "validate": ("validate {data}", "validate {out}/nothing"),
     "export csv": ("export csv {data} --out {out}", "export csv {out}/nothing --out {out}/x"),
-    "export csv RUN": ("export csv {tracks} --out {out}", "export csv {tracks} --fps 5 --out {out}"),
     "export parquet": ("export parquet {tracks}/scene-s40000 --out {out}", "export parquet {scene} --out {out}"),
     "export trajnet": ("export trajnet {data} --out {out}", "export trajnet {out}/nothing --out {out}/x"),
     "export pedpy": ("export pedpy {tracks}/scene-s40000 --out {out}", "export pedpy {scene} --out {out}"),

@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from sim import hashing
 from sim.io.files.atomic import lock_folder
 from sim.io.source import open_source
 from sim.io.store.seal import read_run
@@ -66,7 +65,7 @@ def readers(data: Path, tracks: Path, out: Path) -> list[list[object]]:
     ]
 
 
-@pytest.mark.parametrize("name", ["groups.parquet", "events.json", "tracks.mot.txt"])
+@pytest.mark.parametrize("name", ["groups.parquet", "tracks.mot.txt"])
 def test_a_deleted_file_is_no_answer_without_it(made, tracks, tmp_path, capsys, name):
     (tracks / "scene-s40001" / name).unlink()
     for line in readers(made / "data", tracks, tmp_path / "out"):
@@ -142,16 +141,6 @@ def test_python_stores_what_was_tracked(tmp_path, capsys):
     assert "truth_hash" not in made.info, "labels are not read while tracking"
     (walk / "gt" / "gt.txt").write_text(ROWS.replace("12,", "13,"))
     assert "tracks of another walk" in refused(capsys, "score", walk, tmp_path / "t", "--fps", "5")
-
-
-def test_score_hashes_each_file_once(made, capsys, monkeypatch):
-    hashed, file_hash = [], hashing.file_hash
-    monkeypatch.setattr(hashing, "file_hash", lambda body: hashed.append(body) or file_hash(body))
-    assert run(["score", str(made / "data"), str(made / "blob")]) == 0
-    capsys.readouterr()
-    bodies = [path.read_bytes() for path in (made / "blob").rglob("tracks*.*")]
-    assert bodies
-    assert [hashed.count(body) for body in bodies] == [1] * len(bodies)
 
 
 def test_what_was_tracked_before_anybody_labelled_it(tmp_path):

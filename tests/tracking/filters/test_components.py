@@ -36,9 +36,9 @@ def random_set(r):
     )
 
 
-def test_every_prefix_of_a_thousand_random_sets() -> None:
+def test_every_prefix_of_random_sets() -> None:
     verdicts = []
-    for seed in range(1_000):
+    for seed in range(300):
         r = np.random.default_rng(seed)
         points, weights, rule = random_set(r)
         start = int(r.integers(0, len(points) + 1))
@@ -48,16 +48,16 @@ def test_every_prefix_of_a_thousand_random_sets() -> None:
     assert 0.2 < np.mean(verdicts) < 0.8
 
 
-def test_partitions_of_a_thousand_random_sets() -> None:
+def test_partitions_of_random_sets() -> None:
     joined = noise = 0
-    for seed in range(1_000):
+    for seed in range(300):
         points, weights, rule = random_set(np.random.default_rng(seed))
         label, group = linked(points, rule.link), partition(points, weights, rule)
         assert same(label, reference.linked(points, rule.link)), seed
         assert same(group, reference.partition(points, weights, rule)), seed
         joined += group.max() < label.max()
         noise += group.min() < 0
-    assert min(joined, noise) > 100
+    assert min(joined, noise) > 30
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Set
 from pathlib import Path
@@ -17,7 +16,7 @@ from sim.types import EVENT_KINDS, Tracks, Truth
 from tests.hand_made import Scene, event, tracks, truth
 from tracking import track
 from tracking.scoring import evaluate
-from tracking.scoring.catalogue import ALL, CATALOGUE, CORE, table
+from tracking.scoring.catalogue import CATALOGUE, table
 from tracking.scoring.evaluation import IncomparableError, Scores
 
 NAMES = sorted(path.stem for path in Path(scenarios.__file__).parent.glob("*.toml"))
@@ -145,19 +144,3 @@ def test_every_key_of_the_table_is_returned_and_the_other_way_round() -> None:
     returned = set(evaluate(truth(scene), tracks(scene)))
     rows = set(re.findall(r"^\| `([^`]+)` \|", table(), re.MULTILINE))
     assert returned == rows | {f"{key}_core" for key in rows if CATALOGUE[key].family == "groups"}
-
-
-def test_keys_are_unique_and_said_in_full() -> None:
-    assert len(CATALOGUE) == len(ALL)
-    for score in ALL:
-        assert score.meaning, score.key
-        assert score.low < score.high
-        assert (score.better == "neither") <= math.isnan(score.best)
-    core = [score.key for score in ALL if score.family == CORE]
-    assert core == [f"{score.key}_core" for score in ALL if score.family == "groups"]
-
-
-def test_the_command_shows_scores_that_there_are() -> None:
-    from tracking.app.commands.score_tables import SHOWN, TABLES
-
-    assert {*SHOWN, *(key for keys in TABLES.values() for key in keys)} <= set(CATALOGUE)

@@ -10,7 +10,6 @@ from scenarios.errors import InputError
 from sim.types import Sequence, Truth
 from tracking.app.command_options import ViewOptions
 from tracking.app.commands import view
-from tracking.app.report import page
 
 
 @pytest.fixture
@@ -25,20 +24,6 @@ def test_several_runs_need_labels(options: ViewOptions) -> None:
     with pytest.raises(InputError, match="no labels"):
         view.view(options)
     assert not options.out.exists()
-
-
-@pytest.mark.parametrize("alone", [True, False])
-def test_without_the_packages_of_a_report(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, alone: bool) -> None:
-    def missing() -> None:
-        raise InputError(place="report.html", got="no package bokeh", expected="it", remedy="install it")
-
-    monkeypatch.setattr(page, "check_packages", missing)
-    if alone:
-        with pytest.raises(InputError, match="bokeh"):
-            view._can_report(tmp_path / "index.html", alone)
-    else:
-        with pytest.warns(UserWarning, match="bokeh"):
-            assert not view._can_report(tmp_path / "index.html", alone)
 
 
 def test_a_page_of_others_is_not_replaced(options: ViewOptions, monkeypatch: pytest.MonkeyPatch) -> None:
