@@ -75,22 +75,6 @@ def test_there_is_no_cache_without_any_room(package):
     assert done.stdout == "4 None kernels are compiled anew in every \n", done.stderr
 
 
-@pytest.mark.slow
-def test_a_command_in_a_container(package, tmp_path):
-    """A read-only installation and no home: a dataset is made and tracked."""
-    (tmp_path / "tmp").mkdir()
-    env = {"HOME": f"{package}/home", "TMPDIR": str(tmp_path / "tmp"), "LC_ALL": "C", "TERM": "dumb"}
-    out = str(tmp_path / "data")
-    program = ["-O", "-m", "tracking.app.cli"]
-    made = _run(
-        package, [*program, "generate", "merge", "--seeds", "0", "--set", "camera.fps=5", "--streams", "none",
-        "--out", out], **env,
-    )  # fmt: skip
-    assert (made.returncode, "warning" in made.stderr) == (0, False), made.stderr
-    tracked = _run(package, [*program, "track", "blob", out, "--out", str(tmp_path / "run")], **env)
-    assert (tracked.returncode, "warning" in tracked.stderr) == (0, False), tracked.stderr
-
-
 @pytest.mark.parametrize("harm", ["link", "open to all", "file"])
 def test_a_temporary_folder_of_others_is_not_used(harm, tmp_path, monkeypatch):
     """Caches hold code that is run, so another user must not have laid them there."""

@@ -53,7 +53,7 @@ def refused(line: list[str], capsys, code: int = 2) -> str:
     return text
 
 
-SHOW, MAKE = "scenarios {tmp}/bad", "generate {tmp}/bad --seeds 0:2 --out {tmp}/out"
+SHOW = "scenarios {tmp}/bad"
 TRACK = "track blob {made}/data --out {tmp}/out"
 CLASS = "track {tmp}/bad:Mine {made}/data --out {tmp}/out"
 DET = "track blob {tmp}/bad --fps 10 --out {tmp}/out"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
 from tests.tuning_toys import TOY, write_scenes
@@ -30,17 +28,3 @@ def test_it_says_what_was_gained(line, tmp_path, capsys):
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
         "toy.history.svg", "toy.importance.svg", "toy.journal", "toy.journal.locks", "toy.json", "toy.toml",
     ]  # fmt: skip
-
-
-def test_the_same_again_as_one_object_with_more_trials(line, tmp_path, capsys):
-    assert run([*line, "--json"]) == 0
-    first = json.loads(capsys.readouterr().out)
-    assert first["status"] == "ok"
-    assert first["counts"]["trials"] == 12
-    assert first["file"] == str(tmp_path / "new" / "toy.toml")
-    assert first["comparisons"][0]["sequences"] == 3
-    line[line.index("--trials") + 1] = "13"
-    assert run([*line, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["counts"]["trials"] == 13
-    assert run(["track", TOY, "tests/nothing", "--params", str(tmp_path / "new" / "toy.toml"), "--out", "x"]) == 2
-    assert "tests/nothing" in capsys.readouterr().err
