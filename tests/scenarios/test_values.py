@@ -5,7 +5,6 @@ import pytest
 
 from scenarios import load
 from scenarios.errors import InputError
-from scenarios.limits import PICTURE_SIDE
 from scenarios.schema.values import Distribution
 from sim.rng import draw
 
@@ -66,10 +65,3 @@ def test_unknown_keys_of_distributions(tmp_path, events):
     path.write_text(f"schema = 1\n{events}\ngroup = [{{ id = 5, when = {{ tme = 3 }} }}]\n")
     with pytest.raises(InputError):
         load(path)
-
-
-def test_a_scenario_has_pictures_of_any_size_that_is_read():
-    assert load("merge", set=[f"camera.image=[{PICTURE_SIDE}, 16]"]).camera.image == (PICTURE_SIDE, 16)
-    for size in (f"[{PICTURE_SIDE + 1}, 16]", "[8192, 8192]"):
-        with pytest.raises(InputError, match="image"):
-            load("merge", set=[f"camera.image={size}"])

@@ -71,10 +71,3 @@ def test_pixels_asked_for_after_a_frame_are_those_asked_for_alone() -> None:
     for frame in drawn:
         one, two = drawn.load_pixels(frame.index), alone.load_pixels(frame.index)
         assert canonical_hash(one) == canonical_hash(two)
-
-
-def test_streams_that_cannot_be_are_refused_at_once() -> None:
-    with pytest.raises(InputError, match="rigth"):
-        observe(scenario(), crowd(0), streams=("left", "rigth"))
-    with pytest.raises(InputError, match="baseline"):
-        observe(scenario(camera={"kind": "top"}), crowd(0), streams=("right",))

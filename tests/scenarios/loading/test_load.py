@@ -169,13 +169,6 @@ MINE = Sensor(
 )  # fmt: skip
 
 
-def test_what_is_written_is_what_a_scenario_gets(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    path.write_text(dump_sensor(MINE, "one line\nanother"))
-    assert path.read_text().startswith("# one line\n# another\nschema = 1\n")
-    assert scenarios.load("street", set=scenarios.sensor_settings(path)).sensor == MINE
-
-
 def test_settings_after_it_win_and_hiding_stays(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(dump_sensor(MINE))

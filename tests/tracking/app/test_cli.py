@@ -395,19 +395,3 @@ def test_ctrl_c_in_a_real_process(place, workers):
     sequences = [p for p in (place.out / "flockscope-train").iterdir() if p.is_dir()]
     assert 0 < len(sequences) < 400
     assert all(run(["validate", str(p)]) == 0 for p in sequences)
-
-
-def test_a_dataset_altered_is_told_by_every_reader(place, tmp_path, capsys):
-    data = tmp_path / "data"
-    shutil.copytree(place.data.parent, data)
-    victim = data / "flockscope-demo" / "scene-s40001" / "gt" / "truth.parquet"
-    whole = victim.read_bytes()
-    lines = ["track blob {data} --out {out}", "score {data} {tracks}", "sheet {data} --out {out}", "validate {data}"]
-    for content in (whole[:-1] + b"x", None):
-        victim.write_bytes(content) if content is not None else victim.unlink()
-        for line in lines:
-            words_ = [word.format(data=data, tracks=place.tracks, out=place.out) for word in line.split()]
-            assert run(words_) == (1 if line.startswith("validate") else 2), line
-            printed = capsys.readouterr()
-            assert str(victim) in printed.err + printed.out
-            assert not place.out.exists()

@@ -75,15 +75,6 @@ def test_a_deleted_file_is_no_answer_without_it(made, tracks, tmp_path, capsys, 
     assert not (tmp_path / "out").exists()
 
 
-def test_an_unfinished_run(made, tracks, tmp_path, capsys):
-    (tracks / "scene-s40001" / "run.json").unlink()
-    for line in readers(made / "data", tracks, tmp_path / "out"):
-        assert "incomplete: track again" in refused(capsys, *line)
-    (one,) = (p for p in (made / "data").rglob("*s40001") if p.is_dir())
-    alone = (tracks / "scene-s40001").rename(tmp_path / "alone")
-    assert "incomplete: track again" in refused(capsys, "score", one, alone)
-
-
 @pytest.mark.parametrize(
     ("option", "words"),
     [

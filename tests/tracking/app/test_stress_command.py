@@ -9,7 +9,6 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from sim.io.files.atomic import lock_folder
 from tests.tuning_toys import TOY, write_scenes
 from tracking.app.cli import run
 
@@ -74,12 +73,6 @@ def test_a_found_scene_is_generated_by_its_command(scene: str, capsys) -> None:
     capsys.readouterr()
     assert run(["score", str(folder), f"t/{folder.name}", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["sequences"][0]["HOTA"] == worst["score"]
-
-
-def test_a_second_run_in_the_folder_is_refused(scene: str, capsys) -> None:
-    with lock_folder(Path("o")):
-        assert stress(scene) == 2
-    assert "o: got another run that writes here; expected one at a time" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

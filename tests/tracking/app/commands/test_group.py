@@ -228,18 +228,6 @@ def test_speeds_that_nobody_has(tmp_path, capsys, rows, options, expected):
     assert bool(warned) == bool(expected)
 
 
-def test_without_people(tmp_path, capsys):
-    """Nobody labelled, and a person alone: tables without groups."""
-    (tmp_path / "walk" / "gt").mkdir(parents=True)
-    (tmp_path / "walk" / "gt" / "gt.txt").write_text("")
-    (tmp_path / "walk" / "seqinfo.ini").write_text("[Sequence]\nseqLength=3\n")
-    found = answer(capsys, "group", tmp_path / "walk", "--fps", 10, "--out", tmp_path / "g")
-    assert (found["runs"][0]["people"], found["runs"][0]["groups"]) == (0, [])
-    line = ["group", tmp_path / "walk", "--fps", 10, "--probabilities", "--out", tmp_path / "h"]
-    assert answer(capsys, *line)["runs"][0]["pairs"] == 0
-    assert run(["group", str(tmp_path / "walk"), "--fps", "10", "--out", str(tmp_path / "g")]) == 0
-
-
 def test_wrong_options(walk, tmp_path, capsys):
     here = ["group", walk, "--fps", "10", "--out", tmp_path / "g"]
     (tmp_path / "blob.toml").write_text('tracker = "blob"\n[params]\ngate = 0.9\n')

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError
-from sim.types import Sequence, Truth
+from sim.types import Sequence
 from tracking.app.command_options import ViewOptions
 from tracking.app.commands import view
 
@@ -24,15 +24,3 @@ def test_several_runs_need_labels(options: ViewOptions) -> None:
     with pytest.raises(InputError, match="no labels"):
         view.view(options)
     assert not options.out.exists()
-
-
-def test_a_page_of_others_is_not_replaced(options: ViewOptions, monkeypatch: pytest.MonkeyPatch) -> None:
-    def never() -> Truth:
-        raise AssertionError("the labels are not needed")
-
-    labelled = [Sequence(name, 10.0, 1, lambda: iter(()), never) for name in ("a", "b")]
-    monkeypatch.setattr(view, "_open", lambda _: labelled)
-    options.out.mkdir()
-    (options.out / "index.html").write_text("theirs")
-    with pytest.raises(InputError, match="did not write"):
-        view.view(options)
