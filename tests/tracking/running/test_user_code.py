@@ -151,24 +151,6 @@ def test_the_check_of_a_config():
         Exiting()
 
 
-class Unreadable(Exception):
-    def __str__(self):
-        raise ValueError("no text")
-
-
-class UnreadableExit(Unreadable, SystemExit):
-    pass
-
-
-@pytest.mark.parametrize("error", [Unreadable(), UnreadableExit()], ids=["Exception", "SystemExit"])
-def test_an_exception_whose_text_cannot_be_read(error):
-    tracker = Abrupt()
-    tracker.error = error
-    with pytest.raises(WorkError, match=f"got {type(error).__name__}: a message that cannot be read") as caught:
-        track(tracker, nobody())
-    assert caught.value.__cause__ is error
-
-
 @pytest.mark.parametrize("seed", [2**63, 10**30, -1, 1.5, True])
 def test_a_wrong_seed_is_found_before_the_tracker_is_made(seed):
     class Never(Abrupt):
