@@ -178,10 +178,6 @@ def check_output(capsys, code: int, as_json: bool) -> None:
         assert "\n" not in "".join(answer["error"].values())
 
 
-def files(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
-
-
 class Calls:
     """Counts calls of our own functions; at the call numbered `stop` Ctrl-C is pressed."""
 
@@ -230,7 +226,7 @@ def test_command(name, state, as_json, place, capsys):
     if state == "bad":
         assert not place.out.exists()
     elif name in WRITING:
-        assert files(place.out)
+        assert any(path.is_file() for path in place.out.rglob("*"))
 
 
 @pytest.mark.slow

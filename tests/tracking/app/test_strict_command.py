@@ -42,13 +42,6 @@ def test_an_option_given_twice_is_refused(words: tuple[str, ...], option: str, f
     assert place == option
 
 
-def test_an_error_names_the_option_and_its_last_value(capsys) -> None:
-    assert run(["generate", "cross", "--seeds", "1:3", "--seeds=4:6", "--out", "x"]) == 2
-    assert capsys.readouterr().err == (
-        "error: --seeds: got it 2 times, the last time 4:6; expected it once; leave one --seeds only\n"
-    )
-
-
 TWICE = {
     "generate cross --seeds 1 --out x --set camera.fps=5 --set camera.fps=7": ("camera.fps", "5 and 7"),
     "generate cross --seeds 1 --out x --set camera.fps=5 --set scenario.camera.fps=5": ("camera.fps", "5 and 5"),

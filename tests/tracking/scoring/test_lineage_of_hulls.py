@@ -1,8 +1,6 @@
-"""Who came from whom, told by a method that knows hulls only: the truth's own groups are right, in both planes."""
+"""Who came from whom, told by a method that knows hulls only."""
 
 from __future__ import annotations
-
-from collections.abc import Callable
 
 import pytest
 
@@ -15,12 +13,12 @@ AB, CD, EF = (1, 2), (3, 4), (5, 6)
 PEOPLE = {i: (2.0 * i, 0.0) for i in range(1, 7)}
 
 
-def scenes(merged_at: int, hulls: Callable[[int], dict[int, tuple[float, float]]] | None = None) -> list[Scene]:
-    """Three pairs in a row, the first two are one from a frame on. hulls: from and to where each group is seen."""
+def scenes(merged_at: int) -> list[Scene]:
+    """Three pairs in a row, the first two are one from a frame on."""
     made = []
     for k in range(1, FRAMES + 1):
         members = {1: AB, 2: CD, 3: EF} if k < merged_at else {1: AB + CD, 3: EF}
-        span = {g: (2.0 * min(m), 2.0 * max(m)) for g, m in members.items()} | (hulls(k) if hulls else {})
+        span = {g: (2.0 * min(m), 2.0 * max(m)) for g, m in members.items()}
         made.append(Scene(PEOPLE, {g: (m, (span[g][0], -0.3, span[g][1], 0.3)) for g, m in members.items()}))
     return made
 

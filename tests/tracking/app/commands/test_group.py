@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -110,17 +109,6 @@ def test_labels_of_groups_are_never_read(tmp_path, capsys, groups):
     (row,) = answer(capsys, "score", labelled[0], tmp_path / "a" / "g")["sequences"]
     assert row["pairwise_F1"] > 0.7
     assert "tracks of another walk" in refused(capsys, "score", labelled[0], tmp_path / "b" / "g") or groups is None
-
-
-def test_truth_of_groups_is_not_used():
-    sequence = simulate(load("merge", ["camera.fps=5"]), seed=3, streams=())
-    truth = sequence.truth
-    blind = truth.replace(group=np.full(len(truth.id), -1), groups=None, groups_px=None, events=None, near=None)
-    one, other = (group(replace(sequence, load_truth=lambda t=t: t)) for t in (truth, blind))
-    assert any((t.group >= 0).any() for t in one)
-    assert any(t.events for t in one)
-    assert all(np.array_equal(a.group, b.group) and told(a) == told(b) for a, b in zip(one, other, strict=True))
-    assert one.info == other.info
 
 
 @pytest.mark.parametrize("form", ["ground text", "folder of boxes", "biwi"])
