@@ -16,6 +16,7 @@ from tests.tuning_toys import TOY
 from tracking.app.cli import run
 
 ROOT = Path(__file__).resolve().parents[3]
+FAKE = f"{ROOT / 'tests' / 'fake_tracker.py'}:Nearest"
 GROUP = '{ id = "a", size = 2, start = [4, 4], goal = [12, 4] }'
 OTHER = '{ id = "b", size = 2, start = [12, 4], goal = [4, 4] }'
 MERGE = '{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", when = { time = 1.0 } }'
@@ -223,7 +224,7 @@ def test_tracks_at_another_frame_rate(tmp_path, capsys):
 
 
 def test_a_sequence_without_its_tracks_is_named(made, tmp_path, capsys):
-    assert run(["track", "blob", str(made / "data"), "--out", str(tmp_path / "t")]) == 0
+    assert run(["track", FAKE, str(made / "data"), "--out", str(tmp_path / "t")]) == 0
     (tmp_path / "t" / "scene-s40000").rename(tmp_path / "t" / "other")
     seal_again(tmp_path / "t" / "other", sequence="other")
     output = refused(["score", str(made / "data"), str(tmp_path / "t")], capsys)
