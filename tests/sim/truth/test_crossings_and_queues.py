@@ -3,6 +3,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from scenarios.loading.resolve import load
+from sim.crowd.world import run
 from sim.truth.crossing_events import crossings, net_crossings
 from sim.truth.queue_detection import detect_queues, queues
 
@@ -45,6 +47,14 @@ def crossed(paths, group=None):
 
 
 HEAD_ON = pair((0, 5), straight(1)) + pair((10, 5.2), straight(-1))
+
+
+def test_cross_begins_when_hulls_are_within_a_metre():
+    """Hulls 10 - 2 t - 0.5 apart: within 1 m from 4.25 s, until the same after passing at 5 s."""
+    assert crossed(HEAD_ON) == [(44, 58, (1, 2), (1, 2), (1, 2, 3, 4))]
+    (event,) = crossings(*crowd(HEAD_ON), groups(1, 1, 2, 2), FPS)
+    assert event.pos == pytest.approx((5, 5.1))
+    assert event.emitted is None
 
 
 def test_across_and_back_is_no_cross():
@@ -116,6 +126,16 @@ def waiting(k, arrive=3.0, leave=9.0, spacing=0.8, at=(5.0, 3.0), step=(0.0, 1.2
     return coming + np.maximum(T - leave, 0) * np.array(step)
 
 
+def test_queue_starts_at_its_onset_and_ends_below_two():
+    """All slow from 3 s on (frame 31; the central difference is halved there), one after another leaves from 9 s."""
+    paths = [waiting(k, leave=9 + 0.9 * k) for k in range(3)]
+    (event,) = queued(paths)
+    assert (event.kind, event.members, event.before, event.after) == ("queue", (1, 2, 3), (-1, -1, -1), (-1, -1, -1))
+    speed = np.hypot(*np.moveaxis(crowd(paths)[1], -1, 0)) < 0.4
+    assert event.start == np.flatnonzero(speed.all(axis=1))[0] + 1 == 32
+    assert event.end == np.flatnonzero(speed.sum(axis=1) >= 2)[-1] + 1
+
+
 def test_queue_of_two_or_for_less_than_three_seconds_is_none():
     assert queued([waiting(k) for k in range(2)]) == []
     assert queued([waiting(k, arrive=3, leave=5.9) for k in range(3)]) == []
@@ -146,6 +166,16 @@ def test_first_in_first_out_means_from_one_end(leavers, fifo):
     (line,) = detect_queues(*crowd([waiting(k, spacing=0.6, leave=late.get(k, 99)) for k in range(5)]), FPS)
     assert line.left == leavers
     assert line.fifo == fifo
+
+
+@pytest.mark.parametrize("name", ["queue", "mixed"])
+def test_simulated_queues_are_first_in_first_out(name):
+    for seed in range(3):
+        motion = run(load(name, ["camera.fps=5"]), seed)
+        found = detect_queues(motion.pos, motion.vel, motion.present, motion.fps)
+        assert len(found) == 1
+        assert found[0].fifo
+        assert found[0].left
 
 
 @pytest.mark.parametrize("people", [3, 5, 8])

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from sim.truth.queue_detection import queue_shapes
+from tests.reference_queue_shapes import chain
 
 
 def found(pos):
@@ -24,6 +25,17 @@ def standing(seed):
     if seed % 3 == 1:
         line[-1] = r.uniform(0, 3, 2)
     return line[r.permutation(n)]
+
+
+def test_chains_are_those_tried_line_by_line():
+    lengths = []
+    for seed in range(600):
+        pos = standing(seed)
+        expected = chain(pos).tolist()
+        assert found(pos) == ([min(expected, expected[::-1])] if expected else []), seed
+        lengths.append((len(expected), len(pos)))
+    assert {n for n, _ in lengths} >= {0, 2, 3, 4, 5, 6, 7, 8}
+    assert sum(0 < n < people for n, people in lengths) > 20, "also queue_shapes that leave somebody out"
 
 
 def test_many_crowds_at_once_are_each_by_itself():
