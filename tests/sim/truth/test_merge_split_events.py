@@ -64,6 +64,27 @@ def test_a_stretch_cut_off_by_the_end_does_not_count():
     assert len(groups_and_events(pos[:132], vel[:132], there[:132], want[:132], FPS).events) == 0
 
 
+def parting(speed):
+    """Two and two, 0.7 m apart; the second two drift away at `speed` from 3 s on."""
+    stay = [walk((15, (1, 0)), start=(0, y)) for y in (-0.7, 0)]
+    go = [walk((3, (1, 0)), (12, (1, speed)), start=(0, y)) for y in (0.7, 1.4)]
+    return crowd(*stay, *go)
+
+
+@pytest.mark.parametrize(
+    ("speed", "onset"),
+    [
+        (0.4, 77),  # 0.7 + 0.4 (t - 3) > 2.5 from t > 7.5
+        (0.8, 42),  # 0.7 + 0.8 (t - 3) > 1.5 from t > 4.0, velocities differing by more than 0.7
+    ],
+)
+def test_split_at_the_frame_in_which_they_are_apart(speed, onset):
+    m = groups_and_events(*parting(speed), meant((1, (1, 1, 1, 1)), (20, (1, 1, 2, 2)), frames=150), FPS)
+    assert summary(m.events) == [("split", onset, onset + 19, (1,), (1, 2), (1, 2, 3, 4))]
+    assert (m.group[: onset - 1] == 1).all()
+    assert (m.group[onset - 1 :] == [1, 1, 2, 2]).all()
+
+
 def test_who_enters_together_counts_from_the_first_frame():
     pos, vel, there = crowd(*(walk((10, (1, 0)), start=(0, y)) for y in (0, 4, 4.7, 5.4)))
     there[:20, 1:3] = False
