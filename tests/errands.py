@@ -67,14 +67,6 @@ def profiled(_: object) -> bool:
     )
 
 
-def tell_and_wait(marker: Path) -> str:
-    """Writes whose work it is; lasts until the file beside it with the suffix .go is there."""
-    marker.write_text(str(os.getpid()))
-    while not marker.with_suffix(".go").exists():
-        time.sleep(0.01)
-    return marker.name
-
-
 def told(item: tuple[Path, float]) -> str:
     """Says that it has begun, takes its time, says that it is done."""
     marker, seconds = item

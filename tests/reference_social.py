@@ -181,41 +181,6 @@ def pairwise_scores(true, est):
     }
 
 
-def partition_of(groups, names):
-    """The sets of one frame's people, given its groups and the names of all (None: a track that is nobody)."""
-    numbers = iter(range(1000))
-    sets = [{("nobody", next(numbers)) if p is None else p for p in g.people} for g in groups]
-    grouped = [p for g in groups for p in g.people]
-    sets += [{p} for p in names if p is not None and p not in grouped]
-    return sets + [{("nobody", next(numbers))} for _ in range(names.count(None) - grouped.count(None))]
-
-
-def with_fictitious(sets):
-    """A person alone joined to a fictitious one; everyone else's fictitious one alone (Solera et al. 2016)."""
-    out = []
-    for people in sets:
-        fictitious = [("fictitious", p) for p in people]
-        out += [people | set(fictitious)] if len(people) == 1 else [people, *({f} for f in fictitious)]
-    return out
-
-
-def mitre(sets, other):
-    """Vilain et al. (1995): of the links in the sets, the share that is left when the other partition cuts them."""
-    total = sum(len(s) - 1 for s in sets)
-    parts = [sum(bool(s & o) for o in other) + sum(not any(p in o for o in other) for p in s) for s in sets]
-    return (sum(map(len, sets)) - sum(parts)) / total if total else 1.0
-
-
-def gmitre_scores(true, est, true_people, est_people):
-    """Means over frames; true, est: lists of Group, true_people, est_people: names of all, frame by frame."""
-    f1, precision, recall = [], [], []
-    for a, b, here, seen in zip(true, est, true_people, est_people, strict=True):
-        s, o = with_fictitious(partition_of(a, here)), with_fictitious(partition_of(b, seen))
-        p, r = mitre(o, s), mitre(s, o)
-        f1, precision, recall = [*f1, ratio(2 * p * r, p + r) if p + r else 0.0], [*precision, p], [*recall, r]
-    return {"GMITRE_F1": mean(f1), "GMITRE_precision": mean(precision), "GMITRE_recall": mean(recall)}
-
-
 def right_group_scores(true, est, name, tolerance):
     """Setti et al. (2015), one to one by trying all; tolerance: a Fraction."""
     precision, recall = [], []

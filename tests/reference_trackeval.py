@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +18,24 @@ IDENTITY = ("IDF1", "IDP", "IDR", "IDTP")
 def trackeval_scores(true: Sequence, est: Sequence, similarity: Sequence) -> dict[str, float]:
     """true[t] (N,), est[t] (M,) ids and similarity[t] (N, M) of each frame. Skips where TrackEval is not installed."""
     metrics = pytest.importorskip("trackeval.metrics", reason="trackeval is installed by `make test`")
-    data = _numbered(true, est, similarity)
+    return _scores(metrics, _numbered(true, est, similarity))
+
+
+def trackeval_files(gt: Path, trackers: Path, tracker: str, **config: Any) -> dict[str, dict[str, float]]:
+    """What TrackEval makes of folders of MOTChallenge texts, by sequence."""
+    trackeval = pytest.importorskip("trackeval", reason="trackeval is installed by `make test`")
+    dataset = trackeval.datasets.MotChallenge2DBox(
+        {"GT_FOLDER": str(gt), "TRACKERS_FOLDER": str(trackers), "PRINT_CONFIG": False, **config}
+    )
+    return {
+        name: _scores(
+            trackeval.metrics, dataset.get_preprocessed_seq_data(dataset.get_raw_seq_data(tracker, name), "pedestrian")
+        )
+        for name in dataset.seq_list
+    }
+
+
+def _scores(metrics: Any, data: dict) -> dict[str, float]:
     quiet = {"THRESHOLD": 0.5, "PRINT_CONFIG": False}
     found: dict[str, float] = {}
     for metric, keys in ((metrics.HOTA(), HOTA), (metrics.CLEAR(quiet), CLEAR), (metrics.Identity(quiet), IDENTITY)):

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("scenarios", "sim", "tracking")
 LINES = 500
@@ -108,54 +110,10 @@ def test_scoring_imports_little():
     assert ours == []
 
 
-def run_time_imports(name: str) -> set[str]:
-    """Our modules that a module imports at any time when it runs: at its top or inside a function, type-only excepted.
-
-    `from package import module` counts as an import of the module.
-    """
-
-    def statements(node: ast.AST) -> Iterator[ast.AST]:
-        for child in ast.iter_child_nodes(node):
-            if isinstance(child, ast.If) and dotted_name(child.test).endswith("TYPE_CHECKING"):
-                continue
-            yield child
-            yield from statements(child)
-
-    found = set()
-    for node in statements(tree(name)):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            dotted = {f"{node.module}.{alias.name}": str(node.module) for alias in node.names}
-            found |= {full if full in modules() else module for full, module in dotted.items()}
-    return {dotted for dotted in found if dotted in modules() and dotted != name}
-
-
-def circles(graph: dict[str, set[str]]) -> list[tuple[str, ...]]:
-    """The sets of modules that reach each other along imports, sorted (strongly connected components, naively)."""
-
-    def reached(start: str) -> set[str]:
-        seen, waiting = set(), [start]
-        while waiting:
-            for name in graph[waiting.pop()] - seen:
-                seen.add(name)
-                waiting.append(name)
-        return seen
-
-    reach = {name: reached(name) for name in graph}
-    return sorted({tuple(sorted(b for b in reach[a] if a in reach[b])) for a in graph if a in reach[a]})
-
-
-def test_no_import_circles():
-    """Imports inside functions count; imports for the type checker alone do not."""
-    found = circles({name: run_time_imports(name) for name in modules()})
-    assert found == []
-
-
-def test_pymunk_is_met_in_one_module():
-    assert [name for name in modules() if any(inside(dotted, "pymunk") for dotted in imports(name))] == [
-        "sim.crowd.world"
-    ]
+@pytest.mark.parametrize(("package", "only"), [("pymunk", "sim.crowd.world"), ("numba", "sim.compiler")])
+def test_a_package_is_met_in_one_module(package: str, only: str) -> None:
+    """numba's own njit ends with an error where its cache has no place."""
+    assert [name for name in modules() if any(inside(dotted, package) for dotted in imports(name))] == [only]
 
 
 def test_modules_are_short():

@@ -9,7 +9,6 @@ from types import ModuleType
 
 import pytest
 
-from scenarios.loading.resolve import load
 from tracking.app.commands.scenarios import list_keys
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -69,10 +68,3 @@ def test_public_names_have_an_entry(site: ModuleType) -> None:
 
 def test_every_key_of_a_scenario_has_a_meaning() -> None:
     assert all(row["meaning"] for row in list_keys().data["keys"])
-
-
-def test_the_example_of_the_guide_loads(tmp_path: Path) -> None:
-    guide = (ROOT / "docs" / "guides" / "write-a-scenario.md").read_text(encoding="utf-8")
-    example = re.findall(r"^```toml\n(.*?)^```$", guide, re.DOTALL | re.MULTILINE)
-    (tmp_path / "example.toml").write_text(example[0])
-    assert [e.id for e in load(tmp_path / "example.toml").event] == ["m1", "s1"]

@@ -24,31 +24,22 @@ def loaded(code: str) -> set[str]:
     return set(run.stdout.splitlines()[-1].split())
 
 
-def test_packages_alone_bring_nothing():
-    assert loaded("import sim, tracking, scenarios").isdisjoint(HEAVY)
-
-
-def test_help_brings_typer_only():
-    found = loaded("from tracking.app.cli import run\nassert run(['--help']) == 0")
-    assert "typer" in found
-    assert found.isdisjoint(HEAVY)
-
-
-def test_help_of_a_command_brings_what_typer_itself_needs():
-    found = loaded("from tracking.app.cli import run\nassert run(['track', '--help']) == 0")
-    assert found.isdisjoint(HEAVY - {"pydantic"})
+@pytest.mark.parametrize(
+    ("code", "needed"),
+    [
+        ("import sim, tracking, scenarios", set()),
+        ("from tracking.app.cli import run\nassert run(['--help']) == 0", set()),
+        ("from tracking.app.cli import run\nassert run(['track', '--help']) == 0", {"pydantic"}),
+        ("from tracking import evaluate", {"numpy", "scipy"}),
+    ],
+)
+def test_no_more_is_loaded_than_is_needed(code, needed):
+    assert loaded(code).isdisjoint(HEAVY - needed)
 
 
 def test_a_listing_of_scenarios_does_without_arrays_of_the_world():
-    assert loaded("from tracking.app.cli import run\nrun(['scenarios', '--json'])").isdisjoint(
-        {"numba", "cv2", "pymunk", "pyarrow"}
-    )
-
-
-def test_scoring_alone_is_numpy_and_scipy():
-    found = loaded("from tracking import evaluate")
-    assert "numpy" in found
-    assert found.isdisjoint(HEAVY - {"numpy", "scipy"})
+    found = loaded("from tracking.app.cli import run\nrun(['scenarios', '--json'])")
+    assert found.isdisjoint({"numba", "cv2", "pymunk", "pyarrow"})
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,6 @@ WORDS = (
 )  # fmt: skip
 DEEP = ("[" * 3000, "{" * 500, "[" * 40 + "]" * 40, "a." * 3000, '{"a":' * 2000, "(" * 1000, "<a>" * 3000)
 TOKEN = re.compile(r"-?[0-9]+(?:\.[0-9]+)?(?:[eE][-+]?[0-9]+)?|[A-Za-z_]+")
-CELLS = re.compile(r"[,\t ]")
 
 Mutation = Callable[[bytes, Random], bytes]
 
@@ -83,25 +82,6 @@ def _lines(body: bytes, random: Random) -> bytes:
     elif kind == 3:
         lines[i] = b""
     return random.choice((b"\r\n", b"\r", b" ", b"\x0c\n")).join(lines) if kind == 4 else b"\n".join(lines)
-
-
-def _cells(body: bytes, random: Random) -> bytes:
-    """Cells of a line are swapped, removed, doubled or quoted."""
-    lines = body.split(b"\n")
-    k = random.randint(0, len(lines) - 1)
-    separator = b"," if b"," in lines[k] else b" "
-    cells = lines[k].split(separator)
-    i, j, kind = random.randint(0, len(cells) - 1), random.randint(0, len(cells) - 1), random.randint(0, 3)
-    if kind == 0:
-        cells[i], cells[j] = cells[j], cells[i]
-    elif kind == 1:
-        del cells[i]
-    elif kind == 2:
-        cells.insert(i, cells[j])
-    else:
-        cells[i] = b'"' + cells[i] + random.choice((b'"', b"", b'""', b'"x'))
-    lines[k] = separator.join(cells)
-    return b"\n".join(lines)
 
 
 def _json_value(body: bytes, random: Random) -> bytes:
@@ -165,5 +145,5 @@ def _parquet(body: bytes, random: Random) -> bytes:
 
 
 KINDS: tuple[Mutation, ...] = (
-    _truncated, _flipped, _other_number, _other_number, _other_word, _deeper, _lines, _cells, _json_value, _parquet,
+    _truncated, _flipped, _other_number, _other_number, _other_word, _deeper, _lines, _json_value, _parquet,
 )  # fmt: skip

@@ -6,6 +6,24 @@ from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
 
+import numpy as np
+
+from scenarios import load, sensor_settings
+from scenarios.loading.checks import most_people
+from scenarios.loading.resolve import dump, load_observation, resolve
+from sim.io.formats.calibration import read_calibration
+from sim.io.source import open_source
+from sim.io.store.camera_files import read_scene
+from sim.io.store.group_files import read_events, read_groups_csv, read_near, read_script
+from sim.io.store.track_files import read_tracks
+from sim.io.store.truth_files import read_detections, read_truth
+from sim.scene.camera import ground_jacobian, px_per_m_at_centre, to_ground
+from sim.sequence import simulate
+from tests.damaged.specimens import study_plan
+from tracking.app.stored_tracks import find_tracks
+from tracking.papers.blob.config import BlobConfig
+from tracking.tuning.study import open_study
+
 SHOWN = 20
 """Frames of a recording that are read."""
 SIMULATED = 500
@@ -13,17 +31,10 @@ SIMULATED = 500
 
 
 def _scenario(folder: Path) -> None:
-    from scenarios import load
-    from scenarios.loading.resolve import dump
-
     dump(load(folder / "scene.toml"))
 
 
 def _simulated(folder: Path) -> None:
-    from scenarios import load
-    from scenarios.loading.checks import most_people
-    from sim.sequence import simulate
-
     scenario = load(folder / "scene.toml")
     if most_people(scenario) * scenario.duration * scenario.camera.fps > SIMULATED:
         return
@@ -34,54 +45,13 @@ def _simulated(folder: Path) -> None:
         list(islice(sequence.frames(), 2))
 
 
-def _suite(folder: Path) -> None:
-    from scenarios.loading.resolve import resolve
-
-    resolve(str(folder / "suite.toml"))
-
-
-def _setting(folder: Path) -> None:
-    from scenarios import load
-
-    load("merge", set=[_text(folder / "setting.txt")])
-
-
-def _tracker_setting(folder: Path) -> None:
-    from tracking.papers.blob.config import BlobConfig
-
-    BlobConfig().with_set(_text(folder / "setting.txt"))
-
-
-def _text(path: Path) -> str:
+def _setting(folder: Path) -> str:
     """Returns a text as the command line gives it: bytes that are not UTF-8 become surrogates."""
-    return path.read_bytes().replace(b"\0", b"").decode("utf-8", "surrogateescape")
-
-
-def _parameters(folder: Path) -> None:
-    from tracking.papers.blob.config import BlobConfig
-
-    BlobConfig.from_toml(folder / "params.toml").to_toml()
-
-
-def _sensor(folder: Path) -> None:
-    from scenarios import load, sensor_settings
-
-    load("merge", set=sensor_settings(folder / "sensor.toml"))
-
-
-def _observation(folder: Path) -> None:
-    from scenarios.loading.resolve import load_observation
-
-    load_observation(folder / "view.toml")
+    return (folder / "setting.txt").read_bytes().replace(b"\0", b"").decode("utf-8", "surrogateescape")
 
 
 def _camera(name: str) -> Callable[[Path], None]:
     def read(folder: Path) -> None:
-        import numpy as np
-
-        from sim.io.formats.calibration import read_calibration
-        from sim.scene.camera import ground_jacobian, px_per_m_at_centre, to_ground
-
         camera = read_calibration(folder / name)
         foot = np.array([[camera.centre_px[0], camera.image[1]]])
         to_ground(camera, foot)
@@ -93,9 +63,7 @@ def _camera(name: str) -> Callable[[Path], None]:
 
 def _source(name: str = "") -> Callable[[Path], None]:
     def read(folder: Path) -> None:
-        from sim.io.source import open_source
-
-        for sequence in open_source(folder / name if name else folder):
+        for sequence in open_source(folder / name):
             list(islice(sequence.frames(), SHOWN))
             list(islice(sequence.without_pictures(), SHOWN))
             _ = sequence.truth
@@ -104,76 +72,27 @@ def _source(name: str = "") -> Callable[[Path], None]:
     return read
 
 
-def _tracks(folder: Path) -> None:
-    from sim.io.store.track_files import read_tracks
-
-    read_tracks(folder)
-
-
-def _run(folder: Path) -> None:
-    from sim.io.store.track_files import read_tracks
-    from tracking.app.stored_tracks import find_tracks
-
-    for stored in find_tracks(folder):
-        read_tracks(stored.path)
-
-
-def _events(folder: Path) -> None:
-    from sim.io.store.group_files import read_events
-
-    read_events(folder / "events.json")
-
-
-def _groups(folder: Path) -> None:
-    from sim.io.store.group_files import read_groups_csv
-
-    read_groups_csv(folder / "groups.csv", 4)
-
-
-def _near(folder: Path) -> None:
-    from sim.io.store.group_files import read_near
-
-    read_near(folder / "near.csv")
-
-
-def _script(folder: Path) -> None:
-    from sim.io.store.group_files import read_script
-
-    read_script(folder / "script.json")
-
-
-def _scene(folder: Path) -> None:
-    from sim.io.store.camera_files import read_scene
-
-    read_scene(folder / "scene.json")
-
-
 def _truth(folder: Path) -> None:
-    from sim.io.store.truth_files import read_detections, read_truth
-
     read_truth(folder)
     read_detections(folder / "det" / "det.parquet")
 
 
 def _study(folder: Path) -> None:
-    from tests.damaged.specimens import study_plan
-    from tracking.tuning.study import open_study
-
     with open_study(study_plan(), folder / "study.journal", "damaged") as study:
         study.records()
         study.finished()
 
 
-READERS: dict[str, Callable[[Path], None]] = {
+READERS: dict[str, Callable[[Path], object]] = {
     "scenario": _scenario,
     "extended scenario": _scenario,
     "simulated scenario": _simulated,
-    "suite": _suite,
-    "setting": _setting,
-    "tracker setting": _tracker_setting,
-    "parameters": _parameters,
-    "sensor profile": _sensor,
-    "observation": _observation,
+    "suite": lambda folder: resolve(str(folder / "suite.toml")),
+    "setting": lambda folder: load("merge", set=[_setting(folder)]),
+    "tracker setting": lambda folder: BlobConfig().with_set(_setting(folder)),
+    "parameters": lambda folder: BlobConfig.from_toml(folder / "params.toml").to_toml(),
+    "sensor profile": lambda folder: load("merge", set=sensor_settings(folder / "sensor.toml")),
+    "observation": lambda folder: load_observation(folder / "view.toml"),
     "camera json": _camera("camera.json"),
     "camera xml": _camera("camera.xml"),
     "camera yaml": _camera("pair.yml"),
@@ -185,17 +104,17 @@ READERS: dict[str, Callable[[Path], None]] = {
     "eth": _source("walk.txt"),
     "pedpy": _source("walk.txt"),
     "labelled text": _source("people.csv"),
-    "tracks text": _tracks,
-    "events": _events,
-    "groups": _groups,
-    "near": _near,
-    "script": _script,
-    "scene": _scene,
+    "tracks text": read_tracks,
+    "events": lambda folder: read_events(folder / "events.json"),
+    "groups": lambda folder: read_groups_csv(folder / "groups.csv", 4),
+    "near": lambda folder: read_near(folder / "near.csv"),
+    "script": lambda folder: read_script(folder / "script.json"),
+    "scene": lambda folder: read_scene(folder / "scene.json"),
     "pictures": _source(),
     "video": _source(),
     "dataset": _source(),
     "truth": _truth,
-    "run": _run,
+    "run": lambda folder: [read_tracks(stored.path) for stored in find_tracks(folder)],
     "study": _study,
 }
 """What reads an input of each kind, given its folder."""

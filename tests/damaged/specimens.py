@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tests.small_videos import write_video
+
 if TYPE_CHECKING:
     from tracking.tuning.search_plan import SearchPlan
 
@@ -214,15 +216,8 @@ def _pictures(root: Path) -> dict[str, Path]:
 
 
 def _video(folder: Path, images: list[np.ndarray]) -> Path:
-    import av
-
     for name, codec in (("walk.mp4", "libx264"), ("walk.avi", "mjpeg"), ("walk.mkv", "mpeg4")):
-        with av.open(str(folder / name), "w") as container:
-            stream = container.add_stream(codec, rate=10)
-            stream.width, stream.height, stream.pix_fmt = 64, 48, "yuvj420p" if codec == "mjpeg" else "yuv420p"
-            for image in images:
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="bgr24")))
-            container.mux(stream.encode(None))
+        write_video(folder / name, images, codec=codec, pix_fmt="yuvj420p" if codec == "mjpeg" else "yuv420p")
     return folder
 
 

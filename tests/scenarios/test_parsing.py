@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.errors import InputError, printable, shortened
+from scenarios.errors import InputError, printable
 from scenarios.loading.toml_files import parse, parse_setting, parse_value
 from sim.io.files.tables import read_json
 from tracking.papers.blob.config import BlobConfig
@@ -57,36 +57,7 @@ def test_values_of_settings():
             parse_value(text, "a=b")
 
 
-def test_texts_of_parameters_are_escaped(tmp_path):
-    from dataclasses import dataclass
-    from typing import ClassVar
-
-    from tracking.config import Config, param
-
-    @dataclass(frozen=True)
-    class Quoted(Config):
-        tracker: ClassVar[str] = "quoted"
-        mark: str = param('a"b\\c', ('a"b\\c', "x"), "", "", "categorical")
-
-    (tmp_path / "p.toml").write_text(Quoted().to_toml())
-    assert Quoted.from_toml(tmp_path / "p.toml") == Quoted()
-
-
 TEXT = st.text(alphabet=st.characters(exclude_categories=()), max_size=60)
-
-
-@pytest.mark.parametrize(
-    ("text", "shown"),
-    [
-        ("", ""), ("Zürich 北京 é 😀 [/red] x[door]y \\n", "Zürich 北京 é 😀 [/red] x[door]y \\n"),
-        ("\x1b[31mred\x07", "\\x1b[31mred\\x07"), ("a\u202eb\u2066c\u200d", "a\\u202eb\\u2066c\\u200d"),
-        ("\x9b31m\x7f", "\\x9b31m\\x7f"), ("\udcff", "\\udcff"), ("\U000e0041", "\\U000e0041"),
-        ("a\u2028b\nc", "a\\u2028b\\nc"),
-    ],
-)  # fmt: skip
-def test_control_characters_are_escaped(text, shown):
-    assert printable(text) == shown
-    assert printable(shown) == shown
 
 
 @given(TEXT)
@@ -109,8 +80,3 @@ def test_keys_of_settings_have_as_many_steps_as_tables_may_be_deep():
     assert len(parse_setting(".".join("a" * 32) + "=1")[0]) == 32
     with pytest.raises(InputError, match=r"got 2000 steps; expected at most 32 tables and lists inside each other"):
         parse_setting(".".join("a" * 2000) + "=1")
-
-
-def test_long_text_is_cut_in_the_middle():
-    assert shortened("abcdef", 6) == "abcdef"
-    assert shortened("a" * 50 + "b" * 50, 10) == "aaaaaa…bbb"

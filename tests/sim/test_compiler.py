@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import shutil
 import stat
@@ -76,22 +75,6 @@ def test_there_is_no_cache_without_any_room(package):
     assert done.stdout == "4 None kernels are compiled anew in every \n", done.stderr
 
 
-@pytest.mark.slow
-def test_a_command_in_a_container(package, tmp_path):
-    """A read-only installation and no home: a dataset is made and tracked."""
-    (tmp_path / "tmp").mkdir()
-    env = {"HOME": f"{package}/home", "TMPDIR": str(tmp_path / "tmp"), "LC_ALL": "C", "TERM": "dumb"}
-    out = str(tmp_path / "data")
-    program = ["-O", "-m", "tracking.app.cli"]
-    made = _run(
-        package, [*program, "generate", "merge", "--seeds", "0", "--set", "camera.fps=5", "--streams", "none",
-        "--out", out], **env,
-    )  # fmt: skip
-    assert (made.returncode, "warning" in made.stderr) == (0, False), made.stderr
-    tracked = _run(package, [*program, "track", "blob", out, "--out", str(tmp_path / "run")], **env)
-    assert (tracked.returncode, "warning" in tracked.stderr) == (0, False), tracked.stderr
-
-
 @pytest.mark.parametrize("harm", ["link", "open to all", "file"])
 def test_a_temporary_folder_of_others_is_not_used(harm, tmp_path, monkeypatch):
     """Caches hold code that is run, so another user must not have laid them there."""
@@ -117,22 +100,6 @@ def test_other_faults_of_a_kernel_stay_errors(monkeypatch):
     monkeypatch.setattr(compiler.numba, "njit", refuse)
     with pytest.raises(RuntimeError, match="another fault"):
         compiler.njit(cache=True)(test_other_faults_of_a_kernel_stay_errors)
-
-
-def imports_numba(text: str) -> bool:
-    """Whether a source imports numba or a part of it, at any place and in any form."""
-    return any(
-        name.partition(".")[0] == "numba"
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.Import | ast.ImportFrom)
-        for name in ([node.module or ""] if isinstance(node, ast.ImportFrom) else [alias.name for alias in node.names])
-    )
-
-
-def test_every_kernel_is_compiled_here():
-    """numba's own njit ends with an error where its cache has no place."""
-    modules = [p for folder in ("scenarios", "sim", "tracking") for p in (ROOT / folder).rglob("*.py")]
-    assert [p.name for p in modules if imports_numba(p.read_text(encoding="utf-8"))] == ["compiler.py"]
 
 
 USED = """
@@ -172,27 +139,3 @@ def test_a_kernel_is_compiled_anew_when_what_it_imports_changed(tmp_path, factor
     (tmp_path / "user.py").write_text(USER)
     assert printed(10, 1) == "20 0"
     assert printed(factor, term) == expected
-
-
-CALLER = """
-import gc, time
-from sim.compiler import clock, njit
-@njit(cache=True)
-def term(x, k):
-    return x + k
-@njit(cache=True)
-def caller(x):
-    return term(x, 1) + term(x, 2)
-print(caller(1), len(caller.overloads), len(term.overloads), term(1, 1), len(term.overloads), gc.isenabled())
-print(time.perf_counter() - clock() > 0.01)
-"""
-
-
-def test_a_kernel_called_by_kernels_alone_has_no_form_for_python(tmp_path):
-    """It gets one when Python calls it. Garbage is collected after compilation, and the clock leaves it out."""
-    (tmp_path / "caller.py").write_text(CALLER)
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)}
-    command = [sys.executable, str(tmp_path / "caller.py")]
-    for compiled_before in (False, True):
-        printed = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout.split()
-        assert printed == ["5", "1", "0", "2", "1", "True", str(not compiled_before)]

@@ -46,13 +46,6 @@ def test_truth_of_a_script_that_did_not_come_true_is_refused(monkeypatch: pytest
     assert observe(scenario(), motion, check=False).truth is not None
 
 
-def test_simulation_is_repeatable_and_hides_by_name() -> None:
-    hide = {"hide": [{"start": 0.5, "end": 1.5, "group": "b"}]}
-    a, b = (sim.sequence.simulate(scenario(duration=2.0, sensor=hide), 3) for _ in range(2))
-    for x, y in zip(a, b, strict=True):
-        assert np.array_equal(x.detections.pos, y.detections.pos)
-
-
 SMALL = {"image": [160, 120], "focal_px": 125}
 
 
@@ -78,10 +71,3 @@ def test_pixels_asked_for_after_a_frame_are_those_asked_for_alone() -> None:
     for frame in drawn:
         one, two = drawn.load_pixels(frame.index), alone.load_pixels(frame.index)
         assert canonical_hash(one) == canonical_hash(two)
-
-
-def test_streams_that_cannot_be_are_refused_at_once() -> None:
-    with pytest.raises(InputError, match="rigth"):
-        observe(scenario(), crowd(0), streams=("left", "rigth"))
-    with pytest.raises(InputError, match="baseline"):
-        observe(scenario(camera={"kind": "top"}), crowd(0), streams=("right",))

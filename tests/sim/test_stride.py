@@ -12,9 +12,7 @@ from scenarios.loading.resolve import load
 from sim.dataset.generate import generate
 from sim.sequence import simulate
 from sim.types import Truth
-from tracking.app.cli import run
 
-SMALL = ("camera.image=[160,120]", "duration=8")
 ROWS = ("pos", "vel", "box", "visibility", "z", "heading", "height", "truncation")
 
 
@@ -57,39 +55,3 @@ def test_a_stride_without_frames_is_refused(stride: int, tmp_path: Path) -> None
     with pytest.raises(InputError, match="--stride"):
         generate(["merge"], range(1), tmp_path / "data", streams=(), stride=stride)
     assert not (tmp_path / "data").exists()
-
-
-STREAMS = ("left", "right", "disparity", "ids", "background")
-PAIR = (*SMALL, "camera.baseline=0.3")
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> dict[int | None, Path]:
-    """A pair of cameras' pictures, without a stride, with the stride 1, and with 4."""
-    folder = tmp_path_factory.mktemp("stride")
-    line = ["generate", "pass-by", "--seeds", "5", "--streams", ",".join(STREAMS), "--images", "png"]
-    line += [word for setting in PAIR for word in ("--set", setting)]
-    for stride in (None, 1, 4):
-        options = [] if stride is None else ["--stride", str(stride)]
-        assert run([*line, "--out", str(folder / str(stride)), *options]) == 0
-    return {stride: folder / str(stride) / "flockscope-train" / "pass-by-s00005" for stride in (None, 1, 4)}
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
-def test_a_stride_of_one_changes_no_byte(made: dict[int | None, Path]) -> None:
-    assert files(made[None]) == files(made[1])
-
-
-def test_a_stored_sequence_of_another_stride_is_refused(made: dict[int | None, Path], capsys) -> None:
-    for stored, asked in ((1, 4), (4, 1), (4, 2)):
-        with pytest.raises(InputError, match=f"another sequence .*: stride {stored} → {asked}\\)"):
-            generate(
-                ["pass-by"], range(5, 6), made[stored].parents[1], set=PAIR, streams=STREAMS, images="png",
-                stride=asked,
-            )  # fmt: skip
-    before = (made[4] / "manifest.json").stat().st_mtime_ns
-    generate(["pass-by"], range(5, 6), made[4].parents[1], set=PAIR, streams=STREAMS, images="png", stride=4)
-    assert (made[4] / "manifest.json").stat().st_mtime_ns == before

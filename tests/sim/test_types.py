@@ -45,12 +45,6 @@ def test_what_is_right_is_read_only_and_not_copied() -> None:
             a[0] = 1.0
 
 
-def test_ids_twice_in_a_frame():
-    frame, id = np.array([2, 1, 2, 1, 2, 3, 2]), np.array([5, 5, 4, 6, 5, 5, 5])
-    assert repeated_ids(frame, id).tolist() == [False, False, False, False, True, False, True]
-    assert repeated_ids(frame[:0], id[:0]).tolist() == []
-
-
 def test_against_pairs_one_by_one():
     draws = np.random.default_rng(0)
     for _ in range(50):

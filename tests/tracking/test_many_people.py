@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from benchmarks.many_people import FPS, frames, seconds
+from benchmarks.many_people import FPS, frames
 from sim.types import Context
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.tracker import Joint
@@ -38,11 +37,3 @@ def test_the_belief_forgets_pairs_of_people_who_left():
     there &= np.isin(tracker.belief.pair % 2**31, tracker.belief.number[left])
     tracker.belief.keep(left)
     assert 0 < len(tracker.belief.pair) == there.sum() < pairs
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["particle", "relational", "joint", "stereo"])
-def test_twice_the_newcomers_take_less_than_three_times_as_long(name):
-    """CPU time of the slowest frame, the best of three runs; all pairs would take four times as long."""
-    few, many = (min(max(seconds(name, people, 6)) for _ in range(3)) for people in (500, 1000))
-    assert many < 3 * few

@@ -53,7 +53,7 @@ def test_from_stereo_pairs_the_oracle_has_the_visible_people(scene) -> None:
 
 
 def test_compare_ranks_runs_and_shows_an_oracle_for_each_input() -> None:
-    scenes = [simulate(load("split"), seed) for seed in range(2)]
+    scenes = [simulate(load("split", ["camera.fps=5"]), seed) for seed in range(2)]
     runs = {name: [track(name, scene, detections="file") for scene in scenes] for name in ("blob", "relational")}
     poor = {"detections": "truth", "sensor": {"detect_prob": 0.5}}
     runs |= {str(seed): [track("blob", scene, seed=seed, **poor) for scene in scenes] for seed in (4, 5)}

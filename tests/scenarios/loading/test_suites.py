@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.loading.resolve import Entry, load, names, resolve, rows, suite_names
+from scenarios.loading.resolve import load, resolve, rows, suite_names
 
 
 def suite(path: Path, text: str) -> str:
@@ -33,10 +33,6 @@ def test_entries_expand_in_order(path: Path) -> None:
     assert [e.scenario.duration for e in entries] == [60, 30, 30, 30]
     assert [e.scenario.duration for e in resolve(file, ["duration=70"])] == [70] * 4
     assert resolve(f"suite:{file}") == entries
-
-
-def test_a_scenario_file_is_one_entry(path: Path) -> None:
-    assert resolve(str(path), ["warmup=1"]) == [Entry("tour", load(path, ["warmup=1"]))]
 
 
 @pytest.mark.parametrize(
@@ -69,15 +65,6 @@ def test_an_error_inside_an_entry_names_suite_and_entry(path: Path) -> None:
         resolve(file)
     assert file in caught.value.file
     assert "entry x" in caught.value.file
-
-
-def test_standard_has_every_scenario_at_two_densities() -> None:
-    if not names():
-        pytest.skip("no catalogue")
-    entries = resolve("suite:standard")
-    for name in names():
-        mine = [e for e in entries if e.name in (name, f"{name}-dense")]
-        assert len(mine) == 2, name
 
 
 @pytest.mark.parametrize("name", [*suite_names(), "cross"])

@@ -9,7 +9,7 @@ import pytest
 from scenarios.loading.resolve import load
 from sim.crowd.forces import Steering
 from sim.crowd.formation import standing
-from sim.crowd.order_execution import ServiceQueue, concerned
+from sim.crowd.order_execution import concerned
 from sim.crowd.world import World, run
 from sim.io.store.truth_files import truth_files
 from sim.sequence import observe
@@ -80,15 +80,6 @@ def test_a_merge_as_a_parent_arrives_keeps_the_places_of_the_new_group(tmp_path)
         g = world.groups.alive["ab"]
         kept = world.groups.places[world.groups.members[g]]
         assert sorted(kept.tolist()) == sorted(standing(4, world.groups.spacing[g]).tolist()), t
-
-
-@pytest.mark.parametrize("place", ["joined", "coming"])
-def test_a_queue_forgets_a_group(place):
-    queue = ServiceQueue(np.zeros(2), np.array([1.0, 0.0]), 1.0, {0: 1.0, 1: 1.0}, busy_until=5.0)
-    queue.joined, queue.coming = ([0, 1], []) if place == "joined" else ([1], [0])
-    queue.remove(0)
-    assert (queue.joined, queue.coming) == ([1], [])
-    assert (queue.busy_until is None) == (place == "joined")
 
 
 MEASURED = ("gt/events.json", "gt/near.csv", "gt/groups.csv", "gt/groups.parquet", "gt/groups_px.parquet")

@@ -5,23 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.loading.resolve import load, names
+from scenarios.loading.resolve import load
 from sim.clock import SCRIPT_RATE
 from sim.crowd.navigation import BEHIND, Navigator
 from sim.crowd.world import run
 from sim.truth.label import label
 from sim.truth.order_fulfilment import check_orders
 from sim.types import Scene
-
-
-@pytest.mark.parametrize("name", names())
-def test_every_scenario_moves(name: str) -> None:
-    a = run(load(name, ["duration=12"] if name not in ("party", "mixed") else []), 3)
-    assert np.isfinite(a.pos[a.present]).all()
-    assert ((a.intent >= 0) == a.present).all()
-    assert all(o.fired is not None for o in a.orders)
-    speed = np.linalg.norm(a.vel, axis=2)
-    assert np.nanmax(speed) < 2.6
 
 
 def test_one_group_more_does_not_change_who_the_others_are() -> None:
@@ -67,7 +57,7 @@ def test_round_the_end_of_a_wall():
     assert not narrow.any()
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_nobody_stays_behind_at_a_door(seed):
     motion = run(load("door"), seed)
     through = np.isin(motion.intent[0], [0, 1])

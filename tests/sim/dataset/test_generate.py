@@ -27,12 +27,6 @@ import os, signal, sys, types
 from tests import fake_simulator as fakes
 
 def simulate(scenario, seed, repeat, streams=(), stride=1):
-    deaths = {-2: 1, -3: 99}.get(int(sys.argv[3]), 0)
-    if seed == 1 and repeat == 0 and deaths:
-        with open(sys.argv[1] + "-deaths", "a") as told:
-            print(os.getpid(), file=told)
-        if sum(1 for _ in open(sys.argv[1] + "-deaths")) <= deaths:
-            os.kill(os.getpid(), signal.SIGKILL)
     return fakes.sequence(seed + 100 * repeat)
 
 sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate, observe=None)
@@ -54,14 +48,10 @@ if __name__ == "__main__":
             os.kill(os.getpid(), signal.SIGKILL)
         write(path, body)
 
-    def parent_dies(done, total, name):
-        if kill_after == -1:
-            os.kill(os.getpid(), signal.SIGKILL)
-
     atomic.write_inside = die
     scenario = Scenario.model_validate({"schema": 1, "group": [{"id": "a", "start": [1, 1], "goal": [2, 2]}]})
     entries = [Entry("x", scenario, 0), Entry("y-1", scenario, 1)]
-    generate(entries, range(3), out, workers=WorkerOptions(workers), progress=parent_dies, streams=())
+    generate(entries, range(3), out, workers=WorkerOptions(workers), streams=())
 """
 
 
@@ -199,34 +189,6 @@ def test_two_workers_make_the_same_bytes(tmp_path, whole):
     done = run_program(tmp_path, tmp_path / "out", 2)
     assert done.returncode == 0, done.stderr.decode()
     assert content(tmp_path / "out") == whole
-    assert validate(tmp_path / "out") == []
-
-
-@pytest.mark.slow
-def test_workers_do_not_outlive_a_killed_parent(tmp_path):
-    """Reading the pipes ends only when the last process that holds them is gone."""
-    done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-1)
-    assert done.returncode == -signal.SIGKILL
-    assert run_program(tmp_path, tmp_path / "out", 2).returncode == 0
-    assert validate(tmp_path / "out") == []
-
-
-@pytest.mark.slow
-def test_the_work_of_a_killed_worker_is_done_by_another(tmp_path, whole):
-    done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-2)
-    assert done.returncode == 0, done.stderr.decode()
-    assert len((tmp_path / "out-deaths").read_text().split()) == 2
-    assert content(tmp_path / "out") == whole
-
-
-@pytest.mark.slow
-def test_a_sequence_that_kills_its_workers_fails_alone(tmp_path, whole):
-    done = run_program(tmp_path, tmp_path / "out", 2, kill_after=-3)
-    assert done.returncode == 1
-    message = b"x-s00001: got an item that killed 3 workers, the last by signal 9 (SIGKILL)"
-    assert message in done.stderr.splitlines()[-1]
-    others = {name: body for name, body in whole.items() if "x-s00001" not in name and "seqmaps" not in name}
-    assert {k: v for k, v in content(tmp_path / "out").items() if "seqmaps" not in k} == others
     assert validate(tmp_path / "out") == []
 
 

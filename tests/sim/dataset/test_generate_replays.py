@@ -17,6 +17,7 @@ from sim.io.source import open_source
 from sim.io.store.validate import validate
 from sim.sequence import simulate
 from sim.types import Sequence
+from tests.fake_simulator import content
 
 SMALL = load_observation(set=["camera.image=[160, 120]", "camera.fps=5"])
 
@@ -28,10 +29,6 @@ def walk(tmp_path: Path) -> Sequence:
     (tmp_path / "walk" / "obsmat.txt").write_text("\n".join(lines))
     (tmp_path / "walk" / "groups.txt").write_text("1 2\n")
     return open_folder(tmp_path / "walk")
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 def test_a_dataset_like_any_other(walk: Sequence, tmp_path: Path) -> None:

@@ -12,7 +12,6 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load, load_observation
 from scenarios.schema.scenario import ObservationSpec
 from sim.dataset.replay import Cut, replay
-from sim.dataset.splits import is_real
 from sim.io.formats.biwi import open_folder
 from sim.sequence import simulate
 from sim.types import Sequence
@@ -82,15 +81,6 @@ def test_our_own_motion_keeps_its_world_and_bodies() -> None:
     assert np.unique(made.truth.height).tolist() == np.unique(own.truth.height).tolist()  # type: ignore[arg-type]
     kinds = [[(e.kind, e.members, round(e.start / t.fps)) for e in t.events or ()] for t in (made.truth, own.truth)]
     assert kinds[0] == kinds[1]
-
-
-def test_what_is_real_is_told_from_what_is_not(walk: Sequence) -> None:
-    own = simulate(load("merge"), 3, streams=())
-    assert is_real(walk)
-    assert not is_real(own)
-    assert is_real(replay(walk, ObservationSpec(), streams=()))
-    assert not is_real(replay(own, ObservationSpec(), streams=()))
-    assert is_real(replay(replay(walk, ObservationSpec(), streams=()), ObservationSpec(), streams=()))
 
 
 def test_pictures_show_them(walk: Sequence) -> None:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from scenarios.errors import InputError, WorkError
+from scenarios.errors import InputError
 from scenarios.loading.resolve import Entry
 from sim.dataset import generate as jobs
 from sim.dataset.generate import (
     JobOutcome,
     SequenceJob,
     is_stored,
-    lost_job,
     run_job,
     stored_manifest,
 )
@@ -86,20 +84,6 @@ def test_who_does_not_see_the_mark_writes_nothing(
     assert run_job(elsewhere) == JobOutcome()
 
 
-@pytest.mark.parametrize("error", [KeyError("k"), WorkError(got="a", expected="b", remedy="c")])
-def test_an_error_of_one_is_not_that_of_all(
-    job: SequenceJob, monkeypatch: pytest.MonkeyPatch, made: FakeSimulator, error: Exception
-) -> None:
-    def simulate(*_: object) -> None:
-        raise error
-
-    monkeypatch.setattr(sys.modules["sim.sequence"], "simulate", simulate)
-    outcome = run_job(job)
-    assert isinstance(outcome.error, WorkError)
-    assert outcome.error.file == "x-s00001"
-    assert not outcome.fatal
-
-
 @pytest.mark.parametrize("name", ["", "thesis.tex", "a/b/thesis.tex"])
 def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: FakeSimulator, name: str) -> None:
     """Before: a folder or file with the name of the sequence was deleted. name: "" for a file."""
@@ -119,6 +103,7 @@ def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: F
         ({"duration": 3.0, "camera": {"fps": 5}}, {"streams": ("left",)}, "duration 20 → 3, camera.fps 10 → 5, "
          "streams none → left,background, images none → jpg)"),
         ({"group": [{"id": "b", "start": [1, 1], "goal": [2, 2]}]}, {}, "group[0].id a → b)"),
+        ({}, {"stride": 4}, "stride 1 → 4)"),
     ],
 )  # fmt: skip
 def test_what_differs_is_named(
@@ -129,15 +114,14 @@ def test_what_differs_is_named(
     with pytest.raises(InputError) as refused:
         stored_manifest(other)
     assert f"another sequence (stored → asked for: {words}" in refused.value.got
+
+
+def test_what_differs_is_said_without_a_readable_scenario(job: SequenceJob, made: FakeSimulator) -> None:
+    run_job(job)
+    other = SequenceJob(job.folder, Entry("x", scenario(duration=3.0)), 1)
     for unreadable in ("a = " + "[" * 5000 + "]" * 5000, "a = " + "9" * 5000, None):
         (job.folder / "scenario.toml").unlink()
         if unreadable is not None:
             (job.folder / "scenario.toml").write_text(unreadable)
         with pytest.raises(InputError, match="scenario_hash"):
             stored_manifest(other)
-
-
-def test_given_up(job: SequenceJob) -> None:
-    outcome = lost_job(job, WorkError(got="an item that killed 3 workers", expected="b", remedy="c"))
-    assert outcome == JobOutcome(outcome.error)
-    assert str(outcome.error).startswith("x-s00001: got an item that killed 3 workers")

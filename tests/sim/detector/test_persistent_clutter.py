@@ -32,7 +32,7 @@ def everything(found: list[Detections], name: str) -> np.ndarray:
     return np.concatenate([getattr(d, name) for d in found])
 
 
-@pytest.mark.parametrize("model", [{}, {"life": 1.0}, {"life": 2.0, "seen": 0.5}, {"life": 1.0, "near": 1.0}])
+@pytest.mark.parametrize("model", [{"life": 1.0}, {"life": 2.0, "seen": 0.5}, {"life": 1.0, "near": 1.0}])
 def test_as_many_as_asked_for_whatever_their_life(model: dict[str, float]) -> None:
     truth = people(3000, 2)
     n = np.array([len(d.pos) for d in alarms(truth, **model)])

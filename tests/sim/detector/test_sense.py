@@ -133,14 +133,6 @@ def test_a_person_or_a_frame_more_moves_nobody_else() -> None:
         assert len(a.pos) - len(b.pos) in (0, 1)
 
 
-def test_same_seed_same_draws_and_each_seed_and_repeat_its_own() -> None:
-    truth, sensor = seen(frames=20), Sensor()
-    first = everything(sense(truth, sensor, 5, pinhole(), SIZE), "pos")
-    assert np.array_equal(everything(sense(truth, sensor, 5, pinhole(), SIZE), "pos"), first)
-    assert not np.array_equal(everything(sense(truth, sensor, 6, pinhole(), SIZE), "pos"), first)
-    assert not np.array_equal(everything(sense(truth, sensor, 5, pinhole(), SIZE, repeat=1), "pos"), first)
-
-
 def test_who_is_hidden_is_missed() -> None:
     truth = seen(people=2, frames=400)
     half = truth.replace(visibility=np.where(truth.id == 1, 0.5, 1.0))

@@ -134,12 +134,3 @@ def test_a_pixel_is_the_mean_of_its_samples(view: str, samples: int) -> None:
     height, width = made.direct.shape
     mean = fine.colour.reshape(height, samples, width, samples, 3).mean(axis=(1, 3))
     assert np.abs(mean - made.colour).max() < 1e-3
-
-
-def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(ValueError, match="foliage"):
-        make_renderer(motion_in(0), VIEWS["high"], DARK, Picture(foliage=1.5)).frame(1)
-    with pytest.raises(ValueError, match="foliage"):
-        make_renderer(motion_in(0), VIEWS["high"], DARK, Picture(foliage=-0.1)).frame(1)
-    with pytest.raises(ValueError, match="cloud"):
-        make_renderer(motion_in(0), VIEWS["high"], Light(cloud=-0.1)).frame(1)

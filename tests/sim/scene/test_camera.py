@@ -7,13 +7,11 @@ from hypothesis import strategies as st
 
 from sim.scene.camera import (
     camera_rotation,
-    disparity,
     distort,
     ground_jacobian,
     project,
     px_per_m_at_centre,
     rays,
-    right_camera,
     to_ground,
     undistort,
 )
@@ -76,26 +74,6 @@ def test_ground_comes_back(camera: Camera) -> None:
         seen = depth > 0
         assert to_ground(camera, uv[seen], z) == pytest.approx(xy[seen], abs=1e-9)
     assert seen.any()
-
-
-@pytest.mark.parametrize("camera", [pinhole(), pinhole(60, 30), above(25)])
-def test_jacobian_is_the_derivative(camera: Camera) -> None:
-    uv = np.random.default_rng(2).uniform([50, 150], [600, 450], (50, 2))
-    J = ground_jacobian(camera, uv)
-    for k in range(2):
-        step = np.eye(2)[k] * 1e-3
-        assert J[:, :, k] == pytest.approx(
-            (to_ground(camera, uv + step) - to_ground(camera, uv - step)) / 2e-3, rel=1e-5
-        )
-
-
-def test_disparity_is_what_the_right_camera_sees() -> None:
-    camera = pinhole()
-    xyz = np.random.default_rng(3).uniform([2, 2, 0], [14, 9, 1.9], (50, 3))
-    (left_uv, depth), (right_uv, _) = project(camera, xyz), project(right_camera(camera), xyz)
-    assert left_uv[:, 1] == pytest.approx(right_uv[:, 1])
-    assert left_uv[:, 0] - right_uv[:, 0] == pytest.approx(disparity(camera, depth))
-    assert (disparity(camera, depth) > 0).all()
 
 
 def test_scale_is_a_person_at_the_middle() -> None:

@@ -1,11 +1,13 @@
 import numpy as np
 import pytest
 
-from sim.scene.body import ellipsoids, occlusion_distance, outline_boxes, outlines, person_boxes
+from sim.scene.body import ellipsoids, person_boxes
+from sim.scene.camera import rays
 from sim.scene.visibility import BodyVisibility, measure_visibility
-from sim.scene.visibility_kernels import COLUMNS, ROWS
+from sim.scene.visibility_kernels import COLUMNS
 from sim.types import Array, Camera, Scene
-from tests.reference_sense import above, pinhole, raster_visibility, twin_look
+from tests import reference_render as slow
+from tests.reference_sense import pinhole
 
 OPEN = Scene(np.array([16.0, 10.0]))
 
@@ -25,18 +27,24 @@ def crowded(seed: int, people: int = 14) -> tuple[Array, Array, Array]:
     return r.uniform([5, 2], [11, 7], (people, 2)), r.uniform(0, 6, people), r.uniform(1.5, 1.95, people)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_kernel_equals_its_twin(seed: int) -> None:
-    xy, heading, height = crowded(seed, 40)
-    for camera in (pinhole(), pinhole(15, 20), above()):
-        pos3 = np.column_stack([xy, np.zeros(len(xy))])
-        ellipses = outlines(camera, ellipsoids(pos3, heading, height))
-        near = occlusion_distance(camera, pos3, height)
-        twin = twin_look(camera, outline_boxes(ellipses), ellipses.centre, ellipses.shape, near, COLUMNS, ROWS)
-        assert see(camera, OPEN, xy, heading, height).visibility == pytest.approx(twin, abs=1e-12)
+def ray_visibility(camera: Camera, scene: Scene, pos3: Array, heading: Array, height: Array, n: int = 60) -> Array:
+    """Share of each person's silhouette that is visible, (N,): n × n rays over the amodal box, nearest surface wins."""
+    shapes, out = ellipsoids(pos3, heading, height), []
+    for i, (left, top, width, tall) in enumerate(person_boxes(camera, pos3, heading, height)):
+        u, v = np.meshgrid(left + (np.arange(n) + 0.5) / n * width, top + (np.arange(n) + 0.5) / n * tall)
+        uv = np.column_stack([u.ravel(), v.ravel()])
+        o, d = rays(camera, uv)
+        hits = np.array([
+            np.minimum(*(slow.ball(o, d, *part) for part in zip(shapes.centre[j], shapes.shape[j], strict=True)))
+            for j in range(len(pos3))
+        ])  # fmt: skip
+        first = np.minimum(np.delete(hits, i, axis=0).min(axis=0), slow.still(o, d, scene)[0])
+        seen = (hits[i] < first) & ((uv >= 0) & (uv < camera.image)).all(axis=1)
+        out.append(seen.sum() / np.isfinite(hits[i]).sum())
+    return np.array(out)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("camera", [pinhole(), pinhole(10, 0, (8, -6, 1.6)), pinhole(60, 0, (8, 0, 4))])
 def test_people_against_rays(seed: int, camera: Camera) -> None:
     """Order by the axes' distance and a grid of 512 cells differ from the nearest surface of 3600 rays by < 0.03."""
@@ -45,9 +53,9 @@ def test_people_against_rays(seed: int, camera: Camera) -> None:
     keep = ~((apart < 0.5) & (np.arange(len(xy))[:, None] > np.arange(len(xy)))).any(axis=1)  # nobody inside another
     xy, heading, height = xy[keep], heading[keep], height[keep]
     pos3 = np.column_stack([xy, np.zeros(len(xy))])
-    slow = raster_visibility(camera, OPEN, pos3, heading, height)
-    assert see(camera, OPEN, xy, heading, height).visibility == pytest.approx(slow, abs=0.03)
-    assert slow.min() < 0.9  # somebody is hidden at all
+    expected = ray_visibility(camera, OPEN, pos3, heading, height)
+    assert see(camera, OPEN, xy, heading, height).visibility == pytest.approx(expected, abs=0.03)
+    assert expected.min() < 0.9  # somebody is hidden at all
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -65,9 +73,9 @@ def test_walls_and_pillars_against_rays(seed: int) -> None:
     xy = xy[(np.linalg.norm(xy[:, None] - scene.pillars[:, :2], axis=2) > 0.75).all(axis=1)]
     pos3, heading, height = np.column_stack([xy, np.zeros(len(xy))]), r.uniform(0, 6, len(xy)), np.full(len(xy), 1.7)
     camera = pinhole(25, 0, (8, -4, 3.5))
-    slow = raster_visibility(camera, scene, pos3, heading, height, n=24)
+    expected = ray_visibility(camera, scene, pos3, heading, height, n=24)
     fast = see(camera, scene, xy, heading, height).visibility
-    assert fast == pytest.approx(slow, abs=0.04)
+    assert fast == pytest.approx(expected, abs=0.04)
     assert (see(camera, OPEN, xy, heading, height).visibility > fast + 0.2).any()  # they hide somebody
 
 

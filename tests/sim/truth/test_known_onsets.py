@@ -37,24 +37,6 @@ def told(motion):
     return [(e.kind, e.start, e.end, e.before, e.after, e.members) for e in label(motion, None).events]
 
 
-def between(motion, a, b):
-    """Over time: distance of the nearest of persons a and b, and the difference of their mean velocities."""
-    a, b = (np.array(people) - 1 for people in (a, b))
-    gap = np.hypot(*np.moveaxis(motion.pos[:, a, None] - motion.pos[:, None, b], -1, 0)).min(axis=(1, 2))
-    return gap, np.hypot(*(motion.vel[:, a].mean(axis=1) - motion.vel[:, b].mean(axis=1)).T)
-
-
-def middles(motion, a, b):
-    """Distance (T,) of the middles of persons a and b."""
-    return np.hypot(*(motion.pos[:, np.array(a) - 1].mean(axis=1) - motion.pos[:, np.array(b) - 1].mean(axis=1)).T)
-
-
-def first(holds, frames=1):
-    """The first frame from which `holds` is true for so many frames."""
-    runs = np.convolve(holds, np.ones(frames), "valid")
-    return int(np.flatnonzero(runs > frames - 0.5)[0]) + 1
-
-
 def merging():
     """Two pairs abreast at 1 m/s along x; g is the gap from y = 0.7 to the lower one of the other pair, at first 3.0 m.
 
@@ -75,10 +57,6 @@ def test_merge():
     """The stretch is frames 90-109: 20 frames, 2 s. The older group, 1, keeps its id."""
     motion = merging()
     assert told(motion) == [("merge", 90, 109, (1, 2), (1,), (1, 2, 3, 4))]
-    gap, differ = between(motion, (1, 2), (3, 4))
-    assert first((gap < 1.5) & (differ < 0.5)) == 31, "who does not wait 2 s is early"
-    assert first(gap < 1.5, 20) == 27, "who does not look at velocities is early"
-    assert first((middles(motion, (1, 2), (3, 4)) < 1.5) & (differ < 0.5), 20) == 109, "g < 0.8: middles are late"
 
 
 def splitting():
@@ -100,10 +78,6 @@ def test_split():
     """The stretch is frames 94-113. Of two equal parts the one with the smaller person keeps the id."""
     motion = splitting()
     assert told(motion) == [("split", 94, 113, (1,), (1, 2), (1, 2, 3, 4))]
-    gap, differ = between(motion, (1, 2), (3, 4))
-    assert first((gap > 2.5) | ((gap > 1.5) & (differ > 0.7))) == 40, "who does not wait 2 s is early"
-    assert first(gap > 1.5, 20) == 40, "who undoes the merge rule is early"
-    assert first(middles(motion, (1, 2), (3, 4)) > 2.5, 20) == 43, "g + 0.7 > 2.5: who takes the middles is early"
 
 
 def crossing():
@@ -121,11 +95,6 @@ def crossing():
 def test_cross():
     motion = crossing()
     assert told(motion) == [("cross", 44, 58, (1, 2), (1, 2), (1, 2, 3, 4))]
-    gap, differ = between(motion, (1, 2), (3, 4))
-    assert first((gap <= 1.0) & (differ >= 0.6)) == 47, "who takes people for points is late"
-    gap, differ = between(motion, (1, 2), (5, 6))
-    across = 2 - 0.7 - 2 * 0.25
-    assert across < 1.0 and (differ >= 0.6).all(), "who asks only for near and fast takes C for a crossing, too"  # noqa: PT018
 
 
 def queueing():
@@ -153,10 +122,6 @@ def queueing():
 def test_queue():
     motion = queueing()
     assert told(motion) == [("queue", 81, 150, (-1, -1, -1), (-1, -1, -1), (1, 2, 3))]
-    slow = np.hypot(*np.moveaxis(motion.vel, -1, 0)) < 0.4
-    assert first(slow.sum(axis=1) >= 3) == 36, "who does not wait 3 s is early"
-    still = slow[80:, :3].sum(axis=1) >= 2
-    assert 80 + int(np.flatnonzero(~still)[0]) == 120, "who takes advancing for leaving ends it early"
 
 
 @pytest.mark.parametrize("made", [merging, splitting, crossing, queueing])

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,7 +12,7 @@ import pytest
 from scenarios.errors import InputError, WorkError
 from sim.workers import cluster
 from sim.workers.start import start_workers
-from tests.errands import complain, fall, process, profiled, refuse, root_of, tell_and_wait
+from tests.errands import complain, fall, process, profiled, refuse, root_of
 from tests.loopback import Loopback, loopback
 
 pytestmark = pytest.mark.slow
@@ -53,33 +50,6 @@ def test_an_error_there_is_raised_here(two: Loopback) -> None:
     assert "errands.py" in str(caught.value.__cause__)
     with pytest.raises(RuntimeError, match="Awkward: ab"), start_workers(1, two.address) as run:
         list(run(complain, [0]))
-
-
-def test_the_work_of_a_killed_worker_is_done_by_another(tmp_path: Path) -> None:
-    """Both are at an item; one is killed; the other is let go on, and does both."""
-    with loopback(tmp_path) as cluster, start_workers(1, cluster.address) as run:
-        pids = {worker.pid for worker in cluster.workers}
-        assert {pid for _, pid in run(process, range(8), ahead=8)} <= pids
-        markers = [tmp_path / "a", tmp_path / "b"]
-        pairs = run(tell_and_wait, kill_one(markers, cluster))
-        assert sorted(pairs) == [(m, m.name) for m in markers]
-        survivor = {worker.pid for worker in cluster.workers if worker.poll() is None}
-        assert {int(m.read_text()) for m in markers} == survivor
-
-
-def kill_one(markers: list[Path], cluster: Loopback) -> Iterator[Path]:
-    """The items; who has written the first is killed with the second under way, and then both may end."""
-
-    def kill() -> None:
-        while not all(m.exists() and m.read_text() for m in markers):
-            time.sleep(0.01)
-        os.kill(int(markers[0].read_text()), signal.SIGKILL)
-        next(w for w in cluster.workers if w.pid == int(markers[0].read_text())).wait()
-        for m in markers:
-            m.with_suffix(".go").write_text("")
-
-    threading.Thread(target=kill, daemon=True).start()
-    yield from markers
 
 
 def test_an_item_that_kills_its_workers_is_one_clear_error_or_has_a_result(strict: Loopback) -> None:

@@ -6,8 +6,6 @@ describes them, and answer with what is written below, in the libraries' own for
 
 from __future__ import annotations
 
-import importlib
-import json
 import sys
 from collections.abc import Iterable
 from datetime import datetime
@@ -19,7 +17,6 @@ import pytest
 
 from sim.types import Detections, Frame, Sequence, Tracks
 from tests.tracking.app.test_guides import BLOCK, GUIDES, SAVED, follow
-from tracking.app.cli import run
 from tracking.running.run import track
 
 FPS = 5.0
@@ -200,24 +197,6 @@ def test_points_of_stone_soup(adapters: None) -> None:
         assert sorted(zip(t.id.tolist(), *t.pos.T.tolist(), strict=True)) == expected
         assert np.array_equal(t.vel, np.tile([0.5, -0.5], (len(t.id), 1)))
         assert np.array_equal(t.cov, np.tile(np.diag([1.0, 3.0, 2.0, 4.0]), (len(t.id), 1, 1)))
-
-
-def test_rows_are_a_text_that_score_reads(adapters: None, capsys: pytest.CaptureFixture[str]) -> None:
-    rows = importlib.import_module("others").rows
-
-    tables = [rows(index, *np.split(np.array(found), [1, 5], axis=1)) for index, found in RECORDED.items()]
-    Path("mine").mkdir()
-    np.savetxt("mine/recorded.txt", np.concatenate(tables), delimiter=",", fmt="%g")
-    Path("recorded/gt").mkdir(parents=True)
-    labels = np.concatenate(tables)
-    labels[:, 6] = 1
-    np.savetxt("recorded/gt/gt.txt", np.c_[labels, np.ones((len(labels), 2))], delimiter=",", fmt="%g")
-    Path("recorded/seqinfo.ini").write_text(
-        "[Sequence]\nname=recorded\nframeRate=5\nseqLength=5\nimWidth=200\nimHeight=100\n"
-    )
-    assert run(["score", "recorded", "mine/recorded.txt", "--json"]) == 0
-    (scores,) = json.loads(capsys.readouterr().out)["sequences"]
-    assert scores["HOTA"] == pytest.approx(1)
 
 
 @pytest.mark.slow

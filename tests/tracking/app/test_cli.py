@@ -10,14 +10,12 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from scenarios.errors import WorkError
-from scenarios.loading.resolve import load
 from tracking.app.cli import run
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -115,8 +113,6 @@ COMMANDS = {
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
     "group": ("group {data} --out {out}", "group {out}/nothing --out {out}/x"),
     "score": ("score {data} {tracks}", "score {data} {out}/nothing"),
-    "score one": ("score {one} {tracks}/scene-s40000", "score {one} {tracks}/scene-s40001"),
-    "score text": ("score {one} {tracks}/scene-s40000/tracks.mot.txt", "score {one} {one}/gt/groups.csv"),
     "errors": ("errors {data} {tracks}", "errors {data} {out}/nothing"),
     "stress": (
         "stress " + FAKE + " --vary detection --suite {scene} --seeds 0:2 --start 2 --by HOTA --out {out}",
@@ -125,14 +121,6 @@ COMMANDS = {
     "minimize": (
         "minimize {scene} --tracker " + FAKE + " --while HOTA<=1 --confirm 1 --episodes 6 --out {out}/small.toml",
         "minimize {scene} --tracker " + FAKE + " --while HOTTA<0.7 --out {out}/small.toml",
-    ),
-    "minimize RUN": (
-        "minimize {one} {tracks}/scene-s40000 --while HOTA<=1 --confirm 0 --episodes 6 --out {out}/small.toml",
-        "minimize {data} {tracks}/scene-s40000 --while HOTA<=1 --out {out}/small.toml",
-    ),
-    "stress search": (
-        "stress " + FAKE + " --vary detection --search 3 --suite {scene} --seeds 0:2 --by HOTA --out {out}",
-        "stress " + FAKE + " --vary detection --search 3 --episodes 3 --suite {scene} --out {out}/x",
     ),
     "compare": (
         "compare {tracks}/../scores.json {tracks}/../scores.json", "compare {tracks}/../scores.json {out}/nothing.json",
@@ -151,12 +139,10 @@ COMMANDS = {
         "overlay {seen} {tracks}-seen --out {out}/film.mp4",
         "overlay {one} {tracks}/scene-s40000 --out {out}/film.mp4",
     ),
-    "view truth": ("view {one} --out {out}/page.html", "view {scene} --out {out}/page.html"),
     "sheet": ("sheet {one} --out {out}/sheet.png", "sheet {out}/nothing --out {out}/sheet.png"),
     "tune": (TUNE + " --trials 2 --seeds 0", TUNE + " --trials 2 --seeds 0:20000"),
     "validate": ("validate {data}", "validate {out}/nothing"),
     "export csv": ("export csv {data} --out {out}", "export csv {out}/nothing --out {out}/x"),
-    "export csv RUN": ("export csv {tracks} --out {out}", "export csv {tracks} --fps 5 --out {out}"),
     "export parquet": ("export parquet {tracks}/scene-s40000 --out {out}", "export parquet {scene} --out {out}"),
     "export trajnet": ("export trajnet {data} --out {out}", "export trajnet {out}/nothing --out {out}/x"),
     "export pedpy": ("export pedpy {tracks}/scene-s40000 --out {out}", "export pedpy {scene} --out {out}"),
@@ -190,10 +176,6 @@ def check_output(capsys, code: int, as_json: bool) -> None:
     if code:
         assert set(answer["error"]) == {"file", "place", "got", "expected", "remedy"}
         assert "\n" not in "".join(answer["error"].values())
-
-
-def files(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 class Calls:
@@ -232,51 +214,19 @@ def length(name: str, place: Place) -> int:
     return LENGTHS[name]
 
 
-# Python drops a KeyboardInterrupt raised in a destructor and reports it; `tracking.running.interrupts` raises it again.
-LOST = pytest.mark.filterwarnings("ignore:(?s).*KeyboardInterrupt:pytest.PytestUnraisableExceptionWarning")
-
-
 @pytest.mark.parametrize("as_json", [False, True], ids=["text", "json"])
-@pytest.mark.parametrize("state", ["good", "bad", pytest.param("interrupted", marks=[pytest.mark.slow, LOST])])
+@pytest.mark.parametrize("state", ["good", "bad"])
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n == "demo")) for n in COMMANDS])
 def test_command(name, state, as_json, place, capsys):
-    """Codes 0, 2 and 130; one line or one object; what is written is whole, or nothing is."""
-    line = words(COMMANDS[name][state == "bad"], place) + ["--json"] * as_json
-    stop = length(name, place) // 2 if state == "interrupted" else -1
-    capsys.readouterr()
-    with Calls(stop) if stop > 0 else nullcontext():
-        code = run(line)
-    assert code == {"good": 0, "bad": 2, "interrupted": 130}[state]
+    """Codes 0 and 2; one line or one object; nothing is written by a command that is refused."""
+    code = run(words(COMMANDS[name][state == "bad"], place) + ["--json"] * as_json)
+    assert code == {"good": 0, "bad": 2}[state]
     check_output(capsys, code, as_json)
     assert not list(place.out.parent.rglob(".partial-*"))
-    if state != "good":
-        assert not place.out.exists() or is_whole(name, place.out), list(place.out.rglob("*"))
+    if state == "bad":
+        assert not place.out.exists()
     elif name in WRITING:
-        assert files(place.out)
-
-
-def is_whole(name: str, out: Path) -> bool:
-    """Whether the files of an interrupted command are of finished parts only: datasets that are valid, whole pages; of
-    a search its study too, by which it goes on."""
-    if name == "tune":
-        return all(json.loads(p.read_text()) for p in out.rglob("*.json")) and all(
-            p.read_text().endswith("</svg>\n") for p in out.rglob("*.svg")
-        )
-    if name.startswith("stress"):
-        json.loads((out / "stress.json").read_text()) if (out / "stress.json").exists() else None
-        return {p.name for p in out.rglob("*")} <= {"episodes.jsonl", "episodes.parquet", "stress.json"}
-    if name.startswith("minimize"):
-        return all(len(load(p).group) > 0 for p in out.rglob("*.toml"))
-    if name not in ("generate", "generate pictures", "demo", "track", "view all"):
-        return False
-    sequences = [p.parent for p in out.rglob("scenario.toml")]
-    pages = [p.read_text() for p in out.rglob("*.html")]
-    tracks = [p.parent for p in out.rglob("tracks.parquet")]
-    return (
-        all((p / "manifest.json").is_file() and run(["validate", str(p)]) == 0 for p in sequences)
-        and all("</html>" in page for page in pages)
-        and all((p / "run.json").is_file() and (p / "events.json").is_file() for p in tracks)
-    )
+        assert any(path.is_file() for path in place.out.rglob("*"))
 
 
 @pytest.mark.slow
@@ -441,19 +391,3 @@ def test_ctrl_c_in_a_real_process(place, workers):
     sequences = [p for p in (place.out / "flockscope-train").iterdir() if p.is_dir()]
     assert 0 < len(sequences) < 400
     assert all(run(["validate", str(p)]) == 0 for p in sequences)
-
-
-def test_a_dataset_altered_is_told_by_every_reader(place, tmp_path, capsys):
-    data = tmp_path / "data"
-    shutil.copytree(place.data.parent, data)
-    victim = data / "flockscope-demo" / "scene-s40001" / "gt" / "truth.parquet"
-    whole = victim.read_bytes()
-    lines = ["track blob {data} --out {out}", "score {data} {tracks}", "sheet {data} --out {out}", "validate {data}"]
-    for content in (whole[: len(whole) // 2], whole[:-1] + b"x", None):
-        victim.write_bytes(content) if content is not None else victim.unlink()
-        for line in lines:
-            words_ = [word.format(data=data, tracks=place.tracks, out=place.out) for word in line.split()]
-            assert run(words_) == (1 if line.startswith("validate") else 2), line
-            printed = capsys.readouterr()
-            assert str(victim) in printed.err + printed.out
-            assert not place.out.exists()

@@ -455,7 +455,7 @@ FLIPS = {
         "names": ("{0}/scene.toml", "cross --set camera.fps=5"), "seeds": ("--seeds 7", "--seeds 8"),
         "settings": "--set scenario.duration=3",
     },
-    SMALL: {"streams": "--streams left,ids", "images": "--images png"},
+    SMALL: {"streams": "--streams left,ids", "images": "--images png", "stride": "--stride 2"},
     f"track blob {SEEN}/left.mp4 --px-per-m 12 --out {{1}}": {"background": "--background first:5"},
     RUN: {
         "tracker": ("blob", FAKE), "source": ("40000", "40001"), "params": "--params {0}/params.toml",
@@ -526,7 +526,6 @@ ELSEWHERE = {
     ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("view", "by"),  # report/test_in_browser.py
     ("view", "workers"),
-    ("generate", "stride"),  # tests/sim/test_stride.py
     ("coco", "min_visibility"),  # tests/sim/io/export/test_coco.py
     *((command, "person_class") for command in ("coco", "score", "track")),  # tests/sim/io/formats/test_mot_people.py
     *((command, "box_scale") for command in ("score", "track")),  # tests/sim/io/formats/test_box_columns.py

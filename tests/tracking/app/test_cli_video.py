@@ -111,14 +111,9 @@ def test_which_background_is_told(tmp_path, capsys):
     ("option", "words"),
     [
         ("--background last:5", ["--background", "last:5", "first:N"]),
-        ("--background first:0", ["--background", "first:0"]),
         ("--background first:61", ["--background", "60 frames", "61"]),
         ("--detections file", ["needs pixels or boxes", "film", "images"]),
-        ("--detections truth", ["needs pixels or boxes", "film", "images"]),
         ("--detections image --set sensor.noise_m=3", ["sensor"]),
-        ("--camera nowhere.json", ["nowhere.json"]),
-        ("--fps 0", ["--fps"]),
-        ("--px-per-m -2", ["--px-per-m"]),
     ],
 )
 def test_options_that_cannot_work(option, words, tmp_path, capsys, monkeypatch):

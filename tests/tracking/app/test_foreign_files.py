@@ -30,20 +30,13 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 COMMANDS = {
     "generate": ("generate {0}/scene.toml --seeds 0 --streams none --out {1}", "flockscope-train/scene-s00000/mine"),
-    "generate, a file": ("generate {0}/scene.toml --seeds 0 --streams none --out {1}", "flockscope-train/scene-s00000"),
     "replay": ("replay {0}/data --streams none --out {1}", "flockscope-test/scene-s20000-s20000/mine"),
     "track": ("track blob {0}/data/flockscope-test/scene-s20000 --out {1}", "groups.csv"),
     "export webdataset": ("export webdataset {0}/data --out {1}", "index.json"),
-    "export webdataset, a shard": ("export webdataset {0}/data --out {1}", "shard-000000.json"),
     "export csv": ("export csv {0}/data --out {1}", "scene-s20000/events.csv"),
     "export parquet": ("export parquet {0}/data --out {1}", "scene-s20000/people.parquet"),
     "tune": ("tune {2}/tests/toy_tracker.py:Toy --suite {0}/scene.toml --check none --trials 1 --out {1}/toy.toml",
              "toy.json"),
-    "generate, a manifest": (
-        "generate {0}/scene.toml --seeds 0 --streams none --out {1}", "flockscope-train/scene-s00000/manifest.json"
-    ),
-    "track, run.json": ("track blob {0}/data/flockscope-test/scene-s20000 --out {1}", "run.json"),
-    "track, a table": ("track blob {0}/data/flockscope-test/scene-s20000 --out {1}", "tracks.parquet"),
     "view": ("view {0}/two --out {1}", "other.html"),
     "view, the film": ("view {0}/two/walk --video beside --out {1}/walk.html", "walk.view.mp4"),
     "sheet": ("sheet {0}/two --out {1}", "other.png"),

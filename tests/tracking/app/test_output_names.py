@@ -10,7 +10,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pytest
 
 from sim.io.store.seal import read_manifest, with_hash
 from tracking.app.cli import run
@@ -64,17 +63,6 @@ def test_no_command_leaves_out(tmp_path: Path, capsys) -> None:
     capsys.readouterr()
     assert run(["score", str(inside / "data"), str(inside / "out" / "tracks"), "--json"]) == 0
     assert [row["name"] for row in json.loads(capsys.readouterr().out)["sequences"]] == names
-
-
-@pytest.mark.parametrize(("one", "other"), [("a/b", "a_b"), ("Case", "case")])
-def test_two_names_of_one_file_write_nothing(tmp_path: Path, capsys, one: str, other: str) -> None:
-    recording(tmp_path / "data" / "1", one)
-    recording(tmp_path / "data" / "2", other)
-    data, truth = str(tmp_path / "data"), ["--detections", "truth", "--px-per-m", "20"]
-    for words in (["track", "blob", data, *truth], ["view", data], ["sheet", data], ["export", "coco", data]):
-        assert run([*words, "--out", str(tmp_path / "out" / "x")]) == 2, words
-        assert "unique names" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_manifest_names_files_of_its_own_folder_only(tmp_path: Path, capsys) -> None:

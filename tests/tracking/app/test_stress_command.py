@@ -9,7 +9,6 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from sim.io.files.atomic import lock_folder
 from tests.tuning_toys import TOY, write_scenes
 from tracking.app.cli import run
 
@@ -74,26 +73,6 @@ def test_a_found_scene_is_generated_by_its_command(scene: str, capsys) -> None:
     capsys.readouterr()
     assert run(["score", str(folder), f"t/{folder.name}", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["sequences"][0]["HOTA"] == worst["score"]
-
-
-def test_a_failure_is_listed_and_stored_with_its_traceback(scene: str, capsys) -> None:
-    broken = Path(FAKE.partition(":")[0]).read_text().replace("apart = ", "apart = 1 / 0 + ")
-    Path("broken.py").write_text(broken)
-    assert run(["stress", "broken.py:Nearest", "--suite", scene, "--seeds", "0:2", "--out", "o"]) == 0
-    text = " ".join(capsys.readouterr().out.split())
-    assert "failed on one, seed 0: " in text
-    assert "got ZeroDivisionError: division by zero" in text
-    assert "Traceback" not in text
-    assert "apart = " not in text
-    failed = json.loads(Path("o/stress.json").read_text())["failures"][0]
-    assert "apart = 1 / 0 + " in failed["traceback"]
-    assert failed["traceback"].endswith("ZeroDivisionError: division by zero")
-
-
-def test_a_second_run_in_the_folder_is_refused(scene: str, capsys) -> None:
-    with lock_folder(Path("o")):
-        assert stress(scene) == 2
-    assert "o: got another run that writes here; expected one at a time" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

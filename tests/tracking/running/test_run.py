@@ -7,13 +7,12 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import load
-from sim.scene.camera import px_per_m_at_centre
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.running.prepare import prepare
-from tracking.running.run import TrackingRun, grouped, track
+from tracking.running.run import TrackingRun, track
 
 FPS, LENGTH = 10.0, 30
 
@@ -277,35 +276,3 @@ def test_groups_named_late_are_replaced_with_a_warning():
         run = track(Naming, standing(90))
     assert run[40].group.tolist() == run[80].group.tolist() == [1, 1]
     assert "grouping" in run.info
-
-
-def side_by_side(index: int) -> Tracks:
-    """Two people at rest, 60 px apart in the image."""
-    pos = np.array([[200.0, 200.0], [260.0, 200.0]])
-    known = np.zeros((2, 2)), np.tile(np.eye(4), (2, 1, 1))
-    alone = np.full(2, -1)
-    return Tracks(index, index / 10, "image", "person", np.array([1, 2]), alone, pos, *known, groups=Groups.none())
-
-
-def recording(camera, px_per_m: float, **source) -> Sequence:
-    truth = simulate(load("merge", ["camera.fps=2"]), 40_001).truth.replace(px_per_m=20.0)
-    return Sequence(
-        "made", 10.0, 30, lambda: iter(()), load_truth=lambda: truth, camera=camera, px_per_m=px_per_m, source=source
-    )
-
-
-def test_stored_tracks_are_grouped_by_the_scale_of_the_tracker(monkeypatch):
-    """The camera's, else the one that the user states, else that of all labels; as for `track`, but for the last."""
-    camera = simulate(load("merge", ["camera.fps=2"]), 40_001).camera
-    used = []
-    monkeypatch.setattr(
-        "tracking.grouping.foot_points.with_groups", lambda tracks, fps, scale, rule: used.append(scale) or tracks
-    )
-    unknown = float("nan")
-    for made in (
-        recording(camera, unknown), recording(camera, 55.0), recording(None, 55.0), recording(None, unknown),
-        recording(None, 55.0, px_per_m_frames=12), recording(camera, 55.0, px_per_m_frames=12),
-    ):  # fmt: skip
-        grouped([side_by_side(1)], made)
-    seen = px_per_m_at_centre(camera)
-    assert used == [seen, seen, 55.0, 20.0, 20.0, seen]

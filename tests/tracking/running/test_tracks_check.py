@@ -117,13 +117,6 @@ def test_trackers_of_groups():
     refused(answer(unit="group", group=own, events=(event(),)), "1 in the members")
 
 
-def tracks(n=2, **changes):
-    two = np.zeros((n, 2))
-    alone = np.full(n, -1)
-    made = Tracks(3, 0.2, "ground", "person", np.arange(n), alone, two, two, np.zeros((n, 4, 4)), None, np.ones(n))
-    return made.replace(**changes)
-
-
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
@@ -135,14 +128,14 @@ def tracks(n=2, **changes):
 )  # fmt: skip
 def test_wrong_answers_name_tracker_frame_and_fault(changes, words):
     with pytest.raises(WorkError, match=words) as caught:
-        check_tracks(tracks(**changes), 3, "mine.py:Mine")
+        check_tracks(answer(**changes), 3, "mine.py:Mine")
     assert str(caught.value).startswith("mine.py:Mine: frame 3")
 
 
 def test_right_answers_pass():
-    assert check_tracks(tracks(), 3, "x").id.tolist() == [0, 1]
-    assert len(check_tracks(tracks(0), 3, "x").id) == 0
-    assert check_tracks(tracks(score=np.zeros(0)), 3, "x").score.tolist() == [1.0, 1.0]
+    assert check_tracks(answer(), 3, "x").id.tolist() == [1, 2]
+    assert len(check_tracks(answer(ids=()), 3, "x").id) == 0
+    assert check_tracks(answer(score=np.zeros(0)), 3, "x").score.tolist() == [1.0, 1.0]
     with pytest.raises(WorkError, match="NoneType"):
         check_tracks(None, 3, "x")
 

@@ -137,26 +137,6 @@ def test_no_exit_from_within_ends_a_command_as_if_all_were_well(tmp_path, capsys
     assert "SystemExit: 0" in capsys.readouterr().err
 
 
-def search(tmp_path, statement, part, *options):
-    tmp_path.joinpath("mine.py").write_text(TRACKER.format(part=part, statement=statement))
-    line = [
-        "tune", f"{tmp_path}/mine.py:Tracker", "--suite", "merge", "--set", "scenario.camera.fps=2", "--trials", "3",
-    ]  # fmt: skip
-    line += ["--seeds", "0:2", "--validation", "10000:10001", "--test", "20000:20001", "--check", "none", *options]
-    return run([*line, "--out", str(tmp_path / "best.toml"), "--json"])
-
-
-@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
-def test_in_a_search_the_trial_fails_and_the_search_goes_on(tmp_path, capsys, workers):
-    assert search(tmp_path, "sys.exit(0)", "step of others", "--workers", workers) == 0
-    assert '"impossible": 2' in capsys.readouterr().out
-
-
-def test_a_search_whose_configs_exit_ends_with_an_error(tmp_path, capsys):
-    assert search(tmp_path, "sys.exit(0)", "check of others") == 1
-    assert '"got": "SystemExit: 0"' in capsys.readouterr().out
-
-
 @dataclass(frozen=True)
 class Exiting(Config):
     tracker: ClassVar[str] = "exiting"
@@ -169,24 +149,6 @@ class Exiting(Config):
 def test_the_check_of_a_config():
     with pytest.raises(WorkError, match="exiting: its parameters: got SystemExit: 0"):
         Exiting()
-
-
-class Unreadable(Exception):
-    def __str__(self):
-        raise ValueError("no text")
-
-
-class UnreadableExit(Unreadable, SystemExit):
-    pass
-
-
-@pytest.mark.parametrize("error", [Unreadable(), UnreadableExit()], ids=["Exception", "SystemExit"])
-def test_an_exception_whose_text_cannot_be_read(error):
-    tracker = Abrupt()
-    tracker.error = error
-    with pytest.raises(WorkError, match=f"got {type(error).__name__}: a message that cannot be read") as caught:
-        track(tracker, nobody())
-    assert caught.value.__cause__ is error
 
 
 @pytest.mark.parametrize("seed", [2**63, 10**30, -1, 1.5, True])

@@ -10,11 +10,10 @@ import pytest
 from sim.io.source import open_source
 from sim.io.store.track_files import read_tracks
 from sim.types import Truth
-from tests.reference_trackeval import CLEAR, HOTA, IDENTITY, KEYS
+from tests.reference_trackeval import trackeval_files
 from tracking.scoring.evaluation import Scores, evaluate, weighted_scorers
 
 pytestmark = pytest.mark.filterwarnings("ignore")
-QUIET = {"PRINT_CONFIG": False}
 FRAMES = 12
 
 
@@ -44,20 +43,6 @@ def crowded(seed: int, top: int = 13) -> tuple[np.ndarray, np.ndarray]:
     return np.array(gt), np.array(tracks)
 
 
-def theirs(folder: Path, name: str, benchmark: str, preprocessing: bool) -> dict[str, float]:
-    trackeval = pytest.importorskip("trackeval", reason="trackeval is installed by `make test`")
-    config = {
-        "GT_FOLDER": str(folder / "gt"), "TRACKERS_FOLDER": str(folder / "trackers"), "BENCHMARK": benchmark,
-        "SKIP_SPLIT_FOL": True, "SEQ_INFO": {name: FRAMES}, "DO_PREPROC": preprocessing, **QUIET,
-    }  # fmt: skip
-    dataset, metrics = trackeval.datasets.MotChallenge2DBox(config), trackeval.metrics
-    data = dataset.get_preprocessed_seq_data(dataset.get_raw_seq_data("t", name), "pedestrian")
-    quiet = {"THRESHOLD": 0.5, **QUIET}
-    families = ((metrics.HOTA(), HOTA), (metrics.CLEAR(quiet), CLEAR), (metrics.Identity(quiet), IDENTITY))
-    found = {key: metric.eval_sequence(data)[KEYS.get(key, key)] for metric, keys in families for key in keys}
-    return {key: float(np.mean(value)) for key, value in found.items()}
-
-
 def ours(source: Path, tracks: Path) -> tuple[Truth, Scores]:
     (sequence,) = open_source(source)
     truth = sequence.truth
@@ -68,7 +53,8 @@ def ours(source: Path, tracks: Path) -> tuple[Truth, Scores]:
 @pytest.mark.parametrize("seed", range(4))
 def test_equal_to_trackeval(tmp_path: Path, name: str, seed: int) -> None:
     source, tracks = written(tmp_path, *crowded(seed), name)
-    expected = theirs(tmp_path, name, name[:5], preprocessing=True)
+    config = {"BENCHMARK": name[:5], "SKIP_SPLIT_FOL": True, "SEQ_INFO": {name: FRAMES}, "DO_PREPROC": True}
+    (expected,) = trackeval_files(tmp_path / "gt", tmp_path / "trackers", "t", **config).values()
     truth, found = ours(source, tracks)
     for key, value in expected.items():
         assert found[key] == pytest.approx(value, abs=1e-9), key

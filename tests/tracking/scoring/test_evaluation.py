@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Set
 from pathlib import Path
@@ -12,15 +11,12 @@ import pytest
 
 import scenarios
 from scenarios.loading.resolve import load
-from sim.io.source import open_source
-from sim.io.store.sequence_folder import write_sequence
-from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
 from sim.types import EVENT_KINDS, Tracks, Truth
 from tests.hand_made import Scene, event, tracks, truth
 from tracking import track
 from tracking.scoring import evaluate
-from tracking.scoring.catalogue import ALL, CATALOGUE, CORE, table
+from tracking.scoring.catalogue import CATALOGUE, table
 from tracking.scoring.evaluation import IncomparableError, Scores
 
 NAMES = sorted(path.stem for path in Path(scenarios.__file__).parent.glob("*.toml"))
@@ -69,22 +65,6 @@ def assert_perfect(found: Scores, without: Set[str] = frozenset()) -> None:
         best = CATALOGUE[key].best
         if np.isfinite(value) and np.isfinite(best):
             assert value == pytest.approx(best, abs=1e-6), (key, found.surface, found.group_match)
-
-
-@pytest.mark.parametrize("detections", ["file", "truth"])
-def test_files_are_memory(tmp_path: Path, detections: str) -> None:
-    sequence = simulate(load("party"), 5, streams=())
-    run = track("blob", sequence, detections=detections)
-    write_sequence(tmp_path / "data", sequence, scenario="party", seed=5)
-    write_tracks(tmp_path / "tracks", run, fps=sequence.fps, camera=sequence.camera, info=run.info)
-    (stored,) = open_source(tmp_path / "data")
-    again = read_tracks(tmp_path / "tracks", fps=stored.fps, length=stored.length)
-    for by in ("hull", "members"):
-        was = evaluate(sequence.truth, run, group_match=by)
-        now = evaluate(stored.truth, again, group_match=by)
-        assert (was.similarity, was.surface) == (now.similarity, now.surface)
-        for key, value in was.items():
-            assert now[key] == pytest.approx(value, abs=1e-12, nan_ok=True), key
 
 
 def test_every_score_lies_in_its_range() -> None:
@@ -164,19 +144,3 @@ def test_every_key_of_the_table_is_returned_and_the_other_way_round() -> None:
     returned = set(evaluate(truth(scene), tracks(scene)))
     rows = set(re.findall(r"^\| `([^`]+)` \|", table(), re.MULTILINE))
     assert returned == rows | {f"{key}_core" for key in rows if CATALOGUE[key].family == "groups"}
-
-
-def test_keys_are_unique_and_said_in_full() -> None:
-    assert len(CATALOGUE) == len(ALL)
-    for score in ALL:
-        assert score.meaning, score.key
-        assert score.low < score.high
-        assert (score.better == "neither") <= math.isnan(score.best)
-    core = [score.key for score in ALL if score.family == CORE]
-    assert core == [f"{score.key}_core" for score in ALL if score.family == "groups"]
-
-
-def test_the_command_shows_scores_that_there_are() -> None:
-    from tracking.app.commands.score_tables import SHOWN, TABLES
-
-    assert {*SHOWN, *(key for keys in TABLES.values() for key in keys)} <= set(CATALOGUE)

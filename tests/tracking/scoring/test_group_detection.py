@@ -48,6 +48,12 @@ def test_gmitre_of_one_frame(true: Sets, est: Sets, right: int, of_est: int, of_
     assert found([scene(*true)], [scene(*est)], "GMITRE") == expected
 
 
+def test_a_member_who_is_nobody() -> None:
+    """A false track in the group of 1 and 2: of its two links one is right; 3 to 6 are alone on both sides."""
+    ghost = scene((1, 2, 9), people={**SIX, 9: (3.0, 90.0)})
+    assert found([scene((1, 2))], [ghost], "GMITRE") == near(5 / 6, 5 / 5, 10 / 11)
+
+
 def test_hulls_without_members() -> None:
     """The people inside are the members; of two hulls round one group only one is right. Who is alone is not said."""
     true = [scene((1, 2))]

@@ -57,12 +57,6 @@ def test_an_estimated_group_is_clean_with_60_percent_right_ones(wrong, clean):
     assert found["group_GDSR2"] == clean
 
 
-def test_one_group_of_everybody_finds_neither_of_two_pairs():
-    two, one = {1: ((1, 2), None), 2: ((3, 4), None)}, {9: ((1, 2, 3, 4), None)}
-    assert scores([Scene(APART, two)], [Scene(APART, one)])["group_F1"] == 0
-    assert scores([Scene(APART, one)], [Scene(APART, two)])["group_F1"] == 0
-
-
 @pytest.mark.parametrize("unit", ["person", "group"])
 @pytest.mark.parametrize("apart", [0.5, 0.75, 1.2])
 def test_a_right_pair_is_found_whatever_the_centimetres(apart, unit):

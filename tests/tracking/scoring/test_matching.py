@@ -64,20 +64,6 @@ def test_of_equally_good_matchings_the_one_of_scipy(given: list[np.ndarray]) -> 
     assert set(zip(pairs.i[chosen].tolist(), pairs.j[chosen].tolist(), strict=True)) == expected
 
 
-@pytest.mark.parametrize("seed", range(8))
-@pytest.mark.parametrize("reach", [0.3, 1.5])
-def test_gated_crowds_with_rounded_similarities(seed: int, reach: float) -> None:
-    """People on a coarse grid, similarity 0 beyond a reach: gates and ties as sequences have them."""
-    r = np.random.default_rng(seed)
-    given = []
-    for _ in range(20):
-        a, b = (np.round(r.uniform(0, 4, (r.integers(0, 25), 2)), 1) for _ in range(2))
-        given.append(np.maximum(0, 1 - np.round(np.linalg.norm(a[:, None] - b[None], axis=2) / reach, 1)))
-    pairs = pairs_of(given)
-    check(given, pairs, match(pairs.frame, pairs.i, pairs.j, pairs.s))
-    check(given, pairs, match_as_table(pairs, pairs.s))
-
-
 def test_one_metre_is_near_enough_and_more_is_not() -> None:
     rows = FrameRows(np.array([1, 2]), np.array([5, 5]))
     there = np.array([[1.0, 0.0], [1.001, 0.0]])

@@ -15,8 +15,7 @@ from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario, group_names
 from scenarios.schema.values import bounds
 from tracking.app.cli import run
-from tracking.errors import causes, groups
-from tracking.errors.causes import CAUSES
+from tracking.errors import groups
 from tracking.errors.people import PersonKind
 from tracking.stress.failures import EpisodeOf, Outcome, Subject, parse_failure, play_episode
 from tracking.stress.minimize import Search
@@ -215,11 +214,6 @@ def test_conditions() -> None:
 def test_every_kind_of_error_can_be_named() -> None:
     assert parse_failure("wrong lineage").kind == "wrong lineage"
     assert all(parse_failure(kind).kind == kind for kind in (*get_args(PersonKind), *groups.KINDS))
-
-
-def test_every_cause_can_be_named() -> None:
-    described = {line.split()[0] for line in (causes.__doc__ or "").splitlines() if line.startswith("    ")}
-    assert described == {*CAUSES}
 
 
 SCENE = """

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 import pytest
 
 from sim.rng import rng
 from tests.tuning_toys import write_scenes
-from tracking.app.cli import run
 from tracking.environment.episodes import SourceCache, sources
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.link_rule import LinkRule
@@ -93,16 +90,3 @@ def test_the_rule_is_tuned_like_a_tracker(tmp_path):
     assert found.plan.goals[0].key == "pairwise_F1"
     assert "near" not in found.trials[0].params
     assert LinkRule.from_toml(tmp_path / "rule.toml") == found.config
-
-
-def test_a_rule_on_the_command_line(source, tmp_path, capsys):
-    (tmp_path / "rule.toml").write_text("[params]\nnear = 0.5\n")
-    (tmp_path / "wrong.toml").write_text("[params]\nnaer = 0.5\n")
-    where = str(tmp_path / "data")
-    assert run(["generate", str(tmp_path / "one.toml"), "--seeds", "4", "--streams", "none", "--out", where]) == 0
-    line = ["track", "blob", where, "--out", str(tmp_path / "tracks"), "--grouping"]
-    assert run([*line, str(tmp_path / "rule.toml")]) == 0
-    (info,) = (tmp_path / "tracks").rglob("run.json")
-    assert json.loads(info.read_text())["grouping"]["near"] == 0.5
-    assert run([*line, str(tmp_path / "wrong.toml")]) == 2
-    assert "did you mean near?" in capsys.readouterr().err

@@ -43,16 +43,6 @@ def test_history_marks_a_trial_that_loses_by_far(found):
     assert "far worse" not in words(replace(found, trials=near).plots()[".history.svg"])
 
 
-def test_importance_names_each_parameter_with_its_change(found):
-    shown = words(found.plots()[".importance.svg"])
-    assert {*DEFAULTS, "0.1 → 1 m", "changed by the winner"} <= set(shown)
-
-
-def test_nothing_to_show_is_not_drawn(found):
-    assert set(replace(found, importance=dict.fromkeys(DEFAULTS, 0.0)).plots()) == {".history.svg"}
-    assert "trial" in words(replace(found, trials=found.trials[:1]).plots()[".history.svg"])
-
-
 def test_front_is_drawn_for_two_goals(found):
     made = replace(found.plan, goals=(Goal("HOTA"), Goal("GOSPA", False)))
     configs = [found.default, ToyConfig(skip=1), ToyConfig(skip=2)]

@@ -77,7 +77,7 @@ def test_killed_between_two_lines(tmp_path):
         while (asked := study.ask()) is not None:
             study.tell(asked, [0.5])
     text = (tmp_path / "whole").read_bytes()
-    for k in range(0, len(text), 97):
+    for k in range(0, len(text), 397):
         path = tmp_path / f"cut-{k}"
         path.write_bytes(text[:k])
         with open_study(made, path, "x") as study:

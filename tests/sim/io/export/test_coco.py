@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.export.coco import coco, run_lengths
+from sim.io.export.coco import coco
 from sim.io.store import sequence_folder
 from sim.io.store.validate import content_hash
 
@@ -134,11 +134,3 @@ def test_masks_are_the_visible_pixels(tmp_path, make_pictured):
         right = live.load_pixels(frames[a["image_id"]]).ids == a["track_id"]
         assert np.array_equal(decoded(a["segmentation"]), right)
         assert a["area"] == right.sum()
-
-
-@pytest.mark.parametrize("ids", [np.zeros((3, 2), int), np.ones((3, 2), int), np.array([[1, 2, 1], [-2, 2, 0]])])
-def test_run_lengths(ids):
-    found = run_lengths(ids)
-    assert sorted(found) == sorted({int(k) for k in ids.ravel() if k > 0})
-    for person, counts in found.items():
-        assert np.array_equal(decoded({"size": ids.shape, "counts": counts}), ids == person)

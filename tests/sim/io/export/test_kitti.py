@@ -6,7 +6,6 @@ import cv2
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
 from sim.io.export.kitti import calibration, kitti
 from sim.io.store import sequence_folder
 from sim.scene.camera import project_pair
@@ -48,9 +47,3 @@ def test_pairs_and_disparities_are_those_of_the_dataset(tmp_path, make_pictured)
     assert (target / "calib.txt").read_text() == calibration(live.camera)
     times = [float(line) for line in (target / "times.txt").read_text().splitlines()]
     assert times == pytest.approx([k / live.fps for k in range(live.length)])
-
-
-def test_a_dataset_without_pairs_is_refused(tmp_path, make_sequence) -> None:
-    sequence_folder.write_sequence(tmp_path / "a", make_sequence(0), scenario="schema = 1\n", seed=0)
-    with pytest.raises(InputError, match="left or right"):
-        kitti(tmp_path / "a", tmp_path / "out")

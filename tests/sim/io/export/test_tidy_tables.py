@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -169,12 +168,6 @@ def test_people_are_counted_in_frames_without_labels_of_groups(make_sequence):
     assert minute["groups_mean"] == pytest.approx(
         np.mean([len(g.id) for g, known in zip(truth.groups, truth.labelled, strict=True) if known])
     )
-
-
-def test_without_pandas_the_error_names_the_remedy(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(InputError, match=r"to_pandas\(\): got no pandas; .*pip install pandas, or use to_arrow\(\)"):
-        run_tables(walk(), 2.0).people.to_pandas()
 
 
 def test_a_table_of_another_program_stays(tmp_path: Path):

@@ -21,6 +21,7 @@ from sim.io.source import open_source, sequence_folders
 from sim.io.store import sequence_folder
 from sim.io.store.seal import read_manifest, with_hash
 from sim.io.store.validate import content_hash, validate
+from tests.fake_simulator import content
 
 Sample = dict[str, bytes]
 
@@ -54,10 +55,6 @@ def samples(*paths: Path) -> dict[str, Sample]:
             found[key][kind] = body
             last = key
     return found
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
 def test_a_sequence_is_a_sample_and_can_be_unpacked(data: Path, tmp_path: Path) -> None:

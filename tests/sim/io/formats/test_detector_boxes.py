@@ -73,13 +73,6 @@ def test_what_does_not_fit_is_refused(tmp_path, video, rows, got):
         with_boxes(plain, coco(tmp_path / "det.json", rows))
 
 
-def test_no_json_is_one_line(tmp_path, video):
-    (plain,) = open_source(video)
-    (tmp_path / "det.json").write_text("{")
-    with pytest.raises(InputError, match="expected JSON"):
-        with_boxes(plain, tmp_path / "det.json")
-
-
 def test_boxes_of_another_picture_size(tmp_path, video):
     (plain,) = open_source(video)
     large = [(k, 4 * x, 4 * y, 4 * w, 4 * h, s) for k, x, y, w, h, s in ROWS]

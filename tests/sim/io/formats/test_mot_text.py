@@ -114,17 +114,6 @@ def test_bad_rows_are_one_line(tmp_path, gt, line, word):
     assert error.value.exit_code == 2
 
 
-def test_binary_text_and_wrong_paths(tmp_path):
-    (tmp_path / "gt.txt").write_bytes(b"\xff\xfe\x00")
-    (tmp_path / "clip.mp4").write_bytes(b"")
-    (tmp_path / "empty").mkdir()
-    for name, word in (("gt.txt", "UTF-8"), ("clip.mp4", "video"), ("empty", "without"), ("nowhere", "nothing there")):
-        with pytest.raises(InputError, match=word):
-            open_source(tmp_path / name, fps=10)
-    with pytest.raises(InputError, match="fps"):
-        open_source(tmp_path, fps=-1)
-
-
 def test_a_bare_text_is_truth_or_detections(tmp_path):
     (tmp_path / "a.txt").write_text("1,3,0,0,4,6,1,-1,-1,-1\n")
     (tmp_path / "b.txt").write_text("1,-1,0,0,4,6,1,-1,-1,-1\n")
@@ -252,24 +241,8 @@ def test_the_rate_of_a_video_beside_it_is_named(tmp_path, folder):
         assert open_source(path)[0].fps == 25
 
 
-def test_seqinfo_of_too_large_pictures(tmp_path):
-    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\nseqLength=4\nimWidth=16384\nimHeight=16384\n")
-    with pytest.raises(InputError, match="16384×16384 px") as error:
-        open_source(tmp_path)
-    assert error.value.place == "imWidth, imHeight"
-
-
-def test_equal_scores_say_nothing():
-    assert unit_scores(np.array([-1.0, -1.0]))[0].tolist() == [1.0, 1.0]
-
-
 def test_an_outlier_among_shares_is_clipped():
     score = np.random.default_rng(4).uniform(0.5, 1, 400)
     mapped, told = unit_scores(np.append(score, 400.0))
     assert mapped.tolist() == [*score.tolist(), 1.0]
     assert told == "1 of 401 scores outside 0 to 1 are clipped"
-
-
-def test_a_seqinfo_that_is_no_ini_file(tmp_path):
-    with pytest.raises(InputError, match="expected key=value lines"):
-        open_source(folder(tmp_path, GOOD, ini="nothing\n"))

@@ -118,11 +118,3 @@ def test_right_pictures_without_numbers_are_as_many_as_the_left_ones(tmp_path) -
     (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\n")
     with pytest.raises(InputError, match="2 pictures without numbers; expected 3, as in img1"):
         open_source(tmp_path)
-
-
-def test_all_missing_keys_are_named_at_once(tmp_path) -> None:
-    write_yaml(tmp_path / "pair.yml", rig(40.0), image_width=None, position=None, rotation=None)
-    with pytest.raises(
-        InputError, match="image_width, rotation, position: got nothing; expected the keys image_width, "
-    ):
-        read_calibration(tmp_path / "pair.yml")

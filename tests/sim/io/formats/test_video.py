@@ -260,13 +260,6 @@ def test_a_sample_longer_than_the_video(tmp_path):
     assert sequence.source["background"].startswith("12 frames")
 
 
-@pytest.mark.parametrize("text", ["first", "first:0", "last:3", "spread:-1", "50", "first:3.5", ""])
-def test_no_background(tmp_path, text):
-    path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(12)])
-    with pytest.raises(InputError, match="--background"):
-        open_source(path, background=text)
-
-
 def test_a_folder_of_videos(tmp_path):
     for name in ("b.mp4", "a.avi"):
         write_video(tmp_path / name, [picture(k) for k in range(3)])

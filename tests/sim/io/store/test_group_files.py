@@ -92,21 +92,3 @@ def test_cameras_and_scenes_come_back_exactly(tmp_path, make_sequence, same):
     for scene in (Scene(np.array([3.0, 4.0])), make_sequence(1).scene):
         (tmp_path / "scene.json").write_text(json.dumps(scene_document(scene)))
         same(scene, read_scene(tmp_path / "scene.json"))
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("kind", "fish"), ("position", [1, 2]), ("rotation", [[1]]), ("focal_px", "wide"), ("image", None),
-        ("kind", "top"),
-    ],
-)  # fmt: skip
-def test_bad_cameras_are_one_line(tmp_path, make_sequence, key, value):
-    document = camera_document(make_sequence(1).camera) | {key: value}
-    (tmp_path / "camera.json").write_text(json.dumps(document))
-    with pytest.raises(InputError):
-        read_camera(tmp_path / "camera.json")
-    del document[key]
-    (tmp_path / "camera.json").write_text(json.dumps(document))
-    with pytest.raises(InputError, match=key):
-        read_camera(tmp_path / "camera.json")

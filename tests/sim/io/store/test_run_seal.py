@@ -102,16 +102,6 @@ def test_files_of_two_runs_are_refused(tmp_path, make_tracks):
         read_tracks(folder)
 
 
-def test_files_of_others_beside_a_run_are_no_fault(tmp_path, make_tracks, same):
-    live = make_tracks(1)
-    folder = write_tracks(tmp_path / "t", live, fps=10.0)
-    (folder / "mine.txt").write_text("x")
-    (folder / "overlay.mp4").write_text("x")
-    same(live, read_tracks(folder))
-    write_tracks(folder, make_tracks(2), fps=10.0)
-    assert (folder / "mine.txt").read_text() == (folder / "overlay.mp4").read_text() == "x"
-
-
 def _parquet() -> bytes:
     sink = pa.BufferOutputStream()
     pq.write_table(pa.table({"frame": [1], "boxes": [2]}), sink)
@@ -303,27 +293,9 @@ def test_values_of_another_kind(tmp_path, make_tracks, key, value):
     assert "track again" in error.value.remedy
 
 
-@pytest.mark.parametrize(
-    ("key", "value"), [(key, v) for key, values in WRONG.items() if key != "boxes" for v in values]
-)
-def test_what_cannot_be_read_is_not_written(make_tracks, key, value):
-    with pytest.raises(InputError) as error:
-        tracks_files(make_tracks(1), fps=10.0, info={key: value})
-    assert (error.value.file, error.value.place) == ("run.json", key)
-
-
 def test_right_values_and_further_keys(tmp_path, make_tracks):
     for info in ({}, dict.fromkeys(WRONG.keys() - {"tracker", "sequence", "boxes"}), {"mine": [1, {"a": None}]}):
         assert info.items() <= read_run(write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=info)).items()
-
-
-def test_half_an_id_in_a_table(tmp_path, make_tracks, monkeypatch):
-    with monkeypatch.context() as patch:
-        patch.setattr("sim.io.store.track_files.RunRows.reject_faults", lambda *_: None)
-        wrong = [t.replace(id=t.id.astype(float) + 0.5) for t in make_tracks(1)]
-        write_tracks(tmp_path / "t", wrong, fps=10.0)
-    with pytest.raises(InputError, match="id: got a column of float64"):
-        read_tracks(tmp_path / "t")
 
 
 @pytest.mark.parametrize("body", [b'{"boxes": "measured"', b"", b"[]"])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -99,24 +98,6 @@ def test_a_text(walk, tmp_path, capsys):
     assert merge.members == (1, 2, 3)
 
 
-def test_other_commands_take_the_run(walk, tmp_path, capsys):
-    """The text is a source, too; and the run may be scored with labels of that name."""
-    assert run(["group", str(walk), "--fps", "10", "--out", str(tmp_path / "g")]) == 0
-    out = capsys.readouterr().out
-    assert "positions in metres" in out
-    assert "1 2 3" in out
-    assert run(["validate", str(tmp_path / "g")]) == 0
-    assert run(["view", str(walk), str(tmp_path / "g"), "--fps", "10", "--out", str(tmp_path / "page.html")]) == 0
-    labels = biwi(tmp_path / "biwi" / "walk")
-    (tmp_path / "slow" / "walk.txt").parent.mkdir()
-    rows = [(k + 1, p, *at(0.4 * k)) for k in range(50) for p, at in WALK.items()]
-    (tmp_path / "slow" / "walk.txt").write_text("".join(f"{k},{p},-1,-1,-1,-1,1,{x},{y},0\n" for k, p, x, y in rows))
-    assert run(["group", str(tmp_path / "slow" / "walk.txt"), "--fps", "2.5", "--out", str(tmp_path / "h")]) == 0
-    (row,) = answer(capsys, "score", labels, tmp_path / "h")["sequences"]
-    assert row["pairwise_F1"] > 0.7
-    assert row["HOTA"] == 1
-
-
 @pytest.mark.parametrize("groups", [None, "", "1 4\n2 5\n", "1 2 3 4 5\n"])
 def test_labels_of_groups_are_never_read(tmp_path, capsys, groups):
     labelled = [biwi(tmp_path / k / "walk", labels) for k, labels in (("a", "1 2 3\n"), ("b", groups))]
@@ -128,17 +109,6 @@ def test_labels_of_groups_are_never_read(tmp_path, capsys, groups):
     (row,) = answer(capsys, "score", labelled[0], tmp_path / "a" / "g")["sequences"]
     assert row["pairwise_F1"] > 0.7
     assert "tracks of another walk" in refused(capsys, "score", labelled[0], tmp_path / "b" / "g") or groups is None
-
-
-def test_truth_of_groups_is_not_used():
-    sequence = simulate(load("merge", ["camera.fps=5"]), seed=3, streams=())
-    truth = sequence.truth
-    blind = truth.replace(group=np.full(len(truth.id), -1), groups=None, groups_px=None, events=None, near=None)
-    one, other = (group(replace(sequence, load_truth=lambda t=t: t)) for t in (truth, blind))
-    assert any((t.group >= 0).any() for t in one)
-    assert any(t.events for t in one)
-    assert all(np.array_equal(a.group, b.group) and told(a) == told(b) for a, b in zip(one, other, strict=True))
-    assert one.info == other.info
 
 
 @pytest.mark.parametrize("form", ["ground text", "folder of boxes", "biwi"])
@@ -244,50 +214,6 @@ def test_speeds_that_nobody_has(tmp_path, capsys, rows, options, expected):
     warned = capsys.readouterr().err
     assert expected in warned
     assert bool(warned) == bool(expected)
-
-
-def test_without_people(tmp_path, capsys):
-    """Nobody labelled, and a person alone: tables without groups."""
-    (tmp_path / "walk" / "gt").mkdir(parents=True)
-    (tmp_path / "walk" / "gt" / "gt.txt").write_text("")
-    (tmp_path / "walk" / "seqinfo.ini").write_text("[Sequence]\nseqLength=3\n")
-    found = answer(capsys, "group", tmp_path / "walk", "--fps", 10, "--out", tmp_path / "g")
-    assert (found["runs"][0]["people"], found["runs"][0]["groups"]) == (0, [])
-    line = ["group", tmp_path / "walk", "--fps", 10, "--probabilities", "--out", tmp_path / "h"]
-    assert answer(capsys, *line)["runs"][0]["pairs"] == 0
-    assert run(["group", str(tmp_path / "walk"), "--fps", "10", "--out", str(tmp_path / "g")]) == 0
-
-
-BAD = {
-    "no ids": ("1,-1,5,5,10,20,1\n2,-1,5,5,10,20,1\n", "no people with ids"),
-    "no place": ("1,1,-1,-1,-1,-1,1,-1,-1,-1\n", "line 1"),
-    "some places": ("1,1,5,5,10,20,1,3,4,0\n1,2,5,5,10,20,1,-1,-1,-1\n", "frame 1, id 2: got no position"),
-    "an id twice": ("1,1,5,5,10,20,1\n1,1,6,5,10,20,1\n", "each id once in a frame"),
-    "words": ("frame,id,a,b\n1,1,2,3\n", "line 1"),
-    "five columns": ("1,1,2,3,4\n", "6 to 10 or 4 columns"),
-    "nothing": ("", "no row"),
-}
-
-
-@pytest.mark.parametrize("name", BAD)
-def test_a_text_that_tells_no_people(tmp_path, capsys, name):
-    rows, expected = BAD[name]
-    (tmp_path / "walk.txt").write_text(rows)
-    line = refused(capsys, "group", tmp_path / "walk.txt", "--fps", "10", "--out", tmp_path / "g")
-    assert expected in line
-    assert "walk.txt" in line
-    assert not (tmp_path / "g").exists()
-
-
-def test_wrong_sources(walk, tmp_path, capsys):
-    assert "nothing there" in refused(capsys, "group", tmp_path / "none", "--out", tmp_path / "g")
-    (tmp_path / "empty").mkdir()
-    assert "no tracks" in refused(capsys, "group", tmp_path / "empty", "--out", tmp_path / "g")
-    (tmp_path / "m" / "det").mkdir(parents=True)
-    (tmp_path / "m" / "det" / "det.txt").write_text("1,-1,5,5,10,20,1\n")
-    found = refused(capsys, "group", tmp_path / "m", "--fps", "10", "--out", tmp_path / "g")
-    assert "no people with ids" in found
-    assert "track the people first" in found
 
 
 def test_wrong_options(walk, tmp_path, capsys):

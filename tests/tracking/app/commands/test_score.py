@@ -183,16 +183,3 @@ def test_runs_that_fit_no_common_plane_are_refused(made: Path, scene: Sequence, 
     error = capsys.readouterr().err
     assert "runs in the image (px), and one on the ground (m) with groups without people" in error
     assert run(["score", str(data), str(folder), str(made / "file")]) == 0
-
-
-def test_groups_that_are_not_labelled_are_no_zeros(made: Path, capsys) -> None:
-    gt = made / "data" / "flockscope-train" / "merge-s00005" / "gt" / "gt.txt"
-    shown = made / "file" / "merge-s00005" / "tracks.mot.txt"
-    found = scored(capsys, gt, shown, "--fps", "10")["sequences"][0]
-    assert found["HOTA"] > 0.5
-    unknown = ("group", "pairwise", "GMITRE", "right", "exact", "merge", "event")
-    assert {found[key] for key in CATALOGUE if key.startswith(unknown)} == {None}
-    assert run(["score", str(gt), str(shown), "--fps", "10"]) == 0
-    output = capsys.readouterr().out
-    assert "groups are not labelled" in output
-    assert "strict" not in output

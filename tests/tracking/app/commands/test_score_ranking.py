@@ -55,14 +55,6 @@ def test_the_ranking_is_that_of_compare(made: Path, capsys) -> None:
     assert len(found["differences"]) == 3
 
 
-@pytest.mark.filterwarnings("ignore::UserWarning")
-def test_any_number_of_workers_gives_the_same(made: Path, tmp_path: Path, capsys) -> None:
-    runs = [str(made / "good"), str(made / "bad"), FAKE]
-    alone, both = (ranked(capsys, made, *runs, "--workers", n, "--csv", str(tmp_path / n)) for n in "12")
-    assert alone == both
-    assert (tmp_path / "1").read_bytes() == (tmp_path / "2").read_bytes()
-
-
 def test_a_class_without_a_truth_hash_is_no_difference() -> None:
     stored, played = {"tracker": "a", "truth_hash": "x"}, {"tracker": "a"}
     assert run_differences({"a": [stored], "b": [played]}) == []

@@ -10,10 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from sim.io.source import open_source
-from sim.io.store.seal import check_run
 from sim.io.store.track_files import read_tracks
 from tests.short_scene import write_short_scene
-from tracking import group
 from tracking.app.cli import run
 
 
@@ -50,24 +48,3 @@ def test_several_have_a_folder_each(made: Path, tmp_path: Path) -> None:
     labels = pq.read_table(tmp_path / "data" / "scene-s20000" / "people.parquet")
     assert labels["x_m"].to_pylist() == first.truth.pos[:, 0].tolist()
     assert json.loads(labels.schema.metadata[b"flockscope"])["fps"] == first.fps
-
-
-def test_tables_in_python_are_those_of_the_command(made: Path, tmp_path: Path) -> None:
-    assert run(["export", "parquet", str(made / "runs" / "scene-s20000"), "--out", str(tmp_path)]) == 0
-    tables = group(open_source(made / "data")[0]).tables()
-    for name, each in vars(tables).items():
-        assert pq.read_table(tmp_path / f"{name}.parquet").equals(each.to_arrow()), name
-
-
-def test_refusals(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    stored, detections = made / "runs" / "scene-s20000", tmp_path / "det.txt"
-    detections.write_text("1,-1,10,10,20,40,1\n")
-    cases = {
-        (stored, stored): "--out: got a folder of tracks",
-        (detections, tmp_path / "x"): "no labelled people",
-        (tmp_path / "nothing", tmp_path / "x"): "nothing",
-    }
-    for (source, out), words in cases.items():
-        assert run(["export", "parquet", str(source), "--out", str(out)]) == 2
-        assert words in capsys.readouterr().err
-    check_run(stored)

@@ -11,21 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scenarios.errors import InputError
-from sim.types import GroupEvent, PixelTruth, Sequence, Truth
+from sim.types import GroupEvent, Sequence, Truth
 from tests.coded_pictures import SIZE, number, sequence
 from tracking.app.pictures.contact_sheet import (
     HEAD,
-    OBJECTS,
     TITLE,
     WIDTH,
     PanelPictures,
     choose_frames,
-    coloured_disparity,
-    coloured_ids,
     empty_truth,
     write_sheet,
 )
-from tracking.drawing.canvas import FLOOR, GRID, colour
+from tracking.drawing.canvas import FLOOR, colour
 
 
 def bare(length: int, starts: dict[int, str]) -> Truth:
@@ -77,16 +74,6 @@ def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) ->
     assert not (tmp_path / "none.png").exists()
 
 
-def pixels(index: int) -> PixelTruth:
-    ids = np.zeros(SIZE[::-1], np.int64)
-    ids[30:50, 5:15], ids[:10] = index, -2
-    disparity = np.full(SIZE[::-1], 2.0)
-    disparity[:, :5] = np.nan
-    disparity[30:50, 5:15] = 9.0
-    one = np.ones(1)
-    return PixelTruth(ids, disparity, one, one, np.ones((1, 4)), np.ones(1, np.int64))
-
-
 def test_each_panel_shows_its_frame(tmp_path: Path) -> None:
     """Without labels too: frames spread over the recording."""
     bare = sequence(60)
@@ -103,12 +90,3 @@ def test_each_panel_shows_its_frame(tmp_path: Path) -> None:
     top = (HEAD + TITLE) // 2
     first = cv2.resize(read[top : top + round(SIZE[1] * shrunk), 10 : 10 + WIDTH // 2], SIZE)
     assert number(first) == chosen[0]
-
-
-def test_colours() -> None:
-    here = pixels(3)
-    ids = coloured_ids(here.ids)
-    assert (tuple(ids[40, 10]), tuple(ids[2, 2]), tuple(ids[25, 40])) == (colour(3), OBJECTS, FLOOR)
-    shown = coloured_disparity(here.disparity, 2.0, 9.0).astype(int)
-    assert tuple(shown[40, 2]) == GRID
-    assert shown[40, 10].sum() > shown[25, 40].sum() + 100

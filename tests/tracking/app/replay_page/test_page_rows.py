@@ -13,15 +13,10 @@ from hypothesis import strategies as st
 from sim.geometry.polygons import area, convex_hull, footprint_hull
 from sim.types import GroupEvent, Sequence
 from tests.groups_as_wholes import wholes
+from tests.tracking.app.replay_page.test_page import column
 from tracking.app.replay_page import page_rows
 from tracking.app.replay_page.page import Run, page_data
-from tracking.app.replay_page.page_rows import NIL, Bar, Link, bars, links
-
-
-def column(values: list[int]) -> np.ndarray:
-    whole = np.cumsum(values).astype(float)
-    whole[whole == NIL] = np.nan
-    return whole
+from tracking.app.replay_page.page_rows import Bar, Link, bars, links
 
 
 def rows_of(side: dict) -> dict[str, np.ndarray]:

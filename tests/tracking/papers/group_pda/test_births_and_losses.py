@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sim.truth.merge_split_rules import SPLIT_VELOCITY
-from sim.types import Array, Context, Frame, Tracks
+from sim.types import Array
 from tests.tracking.papers.group_pda.test_tracker import FPS, GROUND, block, changes, events, ids, noisy, sizes, track
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.tracker import GroupPda
 
 
 def walk(velocity: tuple[float, float], hidden: range, seed: int = 0, after: Array | None = None) -> list[Array]:
@@ -151,60 +149,3 @@ def test_two_that_stand_beside_each_other_do_not_join_and_part(gap: float) -> No
         made = track([noisy([block(4, 4), block(4, 4, (1.8 + gap, 0))], r) for _ in range(200)])
         assert not events(made, "split")
         assert len(events(made, "merge")) <= 1
-
-
-HIGH, WIDE, PX = 120, 160, 20.0
-COLOURS = ((30, 20, 190), (190, 30, 20), (20, 170, 40))
-People = Sequence[tuple[float, float]]
-"""Their middles, px."""
-
-
-def picture(people: People, r: np.random.Generator) -> np.ndarray:
-    """(H, W, 3) ellipses of a person's size on a mottled ground, with noise."""
-    image = np.kron(np.random.default_rng(0).uniform(90, 170, (HIGH // 8, WIDE // 8, 3)), np.ones((8, 8, 1)))
-    v, u = np.arange(HIGH)[:, None] + 0.5, np.arange(WIDE) + 0.5
-    for (x, y), colour in zip(people, COLOURS, strict=False):
-        image[((u - x) / 5) ** 2 + ((v - y) / 17) ** 2 <= 1] = colour
-    return np.clip(image + 2 * r.standard_normal(image.shape), 0, 255).astype(np.uint8)
-
-
-def watched(frames: Sequence[People | None], config: GroupPdaConfig | None = None) -> list[Tracks]:
-    """Answers to pictures of these people; None is a lost one."""
-    r, tracker = np.random.default_rng(0), GroupPda(config)
-    empty = np.stack([picture([], r) for _ in range(20)])
-    tracker.reset(Context(FPS, PX, image_size=(WIDE, HIGH), background=empty), 0)
-    shown = [None if people is None else picture(people, r) for people in frames]
-    return [tracker.step(Frame(k + 1, k / FPS, image), None) for k, image in enumerate(shown)]
-
-
-def test_pixels_of_two_who_walk_abreast_are_one_group_of_two() -> None:
-    frames: list[People | None] = [[(20 + 1.5 * k, 60), (32 + 1.5 * k, 60)] for k in range(80)]
-    frames[0] = frames[40] = frames[41] = None
-    made = watched(frames)
-    assert ids(made) == {1}
-    assert not changes(made)
-    for k in range(10, 80):
-        assert made[k].plane == "image"
-        assert made[k].pos[0] == pytest.approx([26 + 1.5 * k, 60], abs=1.5)
-        assert sizes(made[k]) == pytest.approx([2], abs=0.3)
-    assert made[-1].vel[0] == pytest.approx([15, 0], abs=1)
-
-
-def test_pixels_of_two_who_part_split() -> None:
-    frames = [[(60 - 1.2 * max(k - 30, 0), 60.0), (72 + 1.2 * max(k - 30, 0), 60.0)] for k in range(70)]
-    made = watched(frames)
-    ((kind, start, before, after),) = changes(made)
-    assert (kind, before, after) == ("split", (1,), (1, 2))
-    assert start == pytest.approx(41, abs=FPS)  # the ellipses are 1.5 m apart
-    assert sizes(made[-1]) == pytest.approx([1, 1], abs=0.2)
-    assert np.sort(made[-1].pos[:, 0]) == pytest.approx([60 - 46.8, 72 + 46.8], abs=2)
-
-
-def test_pixels_of_pairs_that_pass_each_other_keep_their_ids() -> None:
-    """On their own ways, one behind the other."""
-    frames = [[(10 + 2.0 * k, 40.0), (20 + 2.0 * k, 40.0), (150 - 2.0 * k, 88.0)] for k in range(70)]
-    made = watched(frames)
-    assert made[10].id.tolist() == made[-1].id.tolist() == [1, 2]
-    assert not changes(made)
-    assert sizes(made[-1]) == pytest.approx(sizes(made[10]), rel=0.2)
-    assert np.sign(made[-1].vel[:, 0]).tolist() == np.sign(made[10].vel[:, 0]).tolist()

@@ -5,27 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.types import Array, Context, Detections, Frame, Tracks
+from sim.types import Array, Tracks
 from tests import painted
 from tests.painted import TALL, Person
 from tests.tracking.papers.group_pda.test_association_kernels import bank
+from tests.tracking.papers.group_pda.test_tracker import track
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, merged
 from tracking.papers.group_pda.scaled_parameters import scale_parameters
 from tracking.papers.group_pda.tracker import GroupPda
 
 FPS = 10.0
-
-
-def track(frames: list[Array], config: GroupPdaConfig | None = None) -> list[Tracks]:
-    """Answers to points on the ground."""
-    tracker, made = GroupPda(config), []
-    tracker.reset(Context(FPS, 40.0), 0)
-    for k, points in enumerate(frames):
-        t, score = k / FPS, np.ones(len(points))
-        frame = Frame(k + 1, t, detections=Detections(k + 1, t, "ground", points, score=score))
-        made.append(tracker.step(frame, frame.detections))
-    return made
 
 
 def meeting(leaves: float, returns: float, seed: int, offset: float = 0.0) -> list[Array]:

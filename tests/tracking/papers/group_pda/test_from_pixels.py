@@ -37,6 +37,18 @@ def test_the_learned_scale_does_what_the_same_one_told_does() -> None:
     assert [t.pos.tobytes() for t in learned] == [t.pos.tobytes() for t in told]
 
 
+def test_two_who_part_split() -> None:
+    """0.6 m apart, at 0.6 m/s each from frame 31 on; the ellipses are 1.5 m apart in frame 41."""
+    walked = [2.4 * max(k - 30, 0) for k in range(70)]
+    frames = [[(148 - w, 200.0, painted.TALL), (172 + w, 200.0, painted.TALL)] for w in walked]
+    made = painted.watched(GroupPda(), frames, painted.TALL / 1.7, painted.sample(np.random.default_rng(0)))
+    ((kind, start, before, after),) = [
+        (e.kind, e.start, e.before, e.after) for t in made for e in t.events if e.kind in ("merge", "split")
+    ]
+    assert (kind, before, after) == ("split", (1,), (1, 2))
+    assert start == pytest.approx(41, abs=10)
+
+
 @pytest.mark.parametrize("scale", [math.nan, 0.0, -3.0])
 def test_without_a_scale_and_without_anybody_it_is_asked_for(scale: float) -> None:
     with pytest.raises(InputError, match=r"context\.px_per_m"):
