@@ -1,5 +1,7 @@
 """The belief: equal to a slow twin, causal, and its file."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tests import reference_belief as slow
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs, pair_probabilities
-from tracking.grouping.grouping_choice import groups_of_steps
+from tracking.grouping.grouping_choice import belief_groups, groups_of_steps
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.pair_evidence import NAMES, evidence
 
@@ -166,3 +168,14 @@ def test_probabilities_are_those_of_the_pairs(scene):
     rows = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), strict=True)
     same = np.array([label[f, a] == label[f, b] >= 0 for f, a, b in rows])
     assert found.probability[same].mean() > found.probability[~same].mean() + 0.4
+
+
+def test_stay_and_come_decide_how_long_links_last(scene):
+    ids, column = np.unique(scene.id, return_inverse=True)
+    rows = (scene.frame - 1, column, scene.pos[:, :2], scene.length, scene.fps)
+
+    def changes(**changed):
+        return len(belief_groups(*rows, dataclasses.replace(default_belief(), **changed)).links.frame)
+
+    forgetful, default, late = changes(stay=0.0, come=0.0), changes(), changes(stay=30.0, come=30.0)
+    assert forgetful > default > late
