@@ -171,7 +171,7 @@ def test_probabilities_are_those_of_the_pairs(scene):
 
 
 def test_stay_and_come_decide_how_long_links_last(scene):
-    ids, column = np.unique(scene.id, return_inverse=True)
+    column = np.unique(scene.id, return_inverse=True)[1]
     rows = (scene.frame - 1, column, scene.pos[:, :2], scene.length, scene.fps)
 
     def changes(**changed):
