@@ -159,7 +159,7 @@ def split(
 ) -> list[SpaceGroup]:
     """Returns the children of a group whose M points have been in parts for `split_time`, [] if it does not split."""
     count = int(part.max(initial=-1)) + 1
-    if count < 2 or not motion.config.split:
+    if count < 2:
         group.apart_since = float("nan")
         return []
     if np.isnan(group.apart_since):
@@ -177,7 +177,7 @@ def split(
         return []
     own = born.pop(largest)
     group.ekf, group.spread, group.count, group.members = own.ekf, own.spread, own.count, own.members
-    group.apart_since = float("nan")
+    group.rise, group.apart_since = own.rise, float("nan")
     for child in born:
         child.parent = group.id
     return born

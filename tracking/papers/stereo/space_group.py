@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
 
 POS, VEL = [0, 2, 4], [1, 3, 5]  # Entries of the state that are the position and the velocity.
+TOP = 0.9  # Share of a group's features, by weight, that are below its top.
 LEAST_DENSITY = 0.25  # Least density of features that counts, relative to the highest of the group (ours).
 
 
@@ -59,6 +60,10 @@ class Measurement(Protocol):
 
     def weights(self, points: SpacePoints, width: float) -> Array:
         """Returns the weights (M,) of M points in their group's mean position; width: of the kernel of density, m."""
+        ...
+
+    def rise(self, z: Array, weights: Array, top_offset: float) -> float:
+        """Returns how far, m, the middle of bodies is above the mean of M points with heights z (M,) and weights."""
         ...
 
 
@@ -80,6 +85,13 @@ class PairMeasurement:
         """Returns `inverse_densities` (M,): a person may have any number of features."""
         return inverse_densities(points, width)
 
+    def rise(self, z: Array, weights: Array, top_offset: float) -> float:
+        """Returns how far, m, `top_offset` below the top of M features is above their mean; 0 if it is 0 (ours)."""
+        # others and the edge of the picture hide legs, but seldom heads: the mean height changes with what is seen
+        order = np.argsort(z)
+        top = min(int(np.searchsorted(np.cumsum(weights[order]), TOP)), len(z) - 1)
+        return float(z[order[top]] - top_offset - weights @ z) if top_offset else 0.0
+
 
 class PlaceMeasurement:
     """Z = (x, y, z) in m: points whose places are measured directly."""
@@ -97,6 +109,11 @@ class PlaceMeasurement:
         """Returns ones (M,): each point is a person."""
         del width
         return np.ones(len(points))
+
+    def rise(self, z: Array, weights: Array, top_offset: float) -> float:
+        """Returns 0: the height of a point is that of its person."""
+        del z, weights, top_offset
+        return 0.0
 
 
 def inverse_densities(points: SpacePoints, width: float) -> Array:
@@ -133,7 +150,8 @@ class SpaceGroup:
     the same order. count: N, number of its points in its last measured frame. id: NO_ID while tentative.
     first_seen, last_seen: s; measured_time: s. parent: id of the group that it split from, or NO_ID. members (K,
     3): expected places of its points relative to its position, m, when it was measured last. apart_since: s since when
-    its points have been unlinked parts, nan if they are not or it was not measured.
+    its points have been unlinked parts, nan if they are not or it was not measured. rise: m from its position up to the
+    middle of its members' bodies, smoothed as Sigma.
     """
 
     ekf: ExtendedKalmanFilter
@@ -146,6 +164,7 @@ class SpaceGroup:
     parent: int = NO_ID
     members: Array = field(default_factory=lambda: np.zeros((0, 3)))
     apart_since: float = float("nan")
+    rise: float = 0.0
 
     @property
     def pos(self) -> Array:
@@ -196,7 +215,8 @@ def newborn(points: SpacePoints, measurement: Measurement, motion: Motion3D, t: 
     ekf.x[POS, 0], ekf.x[VEL, 0] = mean, points.vel.mean(0)
     ekf.P[np.ix_(POS, POS)] = mean_covariance(points, weights, config)
     ekf.P[np.ix_(VEL, VEL)] = points.vel_cov.mean(0) / n + VELOCITY_SPREAD**2 / n * np.eye(3)
-    group = SpaceGroup(ekf, spread_of(points, config), float(n), NO_ID, t, t, motion.dt)
+    rise = measurement.rise(points.pos[:, 2], weights, config.top_offset)
+    group = SpaceGroup(ekf, spread_of(points, config), float(n), NO_ID, t, t, motion.dt, rise=rise)
     _place_members(group, points, config)
     return group
 
@@ -245,6 +265,7 @@ def measure(group: SpaceGroup, points: SpacePoints, measurement: Measurement, mo
     group.ekf.P = (group.ekf.P + group.ekf.P.T) / 2
     keep = np.exp(-motion.dt / config.spread_time)
     group.spread = keep * group.spread + (1 - keep) * spread_of(points, config)
+    group.rise = keep * group.rise + (1 - keep) * measurement.rise(points.pos[:, 2], weights, config.top_offset)
     group.count, group.last_seen = float(len(points)), t
     group.measured_time += motion.dt
     _place_members(group, points, config)

@@ -155,6 +155,8 @@ class Stereo:
         axes, s, from_points = 3 if self.plane == "space" else 2, self.scale, self.pictures is None
         order, flat = POS[:axes] + VEL[:axes], np.ix_(POS[:2], POS[:2])
         x = s * np.array([g.ekf.x[order, 0] for g in shown]).reshape(-1, 2 * axes)
+        if axes == 3:
+            x[:, 2] += [g.rise for g in shown]
         P = s**2 * np.array([g.ekf.P[np.ix_(order, order)] for g in shown]).reshape(-1, 2 * axes, 2 * axes)
         extent = s**2 * np.array([g.spread[flat] for g in shown]).reshape(-1, 2, 2)
         outline = FOOTPRINT * (1.0 if from_points else FEATURE_OUTLINE)  # what a point covers, seen from above, m

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.stereo.density import ABOVE, BELOW, in_image
+from benchmarks.stereo.density import HALF, in_image
 from scenarios.errors import InputError
 from sim.geometry.polygons import contains
 from sim.scene.camera import project
@@ -283,10 +283,10 @@ def test_a_hull_in_the_image_covers_bodies_from_their_feet_to_their_heads() -> N
     assert made.plane == "image"
     (hull,) = made.groups.hull
     for height, inside in (
-        (1.4 - BELOW, True),
-        (1.4 + ABOVE, True),
-        (1.4 - BELOW - 0.8, False),
-        (1.4 + ABOVE + 0.8, False),
+        (1.4 - HALF, True),
+        (1.4 + HALF, True),
+        (1.4 - HALF - 0.8, False),
+        (1.4 + HALF + 0.8, False),
     ):
         uv = project(camera, np.array([[1.0, 6.0, height]]))[0]
         assert contains(hull, uv).tolist() == [inside], height
