@@ -65,8 +65,8 @@ def _measured_places(offset: Array, cov: Array, spread: Array) -> Array:
 VARIANTS: Mapping[str, Variant] = {
     "surface_offset": Variant({"surface_offset": 0.0}),
     "top_offset": Variant({"top_offset": 0.0}),
+    "density_width": Variant({"density_width": 20.0}),
     "point_covariance": Variant({"point_covariance": False}),
-    "velocity_weight": Variant({"velocity_weight": 0.0}),
     "spread_weight": Variant({"spread_weight": 0.1}),
     "split_time": Variant({"split_time": 0.0}),
     "confirm_time": Variant({"confirm_time": 0.0}),

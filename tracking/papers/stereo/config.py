@@ -47,6 +47,8 @@ class StereoConfig(BackgroundSettings):
         "process noise: square root of the spectral density of a white acceleration (eq. 2)", "log")
     centroid_noise: float = param(0.1, (0.005, 1.0), "m",
         "v of eq. 5: measurement noise of a group's mean beside that of its points, as points come and go", "log")
+    density_width: float = param(0.15, (0.05, 20.0), "m",
+        "from pixels: kernel of the density by whose inverse features count in the mean (ours)", "log", sees="pixels")
     radius: float = param(0.8, (0.1, 2.0), "m",
         "from pixels: radius of a feature's sphere; features 2 r apart are linked (eq. 12)", sees="pixels")
     point_radius: float = param(0.75, (0.1, 2.0), "m",

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 POS, VEL = [0, 2, 4], [1, 3, 5]  # Entries of the state that are the position and the velocity.
-TOP = 0.9  # Share of a group's features that are below its top (ours).
+TOP = 0.9  # Share of a group's features, by weight, that are below its top.
 
 
 class Measurement(Protocol):
@@ -57,8 +57,12 @@ class Measurement(Protocol):
         """Returns dZ/d(x, y, z) (3, 3) at a position (3,), m."""
         ...
 
-    def rise(self, z: Array, top_offset: float) -> float:
-        """Returns how far, m, the middle of bodies is above the mean of M points with heights z (M,), m."""
+    def weights(self, points: SpacePoints, width: float) -> Array:
+        """Returns the weights (M,) of M points in their group's mean position; width: of the kernel of density, m."""
+        ...
+
+    def rise(self, z: Array, weights: Array, top_offset: float) -> float:
+        """Returns how far, m, the middle of bodies is above the mean of M points with heights z (M,) and weights."""
         ...
 
 
@@ -76,10 +80,16 @@ class PairMeasurement:
         """Returns d(u, v, d)/d(x, y, z) (3, 3) in px/m."""
         return np.asarray(pair_jacobian(self.camera, xyz[None])[0])
 
-    def rise(self, z: Array, top_offset: float) -> float:
+    def weights(self, points: SpacePoints, width: float) -> Array:
+        """Returns `inverse_densities` (M,): a person may have any number of features."""
+        return inverse_densities(points, width)
+
+    def rise(self, z: Array, weights: Array, top_offset: float) -> float:
         """Returns how far, m, `top_offset` below the top of M features is above their mean; 0 if it is 0 (ours)."""
         # others and the edge of the picture hide legs, but seldom heads: the mean height changes with what is seen
-        return float(np.quantile(z, TOP) - top_offset - z.mean()) if top_offset else 0.0
+        order = np.argsort(z)
+        top = min(int(np.searchsorted(np.cumsum(weights[order]), TOP)), len(z) - 1)
+        return float(z[order[top]] - top_offset - weights @ z) if top_offset else 0.0
 
 
 class PlaceMeasurement:
@@ -94,10 +104,24 @@ class PlaceMeasurement:
         del xyz
         return np.eye(3)
 
-    def rise(self, z: Array, top_offset: float) -> float:
+    def weights(self, points: SpacePoints, width: float) -> Array:
+        """Returns ones (M,): each point is a person."""
+        del width
+        return np.ones(len(points))
+
+    def rise(self, z: Array, weights: Array, top_offset: float) -> float:
         """Returns 0: the height of a point is that of its person."""
-        del z, top_offset
+        del z, weights, top_offset
         return 0.0
+
+
+def inverse_densities(points: SpacePoints, width: float) -> Array:
+    """Returns the inverse of the density of M points on the ground at each of them, (M,), up to a factor (ours)."""
+    d = points.pos[:, None, :2] - points.pos[:, :2]
+    S = points.cov[:, None, :2, :2] + points.cov[:, :2, :2]
+    a, b, c = S[..., 0, 0] + width**2, S[..., 0, 1], S[..., 1, 1] + width**2
+    d2 = (c * d[..., 0] ** 2 - 2 * b * d[..., 0] * d[..., 1] + a * d[..., 1] ** 2) / (a * c - b**2)
+    return np.asarray(1 / np.exp(-d2 / 2).sum(1))
 
 
 def measured_state(x: Array, measurement: Measurement) -> Array:
@@ -185,18 +209,27 @@ def newborn(points: SpacePoints, measurement: Measurement, motion: Motion3D, t: 
     config, n = motion.config, len(points)
     ekf = ExtendedKalmanFilter(dim_x=6, dim_z=3)
     ekf.P = np.zeros((6, 6))
-    ekf.x[POS, 0], ekf.x[VEL, 0] = points.pos.mean(0), points.vel.mean(0)
-    ekf.P[np.ix_(POS, POS)] = mean_covariance(points, config)
+    mean, weights = mean_position(points, measurement, config)
+    ekf.x[POS, 0], ekf.x[VEL, 0] = mean, points.vel.mean(0)
+    ekf.P[np.ix_(POS, POS)] = mean_covariance(points, weights, config)
     ekf.P[np.ix_(VEL, VEL)] = points.vel_cov.mean(0) / n + VELOCITY_SPREAD**2 / n * np.eye(3)
-    rise = measurement.rise(points.pos[:, 2], config.top_offset)
+    rise = measurement.rise(points.pos[:, 2], weights, config.top_offset)
     group = SpaceGroup(ekf, spread_of(points, config), float(n), NO_ID, t, t, motion.dt, rise=rise)
     _place_members(group, points, config)
     return group
 
 
-def mean_covariance(points: SpacePoints, config: StereoConfig) -> Array:
+def mean_position(points: SpacePoints, measurement: Measurement, config: StereoConfig) -> tuple[Array, Array]:
+    """Returns the mean position (3,), m, of M points and their weights (M,) in it, with sum 1 (ours)."""
+    weights = measurement.weights(points, config.density_width)
+    weights = weights / weights.sum()
+    return weights @ points.pos, weights
+
+
+def mean_covariance(points: SpacePoints, weights: Array, config: StereoConfig) -> Array:
     """Returns the covariance (3, 3), m^2, of the mean of M points as a measurement of their group's position."""
-    return np.asarray(points.cov.mean(0) / len(points) + config.centroid_noise**2 * np.eye(3))
+    errors = np.einsum("m,mij->ij", weights**2, points.cov)
+    return np.asarray(errors + config.centroid_noise**2 * np.eye(3))
 
 
 def spread_of(points: SpacePoints, config: StereoConfig) -> Array:
@@ -221,16 +254,16 @@ def spread_of(points: SpacePoints, config: StereoConfig) -> Array:
 def measure(group: SpaceGroup, points: SpacePoints, measurement: Measurement, motion: Motion3D, t: float) -> None:
     """Update a group, in place, by its M points of the frame at t s: state (eqs 4 to 6), Sigma (eq. 7) and N."""
     config = motion.config
-    mean = points.pos.mean(0)
+    mean, weights = mean_position(points, measurement, config)
     J = measurement.jacobian(mean)
-    R = J @ mean_covariance(points, config) @ J.T
+    R = J @ mean_covariance(points, weights, config) @ J.T
     group.ekf.update(
         measurement.z(mean), state_jacobian, measured_state, R, args=(measurement,), hx_args=(measurement,)
     )
     group.ekf.P = (group.ekf.P + group.ekf.P.T) / 2
     keep = np.exp(-motion.dt / config.spread_time)
     group.spread = keep * group.spread + (1 - keep) * spread_of(points, config)
-    group.rise = keep * group.rise + (1 - keep) * measurement.rise(points.pos[:, 2], config.top_offset)
+    group.rise = keep * group.rise + (1 - keep) * measurement.rise(points.pos[:, 2], weights, config.top_offset)
     group.count, group.last_seen = float(len(points)), t
     group.measured_time += motion.dt
     _place_members(group, points, config)

@@ -72,7 +72,7 @@ def test_a_linear_measurement_makes_it_a_kalman_filter() -> None:
 def test_errors_have_the_stated_covariance(depth: float) -> None:
     """NEES of the state over 60 runs of 2 s: 6 in the mean, within 99 % of chi-square."""
     camera = rig(**FIT)
-    config = StereoConfig(centroid_noise=0.05, accel_noise=0.5)
+    config = StereoConfig(centroid_noise=0.05, accel_noise=0.5, density_width=20.0)
     measurement, motion, n, runs = PairMeasurement(camera), motion_model(config, DT), 12, 60
     deviations, nees = np.array([0.3, 0.3, 0.25]), []
     for run in range(runs):
@@ -112,7 +112,7 @@ def test_depth_has_no_bias_where_members_stand_at_many_depths() -> None:
     pos = camera.position + z[:, None] * camera.rotation[2]
     d = project_pair(camera, pos)[:, 2]
     assert 246 * 0.12 / d.mean() - 8.0 < -0.1
-    config, measurement = StereoConfig(), PairMeasurement(camera)
+    config, measurement = StereoConfig(density_width=20.0), PairMeasurement(camera)
     motion = motion_model(config, DT)
     points = at_places(pos, point_covariances(camera, pos, np.square([0.3, 0.3, 0.15])))
     group = newborn(points, measurement, motion, 0.0)
