@@ -4,24 +4,20 @@
     Z = f(X_k) + noise                                       (u, v, d) of the mean of the group's points (eqs 4 to 6)
     Sigma <- alpha_s Sigma + (1 - alpha_s) C_y               covariance of its points' positions and velocities (eq. 7)
 
-The filter is filterpy's. The paper's Phi has a step of 1 frame; here times are seconds. The paper has one covariance of
-a group; here P is that of the centroid, by the filter, and Sigma that of the members. Departures: C_y is without the
-points' own covariances and is shrunk to a prior, as the covariance of few points in six dimensions is singular.
+The filter is filterpy's. P is the covariance of the centroid, Sigma that of the members.
 
-Also here: the measurement of a group by the extended Kalman filter: Z = f(X) + noise (eqs 4 to 6), and its Jacobian.
+The measurement (eqs 4 to 6): from pictures Z = (u, v, d), the projection of the mean of the group's points in space.
+The mean of their (u, v, d) would be biased, as the depth b f / d is no linear function of d (the bias is -var(z) / z).
+From detections Z = (x, y, z), so that the filter is a linear Kalman filter.
 
-The state is X = (x, x', y, y', z, z') (eq. 1). From pictures Z = (u, v, d): the projection of the mean of the group's
-points in space. Departure: the mean of their (u, v, d) would be biased, as the depth b f / d is no linear function of d
-(the bias is -var(z) / z). From detections Z = (x, y, z), so that the filter is a linear Kalman filter.
-
-Also here: data association of `stereo`: which group each point belongs to (sec. 3.3).
+Data association (sec. 3.3): which group each point belongs to.
 
     (y_i - xi_j)' S^-1 (y_i - xi_j) < gamma                  search region of group j (eq. 8)
     m_total = p(y_i | xi_j, P_xi)^k_p p(lambda_i | v_j, P_v)^k_v            (eqs 9 to 11)
-Each point belongs to the group with the largest m_total among those in whose region it lies.
 
-Departures. k_p = 1 and k_v are exponents: as factors they cancel. S is the sum of the group's spread Sigma, the
-covariance P of its centroid and that of the point, C_i; the same for velocities.
+Each point belongs to the group with the largest m_total among those in whose region it lies. S is the sum of the
+group's spread Sigma, the covariance P of its centroid and that of the point, C_i; the same for velocities. Departures
+are listed in `tracker`.
 """
 
 from __future__ import annotations

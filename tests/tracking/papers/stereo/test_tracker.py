@@ -114,6 +114,18 @@ def test_a_group_is_found_with_its_place_and_velocity() -> None:
     assert tracker.groups[0].count == 20
 
 
+def test_hidden_legs_do_not_lift_a_group() -> None:
+    """Features from the feet to 1.7 m; then those below 0.9 m are hidden."""
+    r = np.random.default_rng(0)
+    pos = np.array([1.0, 5, 0]) + np.column_stack([0.1 * r.standard_normal((60, 2)), r.uniform(0.0, 1.7, 60)])
+    whole = together([(pos, np.zeros((60, 3)), np.arange(60))] * 60)
+    above = [points.at(points.pos[:, 2] > 0.9) for points in whole]
+    for offset, low, high in ((0.65, 0.8, 1.0), (0.0, 1.2, 1.4)):
+        _, tracks = scripted([*whole, *above * 2], StereoConfig(top_offset=offset))
+        assert tracks[59].pos[0, 2] == pytest.approx(0.87, abs=0.1)
+        assert low < tracks[-1].pos[0, 2] < high
+
+
 @pytest.mark.parametrize(("away", "owner"), [(0.9, 0), (1.4, -1)])
 def test_a_point_in_no_region_belongs_to_nobody(away: float, owner: int) -> None:
     """Its sphere overlaps those of the group's points, and its velocity is the group's (eq. 8)."""
