@@ -1,10 +1,9 @@
-"""`stereo`: the paper's scenes, its decisions one by one, crowds beside one eye.
+"""`stereo`: the paper's scenes and the tracker's decisions, crowds beside one eye.
 
-    python -m benchmarks.stereo MODE [--seeds a:b] [--only cross,merge,…] [--chart FILE] [--store FILE] [--json FILE]
+    python -m benchmarks.stereo MODE [--seeds a:b] [--json FILE]
 
-scenes     the paper's scenes: position errors (bias and scatter apart), group scores, events
-decisions  each decision of the tracker switched off: paired differences of F1 and of the position error
-density    `stereo` in crowds of growing density, beside `group-pda` and `blob` on the left pictures (table and SVG)
+scenes     the paper's scenes by its preset and the default: position errors, group scores; each decision switched off
+density    `stereo` in crowds of growing density, beside `group-pda` and `blob` on the left pictures
 
 The docstrings of the files in this folder say what the columns mean.
 """
@@ -17,26 +16,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.stereo import decisions, density, scenes
+from benchmarks.stereo import density, scenes
 from benchmarks.support.options import add_seeds, new_parser, one_thread, seeds_text
 
-MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
-    "scenes": scenes.scenes,
-    "decisions": decisions.decisions,
-    "density": density.density,
-}
+MODES: dict[str, Callable[[argparse.Namespace], Any]] = {"scenes": scenes.scenes, "density": density.density}
 
 
 def main() -> None:
     parser = new_parser(__doc__)
     parser.add_argument("mode", choices=MODES)
-    add_seeds(parser, "20000:20030")
-    parser.add_argument("--only", help="scenes, separated by commas: cross, merge, stairs, crowded, split, pillar")
-    parser.add_argument(
-        "--options", help="decisions: names of decisions, separated by commas; scenes: stereo, preset paper"
-    )
-    parser.add_argument("--chart", type=Path, help="density: the SVG to write")
-    parser.add_argument("--store", type=Path, help="JSON of rows; measured ones are kept")
+    add_seeds(parser, "20000:20003")
     parser.add_argument("--json", type=Path, help="writes what was measured, sequence by sequence")
     args = parser.parse_args()
     one_thread()

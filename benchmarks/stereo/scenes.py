@@ -1,12 +1,20 @@
-"""The paper's scenes (sec. 4, Table 1) for `stereo`: position errors of groups, group scores, events.
+"""The paper's scenes (sec. 4, Table 1) for `stereo` and its preset `paper`; then its decisions, each switched off.
 
-A true group with two members or more, at most 8 m deep, is compared with the nearest reported group if that is at most
-1.5 m away. `error`: mean distance of centroids on the ground, and standard deviation, as in Table 1; `along`: mean and
-standard deviation of the error along the horizontal line of sight, positive away from the camera; `across`: standard
-deviation of the error across it. `found`: share of those true groups that have a reported group so near. The mean is
-over frames, and then over sequences. `group F1`, `merge F1`: of the catalogue; `extra`: number of reported
-merges and splits of a sequence above that of the true ones; `enters`: false enter events of a sequence. 95 % intervals
-over sequences are Student's.
+A true group with two members or more is compared with the nearest reported group, if that is at most 1.5 m away on the
+ground; `found`: share of those true groups that have one. A true group's height is the mean of its members' body
+middles. Errors are mean distances, with the standard deviation, of groups at most 8 m deep:
+
+ground            on the ground plane
+3-D, offset       in space, after the mean difference of height in the sequence is taken off
+3-D, middle       in space, to the middle of bodies
+3-D, all depths   as 3-D, offset, of groups at any depth
+along             mean error along the horizontal line of sight, positive away from the camera
+
+The mean is over frames, and then over sequences. `group F1`, `merge F1`: of the catalogue; `extra`: number of reported
+merges and splits of a sequence above that of the true ones. 95 % intervals over sequences are Student's.
+
+`VARIANTS` switch decisions off. Those without a parameter replace code of the tracker. Differences are paired, over the
+same sequences.
 """
 
 from __future__ import annotations
@@ -18,55 +26,58 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.stereo.further_scenes import further_entries
 from benchmarks.stereo.kept_points import shared_points
-from benchmarks.stereo.stored_rows import Row, Stored
 from benchmarks.support.in_memory import in_memory
 from benchmarks.support.replaced_code import Replacement, replaced_code
-from benchmarks.support.tables import interval, number, table
+from benchmarks.support.tables import interval, number, signed, table
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import Entry, resolve
 from sim.sequence import simulate
-from sim.types import DetectionMode, Tracks
+from sim.types import Array, Tracks
 from sim.types import Sequence as Recording
+from tracking.papers.stereo import group_life, space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
-from tracking.running.run import TrackingRun, track
+from tracking.running.run import track
 from tracking.scoring import evaluate
 from tracking.stats import mean_interval
 
-SUITE, DEEPEST, NEAR = "subtraction-stereo", 8.0, 1.5
-PAPER = {"cross": "0.119 ± 0.077", "stairs": "0.105 ± 0.076"}
+Row = dict[str, float]
+DEEPEST, NEAR = 8.0, 1.5  # m
+SCENES = ("cross", "merge", "stairs")
+PRINTED = {"cross": "0.119 ± 0.077", "stairs": "0.105 ± 0.076"}
 """Table 1: average error and standard deviation, m."""
-COLUMNS = (
-    "error, m", "± sd", "paper", "along", "± sd", "across ± sd", "found", "group F1", "merge F1", "extra",
-    "enters", "frames/s",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A set of parameters with a name.
+    """A set of parameters; replaced: attributes of the tracker's code that are replaced while it runs: owner, name,
+    value. They must not change points, which variants share."""
 
-    replaced: attributes of the tracker's code that are replaced while it runs: owner, name, value. They must not change
-    points, which variants share.
-    """
-
-    name: str
     params: Mapping[str, object] = field(default_factory=dict)
     replaced: tuple[Replacement, ...] = ()
 
 
-def entries(only: str | None) -> dict[str, Entry]:
-    """Returns the scenes of the suite by name, without its prefix; only: names of these or of the further scenes,
-    separated by commas."""
-    found = {e.name.removeprefix("stereo-"): e for e in resolve(SUITE)}
-    if only is None:
-        return found
-    every = {**found, **further_entries()}
-    return {name: every[name] for name in every if name in set(only.split(","))}
+def _measured_places(offset: Array, cov: Array, spread: Array) -> Array:
+    del cov, spread
+    return offset
 
 
-def recordings(entry: Entry, seeds: Iterable[int]) -> Iterator[tuple[int, Recording]]:
+VARIANTS: Mapping[str, Variant] = {
+    "surface_offset": Variant({"surface_offset": 0.0}),
+    "top_offset": Variant({"top_offset": 0.0}),
+    "density_width": Variant({"density_width": 20.0}),
+    "point_covariance": Variant({"point_covariance": False}),
+    "spread_weight": Variant({"spread_weight": 0.1}),
+    "split_time": Variant({"split_time": 0.0}),
+    "confirm_time": Variant({"confirm_time": 0.0}),
+    "report_coast": Variant({"report_coast": 5.0, "coast_time": 10.0}),
+    "expected places": Variant(replaced=((space_group, "expected_places", _measured_places),)),
+    "settled": Variant(replaced=((group_life, "SETTLED", 0.0),)),
+    "half a footprint": Variant(replaced=((tracker, "FEATURE_OUTLINE", 1.0),)),
+}
+
+
+def recordings(entry: Entry, seeds: Iterable[int]) -> Iterator[Recording]:
     """Yields the pairs of pictures of each seed, kept in memory; a seed that cannot be simulated is printed and left
     out."""
     for seed in seeds:
@@ -76,105 +87,109 @@ def recordings(entry: Entry, seeds: Iterable[int]) -> Iterator[tuple[int, Record
         except FlockscopeError as error:
             print(f"{entry.name}, seed {seed}, left out: {error.line()}", file=sys.stderr)
             continue
-        yield seed, in_memory(live)
+        yield in_memory(live)
 
 
-def tracked(sequence: Recording, variant: Variant, detections: DetectionMode) -> TrackingRun:
-    """Returns the tracks of one sequence by a variant."""
-    with replaced_code(variant.replaced):
-        return track("stereo", sequence, params=variant.params or None, detections=detections)
+def entries() -> dict[str, Entry]:
+    """Returns the scenes of the suite by name, without its prefix."""
+    return {e.name.removeprefix("stereo-"): e for e in resolve("subtraction-stereo")}
 
 
 def row_of(sequence: Recording, variant: Variant) -> Row:
     """Returns position errors and scores of one sequence."""
-    run = tracked(sequence, variant, "image")
+    with replaced_code(variant.replaced):
+        run = track("stereo", sequence, params=variant.params or None, detections="image")
     truth = sequence.truth
     assert truth is not None
-    scores = evaluate(truth, run)
-    kinds = [e.kind for t in run for e in t.events]
-    true = [e.kind for e in truth.events or ()]
+    kinds, true = [e.kind for t in run for e in t.events], [e.kind for e in truth.events or ()]
     extra = sum(max(kinds.count(kind) - true.count(kind), 0) for kind in ("merge", "split"))
-    own = {"extra": float(extra), "frames/s": float(run.info["frames_per_second"])}
-    return {**position_errors(sequence, run), **scores, **own}
+    return {**position_errors(sequence, run), **evaluate(truth, run), "extra": float(extra)}
 
 
-def position_errors(sequence: Recording, tracks: object) -> Row:
-    """Returns mean and standard deviation of the errors of group positions of one sequence, nan without any."""
+def position_errors(sequence: Recording, tracks: Iterable[Tracks]) -> Row:
+    """Returns the errors of group positions of one sequence, nan without any, or without heights."""
     truth, camera = sequence.truth, sequence.camera
     assert truth is not None
     assert truth.groups is not None
     assert camera is not None
-    found, seen = [], 0
-    for t in tracks:  # type: ignore[attr-defined]
-        found_here = _errors_of_frame(t, truth.groups[t.index - 1], camera)
-        seen += len(found_here)
-        found += [e for e in found_here if e is not None]
-    e = np.array(found).reshape(-1, 2)
-    size = np.linalg.norm(e, axis=1)
-    keys = ("error", "sd", "along", "along sd", "across sd")
-    values = (size.mean(), size.std(), e[:, 0].mean(), e[:, 0].std(), e[:, 1].std()) if len(e) else [np.nan] * 5
-    return {**dict(zip(keys, map(float, values), strict=True)), "found": len(e) / seen if seen else np.nan}
+    assert truth.z is not None
+    assert truth.height is not None
+    keys = zip(truth.frame.tolist(), truth.id.tolist(), strict=True)
+    middle = dict(zip(keys, (truth.z + truth.height / 2).tolist(), strict=True))
+    rows = []  # depth; error along, across, up
+    for t in tracks:
+        groups = truth.groups[t.index - 1]
+        assert t.groups is not None
+        for pos, members in zip(groups.pos, groups.members, strict=True):
+            if len(members) < 2:
+                continue
+            z = np.mean([middle[t.index, k] for k in members.tolist()])
+            depth = (np.append(pos, z) - camera.position) @ camera.rotation[2]
+            away = t.groups.pos[:, :2] - pos
+            k = np.linalg.norm(away, axis=1).argmin() if len(away) else -1
+            if k < 0 or np.linalg.norm(away[k]) > NEAR:
+                rows.append([depth, np.nan, np.nan, np.nan])
+                continue
+            sight = (pos - camera.position[:2]) / np.linalg.norm(pos - camera.position[:2])
+            up = t.groups.pos[k, 2] - z if t.plane == "space" else np.nan
+            rows.append([depth, away[k] @ sight, away[k] @ [-sight[1], sight[0]], up])
+    return _errors(np.array(rows).reshape(-1, 4))
 
 
-def _errors_of_frame(t: Tracks, groups: object, camera: object) -> list[np.ndarray | None]:
-    """Returns the error along and across the line of sight of each true group of a frame; None for one not found."""
-    made: list[np.ndarray | None] = []
-    for pos, members in zip(groups.pos, groups.members, strict=True):  # type: ignore[attr-defined]
-        depth = (np.append(pos, 1.0) - camera.position) @ camera.rotation[2]  # type: ignore[attr-defined]
-        if len(members) < 2 or depth > DEEPEST:
-            continue
-        away = t.groups.pos[:, :2] - pos  # type: ignore[union-attr]
-        k = np.linalg.norm(away, axis=1).argmin() if len(away) else -1
-        if k < 0 or np.linalg.norm(away[k]) > NEAR:
-            made.append(None)
-            continue
-        sight = pos - camera.position[:2]  # type: ignore[attr-defined]
-        sight = sight / np.linalg.norm(sight)
-        made.append(np.array([away[k] @ sight, away[k] @ [-sight[1], sight[0]]]))
-    return made
+def _errors(rows: Array) -> Row:
+    near = rows[rows[:, 0] <= DEEPEST]
+    known, every = (part[~np.isnan(part[:, 1]), 1:] for part in (near, rows))
+    made = {"found": len(known) / len(near) if len(near) else np.nan}
+    for name, errors in {
+        "ground": known[:, :2], "offset": _levelled(known), "middle": known, "all depths": _levelled(every)
+    }.items():  # fmt: skip
+        size = np.linalg.norm(errors, axis=1) if len(errors) else np.full(1, np.nan)
+        made |= {name: float(size.mean()), f"{name} sd": float(size.std())}
+    return made | {"along": float(known[:, 0].mean()) if len(known) else np.nan}
 
 
-def measured(args: argparse.Namespace, variants: tuple[Variant, ...]) -> dict[str, dict[str, dict[int, Row]]]:
-    """Returns the rows by scene, variant and seed. Rows of earlier runs in the file args.store are kept, and new ones
-    are added to it after each sequence."""
-    made: dict[str, dict[str, dict[int, Row]]] = {}
-    stored = Stored(args.store)
-    for name, entry in entries(args.only).items():
-        made[name] = {v.name: {} for v in variants}
-        missing = [s for s in args.seeds if not all(stored.has(name, v.name, s) for v in variants)]
-        for seed, sequence in recordings(entry, missing):
+def _levelled(errors: Array) -> Array:
+    return errors - [0.0, 0.0, errors[:, 2].mean()] if len(errors) else errors
+
+
+def scenes(args: argparse.Namespace) -> dict[str, dict[str, list[Row]]]:
+    """Prints the table of scenes and that of decisions, and returns the rows by scene and variant."""
+    variants = {"default": Variant(), "paper": Variant(StereoConfig.preset("paper").as_dict()), **VARIANTS}
+    made: dict[str, dict[str, list[Row]]] = {}
+    for scene in SCENES:
+        by = made.setdefault(scene, {name: [] for name in variants})
+        for sequence in recordings(entries()[scene], args.seeds):
             with shared_points():
-                for v in variants:
-                    if not stored.has(name, v.name, seed):
-                        stored.add(name, v.name, seed, row_of(sequence, v))
-            stored.write()
-            print(f"{name} {seed}", file=sys.stderr, flush=True)
-        for v in variants:
-            made[name][v.name] = stored.rows(name, v.name)
+                for name, variant in variants.items():
+                    by[name].append(row_of(sequence, variant))
+            print(f"{scene} {len(by['default'])}", file=sys.stderr, flush=True)
+    columns = (
+        "printed, m", "ground, m", "3-D, offset", "3-D, middle", "3-D, all depths", "along", "found", "group F1",
+        "merge F1", "extra",
+    )  # fmt: skip
+    rows = {f"{scene}, {name}": _cells(scene, made[scene][name]) for scene in SCENES for name in ("paper", "default")}
+    table("Scenes of the paper: its preset, and the default", "scene", columns, rows)
+    keys = {"group F1": "group_F1_hull", "MOTA": "group_MOTA", "ground, m": "ground", "3-D, middle": "middle",
+            "extra": "extra"}  # fmt: skip
+    off = {name: [_difference(made, name, key) for key in keys.values()] for name in VARIANTS}
+    table("Each decision switched off: difference to the default", "decision", tuple(keys), off)
     return made
 
 
-def scenes(args: argparse.Namespace) -> dict[str, dict[str, dict[int, Row]]]:
-    """Prints the table of scenes, for the defaults and the preset `paper`, and returns the rows."""
-    variants = (Variant("stereo"), Variant("preset paper", StereoConfig.preset("paper").as_dict()))
-    if args.options is not None:
-        variants = tuple(v for v in variants if v.name in args.options.split(","))
-    made = measured(args, variants)
-    rows = {f"{name}, {v}": _cells(name, list(of.values())) for name, by in made.items() for v, of in by.items()}
-    table("Scenes of the paper", "scene", COLUMNS, rows)
-    return made
+def _difference(made: Mapping[str, Mapping[str, list[Row]]], name: str, key: str) -> str:
+    pairs = [pair for by in made.values() for pair in zip(by[name], by["default"], strict=True)]
+    off = np.array([a.get(key, np.nan) - b.get(key, np.nan) for a, b in pairs])
+    return signed(*map(float, mean_interval(off)))
 
 
-def _cells(name: str, rows: list[Row]) -> list[str]:
-    def mean(key: str, digits: int = 3) -> str:
-        values = np.array([r.get(key, np.nan) for r in rows])
-        return number(float(np.nanmean(values)), digits) if np.isfinite(values).any() else "–"
+def _cells(scene: str, rows: list[Row]) -> list[str]:
+    def column(key: str) -> Array:
+        return np.array([r.get(key, np.nan) for r in rows])
 
-    def with_interval(key: str) -> str:
-        return interval(*map(float, mean_interval(np.array([r.get(key, np.nan) for r in rows]))))
+    def mean(key: str) -> str:
+        values = column(key)
+        return number(float(np.nanmean(values)), 3) if np.isfinite(values).any() else "–"
 
-    return [
-        with_interval("error"), mean("sd"), PAPER.get(name, "–"), mean("along"), mean("along sd"), mean("across sd"),
-        mean("found"), with_interval("group_F1_hull"), mean("merge_F1"), mean("extra", 2), mean("enter_FP", 1),
-        mean("frames/s", 0),
-    ]  # fmt: skip
+    errors = [f"{mean(key)} ± {mean(f'{key} sd')}" for key in ("ground", "offset", "middle", "all depths")]
+    f1 = interval(*map(float, mean_interval(column("group_F1_hull"))))
+    return [PRINTED.get(scene, "–"), *errors, mean("along"), mean("found"), f1, mean("merge_F1"), mean("extra")]

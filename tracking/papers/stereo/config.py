@@ -29,6 +29,9 @@ class StereoConfig(BackgroundSettings):
         "from pixels: standard deviation of a feature's u and v", "log", sees="pixels")
     surface_offset: float = param(0.12, (0.0, 0.4), "m",
         "from pixels: people's middle lies so far behind their visible surface (ours)", sees="pixels")
+    top_offset: float = param(0.65, (0.0, 1.0), "m",
+        "from pixels: bodies' middle, as reported, lies so far below the top of the features; 0: mean height (ours)",
+        sees="pixels")
     point_noise: float = param(0.06, (0.005, 1.0), "m",
         "from points: standard deviation of a measured coordinate", "log", sees="points")
     gate: float = param(11.34, (5.0, 30.0), "", "gamma: squared Mahalanobis radius of the search region (eq. 8)")
@@ -52,9 +55,8 @@ class StereoConfig(BackgroundSettings):
         "from points: radius of a point's sphere; points 2 r apart are linked (eq. 12)", sees="points")
     merge_gate: float = param(9.0, (0.5, 30.0), "",
         "squared Mahalanobis radius of the six-dimensional regions of merging (eq. 13)")
-    split: bool = param(True, (True, False), "", "groups whose points are unlinked parts split (ours)", "categorical")
-    split_time: float = param(0.5, (0.0, 3.0), "s",
-        "time for which a group's points must be unlinked parts before it splits (ours)")
+    split_time: float = param(0.5, (0.0, 100.0), "s",
+        "time for which a group's points must be unlinked parts before it splits (ours)", tunable=False)
     confirm_time: float = param(0.3, (0.0, 3.0), "s",
         "a new group is confirmed after so long with measurements, and deleted after so long without (ours)")
     coast_time: float = param(1.5, (0.0, 10.0), "s",

@@ -7,9 +7,8 @@ Merging (eqs 13 to 15, sec. 3.5): regions of the full state that overlap.
 MR_i is the ellipsoid (x - X_i)' Sigma_i^-1 (x - X_i) <= merge_gate in six dimensions, and n_i = N_i / sum N.
 Two ellipsoids are tested exactly, see below.
 
-Tentative groups merge, too: without an event, as nobody knows of them. The paper does not say what P of a merged group
-is: here it is that of a weighted mean, sum of n_i^2 P_i. The group with most points keeps its id, of those that have
-been there for SETTLED if there are any, else of the confirmed ones (ours).
+Tentative groups merge, too: without an event, as nobody knows of them. The group with most points keeps its id and P
+(ours), of those that have been there for SETTLED if there are any, else of the confirmed ones.
 
 The test (`separation`): Gilitschenski & Hanebeck, "A robust computational test for overlap of two arbitrary-dimensional
 ellipsoids in fault-detection of Kalman filters", 2012: the ellipsoids y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 are
@@ -112,11 +111,6 @@ def pooled(states: Array, spreads: Array, counts: Array) -> tuple[Array, Array]:
     return X, np.einsum("k,kij->ij", n, spreads + away[:, :, None] * away[:, None])
 
 
-def covariance_of_mean(n: Array, P: Array) -> Array:
-    """Returns the covariance (D, D) of a mean with weights n (K,), sum 1, of states with covariances P (K, D, D)."""
-    return np.asarray(np.einsum("k,kij->ij", n**2, P))
-
-
 def connected(groups: Sequence[SpaceGroup], gate: float) -> list[list[SpaceGroup]]:
     """Returns the sets I_n of two or more groups whose regions overlap directly or through others (eq. 13)."""
     pairs = [(i, j) for i, j in _close_pairs(groups, gate) if overlap(groups[i], groups[j], gate)]
@@ -132,9 +126,9 @@ def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> Whole
     settled = [g for g in known if g.first_seen <= t - SETTLED or g.parent != NO_ID]
     kept = max(settled or known or parts, key=lambda g: (g.count, -g.id))
     counts = np.array([g.count for g in parts])
-    n, old = counts / counts.sum(), [g.pos for g in parts]
+    old = [g.pos for g in parts]
     X, kept.spread = pooled(np.stack([g.ekf.x[:, 0] for g in parts]), np.stack([g.spread for g in parts]), counts)
-    kept.ekf.x, kept.ekf.P = X[:, None], covariance_of_mean(n, np.stack([g.ekf.P for g in parts]))
+    kept.ekf.x = X[:, None]
     kept.members = np.concatenate([g.members + p for g, p in zip(parts, old, strict=True)]) - kept.pos
     kept.count = float(counts.sum())
     kept.first_seen, kept.last_seen = min(g.first_seen for g in parts), max(g.last_seen for g in parts)
@@ -159,7 +153,7 @@ def split(
 ) -> list[SpaceGroup]:
     """Returns the children of a group whose M points have been in parts for `split_time`, [] if it does not split."""
     count = int(part.max(initial=-1)) + 1
-    if count < 2 or not motion.config.split:
+    if count < 2:
         group.apart_since = float("nan")
         return []
     if np.isnan(group.apart_since):
@@ -177,7 +171,7 @@ def split(
         return []
     own = born.pop(largest)
     group.ekf, group.spread, group.count, group.members = own.ekf, own.spread, own.count, own.members
-    group.apart_since = float("nan")
+    group.rise, group.apart_since = own.rise, float("nan")
     for child in born:
         child.parent = group.id
     return born

@@ -4,24 +4,20 @@
     Z = f(X_k) + noise                                       (u, v, d) of the mean of the group's points (eqs 4 to 6)
     Sigma <- alpha_s Sigma + (1 - alpha_s) C_y               covariance of its points' positions and velocities (eq. 7)
 
-The filter is filterpy's. The paper's Phi has a step of 1 frame; here times are seconds. The paper has one covariance of
-a group; here P is that of the centroid, by the filter, and Sigma that of the members. Departures: C_y is without the
-points' own covariances and is shrunk to a prior, as the covariance of few points in six dimensions is singular.
+The filter is filterpy's. P is the covariance of the centroid, Sigma that of the members.
 
-Also here: the measurement of a group by the extended Kalman filter: Z = f(X) + noise (eqs 4 to 6), and its Jacobian.
+The measurement (eqs 4 to 6): from pictures Z = (u, v, d), the projection of the mean of the group's points in space.
+The mean of their (u, v, d) would be biased, as the depth b f / d is no linear function of d (the bias is -var(z) / z).
+From detections Z = (x, y, z), so that the filter is a linear Kalman filter.
 
-The state is X = (x, x', y, y', z, z') (eq. 1). From pictures Z = (u, v, d): the projection of the mean of the group's
-points in space. Departure: the mean of their (u, v, d) would be biased, as the depth b f / d is no linear function of d
-(the bias is -var(z) / z). From detections Z = (x, y, z), so that the filter is a linear Kalman filter.
-
-Also here: data association of `stereo`: which group each point belongs to (sec. 3.3).
+Data association (sec. 3.3): which group each point belongs to.
 
     (y_i - xi_j)' S^-1 (y_i - xi_j) < gamma                  search region of group j (eq. 8)
     m_total = p(y_i | xi_j, P_xi)^k_p p(lambda_i | v_j, P_v)^k_v            (eqs 9 to 11)
-Each point belongs to the group with the largest m_total among those in whose region it lies.
 
-Departures. k_p = 1 and k_v are exponents: as factors they cancel. S is the sum of the group's spread Sigma, the
-covariance P of its centroid and that of the point, C_i; the same for velocities.
+Each point belongs to the group with the largest m_total among those in whose region it lies. S is the sum of the
+group's spread Sigma, the covariance P of its centroid and that of the point, C_i; the same for velocities. Departures
+are listed in `tracker`.
 """
 
 from __future__ import annotations
@@ -43,7 +39,7 @@ if TYPE_CHECKING:
 
 
 POS, VEL = [0, 2, 4], [1, 3, 5]  # Entries of the state that are the position and the velocity.
-LEAST_DENSITY = 0.25  # Least density of features that counts, relative to the highest of the group (ours).
+TOP = 0.9  # Share of a group's features, by weight, that are below its top.
 
 
 class Measurement(Protocol):
@@ -59,6 +55,10 @@ class Measurement(Protocol):
 
     def weights(self, points: SpacePoints, width: float) -> Array:
         """Returns the weights (M,) of M points in their group's mean position; width: of the kernel of density, m."""
+        ...
+
+    def rise(self, z: Array, weights: Array, top_offset: float) -> float:
+        """Returns how far, m, the middle of bodies is above the mean of M points with heights z (M,) and weights."""
         ...
 
 
@@ -80,6 +80,13 @@ class PairMeasurement:
         """Returns `inverse_densities` (M,): a person may have any number of features."""
         return inverse_densities(points, width)
 
+    def rise(self, z: Array, weights: Array, top_offset: float) -> float:
+        """Returns how far, m, `top_offset` below the top of M features is above their mean; 0 if it is 0 (ours)."""
+        # others and the edge of the picture hide legs, but seldom heads: the mean height changes with what is seen
+        order = np.argsort(z)
+        top = min(int(np.searchsorted(np.cumsum(weights[order]), TOP)), len(z) - 1)
+        return float(z[order[top]] - top_offset - weights @ z) if top_offset else 0.0
+
 
 class PlaceMeasurement:
     """Z = (x, y, z) in m: points whose places are measured directly."""
@@ -98,6 +105,11 @@ class PlaceMeasurement:
         del width
         return np.ones(len(points))
 
+    def rise(self, z: Array, weights: Array, top_offset: float) -> float:
+        """Returns 0: the height of a point is that of its person."""
+        del z, weights, top_offset
+        return 0.0
+
 
 def inverse_densities(points: SpacePoints, width: float) -> Array:
     """Returns the inverse of the density of M points on the ground at each of them, (M,), up to a factor (ours)."""
@@ -105,8 +117,7 @@ def inverse_densities(points: SpacePoints, width: float) -> Array:
     S = points.cov[:, None, :2, :2] + points.cov[:, :2, :2]
     a, b, c = S[..., 0, 0] + width**2, S[..., 0, 1], S[..., 1, 1] + width**2
     d2 = (c * d[..., 0] ** 2 - 2 * b * d[..., 0] * d[..., 1] + a * d[..., 1] ** 2) / (a * c - b**2)
-    density = np.exp(-d2 / 2).sum(1)
-    return np.asarray(1 / np.maximum(density, LEAST_DENSITY * density.max()))
+    return np.asarray(1 / np.exp(-d2 / 2).sum(1))
 
 
 def measured_state(x: Array, measurement: Measurement) -> Array:
@@ -133,7 +144,8 @@ class SpaceGroup:
     the same order. count: N, number of its points in its last measured frame. id: NO_ID while tentative.
     first_seen, last_seen: s; measured_time: s. parent: id of the group that it split from, or NO_ID. members (K,
     3): expected places of its points relative to its position, m, when it was measured last. apart_since: s since when
-    its points have been unlinked parts, nan if they are not or it was not measured.
+    its points have been unlinked parts, nan if they are not or it was not measured. rise: m from its position up to the
+    middle of its members' bodies, smoothed as Sigma.
     """
 
     ekf: ExtendedKalmanFilter
@@ -146,6 +158,7 @@ class SpaceGroup:
     parent: int = NO_ID
     members: Array = field(default_factory=lambda: np.zeros((0, 3)))
     apart_since: float = float("nan")
+    rise: float = 0.0
 
     @property
     def pos(self) -> Array:
@@ -196,7 +209,8 @@ def newborn(points: SpacePoints, measurement: Measurement, motion: Motion3D, t: 
     ekf.x[POS, 0], ekf.x[VEL, 0] = mean, points.vel.mean(0)
     ekf.P[np.ix_(POS, POS)] = mean_covariance(points, weights, config)
     ekf.P[np.ix_(VEL, VEL)] = points.vel_cov.mean(0) / n + VELOCITY_SPREAD**2 / n * np.eye(3)
-    group = SpaceGroup(ekf, spread_of(points, config), float(n), NO_ID, t, t, motion.dt)
+    rise = measurement.rise(points.pos[:, 2], weights, config.top_offset)
+    group = SpaceGroup(ekf, spread_of(points, config), float(n), NO_ID, t, t, motion.dt, rise=rise)
     _place_members(group, points, config)
     return group
 
@@ -245,6 +259,7 @@ def measure(group: SpaceGroup, points: SpacePoints, measurement: Measurement, mo
     group.ekf.P = (group.ekf.P + group.ekf.P.T) / 2
     keep = np.exp(-motion.dt / config.spread_time)
     group.spread = keep * group.spread + (1 - keep) * spread_of(points, config)
+    group.rise = keep * group.rise + (1 - keep) * measurement.rise(points.pos[:, 2], weights, config.top_offset)
     group.count, group.last_seen = float(len(points)), t
     group.measured_time += motion.dt
     _place_members(group, points, config)

@@ -35,6 +35,8 @@ Departures:
 - visible side: points moved away from the camera (`surface_offset`). Paper: none. Why: the camera sees surfaces.
 - mean: inverse density on the ground (`density_width`). Paper: all features count alike. Why: textured people have
   more features.
+- height: reported from the top of the features (`top_offset`); the filter has their mean. Paper: the mean. Why: other
+  people and the edge of the picture hide legs, so that the mean height changes; the result is the middle of bodies.
 - errors of points: added in eqs 8 to 10, taken off C_y (`point_covariance`). Paper: none. Why: depth is uncertain.
 - P and Σ: P of the filter, Σ of the members; regions use both (`point_covariance`). Paper: one covariance. Why: a
   member is no centroid.
@@ -42,11 +44,11 @@ Departures:
 - R: of the mean of the points, and `centroid_noise`. Paper: one, not printed. Why: points come and go.
 - first P: of the points' mean position and velocity. Paper: not stated. Why: a filter needs it.
 - k_p, k_v: exponents, 1 and `velocity_weight`. Paper: factors. Why: factors have no effect.
-- merged id: that of the confirmed group with most points. Paper: a new number (Fig. 7). Why: a group keeps its
-  identity.
+- merged id and P: those of the confirmed group with most points, in the preset `paper`, too. Paper: a new number
+  (Fig. 7); P not stated. Why: a group keeps its identity, as in the scores.
 - young groups: tentative ones without event; one that just arrived, no child, enters. Paper: merge. Why: no false
   merges.
-- splits: linked parts for `split_time`, unless they would merge again (`split`). Paper: none. Why: groups part.
+- splits: linked parts for `split_time`, unless they would merge again. Paper: none. Why: groups part.
 - parts: start anew from their points; the largest keeps the id. Paper: none. Why: tracks need ids.
 - confirmation, deletion: `confirm_time`, `coast_time`, `report_coast`. Paper: none. Why: wrong matches.
 - too much foreground: features start anew, so nothing is measured for `window_time`; groups go on. Paper: none. Why:
@@ -155,6 +157,8 @@ class Stereo:
         axes, s, from_points = 3 if self.plane == "space" else 2, self.scale, self.pictures is None
         order, flat = POS[:axes] + VEL[:axes], np.ix_(POS[:2], POS[:2])
         x = s * np.array([g.ekf.x[order, 0] for g in shown]).reshape(-1, 2 * axes)
+        if axes == 3:
+            x[:, 2] += [g.rise for g in shown]
         P = s**2 * np.array([g.ekf.P[np.ix_(order, order)] for g in shown]).reshape(-1, 2 * axes, 2 * axes)
         extent = s**2 * np.array([g.spread[flat] for g in shown]).reshape(-1, 2, 2)
         outline = FOOTPRINT * (1.0 if from_points else FEATURE_OUTLINE)  # what a point covers, seen from above, m

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.stereo.density import ABOVE, BELOW, in_image
+from benchmarks.stereo.density import HALF, in_image
 from scenarios.errors import InputError
 from sim.geometry.polygons import contains
 from sim.scene.camera import project
@@ -112,6 +112,18 @@ def test_a_group_is_found_with_its_place_and_velocity() -> None:
     assert last.pos.shape == (1, 3)
     assert last.vel[0] == pytest.approx([1, 0.5, 0], abs=0.1)
     assert tracker.groups[0].count == 20
+
+
+def test_hidden_legs_do_not_lift_a_group() -> None:
+    """Features from the feet to 1.7 m; then those below 0.9 m are hidden."""
+    r = np.random.default_rng(0)
+    pos = np.array([1.0, 5, 0]) + np.column_stack([0.1 * r.standard_normal((60, 2)), r.uniform(0.0, 1.7, 60)])
+    whole = together([(pos, np.zeros((60, 3)), np.arange(60))] * 60)
+    above = [points.at(points.pos[:, 2] > 0.9) for points in whole]
+    for offset, low, high in ((0.65, 0.8, 1.0), (0.0, 1.2, 1.4)):
+        _, tracks = scripted([*whole, *above * 2], StereoConfig(top_offset=offset))
+        assert tracks[59].pos[0, 2] == pytest.approx(0.87, abs=0.1)
+        assert low < tracks[-1].pos[0, 2] < high
 
 
 @pytest.mark.parametrize(("away", "owner"), [(0.9, 0), (1.4, -1)])
@@ -283,10 +295,10 @@ def test_a_hull_in_the_image_covers_bodies_from_their_feet_to_their_heads() -> N
     assert made.plane == "image"
     (hull,) = made.groups.hull
     for height, inside in (
-        (1.4 - BELOW, True),
-        (1.4 + ABOVE, True),
-        (1.4 - BELOW - 0.8, False),
-        (1.4 + ABOVE + 0.8, False),
+        (1.4 - HALF, True),
+        (1.4 + HALF, True),
+        (1.4 - HALF - 0.8, False),
+        (1.4 + HALF + 0.8, False),
     ):
         uv = project(camera, np.array([[1.0, 6.0, height]]))[0]
         assert contains(hull, uv).tolist() == [inside], height
