@@ -76,7 +76,7 @@ from tracking.filters.person_streams import NOBODY, PersonStreams
 from tracking.grouping.belief import EVENTS, default_belief
 from tracking.grouping.pair_belief import PairBelief
 from tracking.papers.joint import decentralised_filter, partition_kernels, report
-from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SPEED_PRIOR, JointConfig
+from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SHARPNESS, SPEED_PRIOR, JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import (
     BIRTHS,
@@ -86,7 +86,6 @@ from tracking.papers.joint.distributions import (
     STATE,
     FrameModel,
     moved,
-    newest,
     process_noise,
 )
 from tracking.papers.joint.division_kernels import place_newcomers
@@ -115,8 +114,7 @@ class Joint(PointTracker):
         c = self.config
         self.begin(context, divide=False)
         self.shown: Array | None = None
-        self.frames = max(1, round(c.lag * context.fps))
-        self.nested = Nested.empty((c.particles, c.partitions), STATE * self.frames)
+        self.nested = Nested.empty((c.particles, c.partitions), STATE)
         self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
         self.events = ReportedEvents(context.fps)
         self.belief = PairBelief(context.fps, EVENTS)
@@ -137,7 +135,7 @@ class Joint(PointTracker):
         z = np.full((len(self.people.id), 2), np.nan)
         z[rows] = points[columns]
         self._filter(z)
-        tracks = self._report(frame, np.isfinite(z[:, 0]))
+        tracks = self._report(frame)
         self._resample()
         self.newcomers.predict(self.dt)
         if detections is not None:
@@ -154,7 +152,7 @@ class Joint(PointTracker):
         return self.health.summary()
 
     def _associate(self, points: Array) -> tuple[Ints, Ints]:
-        c, ahead = self.config, moved(self.nested.x[..., :STATE], self.dt)
+        c, ahead = self.config, moved(self.nested.x, self.dt)
         weights = np.full(ahead.shape[:2], 1 / len(ahead))
         mean, cov = report.moments(ahead, weights)
         spread = process_noise(c.place_noise, c.velocity_noise, self.dt)[0] * np.eye(2)
@@ -218,25 +216,22 @@ class Joint(PointTracker):
         if c.individuals == "measured":
             normals[:] = 0.0
         state = self.newcomers.draw(rows, normals)
-        past = np.concatenate([moved(state, -k * self.dt) for k in range(self.frames)], axis=-1)
-        self.nested = n = self.nested.joined(past)
+        self.nested = n = self.nested.joined(state)
         self.people.add(self.newcomers.size[rows], key)
-        self.belief.add(n.x[..., :STATE].mean(axis=0))
-        if c.newcomers == "validity":
-            drawn = self.streams.uniforms(PLACING, key, n.log_q.size, 2).reshape(*n.log_q.shape, len(key), 2)
-            uniforms = np.ascontiguousarray(drawn[..., 0])
-            place_newcomers(newest(n.x), n.z, uniforms, c.validity_rate * self.frames * self.dt, SCALES)
+        self.belief.add(n.x.mean(axis=0))
+        uniforms = self.streams.uniforms(PLACING, key, n.log_q.size, 1).reshape(*n.log_q.shape, len(key))
+        place_newcomers(n.x, n.z, uniforms, SHARPNESS, SCALES)
 
-    def _report(self, frame: Frame, seen: Bools) -> Tracks:
+    def _report(self, frame: Frame) -> Tracks:
         n, c, id = self.nested, self.config, self.people.id
         joint = n.weights()
         weights = n.component_weights() if c.own_weights else np.repeat(joint[:, None], len(id), axis=1)
-        mean, cov = report.moments(n.x[..., :STATE], weights)
+        mean, cov = report.moments(n.x, weights)
         pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
         box = boxes_at(pos, self.people.size) if self.plane == "image" else None
         self.shown = box
         old = self.identities.groups
-        parts = [frozenset(id[rows].tolist()) for rows in self._groups(joint, seen)]
+        parts = [frozenset(id[rows].tolist()) for rows in self._groups(joint)]
         changes = self.identities.step(frame.index, frozenset(id.tolist()), parts)
         self.belief.see(mean[:, :2])
         self.events.add(id, mean[:, :2])
@@ -249,18 +244,15 @@ class Joint(PointTracker):
             own_events=OWN_EVENTS,
         )  # fmt: skip
 
-    def _groups(self, joint: Array, seen: Bools) -> list[Ints]:
-        n, c, id = self.nested, self.config, self.people.id
-        if not len(id):
+    def _groups(self, joint: Array) -> list[Ints]:
+        n, people = self.nested, len(self.people.id)
+        if not people:
             return []
-        particle = n.rest_weights() if c.own_weights else joint
+        particle = n.rest_weights() if self.config.own_weights else joint
         weights = particle[:, None] * np.exp(n.log_q)
-        now = np.empty((len(id), len(id)))
-        partition_kernels.co_membership(n.z, weights, now)
-        together = self.people.together = report.kept_while_missed(now, seen, self.people.together)
-        if c.estimate == "histogram":
-            return report.histogram_partition(n.z, weights)
-        return report.binder_partition(together, n.z, self._before()[0])
+        self.people.together = np.empty((people, people))
+        partition_kernels.co_membership(n.z, weights, self.people.together)
+        return report.histogram_partition(n.z, weights)
 
 
 def remembered(log_odds: Array, group: Ints, known: Array, share: float) -> Array:
