@@ -26,7 +26,7 @@ from tracking.papers.joint.people import People
 
 COUNTS = (10, 25, 50, 100)
 DEPARTURES = (
-    "variant=full", "belief_rate=0 belief_memory=0", "belief_memory=0", "validity_rate=0", "size_std=1.5", "alpha=0.5",
+    "variant=full", "belief_rate=0 belief_memory=0", "belief_memory=0", "validity_rate=0", "alpha=0.5",
     "algorithm=paper",
 )  # fmt: skip
 """Settings of the mode ablation."""

@@ -24,7 +24,7 @@ SPEED_PRIOR = 1.3  # m/s: standard deviation of a new person's velocity, per axi
 GATE = 0.999  # Probability that a detection of a person is in the gate (ours).
 # m: s_0, prior scatter of a cluster, as of one person more, and D_0, distance of a virtual other cluster (ours).
 SCATTER, APART = 0.5, 2.0
-SIZE_MEAN = 1.0  # mu of the prior over group sizes, people.
+SIZE_MEAN, SIZE_STD = 1.0, 1.5  # mu and sigma of the prior over group sizes, people.
 EVENT_TIME = 0.1  # s between the two times of the features for which the event classifier is fitted (ours).
 SHARPNESS = 8.0  # Weight of the validity in the choice of parts of a split, and of a new person's group (ours).
 
@@ -68,7 +68,6 @@ class JointConfig(BackgroundSettings):
         "weight of the beliefs of pairs in log p(Z | X), per second (ours)")
     belief_memory: float = param(0.2, (0.0, 2.0), "share",
         "of the belief's `stay` for people reported in one group, and of its `come` for others (ours)")
-    size_std: float = param(5.0, (0.5, 50.0), "people", "sigma of the prior over group sizes", "log")
     confirm_time: float = param(0.3, (0.0, 3.0), "s",
         "a new person is tracked so long after the first measurement, or given up so long after the last (ours)")
     coast_time: float = param(1.0, (0.1, 10.0), "s",
@@ -90,7 +89,7 @@ class JointConfig(BackgroundSettings):
     def rules(self, dt: float) -> Array:
         """Returns the rules (5,) of events in a step of dt s, as group_events_kernels has them."""
         every = self.algorithm == "paper"
-        return np.array([dt / EVENT_TIME, SHARPNESS, every, SIZE_MEAN, self.size_std])
+        return np.array([dt / EVENT_TIME, SHARPNESS, every, SIZE_MEAN, SIZE_STD])
 
 
 # Squared Mahalanobis distance of the gate: the quantile of chi-squared with 2 degrees of freedom.

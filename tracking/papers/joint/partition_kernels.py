@@ -1,4 +1,4 @@
-"""Kernels on partitions Z of K people into groups: labels, cluster validity, uniform partitions, co-membership.
+"""Kernels on partitions Z of K people into groups: labels, cluster validity, uniform partitions, votes.
 
 A label (K,) is 0 for a person alone, else 1 + the least number of a person in the group. Such a label is the same for
 equal partitions, so that no result depends on how groups are called. A cluster is a group or a person alone; its head
@@ -223,34 +223,6 @@ def uniform_partitions(cumulated: Array, uniforms: Array, label: Ints) -> None:
             for k in range(n):
                 label[i, j, k] = 1 + int(uniforms[i, j, k] * boxes)
             canonical(label[i, j])
-
-
-@njit(cache=True)
-def co_membership(label: Ints, weights: Array, out: Array) -> None:
-    """Writes C_kl, the sum of weights of the partitions in which k and l are in one group, (K, K); 1 on the diagonal.
-
-    label (N_x, N_z, K); weights (N_x, N_z): sum 1.
-    """
-    particles, partitions, n = label.shape
-    end, following = np.empty(n, np.int64), np.empty(n, np.int64)
-    out[:] = 0.0
-    for i in range(particles):
-        j = 0
-        while j < partitions:
-            weight, last = weights[i, j], j
-            while last + 1 < partitions and same_row(label[i, last + 1], label[i, j]):
-                last += 1
-                weight += weights[i, last]
-            for k in range(n):
-                other = next_member(k, label[i, j], end, following)
-                while 0 <= other < k:
-                    out[k, other] += weight
-                    other = following[other]
-            j = last + 1
-    for k in range(n):
-        out[k, k] = 1.0
-        for other in range(k):
-            out[other, k] = out[k, other]
 
 
 @njit(cache=True)

@@ -75,7 +75,7 @@ from tracking.filters.particles import ParticleHealth, effective_number
 from tracking.filters.person_streams import NOBODY, PersonStreams
 from tracking.grouping.belief import EVENTS, default_belief
 from tracking.grouping.pair_belief import PairBelief
-from tracking.papers.joint import decentralised_filter, partition_kernels, report
+from tracking.papers.joint import decentralised_filter, report
 from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SHARPNESS, SPEED_PRIOR, JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import (
@@ -245,14 +245,9 @@ class Joint(PointTracker):
         )  # fmt: skip
 
     def _groups(self, joint: Array) -> list[Ints]:
-        n, people = self.nested, len(self.people.id)
-        if not people:
-            return []
+        n = self.nested
         particle = n.rest_weights() if self.config.own_weights else joint
-        weights = particle[:, None] * np.exp(n.log_q)
-        self.people.together = np.empty((people, people))
-        partition_kernels.co_membership(n.z, weights, self.people.together)
-        return report.histogram_partition(n.z, weights)
+        return report.histogram_partition(n.z, particle[:, None] * np.exp(n.log_q)) if n.z.shape[2] else []
 
 
 def remembered(log_odds: Array, group: Ints, known: Array, share: float) -> Array:
