@@ -1,4 +1,4 @@
-"""Slow, obvious forms of what `joint` computes: all partitions, the cluster validity, eq. 5, Binder's loss."""
+"""Slow, obvious forms of what `joint` computes: all partitions, the cluster validity, eq. 5."""
 
 from __future__ import annotations
 
@@ -45,21 +45,14 @@ def validity(points: np.ndarray, parts: list[list[int]], s0: float, apart: float
     return float(np.mean(found))
 
 
-def log_group_dynamics(
-    new: np.ndarray, old: np.ndarray, parts: list[list[int]], sigma: np.ndarray, dt: float, share: float = 1.0
-) -> float:
-    """Returns log p(X' | X, Z) of eq. 5; new, old (K, 4); sigma (4, 4); share of the group's velocity."""
+def log_group_dynamics(new: np.ndarray, old: np.ndarray, parts: list[list[int]], sigma: np.ndarray, dt: float) -> float:
+    """Returns log p(X' | X, Z) of eq. 5; new, old (K, 4); sigma (4, 4)."""
     B = np.zeros((4, 4))
     B[0, 2] = B[1, 3] = dt
     total = 0.0
     for part in parts:
         g = old[part].mean(axis=0)
         for k in part:
-            residual = new[k] - (old[k] + B @ (share * g + (1 - share) * old[k]))
+            residual = new[k] - (old[k] + B @ g)
             total += -residual @ np.linalg.solve(sigma, residual) / 2 - np.log(np.linalg.det(2 * np.pi * sigma)) / 2
     return total
-
-
-def binder_gain(gain: np.ndarray, parts: list[list[int]]) -> float:
-    """Returns the sum of gain (K, K) over the pairs of each part."""
-    return sum(gain[a, b] for part in parts for a in part for b in part if a < b)

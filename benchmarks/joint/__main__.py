@@ -2,15 +2,14 @@
 
     python -m benchmarks.joint MODE [--seeds a:b] [--filter-seeds a:b] [--set k=v]… [--only A,B]
 
-table2      friends-meet: the paper's columns for full, VAR1, VAR2, VAR3 and .2, and beside them the preset paper,
-            group-pda, relational and the default grouping over blob; differences of variants, paired
+table2      the paper's Tables 2 and 3b: full, VAR1, VAR2, VAR3 and .2 of the preset paper and of the default, on
+            friends-meet and on a recording; differences of variants, paired
 particles   friends-meet: accuracy and frames/s over N_x and N_z (--chart FILE.svg)
 ablation    friends-meet: scores without each departure from the paper that has a parameter, paired differences
 
-A row of table2 holds a sequence's scores, means over filter seeds. Group scores are pooled over the frames of all
-sequences together, strict and core, and of the first variant by kind of sequence; differences are of the means over
-sequences, with 95 % intervals. Detections are the points of the simulated detector; `.2` has true positions, as in the
-paper.
+One sequence of each scenario counts. Group scores are pooled over the frames of all sequences together; differences
+are of the means over sequences, with 95 % intervals. Detections are the points of the simulated detector; `.2` has
+true positions, as in the paper.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[], metavar="K=V", help="parameters of joint")
     parser.add_argument("--suite", help="of the mode ablation (friends-meet)")
     parser.add_argument("--chart", type=Path, metavar="FILE.svg", help="mode particles: draw it")
-    parser.add_argument("--only", help="table2: variants; ablation: settings; separated by commas")
+    parser.add_argument("--only", help="ablation: settings, separated by commas")
     given = parser.parse_args()
     modes[given.mode](given)
 

@@ -22,22 +22,14 @@ from benchmarks.joint.runs import (
 )
 from benchmarks.support import chart, tables
 from sim.types import Array, Ints
-from tracking.papers.joint import report
 from tracking.papers.joint.people import People
 
 COUNTS = (10, 25, 50, 100)
 DEPARTURES = (
-    "belief_rate=0", "belief_memory=0", "group_share=1", "newcomers=alone", "validity_rate=0",
-    "size_std=1.5", "size_std=50", "lag=0.1",
-    "algorithm=paper", "alpha=0", "alpha=0.5", "algorithm=paper size_std=1.5",
-    "estimate=histogram",
+    "variant=full", "belief_rate=0 belief_memory=0", "belief_memory=0", "validity_rate=0", "alpha=0.5",
+    "algorithm=paper",
 )  # fmt: skip
 """Settings of the mode ablation."""
-
-
-def _as_now(now: Array, *before: object) -> Array:
-    del before
-    return now.copy()
 
 
 def _own_absence(people: People, group: Ints) -> Array:
@@ -46,7 +38,6 @@ def _own_absence(people: People, group: Ints) -> Array:
 
 
 RULES: Mapping[str, tuple[object, str, object]] = {
-    "kept while missed": (report, "kept_while_missed", _as_now),
     "absence of groups": (People, "absence", _own_absence),
 }
 """Rules without a parameter that the mode ablation switches off: owner, name and replacement by the name of the row."""

@@ -1,71 +1,72 @@
-"""The paper's Table 2: variants on the suite friends-meet."""
+"""The paper's Tables 2 and 3b: variants of the preset and of the default, on friends-meet and a recording of BIWI."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
+from dataclasses import replace
 
-from benchmarks.joint.runs import (
-    OTHERS,
-    SHARES,
-    Row,
-    Variant,
-    difference,
-    mean_row,
-    measured,
-    others,
-    pooled,
-    sequences,
-)
+import numpy as np
+
+from benchmarks.joint.runs import PX_PER_M, Row, Variant, difference, mean_row, measured, pooled, sequences
 from benchmarks.support import tables
-from benchmarks.support.options import seeds_text
+from benchmarks.support.options import HOTEL, SHARED_DATA, seeds_text
+from sim.io.source import open_source
 from tracking.papers.joint.config import JointConfig
 
 PAPER = {
-    "full": ("93.7", "82.9", "79.7", "57.3"),
-    "VAR1": ("93.8", "81.9", "78.3", "56.0"),
-    "VAR2": ("82.1", "51.6", "48.1", "33.5"),
-    "VAR3": ("65.1", "24.6", "18.9", "4.9"),
+    "preset full": "2.18 (4.96) / 93.7 / 82.9 / 79.7 / 57.3",
+    "preset VAR1": "2.19 (5.46) / 93.8 / 81.9 / 78.3 / 56.0",
+    "preset VAR2": "3.72 (11.81) / 82.1 / 51.6 / 48.1 / 33.5",
+    "preset VAR3": "2.52 (8.35) / 65.1 / 24.6 / 18.9 / 4.9",
 }
-"""Table 2 of the paper, on its own 28 sequences, %: 1-FP, 1-FN, GDSR, MOTA."""
+"""Table 2 of the paper, on its own 28 sequences."""
+PAPER_BIWI = {
+    "preset full": "– / 53.8 / 78.0 / 53.6 / 29.4",
+    "preset VAR3": "– / 60.6 / 51.6 / 29.6 / 9.6",
+}
+"""Table 3b of the paper, on sequences of BIWI that it does not name."""
+COLUMNS = ("error, px (std)", "1-FP, %", "1-FN, %", "GDSR, %", "MOTA, %", "MOTP, px")
+PRINTED = "paper: error / 1-FP / 1-FN / GDSR / MOTA"
 COMPARED = ("GDSR", "MOTA", "1-FN", "1-FP")
-VARIANTS = (
-    Variant("full"),
-    Variant("VAR1", params={"variant": "VAR1"}),
-    Variant("VAR2", params={"variant": "VAR2"}),
-    Variant("VAR3", params={"variant": "VAR3"}),
-    Variant(".2", params={"individuals": "measured"}, detections="truth"),
-    Variant("preset paper", params=JointConfig.preset("paper").as_dict()),
-    Variant("relational", "relational"),
-    Variant("group-pda", "group-pda", seeds=False),
-    Variant("blob + default grouping", "blob", seeds=False),
-)
+BIWI_FPS = 2.5  # Frames/s at which the recording is labelled.
+
+
+def _variants(name: str, params: Mapping[str, object]) -> list[Variant]:
+    found = [Variant(f"{name} {v}", params={**params, "variant": v}) for v in ("full", "VAR1", "VAR2", "VAR3")]
+    known = {**params, "individuals": "measured", "particles": 1}
+    return [*found, Variant(f"{name} .2", params=known, detections="truth")]
+
+
+PRESET = _variants("preset", JointConfig.preset("paper").as_dict())
+DEFAULT = _variants("default", {})
+PAIRS = (("full", "VAR1"), ("VAR1", "VAR2"), ("VAR2", "VAR3"), (".2", "full"))
 
 
 def table2(given: argparse.Namespace) -> None:
-    """Prints the table of variants and the paired differences."""
-    chosen = [v for v in VARIANTS if not given.only or v.name in given.only.split(",")]
-    rows: dict[str, list[Row]] = {v.name: [] for v in chosen}
-    kinds = []
-    for sequence in sequences(given.seeds):
-        kinds.append(sequence.name.rstrip("-0123456789"))
-        for v in chosen:
-            rows[v.name].append(mean_row(measured(sequence, v, given.filter_seeds, given.set)))
-    title = f"{len(rows[chosen[0].name])} sequences, seeds {seeds_text(given.seeds)}, "
-    title += f"filter seeds {seeds_text(given.filter_seeds)}"
-    for part, end in (("strict", ""), ("core", "_core")):
-        cells = {name: [*pooled(found, end), " / ".join(PAPER.get(name, ()))] for name, found in rows.items()}
-        columns = [*(f"{name}, %" for name in SHARES), "MOTP, px", "paper: 1-FP / 1-FN / GDSR / MOTA"]
-        tables.table(f"{part}: {title}", "variant", columns, cells)
-    tables.table(f"other scores: {title}", "variant", OTHERS, {name: others(found) for name, found in rows.items()})
-    cells = {}
-    for first, second in (("full", "VAR1"), ("VAR1", "VAR2"), ("full", "VAR2"), ("VAR2", "VAR3"), (".2", "full")):
-        if first in rows and second in rows:
-            cells[f"{first} − {second}"] = [difference(rows[first], rows[second], f"group_{k}") for k in COMPARED]
-    if cells:
-        tables.table("differences of means over sequences, strict", "", COMPARED, cells)
-    first = chosen[0].name
-    cells = {
-        kind: pooled([row for row, name in zip(rows[first], kinds, strict=True) if name == kind], "_core")[:4]
-        for kind in dict.fromkeys(kinds)
+    """Prints the tables of variants and the paired differences."""
+    made = list(sequences(given.seeds))
+    rows = {
+        v.name: [mean_row(measured(s, v, given.filter_seeds, given.set)) for s in made] for v in (*PRESET, *DEFAULT)
     }
-    tables.table(f"core, {first}, by sequence: {title}", "sequences", [f"{name}, %" for name in SHARES], cells)
+    title = f"{len(made)} sequences, seeds {seeds_text(given.seeds)}, filter seeds {seeds_text(given.filter_seeds)}"
+    cells = {name: [*_cells(found), PAPER.get(name, "")] for name, found in rows.items()}
+    tables.table(f"Table 2: {title}", "variant", [*COLUMNS, PRINTED], cells)
+    differences = {}
+    for system in ("preset", "default"):
+        for first, second in PAIRS:
+            a, b = f"{system} {first}", f"{system} {second}"
+            differences[f"{a} − {second}"] = [difference(rows[a], rows[b], f"group_{k}") for k in COMPARED]
+    tables.table("differences of means over sequences", "", COMPARED, differences)
+    (recording,) = open_source(SHARED_DATA / HOTEL, images=False, fps=BIWI_FPS)
+    chosen = [v for v in PRESET if v.name in PAPER_BIWI or v.name.endswith(".2")]
+    seen = {v.name: replace(v, detections="truth") for v in chosen}
+    found = {name: [mean_row(measured(recording, v, given.filter_seeds))] for name, v in seen.items()}
+    cells = {name: [*_cells(one), PAPER_BIWI.get(name, "")] for name, one in found.items()}
+    tables.table(f"Table 3b: {HOTEL}, its labelled points as detections", "variant", [*COLUMNS, PRINTED], cells)
+
+
+def _cells(rows: list[Row]) -> list[str]:
+    """Returns cells of COLUMNS; error: mean and deviation, over sequences, of the root mean square error."""
+    error = PX_PER_M * np.array([row["RMSE_pos"] for row in rows])
+    return [f"{np.nanmean(error):.2f} ({np.nanstd(error):.2f})", *pooled(rows, "")]

@@ -106,12 +106,12 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
     """Writes the fitted weights of the event classifier as a TOML file, with command and scores as comments."""
     from sim.io.files.atomic import write_file
     from tracking.fitting.joint_events import EventRows, event_rows, event_scores, fit_events
-    from tracking.papers.joint.config import JointConfig
+    from tracking.papers.joint.config import EVENT_TIME
 
     out = option_parsing.output_file(options.out, ".toml")
-    seeds, lag = _fit_and_check_seeds(options.seeds, options.check), JointConfig().lag
+    seeds = _fit_and_check_seeds(options.seeds, options.check)
     rows = {
-        key: EventRows.joined(event_rows(truth, lag, seed) for seed, truth in _simulated(options.names, numbers))
+        key: EventRows.joined(event_rows(truth, EVENT_TIME, seed) for seed, truth in _simulated(options.names, numbers))
         for key, numbers in seeds.items()
     }
     params = fit_events(rows["fitted"])

@@ -24,7 +24,9 @@ SPEED_PRIOR = 1.3  # m/s: standard deviation of a new person's velocity, per axi
 GATE = 0.999  # Probability that a detection of a person is in the gate (ours).
 # m: s_0, prior scatter of a cluster, as of one person more, and D_0, distance of a virtual other cluster (ours).
 SCATTER, APART = 0.5, 2.0
-SIZE_MEAN = 1.0  # mu of the prior over group sizes, people.
+SIZE_MEAN, SIZE_STD = 1.0, 1.5  # mu and sigma of the prior over group sizes, people.
+EVENT_TIME = 0.1  # s between the two times of the features for which the event classifier is fitted (ours).
+SHARPNESS = 8.0  # Weight of the validity in the choice of parts of a split, and of a new person's group (ours).
 
 
 def _weights(event: str) -> Any:
@@ -46,8 +48,9 @@ class JointConfig(BackgroundSettings):
         "N_x, particles of individuals", "int", online=False, tunable=False)
     partitions: int = param(50, (1, 500), "particles",
         "N_z, partitions under each particle", "int", online=False, tunable=False)
-    variant: str = param("full", ("full", "VAR1", "VAR1-standstill", "VAR2", "VAR3"), "",
-        "VAR1: groups move nobody; VAR2: and are uniform; VAR3: and have no validity", "categorical", tunable=False)
+    variant: str = param("VAR1", ("full", "VAR1", "VAR2", "VAR3"), "",
+        "full: the paper; VAR1: groups move nobody; VAR2: and are uniform; VAR3: and have no validity",
+        "categorical", tunable=False)
     individuals: str = param("filtered", ("filtered", "measured"), "",
         "measured: the individuals are the detections, known exactly (DEEPER-JIGT.2)", "categorical", tunable=False)
     algorithm: str = param("ours", ("ours", "paper"), "",
@@ -56,8 +59,6 @@ class JointConfig(BackgroundSettings):
     place_noise: float = param(0.25, (0.01, 2.0), "m/s^0.5",
         "jitter of the places in Sigma; the paper gives no Sigma", "log")
     velocity_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma", "log")
-    group_share: float = param(0.25, (0.0, 1.0), "share",
-        "of the group's mean velocity in a member's motion, the rest is the own velocity; 1: eq. 5 (below 1: ours)")
     point_noise: float = param(0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis", "log")
     pixel_noise: float = param(0.15, (0.005, 2.0), "m",
         "from pixels: standard deviation of the centre of a blob, per axis (ours)", "log", sees="pixels")
@@ -67,13 +68,6 @@ class JointConfig(BackgroundSettings):
         "weight of the beliefs of pairs in log p(Z | X), per second (ours)")
     belief_memory: float = param(0.2, (0.0, 2.0), "share",
         "of the belief's `stay` for people reported in one group, and of its `come` for others (ours)")
-    lag: float = param(0.4, (0.05, 3.0), "s",
-        "between the two times of the features of events, for which the classifier was fitted (ours)", online=False)
-    newcomers: str = param("validity", ("validity", "alone"), "",
-        "validity: new people may join the nearest group (ours); alone: with label 0 (the paper)", "categorical")
-    size_std: float = param(5.0, (0.5, 50.0), "people", "sigma of the prior over group sizes", "log")
-    estimate: str = param("binder", ("binder", "histogram"), "",
-        "binder: the partition of least expected Binder loss (ours); histogram: Fig. 3", "categorical")
     confirm_time: float = param(0.3, (0.0, 3.0), "s",
         "a new person is tracked so long after the first measurement, or given up so long after the last (ours)")
     coast_time: float = param(1.0, (0.1, 10.0), "s",
@@ -92,11 +86,10 @@ class JointConfig(BackgroundSettings):
         """The weights (2, 7) of Merge and Split: of the six features, then the constant."""
         return np.array([self.merge_weights, self.split_weights])
 
-    def rules(self, dt: float, lag: float) -> Array:
-        """Returns the rules (5,) of events in a step of dt s, as group_events_kernels has them; lag: s, a whole number
-        of frames."""
+    def rules(self, dt: float) -> Array:
+        """Returns the rules (5,) of events in a step of dt s, as group_events_kernels has them."""
         every = self.algorithm == "paper"
-        return np.array([dt / lag, self.validity_rate * lag, every, SIZE_MEAN, self.size_std])
+        return np.array([dt / EVENT_TIME, SHARPNESS, every, SIZE_MEAN, SIZE_STD])
 
 
 # Squared Mahalanobis distance of the gate: the quantile of chi-squared with 2 degrees of freedom.

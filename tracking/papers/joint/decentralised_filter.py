@@ -66,7 +66,8 @@ class Nested:
         """Returns the particles of the components where `rows` (K,) is True; parts of Z are numbered anew."""
         z = np.ascontiguousarray(self.z[..., rows])
         relabel(z)
-        return Nested(self.x[:, rows], z, self.log_q, self.log_w[:, rows], self.log_rest, self.ancestor[:, rows])
+        x = np.ascontiguousarray(self.x[:, rows])
+        return Nested(x, z, self.log_q, self.log_w[:, rows], self.log_rest, self.ancestor[:, rows])
 
     def joined(self, x: Array) -> Nested:
         """Returns the particles with new components x (N_x, M, D), of label 0 in Z."""

@@ -117,8 +117,7 @@ MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS, PLACING = range(7)  # W
 class FrameModel:
     """The distributions of a frame; Distributions of decentralised_filter.
 
-    X is (N_x, K, 4 L): the states of the last L frames, the newest first, L frames being the lag. Z is (N_x, N_z, K),
-    labels as partition_kernels has them.
+    X is (N_x, K, 4). Z is (N_x, N_z, K), labels as partition_kernels has them.
 
     config; dt: s; noise: standard deviation of a measured place, m; z (K, 2): measured places, m, nan for a person who
     was not measured; belief (K, K): log-odds that each pair belongs together; streams: the random numbers; key
@@ -140,38 +139,24 @@ class FrameModel:
 
     def individuals(self, x: Array) -> tuple[Array, Array]:
         """Step 4: pi(X_{t+1} | X_{0:t}, y)."""
-        c, old = self.config, newest(x)
-        shape = x.shape[0], x.shape[1]
+        c, shape = self.config, x.shape[:2]
         normals = self.streams.normals(MOTION, self.key, shape[0], STATE)
         uniforms = self.streams.uniforms(CHOICES, self.key, shape[0], 1)[..., 0]
         proposal = Proposal(self.sigma, self.noise, self.dt, c.alpha, c.own_weights)
-        new, log_w = proposal.draw(old, self.z, normals, uniforms)
         if c.individuals == "measured":
-            new, log_w = self._known(x, old), np.zeros(shape)
-        return np.concatenate([new, x[..., :-STATE]], axis=-1), log_w
-
-    def _known(self, x: Array, old: Array) -> Array:
-        seen = np.isfinite(self.z[:, 0])[:, None]
-        place = np.where(seen, self.z, old[..., :2] + self.dt * old[..., 2:])
-        frames = x.shape[-1] // STATE
-        velocity = (place - x[..., -STATE : -STATE + 2]) / (frames * self.dt)
-        return np.concatenate([place, np.where(seen, velocity, old[..., 2:])], axis=-1)
+            place = np.where(np.isfinite(self.z), self.z, moved(x, self.dt)[..., :2])
+            return np.concatenate([place, (place - x[..., :2]) / self.dt], axis=-1), np.zeros(shape)
+        return proposal.draw(x, self.z, normals, uniforms)
 
     def dynamics(self, new: Array, x: Array, z: Ints) -> Array:
         """log p(X_{t+1} | X_t, Z_t) / p_0, with eq. 3 as p_0: eq. 5, and 0 where groups do not move individuals."""
-        variant = self.config.variant
         out = np.zeros(z.shape[:2])
-        if variant in ("VAR1", "VAR2", "VAR3"):
+        if self.config.variant != "full":
             return out
-        late, early = newest(new), newest(x)
         precision, scale = precision_of(self.sigma)
-        own = np.empty(late.shape[:2])
-        own_dynamics(late, early, precision, scale, self.dt, own)
-        if variant == "VAR1-standstill":
-            still = np.empty(late.shape[:2])
-            own_dynamics(late, early, precision, scale, 0.0, still)
-            return np.asarray(out + (still - own).sum(axis=1)[:, None])
-        group_dynamics(late, early, z, precision, scale, self.dt, self.config.group_share, out)
+        own = np.empty(new.shape[:2])
+        own_dynamics(new, x, precision, scale, self.dt, own)
+        group_dynamics(new, x, z, precision, scale, self.dt, out)
         return np.asarray(out - own.sum(axis=1)[:, None])
 
     def groups(self, new: Array, x: Array, z: Ints) -> Ints:
@@ -183,12 +168,8 @@ class FrameModel:
                 stam_cumulated(shape[2]), self._of_partitions(shape, np.append(self.key, NOBODY), 1)[..., 0], out
             )  # fmt: skip
             return out
-        late, early = newest(new), np.ascontiguousarray(x[..., -STATE:])
         uniforms = self._of_partitions(shape, self.key, 3)
-        lag = x.shape[-1] // STATE * self.dt
-        group_events_kernels.propose(
-            early, late, out, uniforms, c.classifier, c.rules(self.dt, lag), SCALES
-        )  # fmt: skip
+        group_events_kernels.propose(x, new, out, uniforms, c.classifier, c.rules(self.dt), SCALES)
         return out
 
     def _of_partitions(self, shape: tuple[int, ...], key: Keys, columns: int) -> Array:
@@ -202,18 +183,13 @@ class FrameModel:
         out = np.zeros(z.shape[:2])
         if c.variant == "VAR3":
             return out
-        partition_kernels.validities(newest(new), z, SCALES, out)
+        partition_kernels.validities(new, z, SCALES, out)
         out *= -c.validity_rate * self.dt
         if c.belief_rate > 0:
             worth = np.empty_like(out)
             partition_kernels.pair_sums(self.belief, z, worth)
             out += c.belief_rate * self.dt * worth
         return out
-
-
-def newest(x: Array) -> Array:
-    """Returns the newest states of X, (N_x, K, 4), contiguous."""
-    return np.ascontiguousarray(x[..., :STATE])
 
 
 @cache

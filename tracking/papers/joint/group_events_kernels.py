@@ -1,8 +1,8 @@
 """Kernels of the joint group proposal (eqs 6, 7): features of a group and its nearest one, events, and what they do.
 
 States are (K, 4): x, y in m, vx, vy in m/s. The features of a group g and its nearest group g' are (d_KL, d_v, d_intra)
-at two times, a lag apart, both with the members of Z_t, and g' the nearest at the earlier time. People alone are groups
-of one (ours).
+at two times, a step apart, both with the members of Z_t, and g' the nearest at the earlier time. People alone are
+groups of one (ours).
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ def event_probabilities(
     """Returns the probabilities of Merge and Split of a group in a step: pi(e | X, g, g'), eq. 7.
 
     features (6,); size, other: people in g and g', other = 0 if a merge is excluded; weights (2, 7): of Merge and
-    Split, the constant last; rules: as RATIO and the following. The classifier gives probabilities over the lag,
+    Split, the constant last; rules: as RATIO and the following. The classifier gives probabilities over EVENT_TIME,
     against None; they are turned into those of a step as hazards (ours). The prior N(|e|; mu, sigma) of sec. 4
     multiplies them: |e| is the size after the event, of a split the mean of the two parts. One person does not split.
     """

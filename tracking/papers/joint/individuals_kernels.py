@@ -24,14 +24,13 @@ def log_normal(residual: Array, precision: Array, log_scale: float) -> float:
 
 @njit(cache=True)
 def group_dynamics(
-    new: Array, old: Array, label: Ints, precision: Array, log_scale: float, dt: float, share: float, out: Array
+    new: Array, old: Array, label: Ints, precision: Array, log_scale: float, dt: float, out: Array
 ) -> None:
     """Writes log p(X_{t+1} | X_t, Z_t) of each partition, (N_x, N_z), eq. 5: N(x + B g, Sigma) for each person.
 
     new, old (N_x, K, 4): states; label (N_x, N_z, K); precision (3,): as PLACE, CROSS, RATE; dt: s. g is the mean of
     the person's group; only places move with its velocity. g of a person alone is the own state, not that of all
-    people alone (a reading). A member's place moves with share g + (1 - share) times the own velocity; share = 1 is eq.
-    5, less than 1 is ours.
+    people alone (a reading).
     """
     particles, partitions, n = label.shape
     sums, size, residual = np.empty((n + 1, 2)), np.empty(n + 1), np.empty(4)
@@ -52,7 +51,7 @@ def group_dynamics(
                 for d in range(2):
                     velocity = old[i, k, d + 2]
                     if g > 0:
-                        velocity += share * (sums[g, d] / size[g] - velocity)
+                        velocity = sums[g, d] / size[g]
                     residual[d] = new[i, k, d] - (old[i, k, d] + dt * velocity)
                     residual[d + 2] = new[i, k, d + 2] - old[i, k, d + 2]
                 total += log_normal(residual, precision, log_scale)

@@ -1,4 +1,4 @@
-"""Kernels on partitions Z of K people into groups: labels, cluster validity, uniform partitions, co-membership.
+"""Kernels on partitions Z of K people into groups: labels, cluster validity, uniform partitions, votes.
 
 A label (K,) is 0 for a person alone, else 1 + the least number of a person in the group. Such a label is the same for
 equal partitions, so that no result depends on how groups are called. A cluster is a group or a person alone; its head
@@ -226,34 +226,6 @@ def uniform_partitions(cumulated: Array, uniforms: Array, label: Ints) -> None:
 
 
 @njit(cache=True)
-def co_membership(label: Ints, weights: Array, out: Array) -> None:
-    """Writes C_kl, the sum of weights of the partitions in which k and l are in one group, (K, K); 1 on the diagonal.
-
-    label (N_x, N_z, K); weights (N_x, N_z): sum 1.
-    """
-    particles, partitions, n = label.shape
-    end, following = np.empty(n, np.int64), np.empty(n, np.int64)
-    out[:] = 0.0
-    for i in range(particles):
-        j = 0
-        while j < partitions:
-            weight, last = weights[i, j], j
-            while last + 1 < partitions and same_row(label[i, last + 1], label[i, j]):
-                last += 1
-                weight += weights[i, last]
-            for k in range(n):
-                other = next_member(k, label[i, j], end, following)
-                while 0 <= other < k:
-                    out[k, other] += weight
-                    other = following[other]
-            j = last + 1
-    for k in range(n):
-        out[k, k] = 1.0
-        for other in range(k):
-            out[other, k] = out[k, other]
-
-
-@njit(cache=True)
 def head_votes(label: Ints, weights: Array, out: Array) -> None:
     """Writes the weighted histogram of Fig. 3 summed over i, (K, K): weight of partitions in which k's cluster has head
     g. A person alone is the head of the own cluster (ours: nobody votes for group 0)."""
@@ -263,56 +235,3 @@ def head_votes(label: Ints, weights: Array, out: Array) -> None:
         for j in range(partitions):
             for k in range(n):
                 out[k, k if label[i, j, k] == 0 else label[i, j, k] - 1] += weights[i, j]
-
-
-@njit(cache=True)
-def binder_moves(gain: Array, label: Ints) -> float:
-    """Improve a partition by moves of one person until none helps; return its gain.
-
-    gain (K, K): symmetric, what it is worth that a pair is in one group; label (K,): the partition to start from,
-    changed in place; labels from 1, one for each cluster, people alone included. The gain is the sum over pairs in one
-    cluster. Binder's loss of the partition is a constant less this sum if gain = 2 C - 1.
-    """
-    n = len(label)
-    worth = np.empty(n + 1)
-    moved = True
-    while moved:
-        moved = False
-        for k in range(n):
-            worth[:] = 0.0
-            for other in range(n):
-                if other != k:
-                    worth[label[other]] += gain[k, other]
-            best, at = worth[label[k]], label[k]
-            for g in range(1, n + 1):
-                if worth[g] > best + 1e-12:
-                    best, at = worth[g], g
-            if at == label[k]:
-                continue
-            label[k] = at
-            moved = True
-    total = 0.0
-    for k in range(n):
-        for other in range(k):
-            if label[k] == label[other]:
-                total += gain[k, other]
-    return total
-
-
-@njit(cache=True)
-def best_sampled(gain: Array, label: Ints, out: Ints) -> None:
-    """Writes the partition (K,) of largest gain among label (N_x, N_z, K), as clusters numbered from 1; gain (K, K)."""
-    particles, partitions, n = label.shape
-    cluster, head = np.empty(n, np.int64), np.empty(n, np.int64)
-    last, following = np.empty(n, np.int64), np.empty(n, np.int64)
-    best = -np.inf
-    for i in range(particles):
-        for j in range(partitions):
-            if j > 0 and same_row(label[i, j], label[i, j - 1]):
-                continue
-            total = _pair_sum(gain, label[i, j], last, following)
-            if total > best:
-                best = total
-                clusters(label[i, j], cluster, head)
-                for k in range(n):
-                    out[k] = cluster[k] + 1

@@ -22,24 +22,15 @@ NEWCOMER_NOISE = 1.0  # Standard deviation of the acceleration of a person who i
 
 @dataclass
 class People(PersonTable):
-    """The K tracked people. id (K,): of the track. next_id: the next new id.
-
-    together (K, K): probability that each pair is in one group, nan for new people."""
+    """The K tracked people. id (K,): of the track. next_id: the next new id."""
 
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     next_id: int = 1
-    together: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     def add(self, size: Array, key: Keys) -> None:
         """Add people; size (M, 2): of their boxes, px, nan if unknown; key (M,)."""
         self.extend(id=self.next_id + np.arange(len(size)), size=size, key=key)
         self.next_id += len(size)
-        self.together = np.pad(self.together, (0, len(size)), constant_values=np.nan)
-
-    def keep(self, rows: Bools) -> None:
-        """Remove all people but those where `rows` (K,) is True."""
-        super().keep(rows)
-        self.together = self.together[:, rows]
 
     def record(self, rows: Ints, sizes: Array, dt: float) -> None:
         """Note that the people `rows` (R,) were measured, with boxes of `sizes` (R, 2), px; others missed."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from sim.truth.identity import GroupChange, Identities, Members
 from sim.truth.merge_split_rules import frames_of
-from sim.types import Array, Bools, GroupEvent, Groups, Ints
+from sim.types import Array, GroupEvent, Groups, Ints
 from tracking.grouping.group_labels import part_sets
 from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, event_of_change
 from tracking.papers.joint import partition_kernels
@@ -27,27 +27,6 @@ def moments(state: Array, weights: Array) -> tuple[Array, Array]:
     mean = np.einsum("ik,ikd->kd", weights, state)
     away = state - mean
     return mean, np.einsum("ik,ikd,ike->kde", weights, away, away)
-
-
-def kept_while_missed(now: Array, seen: Bools, before: Array) -> Array:
-    """Returns the probability that each pair is in one group, (K, K), which stays while one of the two is not measured
-    (ours).
-
-    now (K, K): of this frame. seen (K,): who is measured. before (K, K): as returned in the frame before, nan for a
-    pair with a new person.
-    """
-    return np.where(seen[:, None] & seen | np.isnan(before), now, before)
-
-
-def binder_partition(together: Array, label: Ints, before: Ints) -> list[Ints]:
-    """Returns the groups of two or more people, as arrays of rows: the partition of least expected Binder loss
-    (ours)."""
-    gain = together - 0.5
-    sampled = np.empty(len(together), np.int64)
-    partition_kernels.best_sampled(gain, label, sampled)
-    starts = [sampled, _numbered(before)]
-    gains = [partition_kernels.binder_moves(gain, start) for start in starts]
-    return groups_of(starts[int(np.argmax(gains))])
 
 
 def histogram_partition(label: Ints, weights: Array) -> list[Ints]:
@@ -61,12 +40,6 @@ def groups_of(label: Ints) -> list[Ints]:
     """Returns the rows of each label (K,) that two or more people carry."""
     found = (np.flatnonzero(label == g) for g in np.unique(label))
     return [rows for rows in found if len(rows) > 1]
-
-
-def _numbered(group: Ints) -> Ints:
-    alone = group < 0
-    named = np.where(alone, group.max(initial=0) + 1 + np.arange(len(group)), group)
-    return np.asarray(np.unique(named, return_inverse=True)[1] + 1)
 
 
 # Kinds of events that the tracker reports itself.

@@ -57,9 +57,9 @@ def test_a_pair_of_people_merges_once_with_its_probability():
 
 def test_the_rate_of_events_does_not_depend_on_the_frame_rate():
     features = np.array([2.0, 0.3, 0.5, 1.5, 0.2, 0.6])
-    table, lag, quiet = JointConfig().classifier, 0.4, []
+    config, quiet = JointConfig(), []
     for dt in (0.1, 0.05):
-        p = sum(events.event_probabilities(features, 2.0, 1.0, table, rules(ratio=dt / lag)))
+        p = sum(events.event_probabilities(features, 2.0, 1.0, config.classifier, config.rules(dt)))
         quiet.append((1 - p) ** (1 / dt))
     assert quiet[0] == pytest.approx(quiet[1])
 
@@ -86,11 +86,6 @@ def test_a_group_splits_into_all_pairs_of_parts_by_their_validity():
     expected = np.exp(-8 * energy) / np.exp(-8 * energy).sum()
     for p, probability in zip(parts, expected, strict=True):
         assert share(drawn, label_of(p)) == pytest.approx(probability, abs=0.012)
-
-
-def test_parts_are_drawn_with_the_weight_of_the_validity_over_the_lag():
-    config = JointConfig(validity_rate=30.0, lag=0.2)
-    assert config.rules(0.1, 0.2)[events.SHARPNESS] == pytest.approx(6.0)
 
 
 def test_of_a_large_group_the_cut_between_two_clumps_is_found():

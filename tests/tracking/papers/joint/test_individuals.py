@@ -56,10 +56,10 @@ def test_a_person_who_is_not_measured_follows_the_dynamics():
     np.testing.assert_allclose(np.cov(new[:, 0].T), covariance(SIGMA), atol=3e-3)
 
 
-def dynamics(new, old, label, share=1.0):
+def dynamics(new, old, label):
     precision, scale = precision_of(SIGMA)
     out, own = np.empty(label.shape[:2]), np.empty(new.shape[:2])
-    group_dynamics(new, old, label, precision, scale, DT, share, out)
+    group_dynamics(new, old, label, precision, scale, DT, out)
     own_dynamics(new, old, precision, scale, DT, own)
     return out, own
 
@@ -69,11 +69,10 @@ def test_eq_5_is_that_of_all_partitions():
     old, new = rng.normal(0, 0.5, (2, 3, 4, 4))
     parts = list(all_partitions(4))
     label = np.array([[label_of(p) for p in parts]] * 3)
-    for share in (1.0, 0.3):
-        out, _ = dynamics(new, old, label, share)
-        for i in range(3):
-            expected = [log_group_dynamics(new[i], old[i], p, covariance(SIGMA), DT, share) for p in parts]
-            np.testing.assert_allclose(out[i], expected)
+    out, _ = dynamics(new, old, label)
+    for i in range(3):
+        expected = [log_group_dynamics(new[i], old[i], p, covariance(SIGMA), DT) for p in parts]
+        np.testing.assert_allclose(out[i], expected)
 
 
 def test_eq_5_of_people_alone_is_eq_3_to_the_last_bit():

@@ -1,15 +1,15 @@
-"""Partitions: labels, cluster validity, uniform draws, the Binder estimate (companion page, section 4, E5 to E7)."""
+"""Partitions: labels, cluster validity, uniform draws, the estimate (companion page, section 4, E5 to E7)."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from tests.reference_joint import all_partitions, binder_gain, label_of, validity
+from tests.reference_joint import all_partitions, label_of, validity
 from tracking.grouping.belief import default_belief
 from tracking.papers.joint import partition_kernels
 from tracking.papers.joint.distributions import stam_cumulated
-from tracking.papers.joint.report import binder_partition, histogram_partition
+from tracking.papers.joint.report import histogram_partition
 from tracking.papers.joint.tracker import remembered
 
 SCALES = np.array([0.5, 2.0])
@@ -85,38 +85,6 @@ def test_partitions_are_drawn_uniformly():
     counts = [int((drawn == label_of(p)).all(axis=1).sum()) for p in all_partitions(4)]
     assert sum(counts) == len(drawn)
     assert sum((n - expected) ** 2 / expected for n in counts) < 36.1
-
-
-def sampled(rng, people, count):
-    parts = list(all_partitions(people))
-    return np.array([[label_of(parts[k]) for k in rng.integers(len(parts), size=count)]])
-
-
-def test_co_membership_is_the_share_of_partitions():
-    rng = np.random.default_rng(4)
-    label, weights = sampled(rng, 5, 30), rng.dirichlet(np.ones(30))[None]
-    out = np.empty((5, 5))
-    label[0] = label[0, np.lexsort(label[0].T)]  # equal partitions follow each other
-    partition_kernels.co_membership(label, weights, out)
-    same = (label[0, :, :, None] == label[0, :, None]) & (label[0, :, :, None] > 0)
-    expected = np.einsum("j,jkl->kl", weights[0], same.astype(float))
-    np.fill_diagonal(expected, 1)
-    np.testing.assert_allclose(out, expected)
-
-
-def test_the_estimate_has_the_least_binder_loss_of_all_partitions():
-    rng, alone = np.random.default_rng(5), np.full(5, -1)
-    best = 0
-    for _ in range(60):
-        label, weights = sampled(rng, 5, 12), rng.dirichlet(np.ones(12))[None]
-        together = np.empty((5, 5))
-        partition_kernels.co_membership(label, weights, together)
-        found = binder_partition(together, label, alone)
-        members = {int(k) for rows in found for k in rows}
-        parts = [rows.tolist() for rows in found] + [[k] for k in range(5) if k not in members]
-        gains = [binder_gain(together - 0.5, p) for p in all_partitions(5)]
-        best += binder_gain(together - 0.5, parts) > max(gains) - 1e-9
-    assert best >= 58
 
 
 def test_the_histogram_takes_each_persons_label_of_most_weight():

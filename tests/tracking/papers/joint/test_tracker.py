@@ -69,7 +69,7 @@ def test_people_alone_have_the_kalman_filter(algorithm, error):
     drawn from the transition and weighted together, so that few of 1000 particles count."""
     config = JointConfig(
         particles=1000, partitions=1, place_noise=0.15, algorithm=algorithm, alpha=0.0, validity_rate=0.0,
-        newcomers="alone", **QUIET,
+        **QUIET,
     )  # fmt: skip
     points = walk([[0, 0], [20, 0], [40, 5]], [1.2, 0.3], 25, noise=0.08)
     runs = [stepped(Joint(config), points, seed) for seed in range(6)]
