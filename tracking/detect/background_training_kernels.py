@@ -46,6 +46,21 @@ def shortest(values: Floats, held: int) -> tuple[int, float]:
 
 
 @njit(cache=True, error_model="numpy")
+def guess(value: Floats, shown: Bools, held: int, as_sigma: float, least: float, order: Floats, m: Array, sd: Array) -> None:
+    """Writes a first mean and standard deviation of one pixel, m and sd (3,): those of the shortest interval of each
+    channel that holds `held` of the frames `shown` (K,) of value (K, 3). order (K,): workspace."""
+    for k in range(3):
+        n = 0
+        for t in range(len(value)):
+            if shown[t]:
+                order[n] = value[t, k]
+                n += 1
+        sort(order[:n])
+        first, best = shortest(order[:n], held)
+        m[k], sd[k] = order[first + held // 2], max(0.5 * best * as_sigma, least)
+
+
+@njit(cache=True, error_model="numpy")
 def inliers(value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[float, float, float, int]) -> bool:
     """Compute one pixel's mean E, standard deviation sigma and inlier frames in turn until they settle; all in place.
 
@@ -119,6 +134,7 @@ def learn(
     sample: Image,
     gains: Floats,
     held: int,
+    fewest: int,
     rules: tuple[float, float, float, float, float, int],
     bins: tuple[int, float],
     mean: Floats,
@@ -126,18 +142,21 @@ def learn(
     s: Floats,
     b: Floats,
     valid: Bools,
+    second: Floats,
     counts: Ints,
 ) -> None:
-    """Train on a sample (K, H, W, 3) uint8 and write the model into the last six arguments. Returns nothing.
+    """Train on a sample (K, H, W, 3) uint8 and write the model into the last seven arguments. Returns nothing.
 
     gains (K, 3): gain (brightness factor) of each frame and channel, by which grey levels are divided. held: number of
-    frames in the shortest interval of a channel's grey levels, whose middle is the first guess of the mean. rules:
+    frames in the shortest interval of a channel's grey levels, whose middle is the first guess of the mean; fewest: the
+    same of the second colour, among frames that are no inliers. rules:
     sigma over half the interval's length; least sigma, grey levels; widest sigma of a valid pixel, grey levels; sigmas
     of an inlier; sigmas of a clean frame; most rounds. bins: number and span of the histograms, which reach from -span
     to span; values beyond are counted in the end bins.
 
     Written: mean, sigma (H, W, 3), mean colour and its standard deviation in grey levels; s, b (H, W), normalisers of
-    brightness and chromaticity distortion; valid (H, W), False where no background shows. counts (2, 2, number): the
+    brightness and chromaticity distortion; valid (H, W), False where no background shows; second (H, W, 3), the second
+    colour, nan where there is none. counts (2, 2, number): the
     values of valid pixels are added; first axis inliers or all frames of clean pixels, second axis normalised
     brightness or chromaticity distortion.
     """
@@ -145,20 +164,16 @@ def learn(
     number, span = bins
     frames, high, wide, _ = sample.shape
     value, order = np.empty((frames, 3), np.float32), np.empty(frames, np.float32)
-    inlier = np.empty(frames, np.bool_)
+    every, inlier = np.ones(frames, np.bool_), np.empty(frames, np.bool_)
     alpha, cd = np.empty(frames), np.empty(frames)
     m, sd = np.empty(3), np.empty(3)
     for r in range(high):
         for c in range(wide):
-            good = True
             for k in range(3):
                 for t in range(frames):
-                    x = np.float32(sample[t, r, c, k]) / gains[t, k]
-                    value[t, k] = order[t] = x
-                sort(order)
-                first, best = shortest(order, held)
-                m[k], sd[k] = order[first + held // 2], max(0.5 * best * as_sigma, least)
-                good = good and sd[k] <= widest
+                    value[t, k] = np.float32(sample[t, r, c, k]) / gains[t, k]
+            guess(value, every, held, as_sigma, least, order, m, sd)
+            good = sd.max() <= widest
             clean = inliers(value, m, sd, inlier, (least, inside, untouched, rounds))
             sa, sb = distortions(value, m, sd, inlier, alpha, cd)
             noise = 3 * least / (sd[0] + sd[1] + sd[2])
@@ -167,6 +182,11 @@ def learn(
             for k in range(3):
                 mean[r, c, k], sigma[r, c, k] = m[k], sd[k]
             s[r, c], b[r, c], valid[r, c] = sa, sb, good
+            second[r, c] = np.nan
+            if frames - inlier.sum() >= fewest:
+                guess(value, ~inlier, fewest, as_sigma, least, order, m, sd)
+                if sd.max() <= widest:
+                    second[r, c] = m
             if not good:
                 continue
             for t in range(frames):

@@ -63,19 +63,30 @@ class Ghosts:
             return None
         background_kernels.watch(image, gain, self.reach, self.colour, self.sightings)
         still = self.sightings >= max(math.ceil(ghost_time / self._step) + 1, LEAST_SIGHTINGS)
-        regions = blobs.find(mask & still, least)
-        band = max(round(BAND_M * px_per_m), LEAST_BAND)
-        found = np.zeros(mask.shape, bool)
-        for k, (left, top, wide, high) in enumerate(regions.box.astype(int)):
-            margin = 2 * band
-            part = (
-                slice(max(top - margin, 0), top + high + margin),
-                slice(max(left - margin, 0), left + wide + margin),
-            )
-            region = regions.label[part] == k + 1
-            if has_left(region, mask[part], model[:, *part], self.colour[:, *part], band):
-                found[part] |= cv2.dilate(region.astype(np.uint8), blobs.disc(2 * band + 1)).astype(bool)
+        found = uncovered(mask & still, mask, model, self.colour, px_per_m, least)
         return np.asarray(found & still) if found.any() else None
+
+
+def uncovered(
+    where: Bools, mask: Bools, model: Floats, colour: Floats, px_per_m: float, least: float
+) -> Bools:
+    """Returns the pixels (H, W) of those regions of `where` that have left, and of a band round them.
+
+    mask: all foreground; model, colour (3, H, W): what the background model and the picture show; least: area, px^2.
+    """
+    regions = blobs.find(where, least)
+    band = max(round(BAND_M * px_per_m), LEAST_BAND)
+    found = np.zeros(mask.shape, bool)
+    for k, (left, top, wide, high) in enumerate(regions.box.astype(int)):
+        margin = 2 * band
+        part = (
+            slice(max(top - margin, 0), top + high + margin),
+            slice(max(left - margin, 0), left + wide + margin),
+        )
+        region = regions.label[part] == k + 1
+        if has_left(region, mask[part], model[:, *part], colour[:, *part], band):
+            found[part] |= cv2.dilate(region.astype(np.uint8), blobs.disc(2 * band + 1)).astype(bool)
+    return found
 
 
 def has_left(region: Bools, mask: Bools, model: Floats, colour: Floats, band: int) -> bool:
