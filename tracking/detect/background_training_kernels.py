@@ -45,10 +45,20 @@ def shortest(values: Floats, held: int) -> tuple[int, float]:
     return first, best
 
 
+HALF_AS_SIGMA = 1.48
+"""Standard deviation of a Gaussian over half the length of the central interval that holds half of it."""
+
+
 @njit(cache=True, error_model="numpy")
-def guess(value: Floats, shown: Bools, held: int, as_sigma: float, least: float, order: Floats, m: Array, sd: Array) -> None:
-    """Writes a first mean and standard deviation of one pixel, m and sd (3,): those of the shortest interval of each
-    channel that holds `held` of the frames `shown` (K,) of value (K, 3). order (K,): workspace."""
+def guess(
+    value: Floats, shown: Bools, held: int, as_sigma: float, least: float, order: Floats, m: Array, sd: Array
+) -> None:
+    """Writes a first mean and standard deviation of one pixel's colour, m and sd (3,), from the frames `shown` (K,).
+
+    Of value (K, 3), the channel in which these frames differ most is taken, and its shortest interval that holds `held`
+    of them. So all channels are those of the same frames. order (K,): workspace.
+    """
+    main, reach, low, high = 0, np.float32(-1), np.float32(0), np.float32(0)
     for k in range(3):
         n = 0
         for t in range(len(value)):
@@ -56,8 +66,23 @@ def guess(value: Floats, shown: Bools, held: int, as_sigma: float, least: float,
                 order[n] = value[t, k]
                 n += 1
         sort(order[:n])
-        first, best = shortest(order[:n], held)
-        m[k], sd[k] = order[first + held // 2], max(0.5 * best * as_sigma, least)
+        if order[n - 1] - order[0] > reach:
+            main, reach = k, order[n - 1] - order[0]
+            first, length = shortest(order[:n], held)
+            low, high = order[first], order[first + held - 1]
+            m[k], sd[k] = order[first + held // 2], 0.5 * length * as_sigma
+    for k in range(3):
+        if k != main:
+            n = 0
+            for t in range(len(value)):
+                if shown[t] and low <= value[t, main] <= high:
+                    order[n] = value[t, k]
+                    n += 1
+            sort(order[:n])
+            half = (n + 1) // 2
+            first, length = shortest(order[:n], half)
+            m[k], sd[k] = order[first + half // 2], 0.5 * length * HALF_AS_SIGMA
+        sd[k] = max(sd[k], least)
 
 
 @njit(cache=True, error_model="numpy")
@@ -164,9 +189,9 @@ def learn(
     number, span = bins
     frames, high, wide, _ = sample.shape
     value, order = np.empty((frames, 3), np.float32), np.empty(frames, np.float32)
-    every, inlier = np.ones(frames, np.bool_), np.empty(frames, np.bool_)
+    every, inlier, other_inlier = np.ones(frames, np.bool_), np.empty(frames, np.bool_), np.empty(frames, np.bool_)
     alpha, cd = np.empty(frames), np.empty(frames)
-    m, sd = np.empty(3), np.empty(3)
+    m, sd, other, other_sd = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for r in range(high):
         for c in range(wide):
             for k in range(3):
@@ -175,6 +200,15 @@ def learn(
             guess(value, every, held, as_sigma, least, order, m, sd)
             good = sd.max() <= widest
             clean = inliers(value, m, sd, inlier, (least, inside, untouched, rounds))
+            second[r, c], out = np.nan, frames - inlier.sum()
+            if out >= fewest:
+                guess(value, ~inlier, max(fewest, held * out // frames), as_sigma, least, order, other, other_sd)
+                if other_sd.max() <= widest:
+                    second[r, c] = other
+                    inliers(value, other, other_sd, other_inlier, (least, inside, untouched, rounds))
+                    if other_inlier.sum() > inlier.sum():
+                        second[r, c], clean = m, False
+                        m[:], sd[:], inlier[:] = other, other_sd, other_inlier
             sa, sb = distortions(value, m, sd, inlier, alpha, cd)
             noise = 3 * least / (sd[0] + sd[1] + sd[2])
             # s = a |E / sigma| (eq. 7) and b (eq. 8); of noise `least` alone s would be `noise`, and b sqrt(2) times it
@@ -182,11 +216,6 @@ def learn(
             for k in range(3):
                 mean[r, c, k], sigma[r, c, k] = m[k], sd[k]
             s[r, c], b[r, c], valid[r, c] = sa, sb, good
-            second[r, c] = np.nan
-            if frames - inlier.sum() >= fewest:
-                guess(value, ~inlier, fewest, as_sigma, least, order, m, sd)
-                if sd.max() <= widest:
-                    second[r, c] = m
             if not good:
                 continue
             for t in range(frames):

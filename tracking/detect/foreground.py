@@ -20,7 +20,7 @@ from sim.types import Array, Bools, Context, Image
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
 from tracking.detect.background_settings import GHOST_TIME, MOST_FOREGROUND, BackgroundSettings
-from tracking.detect.ghosts import Ghosts, uncovered
+from tracking.detect.ghosts import Ghosts, uncovered_in_sample
 from tracking.detect.person_size import PersonSize
 
 # m^2 at the image's scale, and px: a blob that is smaller than either is noise.
@@ -65,11 +65,8 @@ class Foreground:
 
     def _uncover(self) -> None:
         model = self.model
-        known = ~np.isnan(model.second[0])
-        second = np.where(known, model.second, model.mean)
-        mask = blobs.clean(known, self.scale)
-        found = uncovered(mask, mask, model.mean, second, self.scale, self.least_area)
-        model.mend(found & known, second)
+        found = uncovered_in_sample(model.mean, model.second, self.scale)
+        model.mend(found, model.second)
 
     def follow(self, settings: BackgroundSettings) -> None:
         """Replace the settings of the background model; what the model learned stays."""

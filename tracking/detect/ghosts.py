@@ -36,6 +36,7 @@ OPEN = 0.5
 # Least ratio of the model's steps to the picture's. At 1 the scores are the same, but people who stand are mended away:
 # 3200 px of them instead of 150 in 72 still pictures.
 STEPS = 2.0
+SURE = 0.7
 
 
 class Ghosts:
@@ -109,3 +110,34 @@ def _means(planes: Floats, where: Floats, band: int) -> Floats:
     size = (2 * band + 1, 2 * band + 1)
     count = np.maximum(cv2.boxFilter(where, -1, size, normalize=False), 1)
     return np.stack([cv2.boxFilter(plane * where, -1, size, normalize=False) / count for plane in planes])
+
+
+def uncovered_in_sample(first: Floats, second: Floats, px_per_m: float) -> Bools:
+    """Returns the pixels (H, W) whose second colour continues their surroundings, and whose first colour does not.
+
+    first, second (3, H, W): what most frames of a background sample show, and what others show, nan if nothing.
+    """
+    single = np.isnan(second[0])
+    band = max(round(BAND_M * px_per_m), LEAST_BAND)
+    size = (2 * band + 1, 2 * band + 1)
+    # single pixels of a person who covered them throughout are no surroundings
+    sure = single & (cv2.boxFilter(single.astype(np.float32), -1, size) > SURE)
+    around = filled(first, sure)
+    of_first, of_second = (np.where(single, 0, np.abs(colour - around).max(0)) for colour in (first, second))
+    nearer = of_second < of_first
+    all_first, all_second = (cv2.boxFilter(each * nearer, -1, size, normalize=False) for each in (of_first, of_second))
+    return np.asarray(nearer & (all_first >= STEPS * all_second))
+
+
+def filled(planes: Floats, known: Bools) -> Floats:
+    """Returns planes (3, H, W) whose pixels that are not known have the colour of the nearest known ones, by a pyramid
+    of means."""
+    weight = known.astype(np.float32)
+    if min(known.shape) < 2 or known.all():
+        return planes
+    half = cv2.pyrDown(weight)
+    mean = np.stack([cv2.pyrDown(plane * weight) for plane in planes]) / np.maximum(half, 1e-6)
+    coarse = filled(mean.astype(np.float32), half > 0.1)
+    size = known.shape[::-1]
+    wide = np.stack([cv2.pyrUp(plane, dstsize=size) for plane in coarse])
+    return np.where(known, planes, wide)
