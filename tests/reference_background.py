@@ -15,7 +15,7 @@ def distortions(image, mean, sigma):
 
 
 def spread(values):
-    """Of (K, h, w, 3): mean and sigma of the inliers, inliers (K, h, w), valid pixels (h, w), second colour (h, w, 3)."""
+    """Of (K, h, w, 3): mean, sigma of the inliers, inliers (K, h, w), valid pixels (h, w), second colour (h, w, 3)."""
     frames, *size = values.shape[:3]
     held = max(int(np.ceil(background_training.SHARE * frames)), 3)
     fewest = max(int(np.ceil(background_training.SECOND_SHARE * frames)), 3)

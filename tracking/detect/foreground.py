@@ -61,12 +61,7 @@ class Foreground:
         self.model = Background(context.background, context.fps, settings)
         self.ghosts = Ghosts(self.shape, self.model.noise, context.fps) if settings.adaptive else None
         if settings.adaptive:
-            self._uncover()
-
-    def _uncover(self) -> None:
-        model = self.model
-        found = uncovered_in_sample(model.mean, model.second, self.scale)
-        model.mend(found, model.second)
+            self.model.mend(uncovered_in_sample(self.model.mean, self.model.second, self.scale), self.model.second)
 
     def follow(self, settings: BackgroundSettings) -> None:
         """Replace the settings of the background model; what the model learned stays."""

@@ -83,7 +83,7 @@ class BackgroundChoice:
 
 
 def parse_choice(text: str | None) -> BackgroundChoice:
-    """Returns the choice that --background names: "first:N", "spread:N", or the path of a picture; None: the default."""
+    """Returns the choice that --background names: "first:N", "spread:N" or a picture's path; None: the default."""
     if text is None:
         return BackgroundChoice()
     found = re.fullmatch(r"(first|spread):([0-9]{1,6})", text)
@@ -110,13 +110,12 @@ class BackgroundSample:
     def __call__(self) -> Image:
         """Returns the pictures (K, H, W, 3) in the order of frames, without those that cannot be read.
 
-        A picture of the empty place follows them, once more often than there are frames.
+        A picture of the empty place follows them.
         """
         wanted, count = self.choice.indices(self.length), 0
-        copies = 0 if self.choice.picture is None else len(wanted) + 1
         for count, (_, picture) in enumerate(self.pictures(wanted), 1):  # no second copy: 0.3 GB at 1920×1080
             if count == 1:
-                found = np.empty((len(wanted) + copies, *picture.shape), np.uint8)
+                found = np.empty((len(wanted), *picture.shape), np.uint8)
             found[count - 1] = picture
         if not count:
             raise InputError(
@@ -126,6 +125,11 @@ class BackgroundSample:
         if self.length < BACKGROUNDS and not self.choice.asked:
             words = f"shorter than a background sample of {BACKGROUNDS} frames; all {self.length} are taken"
             warnings.warn(f"{self.path.name}: {words}", stacklevel=2)
-        if copies:
-            found[count : count + copies] = self.choice.empty(size_of(found[0]))
-        return found[: count + copies]
+        found = found[:count]
+        return found if self.choice.picture is None else with_copies(found, self.choice.empty(size_of(found[0])))
+
+
+def with_copies(sample: Image, empty: Image) -> Image:
+    """Returns a sample (K, H, W, 3) followed by K + 1 copies of a picture of the empty place, which then has the
+    majority at each pixel."""
+    return np.concatenate([sample, np.broadcast_to(empty, (len(sample) + 1, *empty.shape))])
