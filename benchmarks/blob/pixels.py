@@ -7,7 +7,7 @@ rendered: scenes of the catalogue under a camera like that of PETS (480 x 360, 7
 JPEG of quality 80), once with camera and empty background, once as bare video with a background spread over it.
 hall, standing: people who stand, as bare video (hall.toml: 1280 x 720, 25 frames/s, 40 people on a grey floor, a third
 stand; standing.toml: 640 x 480, 10 frames/s, 60 s). Columns as above.
-In a standing clip people stand for the first 20 s, or, of the same seeds, for the first 36 and 48 s. The last row has a
+In a standing clip people stand for the first 20 s, or, of the same seeds, for the first 48 s. The last row has a
 picture of the empty place.
 above: seen from straight above at 20 px per m, and the friends-meet scenes at 40 px per m, from pixels and from boxes.
 """
@@ -53,7 +53,7 @@ HERE = Path(__file__).parent
 HALL: dict[str, list[str]] = {"hall": []}
 STANDING = {
     f"standing for {time} s": [f"group.{who}.stops.0.until=[{time}]" for who in ("alone", "talk")]
-    for time in (20, 36, 48)
+    for time in (20, 48)
 }
 
 

@@ -86,7 +86,7 @@ def test_five_classes_of_known_colours(background, monkeypatch):
     monkeypatch.setattr(Background, "_estimate_gain", lambda self, _: self.gain)
     mean = np.broadcast_to(np.array([90.0, 100.0, 110.0]), (30, 50, 3))
     made = model(mean, background=background)
-    scales = np.repeat([1.0, 0.6, 0.2, 1.2, 2.3], 10)
+    scales = np.repeat([1.0, 0.6, 0.2, 1.1, 2.3], 10)
     picture = mean * scales[None, :, None]
     picture[20:] = mean[20:] * (1.6, 0.9, 0.3)
     classes = made.classify(np.round(picture).astype(np.uint8))
