@@ -52,8 +52,7 @@ LONGEST = 120  # frames of a rendered scene
 HERE = Path(__file__).parent
 HALL: dict[str, list[str]] = {"hall": []}
 STANDING = {
-    f"standing for {time} s": [f"group.{who}.stops.0.until=[{time}]" for who in ("alone", "talk")]
-    for time in (20, 48)
+    f"standing for {time} s": [f"group.{who}.stops.0.until=[{time}]" for who in ("alone", "talk")] for time in (20, 48)
 }
 
 
