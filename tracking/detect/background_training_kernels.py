@@ -173,9 +173,8 @@ def learn(
     """Train on a sample (K, H, W, 3) uint8 and write the model into the last seven arguments. Returns nothing.
 
     gains (K, 3): gain (brightness factor) of each frame and channel, by which grey levels are divided. held: number of
-    frames in the shortest interval of a channel's grey levels, whose middle is the first guess of the mean; fewest: the
-    same of the second colour, among frames that are no inliers. rules:
-    sigma over half the interval's length; least sigma, grey levels; widest sigma of a valid pixel, grey levels; sigmas
+    frames in the shortest interval of a channel's grey levels, whose middle is the first guess of the mean. fewest:
+    number of frames that are no inliers, from which on there is a second colour. rules: sigma over half the interval's length; least sigma, grey levels; widest sigma of a valid pixel, grey levels; sigmas
     of an inlier; sigmas of a clean frame; most rounds. bins: number and span of the histograms, which reach from -span
     to span; values beyond are counted in the end bins.
 
