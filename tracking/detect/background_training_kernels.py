@@ -174,15 +174,15 @@ def learn(
 
     gains (K, 3): gain (brightness factor) of each frame and channel, by which grey levels are divided. held: number of
     frames in the shortest interval of a channel's grey levels, whose middle is the first guess of the mean. fewest:
-    number of frames that are no inliers, from which on there is a second colour. rules: sigma over half the interval's length; least sigma, grey levels; widest sigma of a valid pixel, grey levels; sigmas
-    of an inlier; sigmas of a clean frame; most rounds. bins: number and span of the histograms, which reach from -span
-    to span; values beyond are counted in the end bins.
+    number of frames that are no inliers, from which on there is a second colour. rules: sigma over half the interval's
+    length; least sigma, grey levels; widest sigma of a valid pixel, grey levels; sigmas of an inlier; sigmas of a clean
+    frame; most rounds. bins: number and span of the histograms, which reach from -span to span; values beyond are
+    counted in the end bins.
 
     Written: mean, sigma (H, W, 3), mean colour and its standard deviation in grey levels; s, b (H, W), normalisers of
     brightness and chromaticity distortion; valid (H, W), False where no background shows; second (H, W, 3), the second
-    colour, nan where there is none. counts (2, 2, number): the
-    values of valid pixels are added; first axis inliers or all frames of clean pixels, second axis normalised
-    brightness or chromaticity distortion.
+    colour, nan where there is none. counts (2, 2, number): the values of valid pixels are added; first axis inliers or
+    all frames of clean pixels, second axis normalised brightness or chromaticity distortion.
     """
     as_sigma, least, widest, inside, untouched, rounds = rules
     number, span = bins

@@ -134,7 +134,7 @@ def filled(planes: Floats, known: Bools) -> Floats:
         return planes
     weight = known.astype(np.float32)
     share = cv2.pyrDown(weight)
-    mean: Floats = np.stack([cv2.pyrDown(plane * weight) for plane in planes]) / np.maximum(share, np.float32(1e-6))
-    coarse = filled(mean, share > COVERED)
+    mean = np.stack([cv2.pyrDown(plane * weight) for plane in planes]) / np.maximum(share, 1e-6)
+    coarse = filled(np.asarray(mean, np.float32), np.asarray(share > COVERED))
     wide = np.stack([cv2.pyrUp(plane, dstsize=known.shape[::-1]) for plane in coarse])
     return np.where(known, planes, wide)
