@@ -128,8 +128,9 @@ def measure(video: Sequence, params: dict[str, object], search: bool, people: Ca
 
     def counted(model: Background, where: Bools, colour: Array) -> None:
         nonlocal mended, of_people
-        mended += int(np.count_nonzero(where))
-        of_people += int(np.count_nonzero(where & foreground & people(shown)))
+        if shown:  # not in training
+            mended += int(np.count_nonzero(where))
+            of_people += int(np.count_nonzero(where & foreground & people(shown)))
         mend(model, where, colour)  # type: ignore[arg-type]
 
     def frames() -> Iterator[Frame]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracking.detect import background_training
+from tracking.detect import background_training, background_training_kernels
 
 
 def distortions(image, mean, sigma):
@@ -15,28 +15,59 @@ def distortions(image, mean, sigma):
 
 
 def spread(values):
-    """Of (K, h, w, 3): mean and sigma of the inliers, inliers (K, h, w), pixels never covered and valid ones (h, w)."""
-    mean, half = shortest(values)
-    sigma = np.maximum(half * background_training.AS_SIGMA, background_training.FLOOR)
-    valid = np.all(sigma <= background_training.WIDEST, axis=-1)
+    """Of (K, h, w, 3): mean, sigma of the inliers, inliers (K, h, w), valid pixels (h, w), second colour (h, w, 3)."""
+    frames, *size = values.shape[:3]
+    held = max(int(np.ceil(background_training.SHARE * frames)), 3)
+    fewest = max(int(np.ceil(background_training.SECOND_SHARE * frames)), 3)
+    mean, sigma, second = (np.full((*size, 3), np.nan) for _ in range(3))
+    inlier, valid = np.zeros((frames, *size), bool), np.zeros(size, bool)
+    for place in np.ndindex(*size):
+        colours = values[:, *place]
+        first = guess(colours, held)
+        valid[place] = first[1].max() <= background_training.WIDEST
+        mean[place], sigma[place], inlier[:, *place] = settle(colours, *first)
+        others = colours[~inlier[:, *place]]
+        if len(others) < fewest:
+            continue
+        other = guess(others, max(fewest, held * len(others) // frames))
+        if other[1].max() <= background_training.WIDEST:
+            second[place] = other[0]
+            settled = settle(colours, *other)
+            if settled[2].sum() > inlier[:, *place].sum():
+                second[place] = mean[place]
+                mean[place], sigma[place], inlier[:, *place] = settled
+    return mean, sigma, inlier, valid, second
+
+
+def settle(colours, mean, sigma):
+    """Mean and sigma of the inliers of one pixel's colours (K, 3), and the inliers (K,)."""
     for _ in range(background_training.ROUNDS):
-        away = np.abs(values - mean)
-        inlier = np.all(away <= background_training.INLIER * sigma, axis=-1)
-        clean = np.all(away <= background_training.CLEAN * sigma, axis=(0, -1))
-        n = np.maximum(inlier.sum(axis=0), 1)[..., None]
-        mean = np.sum(values, axis=0, where=inlier[..., None]) / n
-        var = np.sum(np.square(values - mean), axis=0, where=inlier[..., None]) / n
-        mean, sigma = np.maximum(mean, 1.0), np.maximum(np.sqrt(var), background_training.FLOOR)
-    return mean, sigma, inlier, clean, valid
+        inlier = np.all(np.abs(colours - mean) <= background_training.INLIER * sigma, axis=-1)
+        if inlier.any():
+            mean, sigma = colours[inlier].mean(0), colours[inlier].std(0)
+        mean, sigma = np.maximum(mean, 1.0), np.maximum(sigma, background_training.FLOOR)
+    return mean, sigma, inlier
 
 
-def shortest(values):
-    """Median of, and half, the shortest interval that holds SHARE of the values (K, ...), per pixel and colour."""
-    v = np.sort(values, axis=0)
-    held = max(int(np.ceil(background_training.SHARE * len(v))), 3)
-    first = (v[held - 1 :] - v[: len(v) - held + 1]).argmin(axis=0)[None]
-    low, middle, high = (np.take_along_axis(v, first + k, 0)[0] for k in (0, held // 2, held - 1))
-    return middle, (high - low) / 2
+def guess(colours, held):
+    """Middle and sigma of a cluster of colours (K, 3): in the widest channel the shortest interval of `held`."""
+    main = int(np.argmax(np.ptp(colours, axis=0)))
+    middle, length, low = shortest(colours[:, main], held)
+    cluster = colours[(colours[:, main] >= low) & (colours[:, main] <= low + length)]
+    mean, sigma = np.zeros(3), np.zeros(3)
+    for k in range(3):
+        mean[k], length, _ = shortest(cluster[:, k], (len(cluster) + 1) // 2)
+        sigma[k] = length / 2 * background_training_kernels.HALF_AS_SIGMA
+    mean[main], length, _ = middle, *shortest(colours[:, main], held)[1:]
+    sigma[main] = length / 2 * background_training.AS_SIGMA
+    return mean, np.maximum(sigma, background_training.FLOOR)
+
+
+def shortest(values, held):
+    """Middle value, length and start of the shortest interval that holds `held` of the values (K,)."""
+    v = np.sort(values)
+    first = int((v[held - 1 :] - v[: len(v) - held + 1]).argmin())
+    return v[first + held // 2], v[first + held - 1] - v[first], v[first]
 
 
 def normalisers(values, mean, sigma, inlier):

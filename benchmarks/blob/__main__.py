@@ -3,7 +3,7 @@
     python -m benchmarks.blob peers [scenes] [rates] [real] [speed] --peer-python PYTHON [--data FOLDER] [--rounds 5]
         [--scenes 24] [--chart FILE.svg]
     python -m benchmarks.blob options [--scenes 30] [--data FOLDER]
-    python -m benchmarks.blob pixels [pets] [rendered] [above] [--data FOLDER] [--seeds 0:2]
+    python -m benchmarks.blob pixels [pets] [rendered] [hall] [standing] [above] [--data FOLDER] [--seeds 0:2]
 
 The docstrings of benchmarks/blob/*.py say what each mode prints. Without a part a mode does all its parts (`pixels`:
 all but `above`). The speed of `blob` by parts: `python -m benchmarks.speed tracking`.
@@ -19,7 +19,7 @@ from benchmarks.support.options import PETS, add_data, add_seeds, new_parser, on
 PARTS = {
     "peers": ("scenes", "rates", "real", "speed"),
     "options": (),
-    "pixels": ("pets", "rendered", "above"),
+    "pixels": ("pets", "rendered", "hall", "standing", "above"),
 }
 
 
@@ -47,7 +47,7 @@ def main() -> None:
         one_thread()
         options.options(args.scenes or 30, args.data)
     else:
-        pixels.pixels(args.part or ("pets", "rendered"), args.data / PETS, args.seeds)
+        pixels.pixels(args.part or PARTS["pixels"][:-1], args.data / PETS, args.seeds)
 
 
 if __name__ == "__main__":

@@ -5,23 +5,30 @@ pets: PETS09-S2L1-first200, by IoU of boxes; the background sample spread over t
 With the calibration View_001.xml also by the position on the ground (similarity 1 - d / 2 m, 0.5 at 1 m).
 rendered: scenes of the catalogue under a camera like that of PETS (480 x 360, 7 frames/s, tilts of 15 and 20 degrees,
 JPEG of quality 80), once with camera and empty background, once as bare video with a background spread over it.
+hall, standing: people who stand, as bare video (hall.toml: 1280 x 720, 25 frames/s, 40 people on a grey floor, a third
+stand; standing.toml: 640 x 480, 10 frames/s, 60 s). Columns as above.
+In a standing clip people stand for the first 20 s, or, of the same seeds, for the first 48 s. The last row has a
+picture of the empty place.
 above: seen from straight above at 20 px per m, and the friends-meet scenes at 40 px per m, from pixels and from boxes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 import tracking
-from benchmarks.support.in_memory import people_in_view
+from benchmarks.support.in_memory import people_in_view, truth_in_view
 from benchmarks.support.tables import head, row
 from scenarios.loading.resolve import load
+from sim.io.pictures.background_sample import BackgroundChoice, with_copies
 from sim.io.source import open_source
 from sim.sequence import simulate
+from sim.types import Frame, Image
 from sim.types import Sequence as Recording
 from tracking.papers.blob.config import BlobConfig
 from tracking.running.run import track
@@ -42,6 +49,11 @@ ABOVE = {
     ],
 }
 LONGEST = 120  # frames of a rendered scene
+HERE = Path(__file__).parent
+HALL: dict[str, list[str]] = {"hall": []}
+STANDING = {
+    f"standing for {time} s": [f"group.{who}.stops.0.until=[{time}]" for who in ("alone", "talk")] for time in (20, 48)
+}
 
 
 def pixels(parts: Sequence[str], pets_folder: Path, seeds: range) -> None:
@@ -50,6 +62,10 @@ def pixels(parts: Sequence[str], pets_folder: Path, seeds: range) -> None:
         pets(pets_folder)
     if "rendered" in parts:
         rendered(seeds)
+    if "hall" in parts:
+        people_who_stand("hall", HALL, seeds)
+    if "standing" in parts:
+        people_who_stand("standing", STANDING, seeds)
     if "above" in parts:
         above(seeds)
 
@@ -98,6 +114,43 @@ def rendered_scene(name: str, tilt: int, seed: int, bare: bool) -> Recording:
     frames = list(video.frames())
     spread = np.stack([frames[k].image for k in np.linspace(0, len(frames) - 1, 50).astype(int)])
     return replace(video, camera=None, scene=None, px_per_m=float("nan"), load_background=lambda: spread)
+
+
+def people_who_stand(name: str, clips: dict[str, list[str]], seeds: range) -> None:
+    head([f"{name}, bare video", *KEYS, "frames/s"])
+    for title, settings in clips.items():
+        made = [encoded(simulate(load(HERE / f"{name}.toml", set=settings), seed)) for seed in seeds]
+        row([title, *scores_and_speed([video for video, _ in made], {})])
+    row([f"{title}, picture of the empty place", *scores_and_speed([with_picture(*each) for each in made], {})])
+
+
+def encoded(live: Recording) -> tuple[Recording, Image]:
+    """Returns a simulated sequence as bare video with its pictures in memory as JPEG, and its first empty picture."""
+    codes = [cv2.imencode(".jpg", frame.image, [cv2.IMWRITE_JPEG_QUALITY, 95])[1] for frame in live.frames()]
+
+    def picture(k: int) -> Image:
+        return np.asarray(cv2.imdecode(codes[k - 1], cv2.IMREAD_COLOR), np.uint8)
+
+    def frames() -> Iterator[Frame]:
+        return (Frame(k, (k - 1) / live.fps, image=picture(k)) for k in range(1, len(codes) + 1))
+
+    def sample() -> Image:
+        return np.stack([picture(k) for k in BackgroundChoice().indices(len(codes))])
+
+    empty = live.background()
+    assert empty is not None
+    truth = truth_in_view(live, len(codes))
+    video = replace(
+        live, frames=frames, load_truth=lambda: truth, bare=None, load_pixels=None, load_background=sample, camera=None,
+        scene=None, px_per_m=float("nan"),
+    )  # fmt: skip
+    return video, empty[0]
+
+
+def with_picture(video: Recording, empty: Image) -> Recording:
+    sample = video.background()
+    assert sample is not None
+    return replace(video, load_background=lambda: with_copies(sample, empty))
 
 
 def above(seeds: range) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
-from sim.types import Frame
+from sim.types import Frame, Truth
 from sim.types import Sequence as Recording
 
 
@@ -22,11 +22,18 @@ def in_memory(sequence: Recording, *, with_background: bool = True) -> Recording
 
 
 def people_in_view(live: Recording, length: int) -> Recording:
-    """Returns the first `length` frames of a simulated sequence with their pictures in memory.
-
-    People more than half outside the image are left out of its truth; groups and events are, too.
-    """
+    """Returns the first `length` frames of a simulated sequence with their pictures in memory, and `truth_in_view`."""
     frames = tuple(frame for frame in live.frames() if frame.index <= length)
+    in_view = truth_in_view(live, len(frames))
+    return replace(
+        live, length=len(frames), frames=partial(_again, frames), load_truth=lambda: in_view, bare=None,
+        load_pixels=None,
+    )  # fmt: skip
+
+
+def truth_in_view(live: Recording, length: int) -> Truth:
+    """Returns the truth of the first `length` frames without people more than half outside the image, without groups
+    and events."""
     truth = live.truth
     assert truth is not None
     assert truth.truncation is not None
@@ -34,11 +41,7 @@ def people_in_view(live: Recording, length: int) -> Recording:
     columns = ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading", "height", "truncation")
     cut = {k: getattr(truth, k)[keep] for k in (*columns, "visible_box") if getattr(truth, k) is not None}
     none = {"groups": None, "groups_px": None, "labelled": None, "events": None, "near": None, "orders": ()}
-    in_view = truth.replace(length=len(frames), **cut, **none)
-    return replace(
-        live, length=len(frames), frames=partial(_again, frames), load_truth=lambda: in_view, bare=None,
-        load_pixels=None,
-    )  # fmt: skip
+    return truth.replace(length=length, **cut, **none)
 
 
 def _again(frames: Sequence[Frame]) -> Iterator[Frame]:

@@ -53,7 +53,8 @@ def open_source(
         px_per_m: Image scale, px per m.
         camera: Calibration, or the path of its file.
         images: False leaves out the pictures of MOTChallenge folders.
-        background: Frames for background models, "first:N" or "spread:N"; None: spread:50, or the stored empty frames.
+        background: Frames for background models, "first:N" or "spread:N", or the path of a picture of the empty place,
+            which spread:50 is added to; None: spread:50, or the stored empty frames.
         person_class: Class of people in MOTChallenge texts that have classes; None: 1, with a warning about others.
         box_scale: Factor of the boxes of MOTChallenge texts that are not in pixels of the pictures, "X" or "X,Y".
         min_score: Detections of MOTChallenge texts with a lower score, as it stands there, are left out.

@@ -104,7 +104,9 @@ class TrackOptions:
     fps: float | None = FPS()
     px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
-    background: str | None = option("Frames a background model is trained on.", None, metavar="first:N|spread:N")
+    background: str | None = option(
+        "Frames a background model is trained on, or a picture of the empty place.", None,
+        metavar="first:N|spread:N|PICTURE")
     step_timeout: float | None = STEP_TIMEOUT()
     person_class: int | None = PERSON_CLASS()
     box_scale: str | None = BOX_SCALE()

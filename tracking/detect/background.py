@@ -47,6 +47,7 @@ class Background:
     State, float32 unless noted:
         mean (3, H, W)        E: mean of each colour channel at gain 1, grey levels, 1 or more; changed by `adapt`
         var (3, H, W)         variance of each channel in the image, squared grey levels; changed by `adapt`
+        second (3, H, W)      the second colour of a pixel in the sample, at gain 1; nan if there is none
         gain (3,)             brightness of the last classified frame relative to `mean`, 1 at first; set by `classify`
         s, b (H, W)           normalisers, no unit: of brightness (s = a |E / sigma|, sigma^2 the variance) and of
                               chromaticity distortion CD (distance from the line through E); inf where `valid` is False
@@ -71,6 +72,7 @@ class Background:
         trained = train(sample, self.settings.detection_rate, self.settings.adaptive)
         self.mean: Floats = np.ascontiguousarray(np.moveaxis(trained.mean, -1, 0))
         self.var: Floats = np.ascontiguousarray(np.moveaxis(np.square(trained.sigma), -1, 0))
+        self.second: Floats = np.ascontiguousarray(np.moveaxis(trained.second, -1, 0))
         self.valid = trained.valid
         self.s, self.b = (np.where(self.valid, n, np.float32(np.inf)) for n in (trained.s, trained.b))
         self._counts = trained.counts

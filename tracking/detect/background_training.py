@@ -5,8 +5,11 @@ sigma: mean colour and standard deviation of a pixel. alpha: its brightness in a
 distortion, its colour's distance from the line through E in sigmas.
 
 1. E and sigma of each pixel and colour channel (eqs 3, 4). The paper takes all frames; here the inliers only (ours).
-   The first inliers are the shortest interval of grey levels that holds SHARE of the frames. Then inliers, E and sigma
-   are computed in turn until they settle. Median and MAD would fail where people stand about half of the time.
+   The first inliers are the shortest interval of grey levels that holds SHARE of the frames, in the channel in which
+   the frames differ most: so all channels are those of the same frames. Then inliers, E and sigma are computed in turn
+   until they settle. Of the other frames the same is done once more; the colour with more inliers is E, the other one
+   is kept as the second colour. People who stand through most of the sample are E, and the ground is the second colour
+   (tracking.detect.ghosts).
 2. a_i and b_i of each pixel i: the RMS of alpha - 1 and of CD over the inliers (eqs 7, 8). a_i is kept as
    s_i = a_i sqrt(sum (E / sigma)^2), which is 1 for independent Gaussian noise and holds at any gain (ours).
 3. Thresholds: quantiles of the normalised distortions at the detection rate (Gonzalez et al. 2006, Fig. 2), over
@@ -89,6 +92,8 @@ FLOOR = 2.0
 INLIER = 3.5  # A frame is an inlier of a pixel if all its channels lie within so many sigmas of E.
 # Share of the frames in which the background must be visible; a thing at rest in so many frames may replace it.
 SHARE = 0.35
+# Least share of the frames that are no inliers, where there is a second colour; people who walk cover a pixel for less.
+SECOND_SHARE = 0.1
 AS_SIGMA = 2.2  # Standard deviation of a Gaussian over half the length of the central interval that holds SHARE of it.
 ROUNDS = 10  # Most rounds of step 1; inliers settle after three or four.
 # Sigmas: a pixel with any frame beyond was covered by something; all its frames are left out of the thresholds.
@@ -106,10 +111,11 @@ class Trained:
 
     mean, sigma (H, W, 3): mean colour E at gain 1, and its standard deviation, BGR grey levels. s, b (H, W):
     normalisers of brightness and of chromaticity distortion CD, no unit. valid (H, W): False where the sample shows no
-    background; there the other arrays have no meaning. thresholds: of CD / b, then lower and upper of (alpha - 1) / a,
-    alpha the brightness over E's, a = s / |E / sigma|. counts (2, BINS = 4000): histograms over [-SPAN, SPAN], SPAN =
-    20, of the normalised brightness (row 0) and chromaticity distortions (row 1), from which thresholds for another
-    detection rate can be computed.
+    background; there the other arrays have no meaning. second (H, W, 3): the colour, at gain 1, of a cluster of frames
+    that are no inliers, nan if there is none. thresholds: of CD / b, then lower and upper of (alpha - 1) / a, alpha the
+    brightness over E's, a = s / |E / sigma|. counts (2, BINS = 4000): histograms over [-SPAN, SPAN], SPAN = 20, of the
+    normalised brightness (row 0) and chromaticity distortions (row 1), from which thresholds for another detection rate
+    can be computed.
     """
 
     mean: Floats
@@ -117,6 +123,7 @@ class Trained:
     s: Floats
     b: Floats
     valid: Bools
+    second: Floats
     thresholds: tuple[float, float, float]
     counts: Ints
 
@@ -128,10 +135,11 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
     size = sample.shape[1:3]
     mean, sigma = np.empty((*size, 3), np.float32), np.empty((*size, 3), np.float32)
     s, b, valid = np.empty(size, np.float32), np.empty(size, np.float32), np.empty(size, bool)
-    counts = np.zeros((2, 2, BINS), np.int64)
+    second, counts = np.empty((*size, 3), np.float32), np.zeros((2, 2, BINS), np.int64)
     held = max(int(np.ceil(SHARE * len(sample))), 3)
     rules = AS_SIGMA, FLOOR, WIDEST, INLIER, CLEAN, ROUNDS
-    kernels.learn(sample, gains, held, rules, (BINS, SPAN), mean, sigma, s, b, valid, counts)
+    fewest = max(int(np.ceil(SECOND_SHARE * len(sample))), 3)
+    kernels.learn(sample, gains, held, fewest, rules, (BINS, SPAN), mean, sigma, s, b, valid, second, counts)
     if valid.mean() < 0.5:
         raise InputError(
             place="background",
@@ -141,7 +149,7 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
         )
     clean, inliers = (counts[which, kernels.CHROMATICITY].sum() for which in (kernels.CLEAN_PIXELS, kernels.INLIERS))
     counts = counts[kernels.CLEAN_PIXELS if clean >= FEWEST_CLEAN * inliers else kernels.INLIERS].copy()
-    return Trained(mean, sigma, s, b, valid, thresholds(counts, rate), counts)
+    return Trained(mean, sigma, s, b, valid, second, thresholds(counts, rate), counts)
 
 
 def check(sample: Image) -> None:

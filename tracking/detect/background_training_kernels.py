@@ -45,6 +45,46 @@ def shortest(values: Floats, held: int) -> tuple[int, float]:
     return first, best
 
 
+HALF_AS_SIGMA = 1.48
+"""Standard deviation of a Gaussian over half the length of the central interval that holds half of it."""
+
+
+@njit(cache=True, error_model="numpy")
+def guess(
+    value: Floats, shown: Bools, held: int, as_sigma: float, least: float, order: Floats, m: Array, sd: Array
+) -> None:
+    """Writes a first mean and standard deviation of one pixel's colour, m and sd (3,), from the frames `shown` (K,).
+
+    Of value (K, 3), the channel in which these frames differ most is taken, and its shortest interval that holds `held`
+    of them. So all channels are those of the same frames. order (K,): workspace.
+    """
+    main, reach, low, high = 0, np.float32(-1), np.float32(0), np.float32(0)
+    for k in range(3):
+        n = 0
+        for t in range(len(value)):
+            if shown[t]:
+                order[n] = value[t, k]
+                n += 1
+        sort(order[:n])
+        if order[n - 1] - order[0] > reach:
+            main, reach = k, order[n - 1] - order[0]
+            first, length = shortest(order[:n], held)
+            low, high = order[first], order[first + held - 1]
+            m[k], sd[k] = order[first + held // 2], 0.5 * length * as_sigma
+    for k in range(3):
+        if k != main:
+            n = 0
+            for t in range(len(value)):
+                if shown[t] and low <= value[t, main] <= high:
+                    order[n] = value[t, k]
+                    n += 1
+            sort(order[:n])
+            half = (n + 1) // 2
+            first, length = shortest(order[:n], half)
+            m[k], sd[k] = order[first + half // 2], 0.5 * length * HALF_AS_SIGMA
+        sd[k] = max(sd[k], least)
+
+
 @njit(cache=True, error_model="numpy")
 def inliers(value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[float, float, float, int]) -> bool:
     """Compute one pixel's mean E, standard deviation sigma and inlier frames in turn until they settle; all in place.
@@ -119,6 +159,7 @@ def learn(
     sample: Image,
     gains: Floats,
     held: int,
+    fewest: int,
     rules: tuple[float, float, float, float, float, int],
     bins: tuple[int, float],
     mean: Floats,
@@ -126,40 +167,47 @@ def learn(
     s: Floats,
     b: Floats,
     valid: Bools,
+    second: Floats,
     counts: Ints,
 ) -> None:
-    """Train on a sample (K, H, W, 3) uint8 and write the model into the last six arguments. Returns nothing.
+    """Train on a sample (K, H, W, 3) uint8 and write the model into the last seven arguments. Returns nothing.
 
     gains (K, 3): gain (brightness factor) of each frame and channel, by which grey levels are divided. held: number of
-    frames in the shortest interval of a channel's grey levels, whose middle is the first guess of the mean. rules:
-    sigma over half the interval's length; least sigma, grey levels; widest sigma of a valid pixel, grey levels; sigmas
-    of an inlier; sigmas of a clean frame; most rounds. bins: number and span of the histograms, which reach from -span
-    to span; values beyond are counted in the end bins.
+    frames in the shortest interval of a channel's grey levels, whose middle is the first guess of the mean. fewest:
+    number of frames that are no inliers, from which on there is a second colour. rules: sigma over half the interval's
+    length; least sigma, grey levels; widest sigma of a valid pixel, grey levels; sigmas of an inlier; sigmas of a clean
+    frame; most rounds. bins: number and span of the histograms, which reach from -span to span; values beyond are
+    counted in the end bins.
 
     Written: mean, sigma (H, W, 3), mean colour and its standard deviation in grey levels; s, b (H, W), normalisers of
-    brightness and chromaticity distortion; valid (H, W), False where no background shows. counts (2, 2, number): the
-    values of valid pixels are added; first axis inliers or all frames of clean pixels, second axis normalised
-    brightness or chromaticity distortion.
+    brightness and chromaticity distortion; valid (H, W), False where no background shows; second (H, W, 3), the second
+    colour, nan where there is none. counts (2, 2, number): the values of valid pixels are added; first axis inliers or
+    all frames of clean pixels, second axis normalised brightness or chromaticity distortion.
     """
     as_sigma, least, widest, inside, untouched, rounds = rules
     number, span = bins
     frames, high, wide, _ = sample.shape
     value, order = np.empty((frames, 3), np.float32), np.empty(frames, np.float32)
-    inlier = np.empty(frames, np.bool_)
+    every, inlier, other_inlier = np.ones(frames, np.bool_), np.empty(frames, np.bool_), np.empty(frames, np.bool_)
     alpha, cd = np.empty(frames), np.empty(frames)
-    m, sd = np.empty(3), np.empty(3)
+    m, sd, other, other_sd = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for r in range(high):
         for c in range(wide):
-            good = True
             for k in range(3):
                 for t in range(frames):
-                    x = np.float32(sample[t, r, c, k]) / gains[t, k]
-                    value[t, k] = order[t] = x
-                sort(order)
-                first, best = shortest(order, held)
-                m[k], sd[k] = order[first + held // 2], max(0.5 * best * as_sigma, least)
-                good = good and sd[k] <= widest
+                    value[t, k] = np.float32(sample[t, r, c, k]) / gains[t, k]
+            guess(value, every, held, as_sigma, least, order, m, sd)
+            good = sd.max() <= widest
             clean = inliers(value, m, sd, inlier, (least, inside, untouched, rounds))
+            second[r, c], out = np.nan, frames - inlier.sum()
+            if out >= fewest:
+                guess(value, ~inlier, max(fewest, held * out // frames), as_sigma, least, order, other, other_sd)
+                if other_sd.max() <= widest:
+                    second[r, c] = other
+                    inliers(value, other, other_sd, other_inlier, (least, inside, untouched, rounds))
+                    if other_inlier.sum() > inlier.sum():
+                        second[r, c], clean = m, False
+                        m[:], sd[:], inlier[:] = other, other_sd, other_inlier
             sa, sb = distortions(value, m, sd, inlier, alpha, cd)
             noise = 3 * least / (sd[0] + sd[1] + sd[2])
             # s = a |E / sigma| (eq. 7) and b (eq. 8); of noise `least` alone s would be `noise`, and b sqrt(2) times it

@@ -20,7 +20,7 @@ from sim.types import Array, Bools, Context, Image
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
 from tracking.detect.background_settings import GHOST_TIME, MOST_FOREGROUND, BackgroundSettings
-from tracking.detect.ghosts import Ghosts
+from tracking.detect.ghosts import Ghosts, uncovered_in_sample
 from tracking.detect.person_size import PersonSize
 
 # m^2 at the image's scale, and px: a blob that is smaller than either is noise.
@@ -60,6 +60,8 @@ class Foreground:
         self.px_per_m, self._learns = context.px_per_m, bool(np.isnan(context.px_per_m))
         self.model = Background(context.background, context.fps, settings)
         self.ghosts = Ghosts(self.shape, self.model.noise, context.fps) if settings.adaptive else None
+        if settings.adaptive:
+            self.model.mend(uncovered_in_sample(self.model.mean, self.model.second, self.scale), self.model.second)
 
     def follow(self, settings: BackgroundSettings) -> None:
         """Replace the settings of the background model; what the model learned stays."""

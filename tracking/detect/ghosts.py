@@ -11,6 +11,11 @@ A region of the foreground is a ghost if
     left     along that edge the steps of the model sum to at least STEPS times those of the picture
 The step at a pixel of the edge is the difference of the mean colours inside the region and outside the foreground,
 within BAND_M of the pixel, in the channel where it is largest.
+
+People who walk off within the sample leave no ghost (`uncovered_in_sample`): they and the ground are the two colours
+that a pixel has in the sample. The one that continues the surroundings is background. The surroundings are the pixels
+with one colour, filled in from the outside by a pyramid of means. Within BAND_M, the colours of people must be off by
+at least STEPS times as much as those of the ground.
 """
 
 from __future__ import annotations
@@ -36,6 +41,11 @@ OPEN = 0.5
 # Least ratio of the model's steps to the picture's. At 1 the scores are the same, but people who stand are mended away:
 # 3200 px of them instead of 150 in 72 still pictures.
 STEPS = 2.0
+# Least share of pixels with one colour within BAND_M of a pixel that belongs to the surroundings. Single pixels of
+# people who stand have one colour, too, where others hide the ground while they are away.
+SURE = 0.7
+LEAST_SURE = 0.5  # Least share of the image that belongs to the surroundings; with less, nothing is decided.
+COVERED = 0.1  # A pixel of a coarser picture is known if more than this share of it is.
 
 
 class Ghosts:
@@ -98,3 +108,33 @@ def _means(planes: Floats, where: Floats, band: int) -> Floats:
     size = (2 * band + 1, 2 * band + 1)
     count = np.maximum(cv2.boxFilter(where, -1, size, normalize=False), 1)
     return np.stack([cv2.boxFilter(plane * where, -1, size, normalize=False) / count for plane in planes])
+
+
+def uncovered_in_sample(first: Floats, second: Floats, px_per_m: float) -> Bools:
+    """Returns the pixels (H, W) whose second colour continues their surroundings better than the first.
+
+    first, second (3, H, W): the two colours of a pixel in a background sample, the second nan if there is only one.
+    """
+    single = np.isnan(second[0])
+    band = max(round(BAND_M * px_per_m), LEAST_BAND)
+    size = (2 * band + 1, 2 * band + 1)
+    sure = single & (cv2.boxFilter(single.astype(np.float32), -1, size) > SURE)
+    if sure.mean() < LEAST_SURE:
+        return np.zeros(sure.shape, bool)
+    around = filled(first, sure)
+    of_first, of_second = (np.where(single, 0, np.abs(colour - around).max(0)) for colour in (first, second))
+    nearer = of_second < of_first
+    first_sum, second_sum = (cv2.boxFilter(off * nearer, -1, size, normalize=False) for off in (of_first, of_second))
+    return np.asarray(nearer & (first_sum >= STEPS * second_sum))
+
+
+def filled(planes: Floats, known: Bools) -> Floats:
+    """Returns planes (3, H, W) in which pixels that are not known have the mean colour of known pixels near them."""
+    if known.all() or min(known.shape) < 2:
+        return planes
+    weight = known.astype(np.float32)
+    share = cv2.pyrDown(weight)
+    mean = np.stack([cv2.pyrDown(plane * weight) for plane in planes]) / np.maximum(share, 1e-6)
+    coarse = filled(np.asarray(mean, np.float32), np.asarray(share > COVERED))
+    wide = np.stack([cv2.pyrUp(plane, dstsize=known.shape[::-1]) for plane in coarse])
+    return np.where(known, planes, wide)

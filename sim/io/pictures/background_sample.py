@@ -1,4 +1,8 @@
-"""The sample of a recording's frames on which a background model is trained: choosing the frames and reading them."""
+"""The sample of a recording's frames on which a background model is trained: choosing the frames and reading them.
+
+A picture of the empty place is added to the sample so often that it has the majority at each pixel; the frames still
+show how large people are, and the noise.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +17,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import SAMPLE_BYTES
+from sim.io.pictures.picture_folder import SUFFIXES, read_picture, size_of
 from sim.types import BACKGROUNDS, Image
 
 
@@ -24,9 +29,12 @@ class BackgroundChoice:
     how: Literal["first", "spread"] = "spread"
     count: int = BACKGROUNDS  # 1 or more, by default 50
     asked: bool = False  # True if the user gave --background, False for the default
+    picture: Path | None = None  # of the empty place
 
     def __str__(self) -> str:
         """Returns the text that run.json holds, as "first 50 frames (causal from frame 50)"."""
+        if self.picture is not None:
+            return f"{self.picture.name} and {replace(self, picture=None)}"
         if self.how == "first":
             return f"first {self.count} frames (causal from frame {self.count})"
         return f"{self.count} frames spread over the recording (not causal)"
@@ -34,10 +42,14 @@ class BackgroundChoice:
     def of(self, length: int, path: Path, size: tuple[int, int] | None = None) -> BackgroundChoice:
         """Returns the choice for a recording of `length` frames; a default is reduced to what there is and fits.
 
-        size: (width, height) px. A sample is at most 2 GB. Raises InputError if the user asked for more.
+        size: (width, height) px. A sample is at most 2 GB. Raises InputError if the user asked for more, or for a
+        picture that cannot be used.
         """
         width, height = size or (1, 1)
         most = max(1, SAMPLE_BYTES // (3 * width * height))
+        if self.picture is not None:
+            most = max(1, most // 2)
+            self.empty(size)
         if self.count <= min(length, most):
             return self
         if self.asked:
@@ -48,6 +60,20 @@ class BackgroundChoice:
             )  # fmt: skip
         return replace(self, count=min(self.count, length, most))
 
+    def empty(self, size: tuple[int, int] | None) -> Image:
+        """Returns the picture of the empty place, which must be `size` (width, height) px; None: any."""
+        assert self.picture is not None
+        picture = read_picture(self.picture)
+        if picture is None:
+            got = "no picture that can be read" if self.picture.is_file() else "no such file"
+            expected, remedy = "a JPG or PNG of the empty place", "check the path, or store the picture anew"
+            raise InputError(file=self.picture, place="--background", got=got, expected=expected, remedy=remedy)
+        if size not in (None, size_of(picture)):
+            got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px, as the recording".format(*size or ())
+            remedy = "give a picture of the same camera in the same size"
+            raise InputError(file=self.picture, place="--background", got=got, expected=expected, remedy=remedy)
+        return picture
+
     def indices(self, length: int) -> list[int]:
         """Returns the frames of the sample, from 1 and ascending, of a recording of `length` frames."""
         # Else the middle frame of each of `count` equal parts.
@@ -57,14 +83,17 @@ class BackgroundChoice:
 
 
 def parse_choice(text: str | None) -> BackgroundChoice:
-    """Returns the choice that --background names, "first:N" or "spread:N"; None is the default."""
+    """Returns the choice that --background names: "first:N", "spread:N" or a picture's path; None: the default."""
     if text is None:
         return BackgroundChoice()
     found = re.fullmatch(r"(first|spread):([0-9]{1,6})", text)
+    if found is None and Path(text).suffix.lower() in SUFFIXES:
+        return BackgroundChoice(picture=Path(text))
     if found is None or int(found[2]) < 1:
         raise InputError(
-            place="--background", got=text, expected="first:N or spread:N, N frames", remedy="for instance first:50"
-        )
+            place="--background", got=text, expected="first:N or spread:N, N frames, or a picture (JPG, PNG)",
+            remedy="for instance first:50",
+        )  # fmt: skip
     return BackgroundChoice("first" if found[1] == "first" else "spread", int(found[2]), True)
 
 
@@ -79,7 +108,10 @@ class BackgroundSample:
     pictures: Callable[[list[int]], Iterable[tuple[int, Image]]]
 
     def __call__(self) -> Image:
-        """Returns the pictures (K, H, W, 3) in the order of frames, without those that cannot be read."""
+        """Returns the pictures (K, H, W, 3) in the order of frames, without those that cannot be read.
+
+        A picture of the empty place follows them.
+        """
         wanted, count = self.choice.indices(self.length), 0
         for count, (_, picture) in enumerate(self.pictures(wanted), 1):  # no second copy: 0.3 GB at 1920×1080
             if count == 1:
@@ -93,4 +125,11 @@ class BackgroundSample:
         if self.length < BACKGROUNDS and not self.choice.asked:
             words = f"shorter than a background sample of {BACKGROUNDS} frames; all {self.length} are taken"
             warnings.warn(f"{self.path.name}: {words}", stacklevel=2)
-        return found[:count]
+        found = found[:count]
+        return found if self.choice.picture is None else with_copies(found, self.choice.empty(size_of(found[0])))
+
+
+def with_copies(sample: Image, empty: Image) -> Image:
+    """Returns a sample (K, H, W, 3) followed by K + 1 copies of a picture of the empty place, which then has the
+    majority at each pixel."""
+    return np.concatenate([sample, np.broadcast_to(empty, (len(sample) + 1, *empty.shape))])

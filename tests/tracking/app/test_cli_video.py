@@ -29,6 +29,11 @@ def noise(k: int, size: tuple[int, int] = SIZE) -> np.ndarray:
     return np.random.default_rng(k).integers(0, 255, (size[1], size[0], 3), dtype=np.uint8)
 
 
+def empty(path: Path) -> Path:
+    cv2.imwrite(str(path), picture(0))
+    return path
+
+
 def text(path: Path) -> Path:
     path.write_text("hello")
     return path
@@ -98,6 +103,11 @@ def test_which_background_is_told(tmp_path, capsys):
         ([], "50 frames spread over the recording (not causal)", None),
         (["--background", "first:20"], "first 20 frames (causal from frame 20)", 20),
         (["--background", "spread:30"], "30 frames spread over the recording (not causal)", None),
+        (
+            ["--background", str(empty(tmp_path / "empty.png"))],
+            "empty.png and 50 frames spread over the recording (not causal)",
+            None,
+        ),
     ):
         out = tmp_path / "out"
         assert run(["track", "blob", path, "--px-per-m", "20", "--out", str(out), *option]) == 0
@@ -105,6 +115,25 @@ def test_which_background_is_told(tmp_path, capsys):
         assert (shown["background"], shown["causal_from"], shown["detections"]) == (words, begins, "image")
         assert shown["causal"] == (begins is not None)
         assert words in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("nowhere.png", ["no such file", "check the path"]),
+        ("text.png", ["no picture that can be read"]),
+        ("small.png", ["64×96 px", "96×64 px", "the same size"]),
+    ],
+)
+def test_a_picture_that_is_no_background_is_one_line(name, words, tmp_path, capsys, monkeypatch):
+    path = film(tmp_path)
+    text(tmp_path / "text.png")
+    cv2.imwrite(str(tmp_path / "small.png"), np.swapaxes(picture(0), 0, 1))
+    monkeypatch.setattr("sim.io.pictures.background_sample.BackgroundSample.__call__", None)
+    line = ["track", "blob", str(path), "--out", str(tmp_path / "out"), "--background", str(tmp_path / name)]
+    assert run(line) == 2
+    (error,) = capsys.readouterr().err.splitlines()
+    assert all(word in error for word in (name, "--background", *words)), error
 
 
 @pytest.mark.parametrize(

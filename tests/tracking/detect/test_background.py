@@ -86,7 +86,7 @@ def test_five_classes_of_known_colours(background, monkeypatch):
     monkeypatch.setattr(Background, "_estimate_gain", lambda self, _: self.gain)
     mean = np.broadcast_to(np.array([90.0, 100.0, 110.0]), (30, 50, 3))
     made = model(mean, background=background)
-    scales = np.repeat([1.0, 0.6, 0.2, 1.2, 2.3], 10)
+    scales = np.repeat([1.0, 0.6, 0.2, 1.1, 2.3], 10)
     picture = mean * scales[None, :, None]
     picture[20:] = mean[20:] * (1.6, 0.9, 0.3)
     classes = made.classify(np.round(picture).astype(np.uint8))
@@ -214,12 +214,14 @@ def test_training_equals_its_twin(follow):
 
     gains = frame_gains(sample) if follow else np.ones((30, 3))
     values = (sample / gains[:, None, None, :]).astype(np.float32).astype(float)
-    mean, sigma, inlier, _, valid = reference.spread(values)
+    mean, sigma, inlier, valid, second = reference.spread(values)
     s, b = reference.normalisers(values, mean, sigma, inlier)
     np.testing.assert_allclose(made.mean, mean, rtol=1e-5)
     np.testing.assert_allclose(made.sigma, sigma, rtol=1e-4)
     np.testing.assert_allclose(made.s, s, rtol=1e-4)
     np.testing.assert_allclose(made.b, b, rtol=1e-4)
+    np.testing.assert_allclose(made.second, second, rtol=1e-5)
+    assert 0.05 < np.isnan(second).mean() < 0.95
     assert np.array_equal(made.valid, valid)
     assert not valid.all()
 

@@ -9,7 +9,7 @@ from sim.types import Context
 from tests import painted
 from tests import reference_background as reference
 from tests.painted import TALL
-from tracking.detect import background_kernels
+from tracking.detect import background_kernels, ghosts
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.foreground import Foreground
 
@@ -49,6 +49,47 @@ def test_who_stood_in_the_whole_sample_leaves_no_ghost(fps, look):
     learned = np.moveaxis(pipeline.model.mean, 0, -1)
     assert (np.abs(learned - expected)[body].max(-1) < 10).mean() > 0.9
     assert len(pipeline.person_blobs(pipeline.segment(picture([PERSON], 7, look)).mask)) == 1
+
+
+@pytest.mark.parametrize("look", LOOKS)
+@pytest.mark.parametrize("stay", [0.2, 0.4, 0.6, 0.8])
+def test_who_stood_through_a_part_of_the_sample_is_no_background(stay, look):
+    """However long they stayed, if the others of the sample show the ground."""
+    pair = [PERSON, (184.0, 181.0, TALL)]
+    sample = np.stack([picture(pair if k < 30 * stay else [], k, look) for k in range(30)])
+    context = Context(10.0, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample)
+    found = learned_ground(Foreground(context, BackgroundSettings()), look)[painted.shape(PERSON)]
+    assert (found < 10).mean() > 0.95
+    kept = learned_ground(Foreground(context, BackgroundSettings(background="trained")), look)[painted.shape(PERSON)]
+    assert (kept < 10).mean() < 0.2 or stay < 0.5
+
+
+def learned_ground(pipeline, look):
+    """How far the model is from the ground, (H, W) grey levels."""
+    ground = painted.ground() if look == "colour" else np.repeat(painted.ground()[..., 1:2], 3, -1)
+    return np.abs(np.moveaxis(pipeline.model.mean, 0, -1) - ground).max(-1)
+
+
+def test_a_thing_that_passes_often_does_not_replace_the_ground():
+    """Nor does a colour that a quarter of the frames show."""
+    sample = np.stack([picture([PERSON] if k % 4 == 0 else [], k) for k in range(40)])
+    context = Context(10.0, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample)
+    assert np.quantile(learned_ground(Foreground(context, BackgroundSettings()), "colour"), 0.999) < 10
+
+
+def test_surroundings_are_filled_in_and_known_pixels_stay():
+    planes = np.random.default_rng(0).uniform(90, 110, (3, 40, 50)).astype(np.float32)
+    known = ~painted.inside(25, 20, 12, 15)[:40, :50]
+    planes[:, ~known] = 250
+    filled = ghosts.filled(planes, known)
+    assert np.array_equal(filled[:, known], planes[:, known])
+    assert 90 < filled[:, ~known].min() < filled[:, ~known].max() < 110
+
+
+def test_without_surroundings_nothing_is_decided():
+    first, second = (np.full((3, 20, 20), grey, np.float32) for grey in (100, 50))
+    second[:, :9] = np.nan
+    assert not ghosts.uncovered_in_sample(first, second, 20.0).any()
 
 
 @pytest.mark.parametrize("look", LOOKS)

@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.pictures import picture_folder as pictures
-from sim.io.pictures.background_sample import BackgroundChoice, parse_choice
+from sim.io.pictures.background_sample import BackgroundChoice, parse_choice, with_copies
 from sim.io.pictures.picture_folder import declared_size, read_picture
 from sim.io.source import open_source
 from tests.small_videos import SIZE, picture
@@ -273,3 +273,11 @@ def test_more_pictures_than_frames_are_told(tmp_path):
     path = folder(tmp_path / "a", names(range(1, 6)), ini="seqLength=3\n")
     with pytest.warns(UserWarning, match=r"2 pictures beyond frame 3 \(seqLength\) are not read"):
         open_source(path)
+
+
+def test_an_empty_picture_has_the_majority_of_a_sample():
+    sample = np.zeros((5, 4, 6, 3), np.uint8)
+    whole = with_copies(sample, np.full((4, 6, 3), 9, np.uint8))
+    assert len(whole) == 11
+    assert (np.median(whole, axis=0) == 9).all()
+    assert not whole[:5].any()
