@@ -7,8 +7,9 @@ Merging (eqs 13 to 15, sec. 3.5): regions of the full state that overlap.
 MR_i is the ellipsoid (x - X_i)' Sigma_i^-1 (x - X_i) <= merge_gate in six dimensions, and n_i = N_i / sum N.
 Two ellipsoids are tested exactly, see below.
 
-Tentative groups merge, too: without an event, as nobody knows of them. The group with most points keeps its id and P
-(ours), of those that have been there for SETTLED if there are any, else of the confirmed ones.
+Tentative groups merge, too: without an event, as nobody knows of them. The paper does not say what P of a merged group
+is: here it is that of a weighted mean, sum of n_i^2 P_i. The group with most points keeps its id, of those that have
+been there for SETTLED if there are any, else of the confirmed ones (ours).
 
 The test (`separation`): Gilitschenski & Hanebeck, "A robust computational test for overlap of two arbitrary-dimensional
 ellipsoids in fault-detection of Kalman filters", 2012: the ellipsoids y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 are
@@ -126,9 +127,9 @@ def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> Whole
     settled = [g for g in known if g.first_seen <= t - SETTLED or g.parent != NO_ID]
     kept = max(settled or known or parts, key=lambda g: (g.count, -g.id))
     counts = np.array([g.count for g in parts])
-    old = [g.pos for g in parts]
+    n, old = counts / counts.sum(), [g.pos for g in parts]
     X, kept.spread = pooled(np.stack([g.ekf.x[:, 0] for g in parts]), np.stack([g.spread for g in parts]), counts)
-    kept.ekf.x = X[:, None]
+    kept.ekf.x, kept.ekf.P = X[:, None], np.einsum("k,kij->ij", n**2, np.stack([g.ekf.P for g in parts]))
     kept.members = np.concatenate([g.members + p for g, p in zip(parts, old, strict=True)]) - kept.pos
     kept.count = float(counts.sum())
     kept.first_seen, kept.last_seen = min(g.first_seen for g in parts), max(g.last_seen for g in parts)

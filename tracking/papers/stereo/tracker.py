@@ -44,8 +44,8 @@ Departures:
 - R: of the mean of the points, and `centroid_noise`. Paper: one, not printed. Why: points come and go.
 - first P: of the points' mean position and velocity. Paper: not stated. Why: a filter needs it.
 - k_p, k_v: exponents, 1 and `velocity_weight`. Paper: factors. Why: factors have no effect.
-- merged id and P: those of the confirmed group with most points, in the preset `paper`, too. Paper: a new number
-  (Fig. 7); P not stated. Why: a group keeps its identity, as in the scores.
+- merged id: that of the confirmed group with most points, in the preset `paper`, too. Paper: a new number (Fig. 7).
+  Why: a group keeps its identity, as in the scores.
 - young groups: tentative ones without event; one that just arrived, no child, enters. Paper: merge. Why: no false
   merges.
 - splits: linked parts for `split_time`, unless they would merge again. Paper: none. Why: groups part.
