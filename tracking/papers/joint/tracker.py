@@ -31,35 +31,50 @@ Readings, where the paper is silent or contradicts itself:
 - The first partition of a person is drawn by the validity: the person is alone or joins the nearest group.
 - Velocities at the start are those of a Kalman filter over `confirm_time`.
 
-Fitted, as the paper leaves them open, on training seeds 0:2 of friends-meet: `confirm_time`, λ_cl (`validity_rate`) and
-`event_classifier.toml`. Not fitted: N_x, N_z, Σ, λ_y, `alpha`.
+Fitted, as the paper leaves them open: `confirm_time` and λ_cl (`validity_rate`) on friends-meet, training seeds 0:2;
+event_classifier.toml, which names scenes and seeds. Not fitted: N_x, N_z, Σ, λ_y, `alpha`.
 
-Departures:
+Departures. A star marks those that stay in the preset `paper`:
 
-- association: one for all particles, least sum of d² + ln |S|; newcomers after people. Paper: given. Why:
-  detections are anonymous.
-- losses: removed after `coast_time`; in an unseen group times are summed. Paper: restarted from the truth. Why: no
+- association*: within a gate, one for all particles, least sum of d² + ln |S|; newcomers after people. Paper: given.
+  Why: detections are anonymous.
+- births*: a free detection, followed by a Kalman filter, is a person after `confirm_time`. Paper: not stated. Why:
+  false alarms.
+- losses*: removed after `coast_time`; in an unseen group times are summed. Paper: restarted from the truth. Why: no
   truth.
-- p(y | x): normal about the place; 1 if missed. Paper: colour templates. Why: input is points.
-- pixels: each blob one detection (`pixel_noise`). Paper: boxes. Why: no detector.
-- proposal: mixture for each person. Paper: mixture of products. Why: people differ.
+- p(y | x)*: normal about the place; 1 if missed. Paper: colour templates. Why: input is points.
+- pixels*: each blob one detection (`pixel_noise`). Paper: boxes. Why: no detector.
+- proposal*: mixture for each person, the dynamics alone if missed. Paper: mixture of products. Why: people differ.
 - π_det: product of dynamics and likelihood (`algorithm`). Paper: Σ about the detection. Why: more useful particles.
-- Σ: white acceleration and jitter, per root second. Paper: not printed. Why: any frame rate.
+- Σ*: white acceleration and jitter, per root second. Paper: not printed. Why: any frame rate.
 - weights: people resampled by their own part, partitions by the rest (`algorithm`). Paper: one for a particle. Why:
   many people, few particles.
 - moments: by the own part (`algorithm`). Paper: by w. Why: as the weights.
-- validity: with prior scatter and virtual cluster. Paper: Davies-Bouldin. Why: undefined for one cluster.
-- λ_cl: per second (`validity_rate`). Paper: each frame. Why: any frame rate.
+- validity*: with prior scatter, virtual cluster and least distance. Paper: Davies-Bouldin. Why: undefined for one
+  cluster or equal centres.
+- λ_cl*: per second (`validity_rate`). Paper: each frame. Why: any frame rate.
 - beliefs: pairs in one group add their belief (`belief_rate`, `belief_memory`). Paper: none. Why: passing strangers
   look alike.
 - eq. 5: left out (`variant`). Paper: the group's velocity moves people. Why: no score is surely better with it.
-- events: also people alone; in random order, each changes once. Paper: groups, all at once. Why: people alone must
+- events*: also people alone; in random order, each changes once. Paper: groups, all at once. Why: people alone must
   merge.
-- probabilities: hazards over 0.1 s. Paper: each frame. Why: any frame rate.
-- features: log(1 + symmetric d_KL), shrunk covariances, d_v, root. Paper: d_KL, d_v, variance. Why: less noise.
-- parts of a split: drawn by their validity. Paper: not stated. Why: not all are plausible.
-- size prior: Merge only (`algorithm`). Paper: all events. Why: it divides large groups.
-- ids, onsets: ids of the truth, onsets dated back. Paper: none. Why: as the truth.
+- merges*: two groups that are each other's nearest draw it once. Paper: each group draws. Why: the classifier's
+  probability is the pair's.
+- probabilities*: hazards over 0.1 s. Paper: each frame. Why: any frame rate.
+- features*: log(1 + symmetric d_KL) up to 8, shrunk covariances, d_v, root. Paper: d_KL, d_v, variance. Why: less
+  noise.
+- times of the features*: a step apart, learned 0.1 s apart. Paper: a frame for both. Why: one classifier for all frame
+  rates.
+- classifier*: learned also from wrong partitions, with errors of states. Paper: labelled scenarios. Why: the filter
+  recovers.
+- parts of a split*: two, drawn by their validity; of more than six people one alone, or cuts along the main axis.
+  Paper: f is deterministic, its parts not stated. Why: not all are plausible.
+- size prior: Merge only, relative to its peak (`algorithm`). Paper: all events. Why: it divides large groups.
+- votes*: a person alone votes for the own name, as does the least member of a group. Paper: label 0 has votes of its
+  own. Why: a group keeps its least member.
+- weights of votes*: before step 2, by the rest, in the preset by w (`algorithm`). Paper: summed over i after step 2.
+  Why: no noise of resampling.
+- ids, onsets*: ids of the truth, onsets dated back. Paper: none. Why: as the truth.
 """
 
 from __future__ import annotations

@@ -15,7 +15,9 @@ together. z are the detections of a frame, w the weights. The steps of a frame:
 
 Readings: eqs 2 and 8 condition on earlier states only. Eq. 14 ends with the posterior of the frame before. Table 3 is
 read with B and C in m per frame, and C per axis; members of a group have the row of its mean velocity. If people and
-detections differ in number, a mapping maps all of the fewer ones. Positions advance by the new velocity.
+detections differ in number, a mapping maps all of the fewer ones. Positions advance by the new velocity. A newcomer is
+alone with probability 1/2; people alone are groups of one. The estimate is the mean over the particles before they are
+resampled.
 
 Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_distance` x distance -
 `relation_velocity` x difference of velocities. A star marks those that stay in the preset `paper`:
@@ -29,36 +31,42 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
   stated; with a limited number of others. Why: it starts and stops at a rate.
 - evidence: the belief about reported tracks (`relation_evidence`). Paper: the particle's state. Why: it looks back for
   seconds.
-- coupling: approached within `coupling_time`; partners weighted by existence and g(l), less the filter's scatter.
-  Paper: the group's mean velocity. Why: members differ.
+- unreported people: their relations stay as they are (`relation_evidence`). Paper: forecast. Why: no belief about
+  them.
+- coupling: approached within `coupling_time`; partners weighted by existence and, with the belief
+  (`relation_evidence`), by g(l), less the filter's scatter. Paper: the group's mean velocity. Why: members differ.
 - noise: a shared part (`common_noise`). Paper: independent. Why: a hidden member turns, too.
 - people*: slots common to all particles. Paper: each particle has a number of people. Why: few particles would have
   each newcomer.
-- existence: a probability, computed. Paper: none. Why: false alarms.
-- sensor: pairs: e P_D g / λ_c, missed: 1 − e P_D, with existence e, `detect_prob`, `clutter_density`. Paper: all
-  detected, no clutter. Why: detectors err.
-- displaced points: a share `outlier_share`, away from the camera, more if feet are covered. Paper: normal. Why:
-  hidden feet.
+- existence: a probability, computed; at birth by `birth_rate` and `clutter_density`. Paper: none. Why: false alarms.
+- sensor: pairs: e P_D g / λ_c, missed: 1 − e P_D, with existence e, `detect_prob`, `clutter_density`; 1 and 0 switch
+  off what follows from misses and false alarms. Paper: no misses or false alarms in the weights. Why: detectors err.
+- displaced points: a share `outlier_share`, away from the camera, without one in all directions, more if feet are
+  covered. Paper: normal. Why: hidden feet.
 - misses: after a miss, detected again with `hidden_time`. Paper: all alike. Why: occlusions last.
-- people as occluders: nobody is measured behind others. Paper: none. Why: nobody is visible.
-- sums*: exact up to a size, then belief propagation; people and detections are mapped if they are in reach in some
-  particle, or linked by such. Paper: all mappings. Why: exponential cost; nobody becomes a newcomer far away.
+- occluders: nobody is measured behind others, or behind known pillars and walls. Paper: none. Why: nobody is visible
+  there.
+- sums*: exact up to a size, then belief propagation; in the preset people and detections are mapped if they are in
+  reach in some particle, or linked by such, else if in reach and not improbable. Paper: all mappings. Why: exponential
+  cost; nobody becomes a newcomer far away.
 - pixels*: blobs, large ones divided by k-means. In the image*: centres of boxes. Paper: feet of boxes on the ground.
   Why: no calibration.
 - births*: a detection in nobody's reach, or probably nobody's; no weight until the next frame. Paper: a new object.
   Why: not stated when.
-- deaths*: the window stands still behind known pillars and walls; a person counts as measured with more than 1/2.
-  Paper: after a window, which may depend on occlusion. Why: nobody is visible there.
+- deaths*: the window slows by the probability of being behind known pillars and walls, by default also people; a
+  person counts as measured with more than 1/2. Paper: after a window, which may depend on occlusion. Why: nobody is
+  visible there.
 - deaths, report: also below an existence; from `report_existence`. Paper: after the window; all. Why: false alarms.
 - newcomers*: half of those near join, by distance. Paper: half join a group. Why: far groups are improbable.
 - weights: one for each person, others averaged; a missed person has the partners'. Paper: one for a particle. Why:
   many people, few particles.
 - resampling: of people with few effective particles, with a kernel. Paper: each frame. Why: equal particles.
+- resampled relations: drawn with each person alone. Paper: with the particle. Why: weights are people's.
 - groups*: reported ones are derived from the tracks. Paper: in the state. Why: particles differ in groups.
 
-Left open by the paper, fitted once on training seeds (see the presets): B and C of the rows of Table 3 and the sensor's
-noise at our frame rate; the relation's rate, bias and weights of distance and velocity. Not fitted: `time_window`, the
-spread of a newcomer's velocity.
+Fitted, as the paper leaves them open (see the presets): B and C of the rows of Table 3 and the sensor's noise at our
+frame rate, on fitting seeds; the relation's rate, bias and weights of distance and velocity, on training seeds. Not
+fitted: `time_window`, the spread of a newcomer's velocity, the number of particles.
 """
 
 from __future__ import annotations
