@@ -21,39 +21,61 @@ blob's ellipse.
                or by existence                                 ours            existence
     pixels     five classes, cleaning, blobs, ellipses         secs. 3.2, 3.3  tracking.detect
 
-Readings: eq. 4 lacks brackets. Eq. 9 has row and column exchanged. The "Mahalanobis radius" of sec. 4.3 is the
-quantile of chi2.
+Readings: eq. 4 lacks brackets. Eq. 9 has row and column exchanged; eq. 5 of theta is modulo pi. The "Mahalanobis
+radius" of sec. 4.3 is the quantile of chi2. A percentage of the asymptotic value (sec. 5) may be above 100 %
+(`confirm_ratio`).
 
-Departures, from boxes and from pixels. Those from `management` on hold unless it is "rho".
+Departures, from boxes and from pixels. Those from `management` on hold unless it is "rho"; without a parameter that
+switches it off, one holds in the preset `paper`, too.
 
 - input: also boxes, without θ. Paper: blobs. Why: detectors report boxes.
 - noises: in m at the person and per root second. Paper: no values. Why: any scale and frame rate.
-- deletion: also missed tracks outside the image, and at `tentative_time`. Paper: ρ. Why: false alarms end early.
+- first P: R and `speed_prior`, at rest; one measurement after birth never confirms. Paper: not stated. Why: a filter
+  needs it.
+- deletion: also missed tracks outside the image. Paper: ρ. Why: they do not come back.
+- ρ of deletion, with "rho": tentative tracks at its value at birth or at `tentative_time`, confirmed ones 2 % early.
+  Paper: one value. Why: false alarms end early.
+- several boxes of one track, with "rho": the nearest counts. Paper: all are assigned (frame 367), not how. Why: a
+  filter takes one.
 - `management`: by an existence probability (existence). Paper: ρ. Why: rates hold at any frame rate and detector.
 - association: one to one, most likely, against false and new boxes. Paper: nearest gated track. Why: a wide gate must
   not win.
-- scores: likelihood ratios, learned from the existence of the boxes' tracks. Paper: none. Why: any unit.
-- births: by the odds of new people to false boxes and second boxes of people. Paper: a measurement in no gate. Why:
-  people near others must start tracks.
+- scores of boxes: likelihood ratios, learned from the existence of the boxes' tracks. Paper: none. Why: any unit.
+- births from boxes: by the odds of new people to false boxes and second boxes of people; from pixels the odds are the
+  first existence. Paper: a measurement in no gate. Why: people near others must start tracks.
 - hidden people: detected as far as no other in front covers them, and not at all for `hidden_time`. Paper: none. Why:
   misses come in rows.
 - tracks on one body: merged. Paper: they compete (frame 357). Why: one body is one person.
-- report: boxes that are right with a probability of at least 0.5. Paper: not stated. Why: fewer false positives.
+- report: boxes that are right with a probability of at least 0.5, and not leaving while missed. Paper: not stated.
+  Why: fewer false positives.
 
 Departures from pixels only:
 
+- training: robust, with least σ, normalisers and thresholds, from the sample. Paper: all frames; the histogram of a
+  frame (Fig. 2). Why: people walk through the sample.
+- light: gain of each frame; far brighter pixels are foreground; ghosts are replaced (`background`). Paper: none. Why:
+  light and scene change.
+- dark foreground: by the brightness itself (`dark`). Paper: normalised. Why: noise must not move the limit.
+- grey samples: no shadows or highlights. Paper: colour. Why: no chromaticity.
+- opening: none up to 40 px per m; windows in m. Paper: opening. Why: it removes heads.
+- θ: noise by the blob's moments; not used if it is 30° or more, nor in gates from straight above. Paper: one R, gates
+  with θ. Why: a circle has no direction.
 - shared blobs: once the size of a person is known, templates share the foreground: each moves to the most support,
   confirmed tracks first; no gate (`split`). Paper: one measurement for each blob. Why: people merge in the mask.
-- misses: too little foreground under the template. Paper: no blob in the gate. Why: templates always fit somewhere.
-- noise: divided by the square of the visible share. Paper: R. Why: hidden parts are not measured.
-- births: also a lone blob inside a gate; other unexplained foreground, by templates. Paper: a blob outside all gates.
-  Why: people enter as one blob.
-- sizes: return to those of a person at that place. Paper: free. Why: templates measure none.
+- misses (`split`): too little foreground under the template. Paper: no blob in the gate. Why: templates always fit
+  somewhere.
+- noise (`split`): divided by the square of the visible share; 25 times for h, w of templates, 25° for θ. Paper: R.
+  Why: hidden parts are not measured, templates measure no size.
+- births (`split`): also a lone blob inside a gate; other unexplained foreground, by templates. Paper: a blob outside
+  all gates. Why: people enter as one blob.
+- sizes (`split`): return to those of a person at that place. Paper: free. Why: templates measure none.
 - ρ: of a nominal covariance without θ. Paper: of the filter. Why: noise must not count.
-- pieces, without `split`: the ellipse of all their pixels, if in the gate. Paper: one of several measurements. Why:
-  the paper does not say how.
-- too much foreground: prediction and deletion only. Paper: none. Why: light has changed.
-- background: adapts where no confirmed track is (`background`). Paper: trained once. Why: light changes.
+- pieces, without `split`: the ellipse of all pixels of the blobs centred in the predicted box, if in the gate, nearer
+  than the own blob, and of a person's size. Paper: all are assigned (frame 367), not how. Why: a filter takes one.
+- report from pixels: boxes, by the usual ratio to ellipses. Paper: ellipses. Why: scores need boxes.
+- too much foreground (`background`): prediction and deletion only. Paper: none. Why: light has changed.
+- background: adapts where no confirmed track is, ghosts anywhere (`background`). Paper: trained once. Why: light
+  changes.
 """
 
 from __future__ import annotations

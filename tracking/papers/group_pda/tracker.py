@@ -16,40 +16,57 @@ number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or 
     update     x, P, Sigma, N as means over the associations           eq. 2.4, sec. 4.3  association_kernels
     split      a group whose associations all have m_g = 0             sec. 3.3, 4.2      merging_and_splitting
     merge      R_x: overlapping regions and like velocities            sec. 3.1           merging_and_splitting
-               x, Sigma, N of the union, means weighted by N           eq. 3.1            merging_and_splitting
+               x, Sigma, N of the union, means weighted by N           sec. 3.2, eq. 3.1  merging_and_splitting
     birth      unclaimed points, grouped by G_y                        sec. 3.3           births_and_losses
 
-The grouping functions G_0, G_x, G_y of points (sec. 3.3, 4.2.1) are in tracking.filters.components: G_y links points at
-most 2 x `radius` apart, and joins linked sets whose regions overlap. A group that is not measured for `coast_time` is
-lost: it claims no points. `association = "none"` is section 5.2.1: a group takes all points in its region.
+The grouping functions G_0, G_x, G_y of points (sec. 3.1, 3.3, 4.2.1) are in tracking.filters.components: G_y links
+points at most 2 x `radius` apart, and joins linked sets whose regions overlap. A group that is not measured for
+`coast_time` is lost: it claims no points. `association = "none"` is section 5.2.1: a group takes all points in its
+region.
 
 Departures. Those marked (c) are off with `corrections` off.
 
-- search region: Σ, P and a point's variance; (c) wider in infeasible time. Paper: Σ. Why: few points give a small Σ.
+- search region of the gate: Σ, P and a point's variance; (c) wider in infeasible time. Paper: Σ, as in merges here.
+  Why: few points give a small Σ.
 - extents: shrunk to a prior (`spread_weight`); (c) corrected for the gate. Paper: sample covariance. Why: few people.
-- G_x: repeated until nothing changes. Paper: applied once. Why: joined regions overlap others.
+- G_x in G_y: repeated until nothing changes. Paper: applied once. Why: joined regions overlap others.
+- noise, (c): from pixels, components below 0.25 people do not count in G_y. Paper: all count. Why: specks of
+  foreground.
 - births: after `confirm_time`; until then no points of a confirmed group. Paper: at once. Why: false alarms.
-- R, (c): members keep places, some are missed. Paper: Σ / m. Why: less noise.
-- m_N: σ_n grows with N ((c)); heavy tails. Paper: normal, σ_n. Why: several join at once.
+- P: Σ w² P of merged groups; 1.3 m/s per axis of new ones. Paper: none. Why: the filter and SR_v need one.
+- R, (c): members keep places, some are missed. Paper: a member's place and noise, read as Σ / m, of m people. Why:
+  less noise.
+- m_d: S with the R of each association's m. Paper: one P_yc. Why: fewer people measure a centroid worse.
+- m_N: σ_n grows with N, (c) by 15 %, else 1 %; heavy tails. Paper: normal, σ_n. Why: several join at once.
+- α_s and α_N: equal, from `extent_time`. Paper: two constants. Why: one parameter less.
 - missed detections: (c) a miss hypothesis; missed members stand in for `carry_time`, from points. Paper: not
   considered. Why: detectors miss people.
+- size: N over the probability that a member is seen (`detect_prob`), from points. Paper: N. Why: detectors miss
+  people.
 - Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated.
   Why: they would swell.
-- pixels: each counts as a share of a person. Paper: each counts one. Why: N in people.
-- colours: a mass of shared points (`appearance`), from pixels. Paper: future work. Why: similar groups cross.
+- no points: coasts, lost after `coast_time`. Paper: null masses, as before a split. Why: occlusion.
+- pixels: on a grid of 0.1 m, each a share of a person. Paper: all, each counts one. Why: N in people; speed.
+- colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
+  similar groups cross.
 - split: after `split_time`; measured frames count back; (c) parent's velocity. Paper: after infeasible frames, at
   rest. Why: misses.
+- split into one part: the group stays as it is. Paper: initialised anew. Why: others' points made it infeasible.
 - divided points: those most probably the group's. Paper: all in the region. Why: others' people stay out.
 - ids: the largest part or merged group keeps its id. Paper: none. Why: tracks need ids.
-- walking out: a new group within reach of a member is a child. Paper: none. Why: splits without shared points.
-- like velocities, (c): difference up to `merge_velocity` on the mean of two steps. Paper: SR_v overlap. Why: P does not
-  measure likeness; people sway with each step.
+- walking out: a new group within reach of a member is a child, (c) with its velocity. Paper: none. Why: splits without
+  shared points.
+- like velocities, (c): difference up to `merge_velocity` on the mean of two steps. Paper: SR_v overlap. Why: P does
+  not measure likeness; people sway with each step.
+- SR_v, without corrections: of the updated velocity. Paper: of the predicted one. Why: Fig. 1 merges after the update.
 - near groups, (c): people at most 1.5 m apart, too. Paper: regions overlap. Why: no merge after a split.
 - merge: of confirmed, measured, feasible groups; (c) after `merge_time`. Paper: at once. Why: crossing groups.
 - enter: no merge if at most one group is older or a child. Paper: none. Why: they came together.
 - duplicates: of two groups on the same people for `coast_time` one is lost. Paper: none. Why: hidden groups follow
   others.
-- recapture: a newborn group takes a lost one's id (`recapture_time`). Paper: none. Why: occlusion.
+- recapture: a newborn group takes the id of one that is not measured (`recapture_time`). Paper: none. Why: occlusion.
+- reports: until `report_coast` after a measurement, with hulls of points. Paper: every group. Why: lost groups are
+  guesses.
 - onsets: dated back. Paper: none. Why: decisions lag.
 - depth: divided by the sine of the tilt. Paper: px. Why: oblique views.
 """

@@ -20,42 +20,57 @@ tracking.detect.
 
 Readings: eq. 6 is printed with y for x, and takes world for camera coordinates; here f contains the camera's pose. A
 feature has the covariance J^-1 R J^-T, with the Jacobian J of (u, v, d) and R from `pixel_noise` and
-`disparity_noise`: its error grows with the squared depth.
+`disparity_noise`: its error grows with the squared depth. The mean position of sec. 3.3 is that of (x, y, z),
+projected by f: the mean disparity would be biased in depth. The number of sec. 3.4 is that of the points of a
+connected component. I_n of eq. 13 is transitive. The filter is an extended one, as f is not linear.
 
-Departures:
+Departures. Without a parameter that switches it off, one holds in the preset `paper`, too:
 
 - subtraction: in the left picture only. Paper: not stated. Why: one background model.
-- person or not: fixed limits, by quantiles; regions cut by the edge are not too small. Paper: by height and width.
-  Why: no limits printed.
-- features: checked backwards, a least distance apart, no faint disparities. Paper: KLT. Why: wrong matches.
+- foreground: that of `blob` (five classes, cleaning, least area). Paper: background subtraction. Why: shared.
+- matching: OpenCV's block matching with its checks, up to the disparity of `nearest`. Paper: not stated. Why: speed,
+  wrong matches.
+- person or not: fixed limits, by quantiles; any width; regions cut by the edge are not too small; fewer than 5
+  disparities are nobody. Paper: by height and width. Why: no limits printed.
+- features: checked backwards, a least distance apart; they end outside people, need a disparity (median of 3 x 3 px)
+  now and in most of `window_time`; at most 400. Paper: KLT, the window. Why: wrong matches, speed.
 - velocity of a feature: slope over `window_time`. Paper: not stated. Why: one frame is too noisy.
 - time: seconds; α_s = exp(−dt / `spread_time`). Paper: steps of a frame. Why: any frame rate.
-- γ, spheres: constants (`gate`, `radius`). Paper: tuned by scene. Why: no tuning.
-- measurement: its projection. Paper: mean of the points. Why: the mean disparity is biased in depth.
+- Q: white acceleration (`accel_noise`). Paper: not printed. Why: any frame rate.
+- γ, MR, spheres: constants (`gate`, `merge_gate`, `radius`, `point_radius`). Paper: γ, spheres by scene; MR not
+  printed. Why: no tuning.
 - visible side: points moved away from the camera (`surface_offset`). Paper: none. Why: the camera sees surfaces.
 - mean: inverse density on the ground (`density_width`). Paper: all features count alike. Why: textured people have
   more features.
 - height: reported from the top of the features (`top_offset`); the filter has their mean. Paper: the mean. Why: other
   people and the edge of the picture hide legs, so that the mean height changes; the result is the middle of bodies.
-- errors of points: added in eqs 8 to 10, taken off C_y (`point_covariance`). Paper: none. Why: depth is uncertain.
-- P and Σ: P of the filter, Σ of the members; regions use both (`point_covariance`). Paper: one covariance. Why: a
-  member is no centroid.
+- errors of points: added in eqs 8 to 10, taken off C_y (`point_covariance`); R, first P and density have them always.
+  Paper: none. Why: depth is uncertain.
+- P and Σ: P of the filter, Σ of the members; search regions and eqs 9, 10 use both (`point_covariance`), merging Σ.
+  Paper: one covariance. Why: a member is no centroid.
+- merged P: that of the weighted mean, sum of n² P_i. Paper: one covariance, eq. 15. Why: P is of the centroid.
 - Σ: shrunk to a prior (`spread_weight`). Paper: sample covariance. Why: few points in six dimensions.
+- N: of the last frame in which the group was measured. Paper: of every frame. Why: a hidden group would have no
+  weight.
 - R: of the mean of the points, and `centroid_noise`. Paper: one, not printed. Why: points come and go.
-- first P: of the points' mean position and velocity. Paper: not stated. Why: a filter needs it.
+- first P: of the points' mean position and velocity. Paper: covariance of the points. Why: a member is no centroid.
 - k_p, k_v: exponents, 1 and `velocity_weight`. Paper: factors. Why: factors have no effect.
-- merged id: that of the confirmed group with most points, in the preset `paper`, too. Paper: a new number (Fig. 7).
-  Why: a group keeps its identity, as in the scores.
+- merged id: of the largest group that has been there for 1 s or was split off, else of the largest confirmed one.
+  Paper: a new number (Fig. 7). Why: a group keeps its identity, as in the scores.
 - young groups: tentative ones without event; one that just arrived, no child, enters. Paper: merge. Why: no false
   merges.
 - splits: linked parts for `split_time`, unless they would merge again. Paper: none. Why: groups part.
-- parts: start anew from their points; the largest keeps the id. Paper: none. Why: tracks need ids.
+- parts: start anew from their points, with the group's velocity; the largest keeps the id. Paper: none. Why: tracks
+  need ids.
 - confirmation, deletion: `confirm_time`, `coast_time`, `report_coast`. Paper: none. Why: wrong matches.
 - too much foreground: features start anew, so nothing is measured for `window_time`; groups go on. Paper: none. Why:
   light changes.
-- hulls: round places corrected for errors, half a footprint each. Paper: ellipses. Why: features lie all over a body.
-- background: adapts, but not where people are (`background`). Paper: not stated. Why: light changes.
-- points as input: linked between frames; used at once, one is enough. Paper: none. Why: other detectors.
+- hulls: round places corrected for errors (`point_covariance`), half a footprint each, from points a whole one. Paper:
+  ellipses. Why: features lie all over a body.
+- background: adapts, but not where people are, except for ghosts and in frames with too much foreground
+  (`background`). Paper: not stated. Why: light changes.
+- points as input: linked between frames; used at once, one is enough; Z is their place; velocity 0 when new. Paper:
+  none. Why: other detectors.
 """
 
 from __future__ import annotations
