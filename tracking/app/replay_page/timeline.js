@@ -79,7 +79,7 @@ function drawUnlabelled(svg, from, to) {
 }
 
 function drawHeading(svg, y, text) {
-  const [word, what] = text.split(/ (?=\S+$)/), most = 12 - what.length;
+  const [word, what] = text.split(/ (?=\S+$)/), most = 13 - what.length;
   const short = word.length > most ? `…${word.slice(1 - most)}` : word;
   element("title", {}, element("text", { x: GUTTER - 10, y: y + 11, "text-anchor": "end" }, svg, `${short} ${what}`), text);
 }
