@@ -236,11 +236,13 @@ def main() -> None:
     parser.add_argument("mode", choices=["recordings", "sequences"])
     parser.add_argument("--scenes", default=",".join(SCENES), metavar="NAMES")
     add_seeds(parser, "20000:20008")
-    parser.add_argument("--store", type=Path, default=Path("coverage"), metavar="FOLDER")
+    parser.add_argument("--store", type=Path, metavar="FOLDER")
     given = parser.parse_args()
     one_thread()
-    given.store.mkdir(parents=True, exist_ok=True)
-    {"recordings": recordings, "sequences": sequences}[given.mode](measured(given))
+    with tempfile.TemporaryDirectory() as name:
+        given.store = given.store or Path(name)
+        given.store.mkdir(parents=True, exist_ok=True)
+        {"recordings": recordings, "sequences": sequences}[given.mode](measured(given))
 
 
 if __name__ == "__main__":
