@@ -97,8 +97,7 @@ class Foreground:
         """Let the background model learn from a segmented picture, except at pixels where `protected` (H, W) is True.
 
         seen: the result of the last `segment`, as that call also set the brightness of the model. Each call changes
-        every fourth row. `seen.plausible` is not looked at: the caller leaves implausible pictures out. Returns
-        nothing.
+        every fourth row. Ghosts are replaced also where `protected` is True, but not in an implausible picture.
         """
         self.model.adapt(seen.image, seen.classes, protected)
         if seen.plausible and self.ghosts is not None:

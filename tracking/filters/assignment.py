@@ -2,9 +2,9 @@
 
 Input: a cost matrix (N, M), one row per track, one column per measurement, inf outside a track's gate (region where its
 measurements may lie). Output: two index arrays (K,), rows and columns of the assigned pairs. No measurement is assigned
-twice. A track can have several measurements with `nearest` only: there each measurement goes to the track of least cost
-(squared Mahalanobis distance d^2) in whose gate it lies (Gonzalez et al. 2006, sec. 4.4), and one person may be
-detected in several pieces. `optimal` is ours.
+twice. With `nearest` each measurement goes to the track of least cost (squared Mahalanobis distance d^2) in whose gate
+it lies (Gonzalez et al. 2006, sec. 4.4), so that a track can have several: one person may be detected in several
+pieces. `optimal` is ours.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ Order of a frame, with the paper's sections:
     blobs of one person's size: gate, associate, update with the ellipse      secs. 4.2 to 4.4, eqs 3 to 10
     other foreground: split among the tracks expected there, by templates     ours (person_template)
     foreground that no track explains, as large as a person: new tracks       ours (new_people)
-    axes return towards those of a person at the track's place                ours (ellipse_tracks)
+    axes return towards those of a person at the track's place                ours (track_management)
     rho: confirm, delete, start tracks                                        secs. 4.5, 5 (track_management)
     adapt the background, except where confirmed tracks are                   ours
 

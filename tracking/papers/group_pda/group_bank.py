@@ -25,7 +25,7 @@ class MemberPlaces(NamedTuple):
 
     offset (K, 2): from the group's centroid, in the unit of the points; last_seen (K,): time, s; known (K,) bool: True
     if a member was measured near that place before, so that it may stand in when it is missed (see `remember` in
-    missed_members).
+    association).
     """
 
     offset: Array
