@@ -1,10 +1,12 @@
-# `make demo`, `make test` and `make test-slow` make the environment from constraints.txt, then run. Another Python: make PYTHON=python3.13
+# Each target makes what it needs of the environment from constraints.txt, then runs. Another Python: make PYTHON=python3.13
 
 SUPPORTED := import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 PYTHON ?= $(shell for p in python3.12 python3.13 python3.11 python3 python; do \
 	$$p -c '$(SUPPORTED)' 2>/dev/null && echo $$p && break; done)
 VENV := .venv
 BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt
+RUNTIME := $(VENV)/made-to-run
 ENVIRONMENT := $(VENV)/made-from-constraints
 DOCS := $(VENV)/made-for-docs
 DEMO ?=
@@ -12,7 +14,7 @@ TESTS ?=
 
 .PHONY: demo test test-slow lint types docs clean
 
-demo: $(ENVIRONMENT)
+demo: $(RUNTIME)
 	$(BIN)/flockscope demo $(DEMO)
 
 test: $(ENVIRONMENT)
@@ -37,15 +39,19 @@ clean:
 	find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
 
 # Made anew whenever what it is made from changes; whole or not there, because the last line makes it current.
-$(ENVIRONMENT): pyproject.toml constraints.txt
+$(RUNTIME): pyproject.toml constraints.txt
 	@$(PYTHON) -c '$(SUPPORTED)' || { echo "Python 3.11, 3.12 or 3.13 is needed: make PYTHON=/path/to/python" >&2; exit 2; }
 	rm -rf $(VENV)
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt setuptools
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt --no-build-isolation -e ".[dev]"
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt --no-deps trackeval
+	$(PIP) setuptools
+	$(PIP) --no-build-isolation -e .
+	@touch $@
+
+$(ENVIRONMENT): $(RUNTIME)
+	$(PIP) --no-build-isolation -e ".[dev]"
+	$(PIP) --no-deps trackeval
 	@touch $@
 
 $(DOCS): $(ENVIRONMENT)
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt --no-build-isolation -e ".[docs]"
+	$(PIP) --no-build-isolation -e ".[docs]"
 	@touch $@

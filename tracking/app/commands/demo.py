@@ -16,7 +16,7 @@ from pathlib import Path
 
 from scenarios.errors import printable
 from sim.io.files.own_files import GENERATOR, output_path
-from sim.types import Sequence
+from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
@@ -181,12 +181,22 @@ def _cells(tag: str, cells: list[str]) -> str:
     return "<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in cells) + "</tr>"
 
 
-SCENES = ("merge", "split", "cross", "pass-by", "queue", "side-by-side", "party", "mixed")
-SEEDS = range(40_000, 40_003)
+SCENES = ("merge", "split", "cross", "queue", "party", "mixed")
+SEEDS = range(40_000, 40_002)
 QUICK_SCENES, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
+QUICK_TRACKERS = ("blob", "group-pda")  # one that reports people, one that reports groups
 PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)  # The scene that is rendered and tracked from its pictures.
 
 QUICK_PIXEL_SETTINGS = ("camera.fps=5",)  # What --quick changes in that scene.
+
+
+@dataclass(frozen=True, eq=False)
+class _TrackJob:
+    tracker: str
+    detections: DetectionMode
+    folders: list[Path]  # of sequences
+    out: Path  # a run is written into the folder of this that has its sequence's name
+    overlay: Path | None = None  # where to draw tracks over the last sequence's pictures
 
 
 def demo(options: DemoOptions) -> CommandResult:
@@ -200,22 +210,30 @@ def demo(options: DemoOptions) -> CommandResult:
     start, out, quick = time.monotonic(), options.out, options.quick
     refuse_foreign_file(option_parsing.output_folder(out) / "index.html")
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
+    workers = os.cpu_count() or 1
     with ProgressMeter("generate") as meter:
-        workers = WorkerOptions(1 if quick else os.cpu_count() or 1)
-        folders = generate(names, seeds, out / "data", workers=workers, progress=meter.update, streams=())
+        count = WorkerOptions(1 if quick else workers)
+        folders = generate(names, seeds, out / "data", workers=count, progress=meter.update, streams=())
         settings = QUICK_PIXEL_SETTINGS if quick else ()
         (rendered,) = generate(
             [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
         )  # fmt: skip
     sequences = [open_source(folder)[0] for folder in folders]
-    trackers = tracker_registry.names()
-    with ProgressMeter("track, score, draw", len(sequences) * len(trackers)) as meter:
-        scene = _pixel_scene(open_source(rendered)[0], out)
-        runs = {name: _tracked(name, sequences, out, meter) for name in trackers}
+    trackers = QUICK_TRACKERS if quick else tracker_registry.names()
+    jobs = [_TrackJob(name, "file", folders, out / "tracks" / name) for name in trackers]
+    jobs += [
+        _TrackJob(name, "image", [rendered], out / "tracks" / f"{name}-image", _pictures(out) / f"{name}.mp4")
+        for name in trackers if "pixels" in tracker_registry.find(name).needs
+    ]  # fmt: skip
+    runs = _run(jobs, workers)
+    from_points, from_pixels = (
+        {j.tracker: runs[j] for j in jobs if j.detections == mode} for mode in ("file", "image")
+    )
+    scene = _pixel_scene(open_source(rendered)[0], from_pixels, out)
     inputs = {name: _input_word(name) for name in trackers}
     words = sorted({*inputs.values()}, reverse=True)
-    tables = [_table(word, sequences, {n: runs[n] for n in trackers if inputs[n] == word}) for word in words]
-    sections = [_section(name, table, sequences, runs, out) for table in tables for name in table.compared.runs]
+    tables = [_table(word, sequences, {n: from_points[n] for n in trackers if inputs[n] == word}) for word in words]
+    sections = [_section(name, table, sequences, from_points, out) for table in tables for name in table.compared.runs]
     page = out / "index.html"
     write_file(page, demo_page(out, scene, tables, sections).encode())
     text = [f"{len(sequences)} sequences in {folders[0].parent}", *(_line(s.title, s.rows) for s in sections)]
@@ -226,43 +244,57 @@ def demo(options: DemoOptions) -> CommandResult:
     return CommandResult({"sequences": len(sequences), "scores": data, "page": page}, "\n".join(text))
 
 
+def _run(jobs: list[_TrackJob], workers: int) -> dict[_TrackJob, list[TrackingRun]]:
+    from sim.workers.start import results_in_order, start_workers
+
+    runs = {}
+    with ProgressMeter("track", len(jobs)) as meter, start_workers(workers) as run:
+        for job, found in zip(jobs, results_in_order(run, _tracked, jobs), strict=True):
+            runs[job] = found
+            meter.step(f"{job.tracker}{' from pixels' if job.overlay else ''}")
+    return runs
+
+
+def _tracked(job: _TrackJob) -> list[TrackingRun]:
+    from sim.io.source import open_source
+    from tracking.app.pictures.overlay import write_overlay
+
+    runs = []
+    for folder in job.folders:
+        (sequence,) = open_source(folder)
+        runs.append(TrackerSetup(job.tracker, detections=job.detections).run(sequence))
+        runs[-1].write(output_path(job.out, sequence.name), sequence)
+    if job.overlay is not None:
+        write_overlay(sequence, runs[-1], job.overlay, "over")
+    return runs
+
+
 def _table(word: str, sequences: list[Sequence], runs: Mapping[str, list[TrackingRun]]) -> RankingTable:
     compared = compare(sequences, runs)
     return RankingTable(f"Trackers from {word}", compared, usual_key(compared))
 
 
-def _pixel_scene(sequence: Sequence, out: Path) -> PixelScene:
-    from tracking.app.pictures.overlay import write_overlay
+def _pictures(out: Path) -> Path:
+    return out / "pages" / "pictures"
+
+
+def _pixel_scene(sequence: Sequence, runs: Mapping[str, list[TrackingRun]], out: Path) -> PixelScene:
     from tracking.app.replay_page.video import page_video
 
-    folder = out / "pages" / "pictures"
+    folder = _pictures(out)
     video = page_video(sequence, output_path(folder, sequence.name, ".html"), "beside")
-    names = [name for name in tracker_registry.names() if "pixels" in tracker_registry.find(name).needs]
-    runs = {name: TrackerSetup(name, detections="image").run(sequence) for name in names}
-    compared = compare([sequence], {name: [run] for name, run in runs.items()})
-    section, overlays = ResultSection(f"{sequence.name}, from its pictures"), {}
-    for tracker, run in runs.items():
+    compared = compare([sequence], runs)
+    section = ResultSection(f"{sequence.name}, from its pictures")
+    for tracker, (run,) in runs.items():
         row, page = SequenceScores(sequence.name, compared.scores[tracker][0]), folder / f"{tracker}-image.html"
-        run.write(output_path(out / "tracks" / f"{tracker}-image", sequence.name), sequence)
         _write_page(f"{tracker} from pixels", sequence, run, row, page, video)
         section.add(row, page, tracker)
-        overlays[tracker] = write_overlay(sequence, run, folder / f"{tracker}.mp4", "over")
     frames = sequence.length or 0
-    return PixelScene(section, overlays, frames, frames / sequence.fps)
+    return PixelScene(section, {name: folder / f"{name}.mp4" for name in runs}, frames, frames / sequence.fps)
 
 
 def _input_word(tracker: str) -> str:
     return "boxes" if "boxes" in tracker_registry.find(tracker).needs else "points"
-
-
-def _tracked(tracker: str, sequences: list[Sequence], out: Path, meter: ProgressMeter) -> list[TrackingRun]:
-    runs = []
-    for sequence in sequences:
-        run = TrackerSetup(tracker, detections="file").run(sequence)
-        run.write(output_path(out / "tracks" / tracker, sequence.name), sequence)
-        runs.append(run)
-        meter.step(f"{tracker} on {sequence.name}")
-    return runs
 
 
 def _section(
