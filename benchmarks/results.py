@@ -161,7 +161,7 @@ def sources_hash(table: Table) -> str:
     for name in sources_of(table):
         h.update(f"{name}\n{_module_facts(name)[0]}\n".encode())
     for path in (p for package in PACKAGES[1:] for p in sorted((ROOT / package).rglob("*.toml"))):
-        h.update(path.read_bytes())
+        h.update(json.dumps(tomllib.loads(path.read_text(encoding="utf-8")), sort_keys=True, default=str).encode())
     return h.hexdigest()[:16]
 
 

@@ -28,7 +28,7 @@ SURE = 60.0  # s: the interval of a shorter recording is only indicative.
 Scale = Literal["share", "below one", "count", "length", "plain"]
 
 
-def finite_mean(values: Iterable[float]) -> float:
+def mean_of_known(values: Iterable[float]) -> float:
     """Returns the mean of the values that are not nan, nan if there are none. Infinite values are kept."""
     known = [v for v in values if v == v]
     return sum(known) / len(known) if known else float("nan")

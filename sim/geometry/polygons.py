@@ -58,10 +58,11 @@ def pack_padded(vertex: Array) -> PackedPolygons:
 def _shoelace(vertex: Array) -> Array:
     """Returns the signed area (N,), relative to the first vertex, so that it is exact far from the origin, too."""
     p = vertex - vertex[:, :1]
-    return np.asarray(0.5 * _cross(p, np.roll(p, -1, axis=1)).sum(axis=1))
+    return np.asarray(0.5 * cross(p, np.roll(p, -1, axis=1)).sum(axis=1))
 
 
-def _cross(a: Array, b: Array) -> Array:
+def cross(a: Array, b: Array) -> Array:
+    """Returns the cross products (…) of vectors (…, 2)."""
     product: Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return product
 
@@ -123,7 +124,7 @@ def _common_area(a: Array, b: Array) -> Array:
 def _left_of_edges(points: Array, polygon: Array) -> Array:
     """Returns the distance (K, V, N) of N points to the left of V edges, times the edge's length."""
     edge = np.roll(polygon, -1, axis=1) - polygon
-    offset = _cross(polygon, edge)  # cross(e, p - a) = cross(e, p) + cross(a, e)
+    offset = cross(polygon, edge)  # cross(e, p - a) = cross(e, p) + cross(a, e)
     return (
         edge[:, :, None, 0] * points[:, None, :, 1]
         - edge[:, :, None, 1] * points[:, None, :, 0]

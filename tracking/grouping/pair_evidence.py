@@ -1,7 +1,7 @@
 """What tells whether two people belong together: their distance and motion over time, in steps.
 
 `step_positions` averages positions over steps of at most 0.4 s, and `evidence` returns one row per pair and step with
-the quantities of `QUANTITIES` averaged over the past (`TIMES`), and `NOW`. Nothing looks ahead. Only positions are
+the quantities of `QUANTITIES` averaged over the past (`TIMES`), and `NEAR`. Nothing looks ahead. Only positions are
 used: velocities are chords of positions over 0.8 s. Lengths are in m.
 
 What other people do is no evidence, nor when and where people were first seen: it tells who belongs together in
@@ -30,9 +30,9 @@ LONGEST = 20.0  # s: longer times near each other tell no more.
 # velocity of the two where that is at least 0.3 m/s, else the whole distance and nan. growth: of the distance, m/s.
 # turn: angle between the two velocities, rad, nan if one is slower than 0.3 m/s.
 QUANTITIES = ("distance", "velocity difference", "sideways", "lengthwise", "growth", "turn")
-NOW = ("time near",)  # Not averaged: the time of the pair's rows so far, s.
+NEAR = ("time near",)  # Not averaged: the time of the pair's rows so far, s.
 # Names of the columns of `PairRows.values`.
-NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *NOW)
+NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *NEAR)
 PORTION = 100_000  # Rows worked on together: bounds memory.
 
 

@@ -17,7 +17,7 @@ from scenarios.errors import InputError, counted
 from scenarios.loading.toml_files import closest
 from tracking.config import Config
 from tracking.environment.episodes import Episode
-from tracking.stats import finite_mean, paired
+from tracking.stats import mean_of_known, paired
 
 SPEED = "frames/s"  # Key of the tracker's speed. It is the only goal that differs between two runs of the same episode.
 
@@ -43,7 +43,7 @@ class Goal:
         if self.key == SPEED:
             seconds = sum(e.seconds_tracking for e in episodes)
             return sum(e.frames for e in episodes) / seconds if seconds else float("nan")
-        return finite_mean(self.of(e) for e in episodes)
+        return mean_of_known(self.of(e) for e in episodes)
 
     def gain(self, before: float, after: float) -> float:
         """Returns by how much the value `after` is better than `before`, negative if worse, nan if one is nan."""

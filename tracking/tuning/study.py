@@ -38,7 +38,7 @@ from optuna.trial import FrozenTrial, TrialState
 
 from scenarios.errors import FlockscopeError, InputError
 from tracking.environment.episodes import Episode
-from tracking.stats import finite_mean
+from tracking.stats import mean_of_known
 from tracking.tuning.comparison import Goal, TrialRecord
 from tracking.tuning.options import Progress
 from tracking.tuning.parallel_episodes import PlayEpisodes
@@ -405,6 +405,6 @@ def _should_prune(trial: optuna.Trial, scene: int, episode: Episode, plan: Searc
 def _estimate(best: optuna.trial.FrozenTrial, goal: Goal, played: dict[int, Episode]) -> float:
     assert best.value is not None
     pairs = [(goal.of(e), best.intermediate_values[k]) for k, e in played.items() if k in best.intermediate_values]
-    gain = finite_mean(goal.gain(theirs, own) for own, theirs in pairs)
+    gain = mean_of_known(goal.gain(theirs, own) for own, theirs in pairs)
     gain = min(gain, -LEAST_LOSS) if gain == gain else -LEAST_LOSS
     return best.value + gain if goal.higher else best.value - gain

@@ -14,6 +14,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE
+from sim.geometry.polygons import cross
 from sim.io.files.numeric_text import is_number_text
 from sim.types import Array, Bools, Ints
 
@@ -50,10 +51,10 @@ def crossings(frame: Ints, id: Ints, pos: Array, line: Array, downwards: bool) -
     same = np.diff(id[order]) == 0
     a, b = pos[:-1][same], pos[1:][same]
     first, along = line[0], line[1] - line[0]
-    before, after = _cross(along, a - first) > 0, _cross(along, b - first) > 0
+    before, after = cross(along, a - first) > 0, cross(along, b - first) > 0
     # The ends of the line are on different sides of the step, too.
     step = b - a
-    hits = (before != after) & ((_cross(step, line[0] - a) > 0) != (_cross(step, line[1] - a) > 0))
+    hits = (before != after) & ((cross(step, line[0] - a) > 0) != (cross(step, line[1] - a) > 0))
     left = after != downwards
     when = frame[1:][same]
     return when[hits & left], when[hits & ~left]
@@ -67,7 +68,3 @@ def inside(pos: Array, zone: Array) -> Bools:
     rise = np.where(a[:, 1] == b[:, 1], 1.0, b[:, 1] - a[:, 1])
     beyond = x < a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / rise
     return np.asarray((level & beyond).sum(axis=1) % 2 == 1)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

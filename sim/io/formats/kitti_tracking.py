@@ -7,7 +7,6 @@ are of the types in PEOPLE, and are read with their boxes; rows of other types a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -18,9 +17,9 @@ from scenarios.limits import DETECTIONS, FRAMES
 from sim.io.files.numeric_text import NumericTable, crowded, is_number_text, read_text
 from sim.io.formats.labels import require_size
 from sim.io.formats.mot_table import MotTable
-from sim.io.formats.mot_text import truth_of_table
+from sim.io.formats.mot_text import sequence_of_table
 from sim.io.formats.options import RecordingOptions
-from sim.types import Frame, Sequence, Truth
+from sim.types import Sequence
 
 FPS = 10.0
 CELLS = (17, 18)
@@ -36,19 +35,7 @@ def is_kitti_tracking(path: Path) -> bool:
 
 def open_text(path: Path, options: RecordingOptions) -> Sequence:
     """Returns a text as Sequence with truth in the image, without pictures and detections."""
-    table, rate = _table(path), options.fps or FPS
-    length = int(table.frame.max())
-
-    def frames() -> Iterator[Frame]:
-        return (Frame(index, (index - 1) / rate) for index in range(1, length + 1))
-
-    def truth() -> Truth:
-        return truth_of_table(table, path.stem, rate, length, options.scale)
-
-    source = {"kind": "kitti tracking", "path": str(path)}
-    return Sequence(
-        name=path.stem, fps=rate, length=length, frames=frames, load_truth=truth, px_per_m=options.scale, source=source
-    )  # fmt: skip
+    return sequence_of_table(_table(path), path, options.fps or FPS, "kitti tracking", options.scale)
 
 
 def _table(path: Path) -> MotTable:

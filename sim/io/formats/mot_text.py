@@ -17,6 +17,7 @@ people; other programs write categories, occlusion flags, zeros or pixels there.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,7 +32,7 @@ from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable, corner_doubt, rea
 from sim.io.formats.options import BoxScale
 from sim.scene.visibility import scale_of_all_boxes
 from sim.truth.group_hulls import box_groups
-from sim.types import Array, Bools, Detections, Ints, Plane, Truth, Unscored
+from sim.types import Array, Bools, Detections, Frame, Ints, Plane, Sequence, Truth, Unscored
 
 # step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
 LONGEST = 12.0
@@ -385,6 +386,22 @@ def read_truth(
     """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
     return truth_of_table(table, name, fps, length, px_per_m, person_class)
+
+
+def sequence_of_table(table: MotTable, path: Path, fps: float, kind: str, px_per_m: float = float("nan")) -> Sequence:
+    """Returns a text's table as Sequence with truth, without pictures and detections."""
+    length = int(table.frame.max())
+
+    def frames() -> Iterator[Frame]:
+        return (Frame(index, (index - 1) / fps) for index in range(1, length + 1))
+
+    def truth() -> Truth:
+        return truth_of_table(table, path.stem, fps, length, px_per_m)
+
+    return Sequence(
+        name=path.stem, fps=fps, length=length, frames=frames, load_truth=truth, px_per_m=px_per_m,
+        source={"kind": kind, "path": str(path)},
+    )  # fmt: skip
 
 
 def truth_of_table(

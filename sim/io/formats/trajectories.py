@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -25,9 +24,9 @@ from sim.io.files.numeric_text import NumericTable, crowded, is_number_text, rea
 from sim.io.formats.biwi import frame_numbers
 from sim.io.formats.labels import require_size
 from sim.io.formats.mot_table import MotTable
-from sim.io.formats.mot_text import truth_of_table
+from sim.io.formats.mot_text import sequence_of_table
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
-from sim.types import Frame, Sequence, Truth
+from sim.types import Sequence
 
 NDJSON = ".ndjson"
 ETH_FPS = 2.5
@@ -51,19 +50,7 @@ def is_trajectories(path: Path) -> bool:
 def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns a text of trajectories as Sequence with truth, without pictures and detections."""
     rows, rate = _read(path, options.fps)
-    table = _table(rows)
-    length = int(table.frame.max())
-
-    def frames() -> Iterator[Frame]:
-        return (Frame(index, (index - 1) / rate) for index in range(1, length + 1))
-
-    def truth() -> Truth:
-        return truth_of_table(table, path.stem, rate, length)
-
-    return Sequence(
-        name=path.stem, fps=rate, length=length, frames=frames, load_truth=truth,
-        source={"kind": "trajectories", "path": str(path)},
-    )  # fmt: skip
+    return sequence_of_table(_table(rows), path, rate, "trajectories")
 
 
 def _read(path: Path, fps: float | None) -> tuple[NumericTable, float]:

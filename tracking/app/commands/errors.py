@@ -16,7 +16,7 @@ from tracking.app.stored_tracks import StoredTracks
 from tracking.errors.found import CauseRow, RunErrors, errors_of_run, sums_by_cause
 from tracking.errors.repairs import SHOWN
 from tracking.scoring.people_comparison import Similarity
-from tracking.stats import finite_mean
+from tracking.stats import mean_of_known
 
 Job = tuple[StoredTracks, Similarity | None, BoxScale | None]
 
@@ -64,9 +64,9 @@ def _tables(names: list[str], fps: list[float], found: list[RunErrors], causes: 
     for row in causes:
         gains = (_number(row.gains[k], "+.3f") for k in SHOWN)
         lost.add_row(row.kind, row.cause, str(row.errors), f"{row.seconds:.1f}", *gains)
-    left = {k: finite_mean(run.left[k] for run in found) for k in SHOWN}
+    left = {k: mean_of_known(run.left[k] for run in found) for k in SHOWN}
     lost.add_row("position", "", "", "", *(_number(left[k], "+.3f") for k in SHOWN))
-    now = "  ".join(f"{k} {_number(finite_mean(run.scores[k] for run in found), '.3f')}" for k in SHOWN)
+    now = "  ".join(f"{k} {_number(mean_of_known(run.scores[k] for run in found), '.3f')}" for k in SHOWN)
     every = [(name, rate, error) for name, rate, run in zip(names, fps, found, strict=True) for error in run.errors]
     dearest = sorted(every, key=lambda item: -(item[2].cost or 0.0))[:limit]
     listed = new_table(["sequence", "frames", "kind", "who", "cause"], ["cost"])
