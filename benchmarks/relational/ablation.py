@@ -23,7 +23,7 @@ DEPARTURES = (
     "relation_evidence=state", "coupling_time=0 common_noise=0", "coupling_time=0", "common_noise=0",
     "relation_bias=40", "detect_prob=1 clutter_density=0", "NO_FACTORS",
     "PAIR_BY_PAIR", "outlier_share=0",
-    "hidden_time=0.3", "noise_scale=1",
+    "hidden_time=2", "noise_scale=1",
     "clutter_density=0.02",
 )  # fmt: skip
 """Settings of the ablation beside the defaults. With relation_bias 40 partners count fully; detect_prob 1 and

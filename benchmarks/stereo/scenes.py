@@ -35,7 +35,7 @@ from scenarios.loading.resolve import Entry, resolve
 from sim.sequence import simulate
 from sim.types import Array, Tracks
 from sim.types import Sequence as Recording
-from tracking.papers.stereo import group_life, space_group, tracker
+from tracking.papers.stereo import space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
 from tracking.running.run import track
 from tracking.scoring import evaluate
@@ -72,7 +72,6 @@ VARIANTS: Mapping[str, Variant] = {
     "confirm_time": Variant({"confirm_time": 0.0}),
     "report_coast": Variant({"report_coast": 5.0, "coast_time": 10.0}),
     "expected places": Variant(replaced=((space_group, "expected_places", _measured_places),)),
-    "settled": Variant(replaced=((group_life, "SETTLED", 0.0),)),
     "half a footprint": Variant(replaced=((tracker, "FEATURE_OUTLINE", 1.0),)),
 }
 

@@ -65,6 +65,7 @@ def union(area: Array, ellipse: Array) -> tuple[Array, float]:
     return made[0], float(angle_var[0])
 
 
+SIZE_TIME = 0.5  # s between pictures from which sizes are learned: what is remembered must be of many people
 EVIDENCE = 10.0  # nats, log-likelihood of a template with full support; d^2 / 2 of its place is subtracted
 TRACK_SUPPORT = 0.3  # least foreground share in the part of a confirmed track's template that no other covers
 ENTRY_SUPPORT = 0.5  # least support of the template of a new person or of a tentative track
@@ -100,10 +101,10 @@ class Measured(NamedTuple):
 class PixelUpdater:
     """Updates the tracks of `people` from the picture of each frame.
 
-    State: foreground, the pipeline with its background model; size, the size of a person at each place; people, the
-    table of tracks; config; gates, confirm_gates (2,): largest squared Mahalanobis distance
-    d^2, without and with direction, of an association and of a measurement that may confirm a track; upright_var:
-    variance of the direction of an upright template, rad^2, inf from straight above.
+    State: foreground, the pipeline with its background model; size, the size of a person at each place, learned from
+    the next picture at or after `learn_at`, s; people, the table of tracks; config; gates, confirm_gates (2,): largest
+    squared Mahalanobis distance d^2, without and with direction, of an association and of a measurement that may
+    confirm a track; upright_var: variance of the direction of an upright template, rad^2, inf from straight above.
     """
 
     def __init__(self, config: BlobConfig, people: TrackedEllipses, context: Context) -> None:
@@ -113,7 +114,7 @@ class PixelUpdater:
         if not np.isnan(context.px_per_m):
             image_scale.required(context.px_per_m)
         self.people = people
-        self.size = PersonSize(context)
+        self.size, self.learn_at = PersonSize(context), 0.0
         self.foreground = Foreground(context, config)
         self.foreground.learn_person_size(self.size, context.background)
         self.upright_var = np.inf if self.size.above else np.radians(UPRIGHT) ** 2
@@ -145,7 +146,8 @@ class PixelUpdater:
         found = foreground.person_blobs(seen.mask)
         self._measure(frame.t, seen.mask, found)
         foreground.adapt(seen, self._protected())
-        if len(found):
+        if len(found) and frame.t >= self.learn_at:
+            self.learn_at = frame.t + SIZE_TIME
             alone = ~self._several_expected(found.box, people.upright_boxes())
             if self.size.reliable:
                 alone &= self.size.one_person(found.box, found.ellipse)

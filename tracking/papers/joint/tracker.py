@@ -157,7 +157,7 @@ class Joint(PointTracker):
             free = np.ones(len(points), bool)
             free[columns] = False
             self.people.record(rows, sizes[columns], self.dt)
-            self._keep(self.people.absence(tracks.group) <= self.config.coast_time + 1e-9)
+            self._keep(self.people.missed <= self.config.coast_time + 1e-9)
             self._newcomers(points[free], sizes[free])
         return tracks
 

@@ -59,7 +59,7 @@ class ParticleConfig(BackgroundSettings):
         "standard deviation of a displaced position, per axis, at least that of a position (ours)", "log")
     detect_prob: float = param(0.95, (0.3, 1.0), "probability",
         "that a person who was measured in the last frame is measured (ours)")
-    hidden_time: float = param(2.0, (0.05, 20.0), "s",
+    hidden_time: float = param(0.3, (0.05, 20.0), "s",
         "mean time until a person who is not measured is measured again (ours)", "log")
     clutter_density: float = param(0.002, (0.0, 1.0), "1/m^2",
         "false alarms per frame and square metre; 0: none (ours)")

@@ -124,8 +124,7 @@ def connected(groups: Sequence[SpaceGroup], gate: float) -> list[list[SpaceGroup
 
 def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> WholeGroupEvent | None:
     known = [g for g in parts if g.confirmed]
-    settled = [g for g in known if g.first_seen <= t - SETTLED or g.parent != NO_ID]
-    kept = max(settled or known or parts, key=lambda g: (g.count, -g.id))
+    kept = max(known or parts, key=lambda g: (g.count, -g.id))
     counts = np.array([g.count for g in parts])
     n, old = counts / counts.sum(), [g.pos for g in parts]
     X, kept.spread = pooled(np.stack([g.ekf.x[:, 0] for g in parts]), np.stack([g.spread for g in parts]), counts)
@@ -146,7 +145,7 @@ def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> Whole
         return None
     kept.apart_since = float("nan")
     x, y = kept.pos[:2].tolist()
-    return WholeGroupEvent("merge" if len(settled) > 1 else "enter", t, before, (kept.id,), (x, y))
+    return WholeGroupEvent("merge", t, before, (kept.id,), (x, y))
 
 
 def split(
