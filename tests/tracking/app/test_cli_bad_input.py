@@ -86,7 +86,6 @@ WORLDS = {
         f"duration = 4\ngroup = [{GROUP}, {OTHER}]\nevent = [{MERGE}]", 1, "event m such merge"
     ),
 }  # fmt: skip
-RAISES = {"raises": ("return 1 / 0", "ZeroDivisionError s40000, frame 1"), "says nothing": ("return None", "NoneType")}
 
 # an option that is wrong, without a file, and what the line must say.
 OPTIONS = {
@@ -163,16 +162,6 @@ def test_an_entry_of_a_suite_is_named_with_its_file(tmp_path, capsys):
     suite.write_text('[[entry]]\nname = "low"\nscenario = "scene.toml"\n')
     line = refused(["generate", str(suite), "--seeds", "0", "--out", str(tmp_path / "out")], capsys)
     assert f"{suite}: entry low: camera.height" in line
-
-
-@pytest.mark.parametrize("name", RAISES)
-def test_trackers_that_fail(name, made, tmp_path, capsys):
-    body, words = RAISES[name]
-    file = tmp_path / "mine.py"
-    file.write_text(TRACKER.format("boxes") + f"        {body}\n")
-    line = refused(["track", f"{file}:Mine", str(made / "data"), "--out", str(tmp_path / "out")], capsys, 1)
-    assert all(word in line for word in [str(file), *words.split(" ", 1)]), line
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

@@ -50,14 +50,6 @@ def share(classes, kind):
 # --- closed forms -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("k", [0.1, 0.5, 1.0, 1.7])
-def test_a_colour_on_the_line_has_its_factor_and_no_chromaticity(k):
-    mean = scene()
-    alpha, cd = reference.distortions(k * mean, mean, SIGMA)
-    np.testing.assert_allclose(alpha, k, atol=1e-12)
-    np.testing.assert_allclose(cd, 0, atol=1e-12)
-
-
 def test_normalised_distortions_have_unit_rms_over_the_training_sample():
     sample = shots(scene())
     made = train(sample, 0.999, follow_gain=False)

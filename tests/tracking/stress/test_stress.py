@@ -80,11 +80,6 @@ def test_wrong_axes(text: str) -> None:
         parse_axis(text)
 
 
-def test_an_axis_twice_is_refused() -> None:
-    with pytest.raises(InputError, match="detection twice"):
-        parse_axes(["detection", "clutter", "detection=1.0:0.7"])
-
-
 @pytest.mark.parametrize("name", AXES)
 def test_every_axis_sets_keys_of_a_scenario(name: str) -> None:
     axis = AXES[name]
@@ -160,23 +155,6 @@ def test_a_sweep_goes_on_where_it_was_killed(tmp_path: Path) -> None:
     resumed.run()
     assert len(first) + len(rest) == len(whole)
     assert resumed.rows() == complete.rows()
-
-
-def test_a_finished_sweep_plays_nothing_again(tmp_path: Path) -> None:
-    done = sweep(tmp_path, [], episodes=40)
-    done.run()
-    again = sweep(tmp_path, seen := [], episodes=40)
-    again.run()
-    assert seen == []
-    assert again.rows() == done.rows()
-
-
-def test_without_an_axis_every_seed_is_played(tmp_path: Path) -> None:
-    made = sweep(tmp_path, seen := [], axes=(), seeds=tuple(range(20)), start=4, episodes=None)
-    made.run()
-    assert made.values == [()]
-    assert sorted(task.source.seed for task in seen) == list(range(20))
-    assert made.scores("t").shape == made.scores("oracle").shape == (20, 1)
 
 
 @pytest.mark.parametrize(("episodes", "seeds"), [(None, 2), (60, 2), (200, 8)])
