@@ -124,3 +124,14 @@ def test_known_onsets_do_not_hang_on_the_last_bit(made):
     motion = made()
     nudge = np.random.default_rng(1).uniform(-1e-3, 1e-3, motion.pos.shape)
     assert told(motion.replace(pos=motion.pos + nudge)) == told(motion)
+
+
+@pytest.mark.parametrize(
+    ("made", "place"),
+    [(merging, (8.9, 1.444)), (splitting, (9.3, 1.957)), (crossing, (6.015, 5.1)), (queueing, (5.8, 3.0))],
+)
+def test_an_event_is_where_its_people_are(made, place):
+    """In the middle of all of them at its onset, of a crossing when the pairs are nearest, at 5.0 s."""
+    (event,) = label(made(), None).events
+    assert event.pos == pytest.approx(place, abs=1e-9)
+    assert event.emitted is None

@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 
 from sim.truth.merge_split_events import groups_and_events
 from tests.reference_groups import labels
@@ -33,15 +32,6 @@ def merging(speed, near):
     return crowd(*first, *second)
 
 
-def test_merge_at_the_frame_in_which_they_are_near():
-    """6 - 0.4 t < 1.5 from t > 11.25 s on: frame 114."""
-    m = groups_and_events(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), (50, (3, 3, 3, 3)), frames=200), FPS)
-    assert summary(m.events) == [("merge", 114, 133, (1, 2), (1,), (1, 2, 3, 4))]
-    assert (m.group[:113] == [1, 1, 2, 2]).all()
-    assert (m.group[113:] == 1).all()
-    assert m.events[0].pos == pytest.approx((11.3, (-0.7 + 0 + 6 + 6.7 - 2 * 4.52) / 4))
-
-
 def test_merge_no_earlier_than_intent_and_not_without():
     m = groups_and_events(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), (150, (3, 3, 3, 3)), frames=200), FPS)
     assert [e.start for e in m.events] == [150]
@@ -57,27 +47,6 @@ def test_a_stretch_cut_off_by_the_end_does_not_count():
     want = meant((1, (1, 1, 2, 2)), (50, (3, 3, 3, 3)), frames=200)
     assert len(groups_and_events(pos[:133], vel[:133], there[:133], want[:133], FPS).events) == 1
     assert len(groups_and_events(pos[:132], vel[:132], there[:132], want[:132], FPS).events) == 0
-
-
-def parting(speed):
-    """Two and two, 0.7 m apart; the second two drift away at `speed` from 3 s on."""
-    stay = [paced((15, (1, 0)), start=(0, y)) for y in (-0.7, 0)]
-    go = [paced((3, (1, 0)), (12, (1, speed)), start=(0, y)) for y in (0.7, 1.4)]
-    return crowd(*stay, *go)
-
-
-@pytest.mark.parametrize(
-    ("speed", "onset"),
-    [
-        (0.4, 77),  # 0.7 + 0.4 (t - 3) > 2.5 from t > 7.5
-        (0.8, 42),  # 0.7 + 0.8 (t - 3) > 1.5 from t > 4.0, velocities differing by more than 0.7
-    ],
-)
-def test_split_at_the_frame_in_which_they_are_apart(speed, onset):
-    m = groups_and_events(*parting(speed), meant((1, (1, 1, 1, 1)), (20, (1, 1, 2, 2)), frames=150), FPS)
-    assert summary(m.events) == [("split", onset, onset + 19, (1,), (1, 2), (1, 2, 3, 4))]
-    assert (m.group[: onset - 1] == 1).all()
-    assert (m.group[onset - 1 :] == [1, 1, 2, 2]).all()
 
 
 def test_who_enters_together_counts_from_the_first_frame():

@@ -18,6 +18,7 @@ from scenarios.loading.validation import validate
 from scenarios.schema.scenario import Scenario
 from sim.io.store.sequence_folder import sequence_files
 from sim.io.store.track_files import tracks_files
+from tests.processes import FAKE
 from tracking import track
 from tracking.app.cli import app, run
 from tracking.app.commands.scenarios import list_keys
@@ -25,8 +26,6 @@ from tracking.running import tracker_registry
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).resolve().parents[3]
-FAKE = f"{ROOT / 'tests' / 'fake_tracker.py'}:Nearest"
 SCENE = """
 schema = 1
 duration = 12.0

@@ -50,17 +50,6 @@ def share(classes, kind):
 # --- closed forms -----------------------------------------------------------------------------------------------------
 
 
-def test_normalised_distortions_have_unit_rms_over_the_training_sample():
-    sample = shots(scene())
-    made = train(sample, 0.999, follow_gain=False)
-    alpha, cd = reference.distortions(sample.astype(float), made.mean, made.sigma)
-    length = np.sqrt(np.sum(np.square(made.mean / made.sigma), axis=-1))
-    inside = np.all(np.abs(sample - made.mean) <= 2.9 * made.sigma, axis=(0, -1))
-    assert inside.mean() > 0.4
-    for value in ((alpha - 1) * length / made.s, cd / made.b):
-        np.testing.assert_allclose(np.sqrt(np.mean(np.square(value), axis=0))[inside], 1, atol=1e-4)
-
-
 def test_new_frames_of_the_empty_scene_are_background_at_about_the_detection_rate():
     mean = scene(80, 80)
     made = Background(shots(mean, 200), FPS, BackgroundSettings(detection_rate=0.99))
@@ -181,18 +170,6 @@ def test_light_that_drifts_by_a_third_either_way_is_followed():
 
 
 # --- symmetries and twins ---------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("turn", [np.fliplr, np.flipud, lambda a: a.swapaxes(0, 1)])
-def test_a_turned_scene_has_turned_classes(turn):
-    mean = scene(30, 30)
-    sample, picture = shots(mean), shot(mean * scene(30, 30, 20, 0.3, 1.7), np.random.default_rng(11))
-    settings = BackgroundSettings(background="trained")
-    straight = Background(sample, FPS, settings).classify(picture)
-    turned_sample = np.ascontiguousarray(np.stack([turn(f) for f in sample]))
-    turned = Background(turned_sample, FPS, settings).classify(np.ascontiguousarray(turn(picture)))
-    assert len(np.unique(straight)) >= 3
-    assert np.array_equal(turn(straight), turned)
 
 
 @pytest.mark.parametrize("follow", [True, False])

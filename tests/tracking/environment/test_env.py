@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -17,6 +14,7 @@ import tracking
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
+from tests.processes import FAKE, TOY, python
 from tests.toy_tracker import Toy
 from tracking.config import Config, param
 from tracking.environment.env import OBSERVATIONS, TuningEnv
@@ -26,8 +24,6 @@ from tracking.running.tracker_registry import names
 ID = "flockscope/Tuning-v0"
 SHORT = ["camera.fps=5", "duration=6"]
 TINY = ["camera.fps=5", "duration=3"]
-FAKE = f"{Path(__file__).resolve().parents[2] / 'fake_tracker.py'}:Nearest"
-TOY = f"{Path(__file__).resolve().parents[2] / 'toy_tracker.py'}:Toy"
 
 
 def make(tracker="blob", suite=("cross", "pass-by"), **options):
@@ -196,16 +192,6 @@ def test_vectorised():
         )
 
 
-ROOT = Path(__file__).resolve().parents[3]
-
-
-def run(*lines):
-    """Run lines in a fresh interpreter."""
-    program = "\n".join(["import sys", *lines])
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, check=False)
-    assert done.returncode == 0, done.stderr
-
-
 KNOWN = "assert gymnasium.registry['flockscope/Tuning-v0'].entry_point == 'tracking.environment.env:TuningEnv'"
 
 
@@ -217,7 +203,8 @@ KNOWN = "assert gymnasium.registry['flockscope/Tuning-v0'].entry_point == 'track
     ],
 )
 def test_it_is_known(lines):
-    run(*lines)
+    done = python("-c", "\n".join(["import sys", *lines]))
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_step_needs_an_episode():

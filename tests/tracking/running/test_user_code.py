@@ -10,6 +10,7 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from sim.types import Detections, Frame, Sequence
+from tests.tracking.running.test_run import Stranger
 from tracking.app.cli import run
 from tracking.config import Config, param
 from tracking.running.interrupts import recorded_interrupts
@@ -96,12 +97,7 @@ def test_ctrl_c_stays_an_interruption_whatever_the_tracker_makes_of_it(tmp_path,
         assert "interrupted" in capsys.readouterr().err
 
 
-class Abrupt:
-    needs = ("points",)
-
-    def reset(self, context, seed):
-        pass
-
+class Abrupt(Stranger):
     def step(self, frame, detections):
         raise self.error
 

@@ -1,7 +1,6 @@
 import json
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 
@@ -9,6 +8,7 @@ from scenarios.errors import InputError
 from sim.io.export.coco import coco
 from sim.io.store import sequence_folder
 from sim.io.store.validate import content_hash
+from tests.recordings import mot_folder
 
 
 def test_coco_has_every_box(tmp_path, make_sequence):
@@ -49,12 +49,8 @@ def stored(folder, sequence, seed=1, **options):
 
 def labelled_folder(path, rows, *, pictures=(), ini=""):
     """A MOTChallenge folder; pictures: names below it, of 64 × 48 px."""
-    (path / "gt").mkdir(parents=True)
-    (path / "gt/gt.txt").write_text("".join(f"{row}\n" for row in rows))
-    (path / "seqinfo.ini").write_text(f"[Sequence]\nname={path.name}\nframeRate=5\n{ini}")
-    for name in pictures:
-        (path / name).parent.mkdir(exist_ok=True)
-        cv2.imwrite(str(path / name), np.zeros((48, 64, 3), np.uint8))
+    shown = dict.fromkeys(pictures, np.zeros((48, 64, 3), np.uint8))
+    mot_folder(path, "\n".join(rows), ini=f"name={path.name}\nframeRate=5\n{ini}", pictures=shown)
 
 
 def test_each_split_has_its_own_file(tmp_path, make_sequence):

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import pickle
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +19,10 @@ from sim.io.store import seal
 from sim.io.store.seal import NAMES, check_run, read_run, with_hash
 from sim.io.store.track_files import read_tracks, tracks_files, write_tracks
 from sim.io.store.validate import validate
+from tests.processes import python
 from tests.sealing import seal_again
 from tracking.app.stored_tracks import find_tracks
 
-ROOT = Path(__file__).resolve().parents[4]
 PAIRS = bytes(range(256))
 INFO = {"tracker": "blob", "config": {"a": 1.5e-7}, "seed": 0, "sequence": "s", "fps": 10.0}
 
@@ -219,10 +216,7 @@ def test_killed_at_any_moment(tmp_path, make_tracks, same, before):
     for k in range(1, 60):
         if before == "another run":
             shutil.copytree(first, tmp_path / "out" / str(k))
-    done = subprocess.run(
-        [sys.executable, str(tmp_path / "program.py"), str(tmp_path / "out"), str(tmp_path / "files")],
-        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
+    done = python(tmp_path / "program.py", tmp_path / "out", tmp_path / "files")
     assert done.returncode == 0, done.stderr
     last = int(done.stdout)
     assert 5 < last < 60

@@ -8,13 +8,12 @@ import pytest
 
 import tracking
 from sim.io.source import open_source
+from tests.processes import FAKE
 from tests.refusals import answer
 from tests.short_scene import write_short_scene
 from tracking import track
 from tracking.app.cli import run
 from tracking.app.commands.score_ranking import run_differences
-
-FAKE = f"{Path(__file__).resolve().parents[3] / 'fake_tracker.py'}:Nearest"
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.types import Camera, Context, Detections, Frame
+from sim.types import Context, Detections, Frame
 from tests.painted import ids
+from tests.reference_sense import above, pinhole
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
 
@@ -207,24 +208,12 @@ def test_innovations_are_white_and_of_unit_size_on_the_model_itself():
         assert abs(np.mean(found[lag:] * found[:-lag])) < 0.06
 
 
-def pinhole(tilt_deg=25.0, height=4.0):
-    tilt = np.radians(tilt_deg)
-    forward, right = np.array([0.0, np.cos(tilt), -np.sin(tilt)]), np.array([1.0, 0, 0])
-    rotation = np.stack([right, np.cross(forward, right), forward])
-    return Camera("pinhole", (640, 480), (500.0, 500.0), (320.0, 240.0), np.array([0.0, 0, height]), rotation)
-
-
-def above():
-    up = np.diag([1.0, -1.0, -1.0])
-    return Camera("top", (640, 480), (1.0, 1.0), (320.0, 240.0), np.array([0.0, 0, 10]), up, px_per_m=40.0)
-
-
-@pytest.mark.parametrize("camera", [pinhole(), above()], ids=["pinhole", "top"])
+@pytest.mark.parametrize("camera", [pinhole(25.0, at=(0.0, 0.0, 4.0)), above()], ids=["pinhole", "top"])
 def test_reports_on_the_ground_where_the_camera_is_known(camera):
     from sim.scene.camera import project, px_per_m_at_centre
 
     context = Context(fps=FPS, px_per_m=px_per_m_at_centre(camera), camera=camera, image_size=camera.image)
-    middle = np.array([0.0, 9.0]) if camera.kind == "pinhole" else np.zeros(2)
+    middle = np.array([0.0, 9.0] if camera.kind == "pinhole" else [8.0, 5.0])
     path = middle + np.array([[-2 + 0.1 * k, 0.03 * k] for k in range(40)])
     boxes = []
     for x, y in path:

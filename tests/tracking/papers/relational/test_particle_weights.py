@@ -20,7 +20,7 @@ def sight(detect, missed=None, cut=None, eye=(np.nan, np.nan)):
     detect = np.asarray(detect, float)
     none = np.zeros(len(detect))
     return sensor.Sight(
-        detect, none > 0 if missed is None else missed, none if cut is None else np.array(cut), np.array(eye)
+        detect, none > 0 if missed is None else np.array(missed), none if cut is None else np.array(cut), np.array(eye)
     )
 
 
