@@ -20,7 +20,7 @@ def mot_folder(
             (folder / name).write_text(text, encoding="utf-8")
     for name, picture in (pictures or {}).items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        cv2.imwrite(str(folder / name), picture)
+        (folder / name).write_bytes(cv2.imencode(Path(name).suffix, picture)[1].tobytes())
     return folder
 
 

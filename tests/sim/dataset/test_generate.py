@@ -24,7 +24,7 @@ import os, signal, sys, types
 from tests import fake_simulator as fakes
 
 def simulate(scenario, seed, repeat, streams=(), stride=1):
-    return fakes.sequence(seed + 100 * repeat)
+    return fakes.make_sequence(seed + 100 * repeat)
 
 sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate, observe=None)
 from scenarios.loading.resolve import Entry

@@ -63,8 +63,9 @@ def test_in_a_crowd_with_false_alarms(name, crowd):
 
 
 def test_in_the_image(crowd):
-    truth = dataclasses.replace(crowd.truth, px_per_m=40.0)
-    made, scale = raw("blob", dataclasses.replace(crowd, camera=None, px_per_m=40.0, load_truth=lambda: truth))
+    labels = dataclasses.replace(crowd.truth, px_per_m=40.0)
+    flat = dataclasses.replace(crowd, camera=None, px_per_m=40.0, load_truth=lambda: labels)
+    truth, (made, scale) = flat.truth, raw("blob", flat)
     assert made[5].plane == "image"
     assert agree(truth, made, scale)["group_F1"] > 0
     unboxed = [t.replace(box=None) for t in made]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -98,24 +98,33 @@ def test_values_of_an_axis() -> None:
 SMALL = ("duration=4", "group.a.size=2")
 
 
-def sweep(tmp_path: Path, seen: list[EpisodeTask], breaks: float = 0.62, **changes) -> Sweep:
-    """A sweep whose tracker falls from 1 at detection 0.8 to 0.5 at `breaks`; it simulates nothing but one scene."""
-
-    def score(source: Source) -> float:
-        x = source.entry.scenario.sensor.detect_prob
-        noise = 0.1 * np.random.default_rng(source.seed).standard_normal()
-        return float(np.interp(x, [0.4, breaks, 0.8, 1], [0.3, 0.5, 1, 1]) * (1 + noise))
+def sweep_of(
+    score: Callable[[Source], float], tmp_path: Path, seen: list[EpisodeTask], oracle: float = 1.0, **given
+) -> Sweep:
+    """A sweep whose tracker has this score in a scene; it simulates nothing but one scene."""
 
     def play(scenes: Sequence[Tasks]):
         for tasks in scenes:
             seen.extend(task for task in tasks if isinstance(task, EpisodeTask))
-            yield [Outcome({"HOTA": score(t.source) if isinstance(t, EpisodeTask) else 1.0}) for t in tasks]
+            yield [Outcome({"HOTA": score(t.source) if isinstance(t, EpisodeTask) else oracle}) for t in tasks]
+
+    plan = Plan(by="HOTA", detections="file", **given)
+    return Sweep(plan, {"t": TunedTracker("blob", "t", ("points",))}, play, Store(tmp_path / "e.jsonl"))
+
+
+def sweep(tmp_path: Path, seen: list[EpisodeTask], **changes) -> Sweep:
+    """A sweep whose tracker falls from 1 at detection 0.8 to 0.5 at 0.62."""
+
+    def score(source: Source) -> float:
+        x = source.entry.scenario.sensor.detect_prob
+        noise = 0.1 * np.random.default_rng(source.seed).standard_normal()
+        return float(np.interp(x, [0.4, 0.62, 0.8, 1], [0.3, 0.5, 1, 1]) * (1 + noise))
 
     given = {
-        "scenarios": ("cross",), "axes": parse_axes(["detection"]), "seeds": tuple(range(64)), "start": 8, "by": "HOTA",
-        "share": 0.5, "detections": "file", "settings": SMALL, "episodes": 400, **changes,
+        "scenarios": ("cross",), "axes": parse_axes(["detection"]), "seeds": tuple(range(64)), "start": 8,
+        "share": 0.5, "settings": SMALL, "episodes": 400, **changes,
     }  # fmt: skip
-    return Sweep(Plan(**given), {"t": TunedTracker("blob", "t", ("points",))}, play, Store(tmp_path / "e.jsonl"))
+    return sweep_of(score, tmp_path, seen, **given)
 
 
 def test_values_are_placed_where_the_curve_breaks(tmp_path: Path) -> None:

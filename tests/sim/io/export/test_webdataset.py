@@ -22,12 +22,13 @@ from sim.io.store import sequence_folder
 from sim.io.store.seal import read_manifest, with_hash
 from sim.io.store.validate import content_hash, validate
 from tests.fake_simulator import content
+from tests.made_up import make_pictured
 
 Sample = dict[str, bytes]
 
 
 @pytest.fixture
-def data(tmp_path: Path, make_pictured: Callable[..., Any]) -> Path:
+def data(tmp_path: Path) -> Path:
     """Three sequences with pictures, one of them with a dot in its name."""
     for k, name in enumerate(("b-s00000", "a.2-s00000", "c-s00000")):
         live = make_pictured(k, ("left", "ids", "background"))
@@ -159,7 +160,7 @@ def test_an_altered_file_is_named_and_its_shard_not_written(data: Path, tmp_path
     assert not (tmp_path / "out" / "index.json").exists()
 
 
-def test_frames_of_videos_are_refused(tmp_path: Path, make_pictured: Callable[..., Any]) -> None:
+def test_frames_of_videos_are_refused(tmp_path: Path) -> None:
     folder = tmp_path / "x-s00000"
     sequence_folder.write_sequence(
         folder, make_pictured(1, ("left",)), scenario="schema = 1\n", seed=1, streams=("left",), images="mp4"
