@@ -147,24 +147,30 @@ def meeting(n: int) -> Scene:
     return Scene(people, one if 20 <= n + 1 < 40 else {1: ([1, 2], None), 2: ([3, 4], None)})
 
 
+def reported(scenes: list[Scene], start: int, end: int, groups, unit: str) -> list[Tracks]:
+    """A tracker that reports other groups in some frames."""
+    told = [Scene(s.people, groups) if start <= k <= end else s for k, s in enumerate(scenes, 1)]
+    return tracks(told, unit=unit)
+
+
+TWO, ONE = {1: ([1, 2], None), 2: ([3, 4], None)}, {3: ([1, 2, 3, 4], None)}
+
+
+@pytest.mark.parametrize("unit", ["person", "group"])
 @pytest.mark.parametrize(
     ("start", "end", "groups", "kinds"),
     [
-        (20, 29, {1: [1, 2], 2: [3, 4]}, ["late merge"]),
-        (20, 39, {1: [1, 2], 2: [3, 4]}, ["missed merge"]),
-        (40, 49, {3: [1, 2, 3, 4]}, ["late split", "late split"]),
-        (40, 60, {3: [1, 2, 3, 4]}, ["missed split", "missed split"]),
+        (20, 29, TWO, ["late merge"]),
+        (20, 39, TWO, ["missed merge"]),
+        (40, 49, ONE, ["late split", "late split"]),
+        (40, 60, ONE, ["missed split", "missed split"]),
     ],
 )
-def test_merges_and_splits(start: int, end: int, groups: dict[int, list[int]], kinds: list[str]) -> None:
-    scenes = [meeting(n) for n in range(FRAMES)]
-    events = [event("merge", 20, [1, 2, 3, 4]), event("split", 40, [1, 2, 3, 4])]
-    label = {person: g for g, members in groups.items() for person in members}
-    run = [
-        changed(t, group=np.array([label[int(i)] for i in t.id])) if start <= t.index <= end else t
-        for t in tracks(scenes)
-    ]
-    found = find_errors(sequence_of(scenes, events=tuple(events)), run)
+def test_merges_and_splits(start: int, end: int, groups, kinds: list[str], unit: str) -> None:
+    """Pairs are so far from each other that the hulls of whole groups hold no others."""
+    far = [Scene({i: (x, 3 * y) for i, (x, y) in meeting(n).people.items()}, meeting(n).given) for n in range(FRAMES)]
+    events = (event("merge", 20, [1, 2, 3, 4]), event("split", 40, [1, 2, 3, 4]))
+    found = find_errors(sequence_of(far, events=events), reported(far, start, end, groups, unit))
     assert [one.error.kind for one in found.errors] == kinds
     assert all(isinstance(one.error, GroupError) for one in found.errors)
     assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
@@ -172,11 +178,7 @@ def test_merges_and_splits(start: int, end: int, groups: dict[int, list[int]], k
 
 @pytest.mark.parametrize(
     ("cause", "changes"),
-    [
-        ("hidden", {"visibility": 0.1}),
-        ("edge", {"truncation": 0.6}),
-        ("tracker", {}),
-    ],
+    [("hidden", {"visibility": 0.1}), ("edge", {"truncation": 0.6}), ("tracker", {}), ("undetected", {})],
 )
 def test_causes_of_a_gap(cause: str, changes: dict[str, float]) -> None:
     made = truth(SCENES)
@@ -185,14 +187,8 @@ def test_causes_of_a_gap(cause: str, changes: dict[str, float]) -> None:
     for name, value in changes.items():
         columns[name][gap] = value
     run = [lost(t, 5, 20, 30) for t in tracks(SCENES)]
-    (one,) = find_errors(sequence_of(SCENES, **columns), run).errors
+    (one,) = find_errors(sequence_of(SCENES, **columns), run, seen=run if cause == "undetected" else None).errors
     assert one.cause.name == cause
-
-
-def test_the_detector_did_not_see_the_person() -> None:
-    run = [lost(t, 5, 20, 30) for t in tracks(SCENES)]
-    (one,) = find_errors(sequence_of(SCENES), run, seen=run).errors
-    assert one.cause.name == "undetected"
 
 
 @pytest.mark.parametrize(("where", "cause"), [((20.0, 20.0), "clutter"), ((0.5, 0.4), "double")])
@@ -218,12 +214,6 @@ def test_what_cannot_be_compared_is_an_error_of_one_line(spoil, words: str) -> N
         errors_of_run(sequence_of(SCENES, px_per_m=np.nan), run)
 
 
-def hulls(scenes: list[Scene], start: int, end: int, groups: dict[int, tuple[list[int], object]]) -> list[Tracks]:
-    """A tracker of whole groups that reports other groups in some frames."""
-    told = [Scene(s.people, groups) if start <= k <= end else s for k, s in enumerate(scenes, 1)]
-    return tracks(told, unit="group")
-
-
 @pytest.mark.parametrize("k", range(12, 42, 6))
 @pytest.mark.parametrize(
     ("groups", "kinds"),
@@ -238,28 +228,13 @@ def hulls(scenes: list[Scene], start: int, end: int, groups: dict[int, tuple[lis
 )
 def test_errors_of_a_tracker_of_whole_groups(groups, kinds: list[str], k: int) -> None:
     scenes = [Scene({**scene(n).people, 5: (SPEED * n, 2.0), 6: (SPEED * n, -1.5)}, scene(n).given) for n in range(60)]
-    run, sequence = hulls(scenes, k, k + 9, groups), sequence_of(scenes)
+    run, sequence = reported(scenes, k, k + 9, groups, "group"), sequence_of(scenes)
     found = find_errors(sequence, run)
     assert [(one.error.kind, one.error.start, one.error.end) for one in found.errors] == [(x, k, k + 9) for x in kinds]
     assert all(one.cost > 0 for one in found.errors)
     assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
     assert np.isnan([found.scores["HOTA"], found.left["IDF1"]]).all()
     assert found.scores["group_F1"] == pytest.approx(evaluate(sequence.truth, run)["group_F1"])
-
-
-@pytest.mark.parametrize(
-    ("start", "end", "groups", "kinds"),
-    [
-        (20, 29, {1: ([1, 2], None), 2: ([3, 4], None)}, ["late merge"]),
-        (40, 60, {3: ([1, 2, 3, 4], None)}, ["missed split", "missed split"]),
-    ],
-)
-def test_merges_and_splits_of_whole_groups(start: int, end: int, groups, kinds: list[str]) -> None:
-    far = [Scene({i: (x, 3 * y) for i, (x, y) in meeting(n).people.items()}, meeting(n).given) for n in range(FRAMES)]
-    events = (event("merge", 20, [1, 2, 3, 4]), event("split", 40, [1, 2, 3, 4]))
-    found = find_errors(sequence_of(far, events=events), hulls(far, start, end, groups))
-    assert [one.error.kind for one in found.errors] == kinds
-    assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
 
 
 def test_a_part_of_a_group_that_is_found_is_an_error() -> None:

@@ -131,23 +131,17 @@ def test_a_group_waits_for_a_member_who_is_not_seen():
 
 
 @pytest.mark.parametrize(
-    ("changed", "told"),
+    ("people", "changed", "told"),
     [
-        (LinkRule(near=1.0), 142),  # 6 - 0.4 t < 1 from frame 127 on
-        (LinkRule(share=1.0), 133),
-        (LinkRule(window=1.0), 121),
-        (LinkRule(alike=0.3), 146),  # not before it stops drifting, in frame 131
+        (joining(), LinkRule(near=1.0), 142),  # 6 - 0.4 t < 1 from frame 127 on
+        (joining(), LinkRule(share=1.0), 133), (joining(), LinkRule(window=1.0), 121),
+        (joining(), LinkRule(alike=0.3), 146),  # not before it stops drifting, in frame 131
+        (leaving(), LinkRule(apart=2.0), 103), (leaving(), LinkRule(patience=1.0), 106),
+        (leaving(), LinkRule(diverge=0.3), 91),
     ],
-)
-def test_parameters_of_joining(changed, told):
-    assert [e[0] for e in events(derive(tracks(joining()), FPS, rule=changed))] == [told]
-
-
-@pytest.mark.parametrize(
-    ("changed", "told"), [(LinkRule(apart=2.0), 103), (LinkRule(patience=1.0), 106), (LinkRule(diverge=0.3), 91)]
-)
-def test_parameters_of_parting(changed, told):
-    assert [e[0] for e in events(derive(tracks(leaving()), FPS, rule=changed))] == [told]
+)  # fmt: skip
+def test_parameters_of_the_rule(people, changed, told):
+    assert [e[0] for e in events(derive(tracks(people), FPS, rule=changed))] == [told]
 
 
 def passing():
