@@ -13,9 +13,9 @@ TOY = f"{ROOT}/tests/toy_tracker.py:Toy"
 
 
 def python(*words: object, **env: str) -> subprocess.CompletedProcess:
-    """Runs Python in the project's folder, with these variables beside those of this process, for 120 s at most."""
+    """Runs Python in the project's folder, with these variables beside those of this process, for 600 s at most."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), **env}
     return subprocess.run(
-        [sys.executable, *map(str, words)], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=120,
+        [sys.executable, *map(str, words)], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=600,
         check=False,
     )  # fmt: skip

@@ -113,6 +113,16 @@ def test_a_sudden_change_of_light_does_not_flood_the_frame(gain):
 # --- adaptation -------------------------------------------------------------------------------------------------------
 
 
+PLAIN = np.broadcast_to(np.array([110.0, 120.0, 100.0]), (24, 24, 3))
+
+
+def with_object(colour=(40, 200, 40)):
+    """The plain scene with something of this colour in its middle."""
+    picture = PLAIN.copy()
+    picture[8:16, 8:16] = colour
+    return picture
+
+
 def foreground_over_time(made, picture, seconds, protected=None, seed=8):
     rng, curve = np.random.default_rng(seed), []
     for _ in range(int(seconds * FPS)):
@@ -126,35 +136,26 @@ def foreground_over_time(made, picture, seconds, protected=None, seed=8):
 @pytest.mark.parametrize("colour", [(40, 200, 40), (10, 10, 10)], ids=["put down", "dark"])
 def test_what_stays_becomes_background_and_what_goes_leaves_no_ghost(colour):
     """Foreground adapts in 10 s: a difference of D is gone after 10 ln(D / threshold) seconds, and so is its ghost."""
-    mean = np.broadcast_to(np.array([110.0, 120.0, 100.0]), (24, 24, 3))
-    made = model(mean, background_time=1)
-    lamp = mean.copy()
-    lamp[8:16, 8:16] = colour
-    on = foreground_over_time(made, lamp, 60)
+    made = model(PLAIN, background_time=1)
+    on = foreground_over_time(made, with_object(colour), 60)
     assert on[:10].min() > 0.95
     assert on[-50:].max() < 0.1
-    off = foreground_over_time(made, mean, 60, seed=9)
+    off = foreground_over_time(made, PLAIN, 60, seed=9)
     assert off[:10].min() > 0.95
     assert off[-50:].max() < 0.1
 
 
 def test_a_model_that_stays_as_trained_keeps_foreground_for_ever():
-    mean = np.broadcast_to(np.array([110.0, 120.0, 100.0]), (24, 24, 3))
-    lamp = mean.copy()
-    lamp[8:16, 8:16] = (40, 200, 40)
-    made = model(mean, background="trained")
-    assert foreground_over_time(made, lamp, 60)[-50:].min() > 0.95
+    made = model(PLAIN, background="trained")
+    assert foreground_over_time(made, with_object(), 60)[-50:].min() > 0.95
 
 
 def test_a_protected_place_learns_nothing():
-    mean = np.broadcast_to(np.array([110.0, 120.0, 100.0]), (24, 24, 3))
-    person = mean.copy()
-    person[8:16, 8:16] = (40, 200, 40)
     keep = np.zeros((24, 24), bool)
     keep[8:16, 8:16] = True
-    made = model(mean, background_time=1)
+    made = model(PLAIN, background_time=1)
     before = made.mean[:, 8:16, 8:16].copy()
-    assert foreground_over_time(made, person, 30, keep).min() > 0.95
+    assert foreground_over_time(made, with_object(), 30, keep).min() > 0.95
     assert np.array_equal(made.mean[:, 8:16, 8:16], before)
 
 
