@@ -116,3 +116,82 @@ def test_a_package_is_met_in_one_module(package: str, only: str) -> None:
 def test_modules_are_short():
     lengths = {name: len(path.read_text(encoding="utf-8").splitlines()) for name, path in modules().items()}
     assert {name: length for name, length in lengths.items() if length > LINES} == {}
+
+
+def dotted_name(node: ast.AST) -> str:
+    if isinstance(node, ast.Attribute):
+        return f"{dotted_name(node.value)}.{node.attr}"
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def test_no_global_state_of_chance_and_time():
+    """Randomness comes as a Generator (sim.rng), time from frames."""
+    for name in modules():
+        assert not any(inside(dotted, "random") for dotted in imports(name)), f"{name} imports random"
+        read = {dotted_name(node) for node in ast.walk(tree(name)) if isinstance(node, ast.Attribute)}
+        clocks = {"time.time", "datetime.now", "datetime.datetime.now"}
+        assert inside(name, "tracking.app") or read.isdisjoint(clocks), name
+
+
+DECIDING = (
+    "sim.crowd", "sim.truth", "sim.scene", "sim.detector", "sim.geometry", "sim.rng", "sim.clock", "sim.elementary",
+)  # fmt: skip
+"""What decides motion, truth and detections: the same bits on every processor."""
+
+BY_PROCESSOR = {
+    "np": {
+        *("exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh"),
+        *("arcsin", "arccos", "arctan", "arctan2", "arcsinh", "arccosh", "arctanh", "hypot", "power", "float_power"),
+        *("cbrt", "logaddexp", "linalg", "dot", "vdot", "inner", "matmul", "tensordot", "einsum", "convolve"),
+        *("correlate", "cov", "corrcoef", "polyfit", "interp", "argpartition", "unwrap", "angle", "deg2rad", "rad2deg"),
+    },
+    "math": {
+        *("exp", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "asin", "acos", "atan", "atan2"),
+        *("sinh", "cosh", "tanh", "hypot", "dist", "pow", "cbrt", "erf", "erfc", "gamma", "lgamma", "sumprod", "fma"),
+    },
+}
+"""Functions of numpy, BLAS and the C library whose code is chosen by processor; `sim.elementary` has their equals."""
+
+DRAWS = {
+    "normal", "standard_normal", "exponential", "poisson", "gamma", "beta", "lognormal", "uniform", "choice",
+    "binomial",
+}  # fmt: skip
+"""Methods of numpy's generators that call the C library or may be contracted; `sim.rng` has their equals."""
+
+WITHOUT_ARITHMETIC = {"scipy.optimize.linear_sum_assignment", "scipy.sparse.csgraph.connected_components"}
+"""Of scipy only what adds and compares."""
+
+
+def by_processor(node: ast.AST) -> str | None:
+    """What in an expression depends on the processor; None if nothing does."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.MatMult):
+        return "@"
+    if (
+        isinstance(node, ast.BinOp)
+        and isinstance(node.op, ast.Pow)
+        and not isinstance(node.left, (ast.Constant, ast.UnaryOp))
+    ):
+        return "**"
+    if isinstance(node, ast.Attribute) and node.attr in BY_PROCESSOR.get(getattr(node.value, "id", ""), ()):
+        return ast.unparse(node)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+        if node.func.attr in DRAWS:
+            return f".{node.func.attr}(...)"
+        if node.func.attr == "argsort" and not any(k.arg == "kind" for k in node.keywords):
+            return "an unstable argsort"
+    if isinstance(node, ast.ImportFrom) and node.module:
+        names = {f"{node.module}.{alias.name}" for alias in node.names}
+        if node.module == "math" and not BY_PROCESSOR["math"].isdisjoint(alias.name for alias in node.names):
+            return f"from math import {', '.join(alias.name for alias in node.names)}"
+        if node.module.split(".")[0] in ("scipy", "cv2") and not names <= WITHOUT_ARITHMETIC | {
+            "scipy.sparse.coo_array"
+        }:
+            return ", ".join(names)
+    return None
+
+
+def test_nothing_that_decides_the_truth_depends_on_the_processor() -> None:
+    for name in of(*DECIDING):
+        found = [f"{name}:{node.lineno}: {what}" for node in ast.walk(tree(name)) if (what := by_processor(node))]
+        kernels = name.endswith("_kernels")  # numba's argsort is code of its own, the same everywhere
+        assert [f for f in found if not (kernels and "argsort" in f)] == []
