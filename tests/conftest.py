@@ -1,13 +1,19 @@
-"""Fixtures shared by all tests: where real recordings lie, one thread per library, which tests are slow."""
+"""What all tests share: real recordings, one thread per library, which tests are slow, each kernel compiled once."""
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
+import tempfile
+import zlib
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
+from numba.core.caching import NullCache
+from numba.core.dispatcher import Dispatcher
 
 hypothesis.settings.register_profile("explore", deadline=None, print_blob=True)
 hypothesis.settings.register_profile("repeatable", deadline=None, derandomize=True)
@@ -19,6 +25,34 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a job that a shell started in the background
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+LOCKS = Path(tempfile.gettempdir(), f"flockscope-tests-{os.getuid()}.lock")
+
+
+def compile_in_turn() -> None:
+    """Lets one process compile a kernel while the others wait, to find it in numba's cache afterwards.
+
+    The workers of pytest-xdist need the same kernels at the same time, and would each compile all of them.
+    """
+    compiled, locks = Dispatcher.compile, LOCKS.open("a")
+
+    def compile_alone(self: Any, signature: Any) -> Any:
+        if isinstance(self._cache, NullCache):
+            return compiled(self, signature)
+        code = self.py_func.__code__
+        place = zlib.crc32(f"{code.co_filename}:{code.co_name}".encode())
+        fcntl.lockf(locks, fcntl.LOCK_EX, 1, place)  # which ends with the process, whatever happens to it
+        try:
+            return compiled(self, signature)
+        finally:
+            fcntl.lockf(locks, fcntl.LOCK_UN, 1, place)
+
+    Dispatcher.compile = compile_alone
+
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    compile_in_turn()
 
 
 @pytest.fixture(scope="session")

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.schema.scenario import Scenario
-from tests.sim.io.conftest import pictured, sequence
+from tests.made_up import make_pictured, make_sequence
 
-__all__ = ["FakeSimulator", "content", "pictured", "scenario", "sequence"]
+__all__ = ["FakeSimulator", "content", "make_pictured", "make_sequence", "scenario"]
 
 
 class FakeSimulator(types.ModuleType):
@@ -30,7 +30,7 @@ class FakeSimulator(types.ModuleType):
         self.asked.append((seed, streams))
         if seed in self.wrong:
             raise self.wrong[seed]
-        return pictured(seed + 100 * repeat, streams) if streams else sequence(seed + 100 * repeat)
+        return make_pictured(seed + 100 * repeat, streams) if streams else make_sequence(seed + 100 * repeat)
 
 
 def scenario(**more: Any) -> Scenario:

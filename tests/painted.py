@@ -110,6 +110,11 @@ def track(
     return made
 
 
+def ids(tracks: Iterable[Tracks]) -> set[int]:
+    """All ids that are reported."""
+    return {int(i) for t in tracks for i in t.id}
+
+
 def overlap(a: np.ndarray, b: np.ndarray) -> float:
     """IoU of two boxes ltwh."""
     low, high = np.maximum(a[:2], b[:2]), np.minimum(a[:2] + a[2:], b[:2] + b[2:])

@@ -23,6 +23,13 @@ def above(yaw: float = 0.0) -> Camera:
     )
 
 
+def small(camera: Camera, share: float = 0.25) -> Camera:
+    """The same view on fewer or more pixels."""
+    width, height = (round(share * n) for n in camera.image)
+    focal, middle = (camera.focal_px[0] * share, camera.focal_px[1] * share), (width / 2, height / 2)
+    return camera.replace(image=(width, height), focal_px=focal, centre_px=middle, px_per_m=camera.px_per_m * share)
+
+
 def walkers(
     start: Array,
     velocity: Array,
@@ -50,6 +57,13 @@ def walkers(
         "made-up", 7, 0, fps, pos, vel, heading, there, np.where(there, wanted, -1).astype(np.int64), h,
         SHOULDER_SHARE * h, DEPTH_SHARE * h, np.full(people, 1.34), scene or Scene(np.array([16.0, 10.0])), orders,
     )  # fmt: skip
+
+
+def paced(*pieces: tuple[float, tuple[float, float]], start: tuple[float, float] = (0.0, 0.0)) -> tuple[Array, Array]:
+    """Places and velocities (T, 2) of one person, 10 frames/s; pieces: (s, velocity). The velocity of a frame is that
+    of the step from it to the next."""
+    vel = np.concatenate([np.tile(np.array(v, float), (round(10 * s), 1)) for s, v in pieces])
+    return np.array(start) + np.concatenate([[[0, 0]], np.cumsum(vel[:-1], axis=0)]) / 10, vel
 
 
 def crowd(seed: int, people: int = 12, frames: int = 30, **options: object) -> Motion:

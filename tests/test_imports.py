@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
-
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+from tests.processes import python
+
 HEAVY = {
     "numpy", "scipy", "numba", "cv2", "pymunk", "pyarrow", "pydantic", "filterpy", "gymnasium", "av", "rich",
     "matplotlib", "optuna",
@@ -18,8 +15,7 @@ LIST = "print(*sorted({name.partition('.')[0] for name in sys.modules}))"
 
 def loaded(code: str) -> set[str]:
     """Top-level packages in a fresh interpreter after `code`."""
-    program = f"import sys\n{code}\n{LIST}"
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=ROOT, check=False)
+    run = python("-c", f"import sys\n{code}\n{LIST}")
     assert run.returncode == 0, run.stderr
     return set(run.stdout.splitlines()[-1].split())
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from tests.processes import TOY
 from tracking.tuning.options import TuneOptions
 from tracking.tuning.search_plan import SearchPlan, search_plan
 
-TOY = f"{Path(__file__).parent / 'toy_tracker.py'}:Toy"
 SCENE = """
 schema = 1
 about = "three people, nothing happens"

@@ -27,7 +27,7 @@ from tracking.running.run import track
 from tracking.running.tracker_registry import find, names
 
 FPS = 5
-LENGTHS = {"file": 20, "image": 12}
+LENGTHS = {"file": 15, "image": 12}
 """Frames tracked, by kind of detections."""
 
 

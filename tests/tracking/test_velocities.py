@@ -13,6 +13,7 @@ from scenarios.loading.resolve import load
 from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
 from sim.types import Sequence, Tracks
+from tests.fake_tracker import Nearest
 from tracking.grouping.grouped_tracks import with_velocities
 from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.plausibility import velocity_error, velocity_warning
@@ -22,33 +23,20 @@ from tracking.scoring import evaluate
 FPS = 10.0
 
 
-class Numbers:
-    """Numbers the true people in the order of their first places, on a grid of 1 cm and 1 px. No velocities."""
+class Numbers(Nearest):
+    """Numbers the true people, on a grid of 1 cm and 1 px. No velocities."""
 
     needs = ("boxes",)
     plane = "image"
 
-    def reset(self, context, seed):
-        self.fps, self.before, self.ids, self.next = context.fps, np.zeros((0, 2)), np.zeros(0, np.int64), 0
-
-    def velocities(self, id, pos):
+    def velocities(self, id, pos, before):
         return np.full(pos.shape, np.nan)
 
     def step(self, frame, detections):
-        box = detections.box.round()
+        box, before = detections.box.round(), dict(zip(self.id.tolist(), self.pos, strict=True))
         pos = (box[:, :2] + box[:, 2:] / 2) if self.plane == "image" else detections.pos.round(2)
-        id = np.full(len(pos), -1)
-        apart = np.linalg.norm(pos[:, None] - self.before[None], axis=2)
-        while apart.size and apart.min() < (30.0 if self.plane == "image" else 0.6):
-            row, known = np.unravel_index(apart.argmin(), apart.shape)
-            id[row], apart[row], apart[:, known] = self.ids[known], np.inf, np.inf
-        new = id < 0
-        id[new] = self.next + np.arange(new.sum())
-        vel = self.velocities(id, pos)
-        self.before, self.ids, self.next = pos, id, self.next + int(new.sum())
-        n = len(pos)
-        cov, alone = np.tile(np.eye(4), (n, 1, 1)), np.full(n, -1)
-        return Tracks(frame.index, frame.t, self.plane, "person", id, alone, pos, vel, cov, box, np.ones(n))
+        found = super().step(frame, detections.replace(plane=self.plane, pos=pos, box=box))
+        return found.replace(vel=self.velocities(found.id, pos, before), score=np.ones(len(pos)))
 
 
 class OnTheGround(Numbers):
@@ -58,15 +46,13 @@ class OnTheGround(Numbers):
 class Differences(Numbers):
     """The difference to the place of the frame before."""
 
-    def velocities(self, id, pos):
-        known = dict(zip(self.ids.tolist(), self.before, strict=True))
-        return np.array([(p - known.get(i, p)) * self.fps for i, p in zip(id.tolist(), pos, strict=True)]).reshape(
-            -1, 2
-        )
+    def velocities(self, id, pos, before):
+        steps = [p - before.get(i, p) for i, p in zip(id.tolist(), pos, strict=True)]
+        return np.array(steps).reshape(-1, 2) * self.fps
 
 
 class Standing(Numbers):
-    def velocities(self, id, pos):
+    def velocities(self, id, pos, before):
         return np.zeros(pos.shape)
 
 
@@ -77,7 +63,7 @@ class Exact(Numbers):
         super().reset(context, seed)
         self.places = {}
 
-    def velocities(self, id, pos):
+    def velocities(self, id, pos, before):
         found = np.zeros(pos.shape)
         for k, i in enumerate(id.tolist()):
             path = self.places.setdefault(i, [])

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,11 +10,11 @@ from scenarios.loading.resolve import resolve
 from sim.dataset.generate import generate
 from sim.io.store.validate import validate
 from tests.fake_simulator import content
+from tests.processes import python
 
 pytestmark = pytest.mark.slow
 
 
-ROOT = Path(__file__).resolve().parents[3]
 SCENE = """
 schema = 1
 duration = 3.0
@@ -36,11 +33,9 @@ def test_however_it_is_made(tmp_path: Path) -> None:
     scene.write_text(SCENE)
     for entry in resolve(str(scene)):
         generate([entry], range(2), here)
-    line = ["generate", str(scene), "--seeds", "0:2", "--out", str(there), "--workers", "2", "--json"]
-    other = {"PYTHONHASHSEED": "12345", "OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2", "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        [sys.executable, "-m", "tracking.app.cli", *line], env={**os.environ, **other}, capture_output=True, check=False
-    )
+    line = ["generate", scene, "--seeds", "0:2", "--out", there, "--workers", "2", "--json"]
+    other = {"PYTHONHASHSEED": "12345", "OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"}
+    done = python("-m", "tracking.app.cli", *line, **other)
     assert done.returncode == 0, done.stdout
     assert content(here) == content(there)
     assert validate(there) == []

@@ -18,17 +18,14 @@ from sim.io.store.validate import validate
 from sim.sequence import simulate
 from sim.types import Sequence
 from tests.fake_simulator import content
+from tests.recordings import biwi_walk
 
 SMALL = load_observation(set=["camera.image=[160, 120]", "camera.fps=5"])
 
 
 @pytest.fixture
 def walk(tmp_path: Path) -> Sequence:
-    lines = [f"{10 * k} {id} {0.5 * k} 0 {id}.0 0 0 0" for k in range(20) for id in (1, 2)]
-    (tmp_path / "walk").mkdir()
-    (tmp_path / "walk" / "obsmat.txt").write_text("\n".join(lines))
-    (tmp_path / "walk" / "groups.txt").write_text("1 2\n")
-    return open_folder(tmp_path / "walk")
+    return open_folder(biwi_walk(tmp_path / "walk"))
 
 
 def test_a_dataset_like_any_other(walk: Sequence, tmp_path: Path) -> None:

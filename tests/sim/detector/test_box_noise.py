@@ -16,17 +16,12 @@ def some(count: int = 20_000) -> tuple[np.ndarray, np.ndarray]:
     return np.column_stack([box, r.uniform(50, 200, count)]), r.standard_normal((count, 4))
 
 
-def test_errors_have_the_means_and_sds_asked_for() -> None:
+@pytest.mark.parametrize(("visible", "factor"), [(1.0, 1.0), (0.25, 2.5)])
+def test_errors_have_the_means_and_sds_asked_for_and_grow_with_occlusion(visible: float, factor: float) -> None:
     box, n = some()
-    e = box_errors(perturb_boxes(box, np.ones(len(box)), NOISE, n), box)
-    assert e.mean(axis=0) == pytest.approx([0.02, -0.03, 0.01, 0.2], abs=0.003)
-    assert e.std(axis=0) == pytest.approx([0.05, 0.04, 0.06, 0.1], rel=0.03)
-
-
-def test_errors_grow_with_occlusion() -> None:
-    box, n = some()
-    e = box_errors(perturb_boxes(box, np.full(len(box), 0.25), NOISE, n), box)
-    assert e.std(axis=0) == pytest.approx(2.5 * np.array([0.05, 0.04, 0.06, 0.1]), rel=0.03)
+    e = box_errors(perturb_boxes(box, np.full(len(box), visible), NOISE, n), box)
+    assert e.mean(axis=0) == pytest.approx([0.02, -0.03, 0.01, 0.2], abs=0.003 * factor)
+    assert e.std(axis=0) == pytest.approx(factor * np.array([0.05, 0.04, 0.06, 0.1]), rel=0.03)
 
 
 def test_small_boxes_are_off_by_the_floor() -> None:

@@ -11,14 +11,7 @@ from sim.scene.camera import foot_points
 from sim.truth.label import bodies
 from sim.types import Detections, Truth
 from tests.reference_sense import above, crowd, pinhole
-
-SIZE = (640, 480)
-CAMERA = pinhole(at=(8.0, -8.0, 9.0))
-
-
-def people(frames: int = 400, count: int = 12) -> Truth:
-    motion = crowd(0, count, frames)
-    return bodies(motion.replace(pos=np.broadcast_to(motion.pos[:1], motion.pos.shape)), CAMERA)
+from tests.sim.detector.test_sense import CAMERA, SIZE, everything, seen
 
 
 def alarms(truth: Truth, rate: float = 2.0, seed: int = 1, camera: Any = CAMERA, **model: Any) -> list[Detections]:
@@ -28,24 +21,19 @@ def alarms(truth: Truth, rate: float = 2.0, seed: int = 1, camera: Any = CAMERA,
     return sense(truth, sensor, seed, camera, SIZE)
 
 
-def everything(found: list[Detections], name: str) -> np.ndarray:
-    return np.concatenate([getattr(d, name) for d in found])
-
-
 @pytest.mark.parametrize("model", [{"life": 1.0}, {"life": 2.0, "seen": 0.5}, {"life": 1.0, "near": 1.0}])
 def test_as_many_as_asked_for_whatever_their_life(model: dict[str, float]) -> None:
-    truth = people(3000, 2)
+    truth = seen(people=2, frames=3000)
     n = np.array([len(d.pos) for d in alarms(truth, **model)])
-    slow = 1.0 + 2.0 * 10.0 * model.get("life", 0.0)  # effective samples are fewer by about this
+    slow = 1.0 + 2.0 * 10.0 * model["life"]  # effective samples are fewer by about this
     assert n.mean() == pytest.approx(2.0, abs=4 * np.sqrt(2.0 * slow / 3000))
     assert n.var() == pytest.approx(2.0, rel=0.25)
-    life, seen = model.get("life", 0.0), model.get("seen", 1.0)
-    wanted = seen * np.exp(-1 / (10 * life)) if life else 0.0
+    wanted = model.get("seen", 1.0) * np.exp(-1 / (10 * model["life"]))
     assert np.corrcoef(n[1:], n[:-1])[0, 1] == pytest.approx(wanted, abs=0.08)
 
 
 def test_those_beside_people_keep_their_place_and_size() -> None:
-    truth = people()
+    truth = seen(frames=400)
     model = {"life": 3.0, "near": 1.0, "across": (0.5, 0.0), "foot": (-0.2, 0.0), "near_height": (-0.7, 0.0)}
     box = everything(alarms(truth, **model, aspect=(-1.0, 0.0)), "box")
     first = truth.box[truth.rows(1)]

@@ -14,6 +14,7 @@ from sim.types import Detections, Truth
 from tests.reference_sense import above, crowd, pinhole
 
 SIZE = (640, 480)
+CAMERA = pinhole(at=(8.0, -8.0, 9.0))
 PERFECT: dict[str, Any] = {
     "detect_prob": 1.0, "clutter_rate": 0.0, "box_noise": {"scale": 0.0}, "noise_m": 0.0, "box": "amodal",
     "occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0,
@@ -24,7 +25,7 @@ def seen(seed: int = 0, people: int = 12, frames: int = 200, **changes: Any) -> 
     """People who stand scattered before the usual camera."""
     motion = crowd(seed, people, frames)
     motion = motion.replace(pos=np.broadcast_to(motion.pos[:1], motion.pos.shape))
-    return bodies(motion, pinhole(at=(8.0, -8.0, 9.0))).replace(**changes)
+    return bodies(motion, CAMERA).replace(**changes)
 
 
 def perfect(**changes: Any) -> Sensor:
@@ -174,14 +175,13 @@ def hidden_from_below(truth: Truth, share: float) -> Truth:
 
 @pytest.mark.parametrize("z", [0.0, 0.8])
 def test_points_follow_the_foot_of_the_visible_part(z: float) -> None:
-    camera = pinhole(at=(8.0, -8.0, 9.0))
     truth = seen(people=6, frames=3)
     truth = hidden_from_below(truth.replace(z=np.full(len(truth.id), z)), 0.4)
-    rays_end = foot_points(truth.visible_box, truth.z, camera), foot_points(truth.box, truth.z, camera)  # type: ignore[arg-type]
+    rays_end = foot_points(truth.visible_box, truth.z, CAMERA), foot_points(truth.box, truth.z, CAMERA)  # type: ignore[arg-type]
     wanted = truth.pos + rays_end[0] - rays_end[1]
-    found = everything(sense(truth, perfect(box="visible"), 1, camera), "pos")
+    found = everything(sense(truth, perfect(box="visible"), 1, CAMERA), "pos")
     assert np.sort(found, axis=0) == pytest.approx(np.sort(wanted, axis=0))
-    whole = everything(sense(truth, perfect(), 1, camera), "pos")  # amodal boxes: nothing is hidden from the detector
+    whole = everything(sense(truth, perfect(), 1, CAMERA), "pos")  # amodal boxes: nothing is hidden from the detector
     assert {tuple(r) for r in whole} == {tuple(r) for r in truth.pos}  # type: ignore[union-attr]
 
 

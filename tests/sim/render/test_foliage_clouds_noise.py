@@ -11,24 +11,15 @@ from sim.hashing import canonical_hash
 from sim.render.camera_view import NODE_STEP
 from sim.render.renderer import make_renderer
 from sim.render.weather import draw_illumination
-from sim.types import BACKGROUNDS, Camera, Motion, Scene
-from tests.reference_sense import above, crowd, pinhole
+from sim.types import BACKGROUNDS, Motion, Scene
+from tests.reference_sense import above, crowd, pinhole, small
 
 BARE = Scene(np.array([16.0, 10.0]))
 DARK = Light(shadow=0.0)
 CALM = Picture(noise=0.0, blur_px=0.0)
 
 
-def small(camera: Camera, share: float = 0.5) -> Camera:
-    """The same view on fewer or more pixels."""
-    width, height = (round(share * n) for n in camera.image)
-    focal = (camera.focal_px[0] * share, camera.focal_px[1] * share)
-    return camera.replace(
-        image=(width, height), focal_px=focal, centre_px=(width / 2, height / 2), px_per_m=camera.px_per_m * share
-    )
-
-
-VIEWS = {"high": small(pinhole()).replace(baseline=0.5), "above": small(above())}
+VIEWS = {"high": small(pinhole(), 0.5).replace(baseline=0.5), "above": small(above(), 0.5)}
 
 
 def motion_in(people: int = 6) -> Motion:
@@ -112,7 +103,7 @@ def test_clouds_pass_over_the_ground(view: str) -> None:
 
 @pytest.mark.parametrize("shot", [0.0, 0.5, 1.0])
 def test_noise_grows_with_brightness_by_the_share_of_shot_noise(shot: float) -> None:
-    motion, camera = motion_in(0), small(pinhole(60.0))
+    motion, camera = motion_in(0), small(pinhole(60.0), 0.5)
     for gain in (0.4, 1.0):
         light = Light(shadow=0.0, switch=({"at": -100, "gain": gain},))  # type: ignore[arg-type]
         made = make_renderer(motion, camera, light, Picture(noise=4.0, shot=shot, texture=0.0))

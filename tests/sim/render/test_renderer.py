@@ -11,9 +11,9 @@ from sim.hashing import canonical_hash
 from sim.render.pixel_truth import amodal_mask, modal_mask
 from sim.render.renderer import BACKGROUNDS, make_renderer
 from sim.truth.label import bodies
-from sim.types import Camera, Motion, Scene, Stairs
+from sim.types import Motion, Scene, Stairs
 from tests import reference_render as slow
-from tests.reference_sense import above, crowd, pinhole, walkers
+from tests.reference_sense import above, crowd, pinhole, small, walkers
 
 STAIRS = Stairs(np.array([9.0, 5.0]), np.array([12.0, 6.0]), 3.0, 1.2, 6, 2.0)
 BARE = Scene(np.array([16.0, 10.0]))
@@ -24,19 +24,11 @@ BUILT = Scene(
 SHARP = Picture(noise=0.0, blur_px=0.0)
 
 
-def small(camera: Camera, size: tuple[int, int] = (160, 120)) -> Camera:
-    """The same view on fewer pixels."""
-    share = size[0] / camera.image[0]
-    focal = (camera.focal_px[0] * share, camera.focal_px[1] * share)
-    middle = (size[0] / 2, size[1] / 2)
-    return camera.replace(image=size, focal_px=focal, centre_px=middle, px_per_m=camera.px_per_m * share)
-
-
 VIEWS = {
     "high": small(pinhole(40.0)).replace(baseline=0.5),
     "low": small(pinhole(12.0, at=(8.0, -5.0, 2.2))).replace(baseline=0.5),
     "turned": small(pinhole(30.0, yaw=35.0, at=(15.0, -4.0, 6.0))).replace(baseline=0.3),
-    "above": small(above(20.0), (320, 240)),
+    "above": small(above(20.0), 0.5),
 }
 SCENES = {"bare": BARE, "built": BUILT}
 

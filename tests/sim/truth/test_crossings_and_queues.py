@@ -49,14 +49,6 @@ def crossed(paths, group=None):
 HEAD_ON = pair((0, 5), straight(1)) + pair((10, 5.2), straight(-1))
 
 
-def test_cross_begins_when_hulls_are_within_a_metre():
-    """Hulls 10 - 2 t - 0.5 apart: within 1 m from 4.25 s, until the same after passing at 5 s."""
-    assert crossed(HEAD_ON) == [(44, 58, (1, 2), (1, 2), (1, 2, 3, 4))]
-    (event,) = crossings(*crowd(HEAD_ON), groups(1, 1, 2, 2), FPS)
-    assert event.pos == pytest.approx((5, 5.1))
-    assert event.emitted is None
-
-
 def test_across_and_back_is_no_cross():
     """A pair steps over the way of the other (y = 5) 3 m ahead of it, at 5.1 s; then back again at 5.9 s, or on."""
 
@@ -124,16 +116,6 @@ def waiting(k, arrive=3.0, leave=9.0, spacing=0.8, at=(5.0, 3.0), step=(0.0, 1.2
     place = np.array([at[0] + spacing * k, at[1]])
     coming = place + np.maximum(arrive - T, 0) * [1.3, 0]
     return coming + np.maximum(T - leave, 0) * np.array(step)
-
-
-def test_queue_starts_at_its_onset_and_ends_below_two():
-    """All slow from 3 s on (frame 31; the central difference is halved there), one after another leaves from 9 s."""
-    paths = [waiting(k, leave=9 + 0.9 * k) for k in range(3)]
-    (event,) = queued(paths)
-    assert (event.kind, event.members, event.before, event.after) == ("queue", (1, 2, 3), (-1, -1, -1), (-1, -1, -1))
-    speed = np.hypot(*np.moveaxis(crowd(paths)[1], -1, 0)) < 0.4
-    assert event.start == np.flatnonzero(speed.all(axis=1))[0] + 1 == 32
-    assert event.end == np.flatnonzero(speed.sum(axis=1) >= 2)[-1] + 1
 
 
 def test_queue_of_two_or_for_less_than_three_seconds_is_none():

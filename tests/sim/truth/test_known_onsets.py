@@ -9,15 +9,9 @@ import numpy as np
 import pytest
 
 from sim.truth.label import label
-from tests.reference_sense import walkers
+from tests.reference_sense import paced, walkers
 
 FPS = 10.0
-
-
-def walk(start, *pieces):
-    """Places and velocities (T, 2) of one person."""
-    vel = np.concatenate([np.tile(np.array(v, float), (round(s * FPS), 1)) for s, v in pieces])
-    return np.array(start) + np.concatenate([[[0, 0]], np.cumsum(vel[:-1], axis=0)]) / FPS, vel
 
 
 def scene(people, *intent):
@@ -48,8 +42,8 @@ def merging():
     They are meant to be one from frame 20 on.
     """
     pieces = [(3, -0.6), (1.5, 0), (2, 0.6), (4.5, -0.38), (4, 0)]
-    stay = [walk((0, y), (15, (1, 0))) for y in (0, 0.7)]
-    come = [walk((0, y), *((s, (1, v)) for s, v in pieces)) for y in (3.7, 4.4)]
+    stay = [paced((15, (1, 0)), start=(0, y)) for y in (0, 0.7)]
+    come = [paced(*((s, (1, v)) for s, v in pieces), start=(0, y)) for y in (3.7, 4.4)]
     return scene([*stay, *come], (1, (1, 1, 2, 2)), (20, (3, 3, 3, 3)))
 
 
@@ -69,8 +63,8 @@ def splitting():
     They are meant to be two from frame 15 on.
     """
     pieces = [(3, 0), (1.5, 1.0), (3.5, 0), (7, 0.28)]
-    stay = [walk((0, y), (15, (1, 0))) for y in (0, 0.7)]
-    go = [walk((0, y), *((s, (1, v)) for s, v in pieces)) for y in (1.35, 2.05)]
+    stay = [paced((15, (1, 0)), start=(0, y)) for y in (0, 0.7)]
+    go = [paced(*((s, (1, v)) for s, v in pieces), start=(0, y)) for y in (1.35, 2.05)]
     return scene([*stay, *go], (1, (1, 1, 1, 1)), (15, (1, 1, 2, 2)))
 
 
@@ -88,7 +82,7 @@ def crossing():
     The velocities differ by 2 m/s. Pair C walks left like B, 2 m up: its hull passes 0.8 m from A's, beside it.
     """
     ways = [(0.0, 5.0, 1.2), (10.03, 5.2, -0.8), (10.03, 7.0, -0.8)]
-    people = [walk((x, y + side), (12, (v, 0))) for x, y, v in ways for side in (-0.35, 0.35)]
+    people = [paced((12, (v, 0)), start=(x, y + side)) for x, y, v in ways for side in (-0.35, 0.35)]
     return scene(people, (1, (1, 1, 2, 2, 3, 3)))
 
 
@@ -115,7 +109,7 @@ def queueing():
         3: [(4, (0, 0)), (1, up), (7, (0, 0))],
         4: [(2, (0, 0)), (14.5, leave)],
     }
-    people = [walk((places[p] + 1.2 * stand[p], 3), (stand[p], (-1.2, 0)), *after[p]) for p in places]
+    people = [paced((stand[p], (-1.2, 0)), *after[p], start=(places[p] + 1.2 * stand[p], 3)) for p in places]
     return scene(people, (1, (1, 2, 3, 4)))
 
 
@@ -130,3 +124,14 @@ def test_known_onsets_do_not_hang_on_the_last_bit(made):
     motion = made()
     nudge = np.random.default_rng(1).uniform(-1e-3, 1e-3, motion.pos.shape)
     assert told(motion.replace(pos=motion.pos + nudge)) == told(motion)
+
+
+@pytest.mark.parametrize(
+    ("made", "place"),
+    [(merging, (8.9, 1.444)), (splitting, (9.3, 1.957)), (crossing, (6.015, 5.1)), (queueing, (5.8, 3.0))],
+)
+def test_an_event_is_where_its_people_are(made, place):
+    """In the middle of all of them at its onset, of a crossing when the pairs are nearest, at 5.0 s."""
+    (event,) = label(made(), None).events
+    assert event.pos == pytest.approx(place, abs=1e-9)
+    assert event.emitted is None

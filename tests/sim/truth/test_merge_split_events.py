@@ -1,16 +1,10 @@
 import numpy as np
-import pytest
 
 from sim.truth.merge_split_events import groups_and_events
 from tests.reference_groups import labels
+from tests.reference_sense import paced
 
 FPS = 10.0
-
-
-def walk(*pieces, start=(0.0, 0.0), fps=FPS):
-    """A path from velocities: pieces (seconds, (vx, vy)); the velocity of a frame is that of the step to it."""
-    vel = np.concatenate([np.tile(np.array(v, float), (round(s * fps), 1)) for s, v in pieces])
-    return np.array(start) + np.concatenate([[[0, 0]], np.cumsum(vel[:-1], axis=0)]) / fps, vel
 
 
 def crowd(*people):
@@ -33,18 +27,9 @@ def summary(events):
 def merging(speed, near):
     """Two pairs side by side at 1 m/s; the second drifts towards the first at `speed` until `near` m are left."""
     seconds = round((6 - near) / speed, 1)
-    first = [walk((20, (1, 0)), start=(0, y)) for y in (-0.7, 0)]
-    second = [walk((seconds, (1, -speed)), (20 - seconds, (1, 0)), start=(0, y)) for y in (6, 6.7)]
+    first = [paced((20, (1, 0)), start=(0, y)) for y in (-0.7, 0)]
+    second = [paced((seconds, (1, -speed)), (20 - seconds, (1, 0)), start=(0, y)) for y in (6, 6.7)]
     return crowd(*first, *second)
-
-
-def test_merge_at_the_frame_in_which_they_are_near():
-    """6 - 0.4 t < 1.5 from t > 11.25 s on: frame 114."""
-    m = groups_and_events(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), (50, (3, 3, 3, 3)), frames=200), FPS)
-    assert summary(m.events) == [("merge", 114, 133, (1, 2), (1,), (1, 2, 3, 4))]
-    assert (m.group[:113] == [1, 1, 2, 2]).all()
-    assert (m.group[113:] == 1).all()
-    assert m.events[0].pos == pytest.approx((11.3, (-0.7 + 0 + 6 + 6.7 - 2 * 4.52) / 4))
 
 
 def test_merge_no_earlier_than_intent_and_not_without():
@@ -64,29 +49,8 @@ def test_a_stretch_cut_off_by_the_end_does_not_count():
     assert len(groups_and_events(pos[:132], vel[:132], there[:132], want[:132], FPS).events) == 0
 
 
-def parting(speed):
-    """Two and two, 0.7 m apart; the second two drift away at `speed` from 3 s on."""
-    stay = [walk((15, (1, 0)), start=(0, y)) for y in (-0.7, 0)]
-    go = [walk((3, (1, 0)), (12, (1, speed)), start=(0, y)) for y in (0.7, 1.4)]
-    return crowd(*stay, *go)
-
-
-@pytest.mark.parametrize(
-    ("speed", "onset"),
-    [
-        (0.4, 77),  # 0.7 + 0.4 (t - 3) > 2.5 from t > 7.5
-        (0.8, 42),  # 0.7 + 0.8 (t - 3) > 1.5 from t > 4.0, velocities differing by more than 0.7
-    ],
-)
-def test_split_at_the_frame_in_which_they_are_apart(speed, onset):
-    m = groups_and_events(*parting(speed), meant((1, (1, 1, 1, 1)), (20, (1, 1, 2, 2)), frames=150), FPS)
-    assert summary(m.events) == [("split", onset, onset + 19, (1,), (1, 2), (1, 2, 3, 4))]
-    assert (m.group[: onset - 1] == 1).all()
-    assert (m.group[onset - 1 :] == [1, 1, 2, 2]).all()
-
-
 def test_who_enters_together_counts_from_the_first_frame():
-    pos, vel, there = crowd(*(walk((10, (1, 0)), start=(0, y)) for y in (0, 4, 4.7, 5.4)))
+    pos, vel, there = crowd(*(paced((10, (1, 0)), start=(0, y)) for y in (0, 4, 4.7, 5.4)))
     there[:20, 1:3] = False
     there[:40, 3] = False
     there[80:, 1:] = False

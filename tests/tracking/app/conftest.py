@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from sim.types import Camera, Detections, Frame, GroupEvent, Groups, Near, Scene, Sequence, Stairs, Tracks, Truth
+from sim.types import Camera, Detections, Frame, GroupEvent, Near, Scene, Sequence, Stairs, Tracks, Truth
+from tests import hand_made
 
 FPS, LENGTH = 10.0, 160
 MERGE, SPLIT = 50, 110
@@ -57,33 +58,25 @@ def paths() -> np.ndarray:
     return np.stack([*place, stranger, wait], axis=1)
 
 
-def groups_of(ids: np.ndarray, group: np.ndarray, pos: np.ndarray, vel: np.ndarray) -> Groups:
-    names = np.unique(group[group >= 0])
-    rows = [np.flatnonzero(group == g) for g in names]
-    if not rows:
-        return Groups.none()
-    return Groups(
-        names, tuple(ids[r] for r in rows), np.array([pos[r].mean(axis=0) for r in rows]),
-        np.array([vel[r].mean(axis=0) for r in rows]), np.full((len(rows), 2, 2), np.nan),
-        np.array([float(len(r)) for r in rows]),
-        tuple(pos[r].mean(axis=0) + np.array([[-1, -1], [1, -1], [1, 1], [-1, 1.0]]) for r in rows),
-    )  # fmt: skip
+def groups(k: int) -> dict[int, tuple[list[int], None]]:
+    """Who is in which group in frame k: {group: (people, None)}."""
+    if MERGE <= k < SPLIT:
+        return {1: ([1, 2, 3, 4, 5], None)}
+    return {1: ([1, 2, 3], None), (2 if k < MERGE else 3): ([4, 5], None)}
+
+
+def scenes() -> list[hand_made.Scene]:
+    return [
+        hand_made.Scene({p: tuple(xy) for p, xy in enumerate(places, 1) if np.isfinite(xy[0])}, groups(k))
+        for k, places in enumerate(paths(), 1)
+    ]
 
 
 @pytest.fixture
 def truth() -> Truth:
-    path, camera = paths(), look_at()
+    path = paths()
     frame, person = np.nonzero(np.isfinite(path[..., 0]))
-    vel = np.gradient(path, 1 / FPS, axis=0)
-    vel = np.where(np.isfinite(vel), vel, 0.0)
-    pos, vel = path[frame, person], vel[frame, person]
-    group = np.full(len(frame), -1)
-    group[person < 3] = 1
-    group[(person == 3) | (person == 4)] = 2
-    together = (frame + 1 >= MERGE) & (frame + 1 < SPLIT) & (person < 5)
-    group[together] = 1
-    group[(frame + 1 >= SPLIT) & ((person == 3) | (person == 4))] = 3
-    ids = person + 1
+    vel = np.nan_to_num(np.gradient(path, 1 / FPS, axis=0)[frame, person])
     events = (
         GroupEvent("enter", 11, 11, None, (), (-1,), (6,), (13.8, 8.1)),
         GroupEvent("merge", MERGE, MERGE + 20, None, (1, 2), (1,), (1, 2, 3, 4, 5), (8.0, 5.5)),
@@ -91,12 +84,9 @@ def truth() -> Truth:
         GroupEvent("split", SPLIT, SPLIT + 20, None, (1,), (1, 3), (1, 2, 3, 4, 5), (12.0, 5.5)),
         GroupEvent("leave", 111, 111, None, (-1,), (), (6,), (1.8, 4.6)),
     )
-    frames = [np.flatnonzero(frame == k) for k in range(LENGTH)]
-    return Truth(
-        "meeting", FPS, LENGTH, 60.0, frame + 1, ids, group, pos, vel, boxes(camera, pos),
-        np.where((person == 2) & (frame < 30), 0.1, 1.0),
-        groups=tuple(groups_of(ids[r], group[r], pos[r], vel[r]) for r in frames),
-        labelled=np.arange(LENGTH) < LENGTH - 10, events=events,
+    return hand_made.truth(
+        scenes(), events, name="meeting", px_per_m=60.0, vel=vel, box=boxes(look_at(), path[frame, person]),
+        visibility=np.where((person == 2) & (frame < 30), 0.1, 1.0), labelled=np.arange(LENGTH) < LENGTH - 10,
         near=Near(np.array([20]), np.array([40]), np.array([6]), np.array([7])),
     )  # fmt: skip
 
@@ -121,26 +111,21 @@ def sequence(truth: Truth) -> Sequence:
 @pytest.fixture
 def tracks(truth: Truth) -> list[Tracks]:
     """The truth, late by four frames and a little off, with a tracker's own ids; person 2 gets a new id half-way."""
-    rng, answers = np.random.default_rng(1), []
-    late = 4
-    moved = {
-        MERGE + late: GroupEvent("merge", MERGE, MERGE + late, MERGE + late, (0, 7), (0,), (0, 1, 2, 3, 4), (8.0, 5.4)),
-        SPLIT + late: GroupEvent(
-            "split", SPLIT, SPLIT + late, SPLIT + late, (0,), (0, 8), (0, 1, 2, 3, 4), (12.0, 5.4)
-        ),
-    }
+    rng, answers, late, label = np.random.default_rng(1), [], 4, np.array([-1, 0, 7, 8])
+    merge = GroupEvent("merge", MERGE, MERGE + late, MERGE + late, (0, 7), (0,), (0, 1, 2, 3, 4), (8.0, 5.4))
+    split = GroupEvent("split", SPLIT, SPLIT + late, SPLIT + late, (0,), (0, 8), (0, 1, 2, 3, 4), (12.0, 5.4))
     for k in range(1, LENGTH + 1):
         now, before = truth.at(k), truth.at(max(k - late, 1))
         group_of = dict(zip(before.id.tolist(), before.group.tolist(), strict=True))
         ids = np.where((now.id == 2) & (k > 80), 20, now.id - 1)
-        group = np.array([{1: 0, 2: 7, 3: 8, -1: -1}[group_of.get(i, -1)] for i in now.id.tolist()])
+        group = label[[max(group_of.get(i, -1), 0) for i in now.id.tolist()]]
         pos = now.pos + rng.normal(0, 0.05, now.pos.shape)
         n = len(ids)
+        members = {g: (ids[group == g].tolist(), None) for g in np.unique(group[group >= 0]).tolist()}
+        named = hand_made.Scene(dict(zip(ids.tolist(), pos.tolist(), strict=True)), members).groups()
+        told = tuple(event for event in (merge, split) if event.emitted == k)
+        cov, box = np.tile(np.eye(4), (n, 1, 1)), now.box + rng.normal(0, 2, (n, 4))
         answers.append(
-            Tracks(
-                k, now.t, "ground", "person", ids, group, pos, now.vel, np.tile(np.eye(4), (n, 1, 1)),
-                box=now.box + rng.normal(0, 2, (n, 4)), score=np.ones(n), groups=groups_of(ids, group, pos, now.vel),
-                events=(moved[k],) if k in moved else (),
-            )
-        )  # fmt: skip
+            Tracks(k, now.t, "ground", "person", ids, group, pos, now.vel, cov, box, np.ones(n), named, told)
+        )
     return answers

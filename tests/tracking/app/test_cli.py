@@ -16,12 +16,10 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import WorkError
+from tests.processes import FAKE, ROOT, TOY
 from tracking.app.cli import run
 
-ROOT = Path(__file__).resolve().parents[3]
 OURS = tuple(str(ROOT / name) + os.sep for name in ("scenarios", "sim", "tracking"))
-FAKE = f"{ROOT / 'tests' / 'fake_tracker.py'}:Nearest"
-TOY = f"{ROOT / 'tests' / 'toy_tracker.py'}:Toy"
 TUNE = f"tune {TOY} --suite {{scene}} --check none --validation 10000 --test 20000 --out {{out}}/toy.toml"
 SCENE = """
 schema = 1

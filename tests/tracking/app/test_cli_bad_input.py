@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
+from tests.processes import FAKE, ROOT
+from tests.recordings import biwi_walk
 from tests.sealing import seal_again
 from tests.small_disks import small_disk
 from tests.tuning_toys import TOY
 from tracking.app.cli import run
 
-ROOT = Path(__file__).resolve().parents[3]
-FAKE = f"{ROOT / 'tests' / 'fake_tracker.py'}:Nearest"
 GROUP = '{ id = "a", size = 2, start = [4, 4], goal = [12, 4] }'
 OTHER = '{ id = "b", size = 2, start = [12, 4], goal = [4, 4] }'
 MERGE = '{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", when = { time = 1.0 } }'
@@ -86,12 +86,11 @@ WORLDS = {
         f"duration = 4\ngroup = [{GROUP}, {OTHER}]\nevent = [{MERGE}]", 1, "event m such merge"
     ),
 }  # fmt: skip
-RAISES = {"raises": ("return 1 / 0", "ZeroDivisionError s40000, frame 1"), "says nothing": ("return None", "NoneType")}
 
 # an option that is wrong, without a file, and what the line must say.
 OPTIONS = {
     **{GOOD.replace("--seeds 0", f"--seeds={text}"): "seeds"
-       for text in ("", "3:", "5:3", "-1:3", "1:2:3", "9990:10010", "0.5")},
+       for text in ("", "3:", "5:3", "-1:3", "1:2:3", "9990:10010", "0:30000", "39999:40001", "0.5")},
     **{f"{DET} {option}={text}".replace("{tmp}/bad", "{det}"): option
        for option in ("--fps", "--px-per-m") for text in ("0", "nan", "x")},
     **{f"{GOOD} --set {text}": text.partition("=")[0] for text in ("duration", "=3", "camera.fsp=3", "tracker.gate=1")},
@@ -117,11 +116,9 @@ OPTIONS = {
 def places(made, tmp_path) -> dict[str, Path]:
     """Folders and good files that the commands above name."""
     found = {"made": made, "one": made / "data" / "flockscope-demo" / "scene-s40000", "tmp": tmp_path / "here"}
-    walk = "".join(f"{10 * k} {person} {0.5 * k} 0 {person}.0 0 0 0\n" for k in range(20) for person in (1, 2))
     files = {"det": ("det.txt", DETECTION), "biwi": ("obsmat.txt", ""), "caviar": ("people.xml", "<dataset/>")}
-    files["walk"] = ("walk/obsmat.txt", walk)
+    found["walk"] = biwi_walk(tmp_path / "walk") / "obsmat.txt"
     found["tmp"].mkdir()
-    (tmp_path / "walk").mkdir()
     for key, (name, text) in files.items():
         found[key] = tmp_path / name
         found[key].write_text(text)
@@ -163,16 +160,6 @@ def test_an_entry_of_a_suite_is_named_with_its_file(tmp_path, capsys):
     suite.write_text('[[entry]]\nname = "low"\nscenario = "scene.toml"\n')
     line = refused(["generate", str(suite), "--seeds", "0", "--out", str(tmp_path / "out")], capsys)
     assert f"{suite}: entry low: camera.height" in line
-
-
-@pytest.mark.parametrize("name", RAISES)
-def test_trackers_that_fail(name, made, tmp_path, capsys):
-    body, words = RAISES[name]
-    file = tmp_path / "mine.py"
-    file.write_text(TRACKER.format("boxes") + f"        {body}\n")
-    line = refused(["track", f"{file}:Mine", str(made / "data"), "--out", str(tmp_path / "out")], capsys, 1)
-    assert all(word in line for word in [str(file), *words.split(" ", 1)]), line
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import shutil
 from functools import cache
 from pathlib import Path
@@ -17,6 +18,7 @@ from scenarios.loading.validation import validate
 from scenarios.schema.scenario import Scenario
 from sim.io.store.sequence_folder import sequence_files
 from sim.io.store.track_files import tracks_files
+from tests.processes import FAKE
 from tracking import track
 from tracking.app.cli import app, run
 from tracking.app.commands.scenarios import list_keys
@@ -24,8 +26,6 @@ from tracking.running import tracker_registry
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).resolve().parents[3]
-FAKE = f"{ROOT / 'tests' / 'fake_tracker.py'}:Nearest"
 SCENE = """
 schema = 1
 duration = 12.0
@@ -77,101 +77,57 @@ NEAR = "event.p.parts.c.goal=[8, 10]"
 STOP = "group.s.stops=[{ at = [13, 13], stay = 2 }]"
 SERVED = "event.l.goal=[21, 8]"
 
-# key: what is set, then what is set instead ("" for nothing; several apart by ";"): the two outputs must differ.
+NAMES = {
+    r"^group\.\w\.": "group[].", r"^event\.m\.": "event[](merge).", r"^event\.p\.": "event[](split).",
+    r"^event\.l\.": "event[](queue).", r"parts\.\w\.": "parts[].", r"(stairs|doors|hide)\.\d\.": r"\1[].",
+    r"walls\.\d$": "walls",
+}  # fmt: skip
+"""What stands for names and numbers of rows in the keys of settings."""
+
+
+def key_of(setting: str) -> str:
+    """The key that a setting sets, as the list of keys has it."""
+    path = setting.partition("=")[0]
+    for name, key in NAMES.items():
+        path = re.sub(name, key, path)
+    return path
+
+
 MEMORY = "sensor.box_noise.memory=[{ share = 0.5, time = 2 }]"
-KEYS = {
-    "name": ("", "name=other"),
-    "duration": ("", "duration=10"),
-    "warmup": ("", "warmup=2"),
-    "turn_deg": ("", "turn_deg=5"),
-    "lead": ("", "lead=1.5"),
-    "mirror": ("", "mirror=true"),
-    "world.size": ("", "world.size=[25, 20]"),
-    "world.walls": ("", "world.walls.1=[16.5, 3.2, 18.5, 3.2]"),
-    "world.pillars": ("", "world.pillars=[[8, 4, 0.3]]"),
-    "world.service": ("", "world.service=[[20, 4]]"),
-    "world.wall_height": ("", "world.wall_height=1.0"),
-    "world.pillar_height": ("", "world.pillar_height=1.0"),
-    "world.stairs[].foot": ("", "world.stairs.0.foot=[13.5, 14]"),
-    "world.stairs[].head": ("", "world.stairs.0.head=[17, 14]"),
-    "world.stairs[].width": ("", "world.stairs.0.width=1.0"),
-    "world.stairs[].rise": ("", "world.stairs.0.rise=1.0"),
-    "world.stairs[].steps": ("", "world.stairs.0.steps=5"),
-    "world.stairs[].landing": ("", "world.stairs.0.landing=2"),
-    "world.stairs[].slowdown": ("", "world.stairs.0.slowdown=1"),
-    "world.doors[].at": ("", "world.doors.0.at=[9, 18]"),
-    "world.doors[].width": ("", "world.doors.0.width=2"),
-    "camera.kind": ("", TOP),
-    "camera.image": ("", "camera.image=[320, 240]"),
-    "camera.fps": ("", "camera.fps=4"),
-    "camera.focal_px": ("", "camera.focal_px=400"),
-    "camera.baseline": ("", "camera.baseline=0.2"),
-    "camera.tilt_deg": ("", "camera.tilt_deg=50"),
-    "camera.yaw_deg": ("", "camera.yaw_deg=30"),
-    "camera.px_per_m": (TOP, TOP.replace("20", "15")),
-    "camera.height": ("", "camera.height=25"),
-    "camera.position": ("", "camera.position=[12, -14]"),
+# key: what is set, then what is set instead ("" for nothing; several apart by ";"): the two outputs must differ.
+KEYS = {key_of(setting): ("", setting) for setting in (
+    "name=other", "duration=10", "warmup=2", "turn_deg=5", "lead=1.5", "mirror=true", "world.size=[25, 20]",
+    "world.walls.1=[16.5, 3.2, 18.5, 3.2]", "world.pillars=[[8, 4, 0.3]]", "world.service=[[20, 4]]",
+    "world.wall_height=1.0", "world.pillar_height=1.0", "world.stairs.0.foot=[13.5, 14]",
+    "world.stairs.0.head=[17, 14]", "world.stairs.0.width=1.0", "world.stairs.0.rise=1.0", "world.stairs.0.steps=5",
+    "world.stairs.0.landing=2", "world.stairs.0.slowdown=1", "world.doors.0.at=[9, 18]", "world.doors.0.width=2",
+    "camera.image=[320, 240]", "camera.fps=4", "camera.focal_px=400", "camera.baseline=0.2", "camera.tilt_deg=50",
+    "camera.yaw_deg=30", "camera.height=25", "camera.position=[12, -14]", "sensor.detect_prob=0.5",
+    "sensor.clutter_rate=2", "sensor.box_noise.across=[0, 0.1]", "sensor.box_noise.foot=[0, 0.1]",
+    "sensor.box_noise.top=[0, 0.1]", "sensor.box_noise.width=[0, 0.1]", "sensor.box_noise.floor_px=9",
+    "sensor.box_noise.scale=2", "sensor.box_noise.occluded=2", "sensor.box_noise.tails=3", "sensor.noise_m=0.2",
+    "sensor.box=amodal", "sensor.points=own", "sensor.occlusion_power=4", "sensor.min_visibility=0.9",
+    "sensor.small_px=80", "sensor.persistence=0.9", "sensor.hide.0.start=2", "sensor.hide.0.end=4",
+    "sensor.hide.0.group=a", "crowd.free_speed=1.0", "crowd.spacing=1.1", "crowd.height=1.6",
+    "crowd.slowdown_per_member=0.2", "crowd.sway=0", "crowd.velocity_noise=[0, 0]", "crowd.place_noise=[0, 0]",
+    "group.s.size=3", "group.s.start=[11, 14]", "group.s.scatter=0.3", "group.s.via=[[13, 12]]", "group.s.speed=1.7",
+    "group.s.enter=2", "group.s.at_goal=leave", "group.q.repeat=3", "event.m.id=n", "event.m.groups=['a', 'b', 's']",
+    "event.m.goal=meet", "event.m.via=[[10, 6]]", "event.p.id=n", "event.p.parts.c.size=3",
+    "event.p.parts.c.goal=[4, 14]", "event.p.parts.c.via=[[10, 13]]", "event.l.id=n",
+    "event.l.groups=['q-1', 'q-2', 'q-3']", "event.l.at=[19, 6]", "event.l.direction_deg=90", "event.l.spacing=1.1",
+    "event.l.service=0.2", "event.l.goal=[22, 9]",
+)} | {
+    "camera.kind": ("", TOP), "camera.px_per_m": (TOP, TOP.replace("20", "15")),
     "camera.crop": (LOW, f"{LOW};camera.crop=true"),
-    "sensor.detect_prob": ("", "sensor.detect_prob=0.5"),
-    "sensor.clutter_rate": ("", "sensor.clutter_rate=2"),
-    "sensor.box_noise.across": ("", "sensor.box_noise.across=[0, 0.1]"),
-    "sensor.box_noise.foot": ("", "sensor.box_noise.foot=[0, 0.1]"),
-    "sensor.box_noise.top": ("", "sensor.box_noise.top=[0, 0.1]"),
-    "sensor.box_noise.width": ("", "sensor.box_noise.width=[0, 0.1]"),
-    "sensor.box_noise.floor_px": ("", "sensor.box_noise.floor_px=9"),
-    "sensor.box_noise.scale": ("", "sensor.box_noise.scale=2"),
-    "sensor.box_noise.occluded": ("", "sensor.box_noise.occluded=2"),
-    "sensor.box_noise.tails": ("", "sensor.box_noise.tails=3"),
     "sensor.box_noise.memory[].share": (MEMORY, MEMORY.replace("0.5", "0.9")),
-    "sensor.box_noise.memory[].time": (MEMORY, MEMORY.replace("2", "1")),
-    "sensor.noise_m": ("", "sensor.noise_m=0.2"),
-    "sensor.box": ("", "sensor.box=amodal"),
-    "sensor.points": ("", "sensor.points=own"),
-    "sensor.occlusion_power": ("", "sensor.occlusion_power=4"),
-    "sensor.min_visibility": ("", "sensor.min_visibility=0.9"),
-    "sensor.small_px": ("", "sensor.small_px=80"),
-    "sensor.persistence": ("", "sensor.persistence=0.9"),
-    "sensor.hide[].start": ("", "sensor.hide.0.start=2"),
-    "sensor.hide[].end": ("", "sensor.hide.0.end=4"),
-    "sensor.hide[].group": ("", "sensor.hide.0.group=a"),
-    "crowd.free_speed": ("", "crowd.free_speed=1.0"),
-    "crowd.spacing": ("", "crowd.spacing=1.1"),
-    "crowd.height": ("", "crowd.height=1.6"),
-    "crowd.slowdown_per_member": ("", "crowd.slowdown_per_member=0.2"),
-    "crowd.sway": ("", "crowd.sway=0"),
-    "crowd.velocity_noise": ("", "crowd.velocity_noise=[0, 0]"),
-    "crowd.place_noise": ("", "crowd.place_noise=[0, 0]"),
-    "group[].size": ("", "group.s.size=3"),
-    "group[].start": ("", "group.s.start=[11, 14]"),
-    "group[].goal": ("", FAR),
+    "sensor.box_noise.memory[].time": (MEMORY, MEMORY.replace("2", "1")), "group[].goal": ("", FAR),
     "group[].stops[].at": (STOP, STOP.replace("13]", "12]")),
     "group[].stops[].stay": (STOP, STOP.replace("2 }", "3 }")),
     "group[].stops[].until": (STOP, STOP.replace("2 }", "2, until = [6] }")),
     "group[].stops[].members": (STOP, STOP.replace("2 }", "2, members = 1 }")),
-    "group[].scatter": ("", "group.s.scatter=0.3"),
-    "group[].via": ("", "group.s.via=[[13, 12]]"),
-    "group[].speed": ("", "group.s.speed=1.7"),
-    "group[].enter": ("", "group.s.enter=2"),
-    "group[].at_goal": ("", "group.s.at_goal=leave"),
-    "group[].repeat": ("", "group.q.repeat=3"),
-    "event[](merge).id": ("", "event.m.id=n"),
-    "event[](merge).groups": ("", "event.m.groups=['a', 'b', 's']"),
-    "event[](merge).goal": ("", "event.m.goal=meet"),
-    "event[](merge).via": ("", "event.m.via=[[10, 6]]"),
     "event[](merge).at_goal": ("event.p.when.time=11.9", "event.m.at_goal=leave"),
-    "event[](split).id": ("", "event.p.id=n"),
     "event[](split).group": ("", SPLIT),
-    "event[](split).parts[].size": ("", "event.p.parts.c.size=3"),
-    "event[](split).parts[].goal": ("", "event.p.parts.c.goal=[4, 14]"),
-    "event[](split).parts[].via": ("", "event.p.parts.c.via=[[10, 13]]"),
     "event[](split).parts[].at_goal": (NEAR, f"{NEAR};event.p.parts.c.at_goal=leave"),
-    "event[](queue).id": ("", "event.l.id=n"),
-    "event[](queue).groups": ("", "event.l.groups=['q-1', 'q-2', 'q-3']"),
-    "event[](queue).at": ("", "event.l.at=[19, 6]"),
-    "event[](queue).direction_deg": ("", "event.l.direction_deg=90"),
-    "event[](queue).spacing": ("", "event.l.spacing=1.1"),
-    "event[](queue).service": ("", "event.l.service=0.2"),
-    "event[](queue).goal": ("", "event.l.goal=[22, 9]"),
     "event[](queue).at_goal": (SERVED, f"{SERVED};event.l.at_goal=stand"),
 }  # fmt: skip
 
@@ -186,26 +142,22 @@ WHEN = {
 """For the merge; one model serves all three orders."""
 
 LAMP = "light.switch=[{ at = 0.2, gain = 0.5 }]"
-PICTURES = {
+PICTURES = {key_of(setting): ("", setting) for setting in (
+    "light.shadow=0.6", "light.penumbra=0.4", "light.drift=0.1", "light.flicker=0.05", "light.cloud=0.2",
+    "picture.texture=0.9", "picture.samples=3", "picture.noise=6", "picture.blur_px=1.5", "picture.jpeg=50",
+    "picture.shot=1", "picture.foliage=0.3", "picture.right_gain=1.2", "picture.right_roll_deg=1",
+    "picture.right_down_px=1",
+)} | {
     "light.sun_azimuth_deg": ("light.sun_azimuth_deg=0", "light.sun_azimuth_deg=90"),
     "light.sun_elevation_deg": ("light.sun_elevation_deg=30", "light.sun_elevation_deg=60"),
-    "light.shadow": ("", "light.shadow=0.6"), "light.penumbra": ("", "light.penumbra=0.4"),
-    "light.drift": ("", "light.drift=0.1"),
     "light.drift_time": ("light.drift=0.1", "light.drift=0.1;light.drift_time=2"),
-    "light.flicker": ("", "light.flicker=0.05"), "light.cloud": ("", "light.cloud=0.2"),
     "light.cloud_size": ("light.cloud=0.2", "light.cloud=0.2;light.cloud_size=2"),
     "light.cloud_speed": ("light.cloud=0.2", "light.cloud=0.2;light.cloud_speed=3"),
     "light.switch[].at": (LAMP, LAMP.replace("0.2", "0.4")),
     "light.switch[].gain": (LAMP, LAMP.replace("0.5", "0.7")),
     "light.switch[].ramp": (LAMP, LAMP.replace("gain", "ramp = 0.6, gain")),
-    "picture.texture": ("", "picture.texture=0.9"), "picture.samples": ("", "picture.samples=3"),
-    "picture.noise": ("", "picture.noise=6"), "picture.blur_px": ("", "picture.blur_px=1.5"),
-    "picture.jpeg": ("", "picture.jpeg=50"), "picture.shot": ("", "picture.shot=1"),
-    "picture.foliage": ("", "picture.foliage=0.3"),
     "picture.sway_px": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_px=4"),
     "picture.sway_time": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_time=2"),
-    "picture.right_gain": ("", "picture.right_gain=1.2"), "picture.right_roll_deg": ("", "picture.right_roll_deg=1"),
-    "picture.right_down_px": ("", "picture.right_down_px=1"),
 }  # fmt: skip
 """What pictures alone are made of: looked for in frame 3, at 0.4 s, without the noise; `right_` in right pictures."""
 

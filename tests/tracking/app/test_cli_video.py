@@ -118,29 +118,13 @@ def test_which_background_is_told(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("nowhere.png", ["no such file", "check the path"]),
-        ("text.png", ["no picture that can be read"]),
-        ("small.png", ["64×96 px", "96×64 px", "the same size"]),
-    ],
-)
-def test_a_picture_that_is_no_background_is_one_line(name, words, tmp_path, capsys, monkeypatch):
-    path = film(tmp_path)
-    text(tmp_path / "text.png")
-    cv2.imwrite(str(tmp_path / "small.png"), np.swapaxes(picture(0), 0, 1))
-    monkeypatch.setattr("sim.io.pictures.background_sample.BackgroundSample.__call__", None)
-    line = ["track", "blob", str(path), "--out", str(tmp_path / "out"), "--background", str(tmp_path / name)]
-    assert run(line) == 2
-    (error,) = capsys.readouterr().err.splitlines()
-    assert all(word in error for word in (name, "--background", *words)), error
-
-
-@pytest.mark.parametrize(
     ("option", "words"),
     [
         ("--background last:5", ["--background", "last:5", "first:N"]),
         ("--background first:61", ["--background", "60 frames", "61"]),
+        ("--background {}/nowhere.png", ["nowhere.png", "--background", "no such file", "check the path"]),
+        ("--background {}/text.png", ["text.png", "--background", "no picture that can be read"]),
+        ("--background {}/small.png", ["small.png", "--background", "64×96 px", "96×64 px", "the same size"]),
         ("--detections file", ["needs pixels or boxes", "film", "images"]),
         ("--detections image --set sensor.noise_m=3", ["sensor"]),
     ],
@@ -148,8 +132,10 @@ def test_a_picture_that_is_no_background_is_one_line(name, words, tmp_path, caps
 def test_options_that_cannot_work(option, words, tmp_path, capsys, monkeypatch):
     """Before a frame is read."""
     path = film(tmp_path)
+    text(tmp_path / "text.png")
+    cv2.imwrite(str(tmp_path / "small.png"), np.swapaxes(picture(0), 0, 1))
     monkeypatch.setattr("sim.io.pictures.background_sample.BackgroundSample.__call__", None)
-    assert run(["track", "blob", str(path), "--out", str(tmp_path / "out"), *option.split()]) == 2
+    assert run(["track", "blob", str(path), "--out", str(tmp_path / "out"), *option.format(tmp_path).split()]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert all(word in line for word in words), line
     assert not (tmp_path / "out").exists()

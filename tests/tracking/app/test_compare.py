@@ -67,30 +67,24 @@ def test_a_saved_baseline_gives_the_same_verdict(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("write", "words"),
     [
-        (lambda p: stored(p, BASE[:4]), "incomplete: got no s4, s5"),
-        (lambda p: stored(p, np.append(BASE, 0.5)), "incomplete: got s6, not in"),
-        (lambda p: stored(p, BASE, similarity="image"), "s0: similarity: got 'image'"),
+        (lambda p: stored(p, BASE[:4], truth="a"), "incomplete: got no s4, s5"),
+        (lambda p: stored(p, np.append(BASE, 0.5), truth="a"), "incomplete: got s6, not in"),
+        (lambda p: stored(p, BASE, similarity="image", truth="a"), "s0: similarity: got 'image'"),
+        (lambda p: stored(p, BASE, truth="b"), "s0: truth"),
         (lambda p: (p.write_text("{}"), str(p))[1], "got no scores of sequences"),
         (lambda p: (p.write_text('{"sequences": [{"name": "a"}, {"name": "a"}]}'), str(p))[1], "a sequence twice"),
     ],
 )
 def test_what_is_not_compared_ends_with_2(write, words, tmp_path, capsys):
-    before = stored(tmp_path / "a.json", BASE)
+    before = stored(tmp_path / "a.json", BASE, truth="a")
     assert run(["compare", before, write(tmp_path / "b.json")]) == 2
     assert words in capsys.readouterr().err
 
 
-def test_too_few(tmp_path, capsys):
-    one = stored(tmp_path / "a.json", BASE[:1])
-    assert run(["compare", one, one]) == 2
-    assert "too few" in capsys.readouterr().err
-    two = stored(tmp_path / "b.json", BASE[:2])
-    assert run(["compare", two, two, "--by", "HOTA"]) == 2
-    assert "HOTA: got known in 0 sequences" in capsys.readouterr().err
-    assert run(["compare", two, two, "--by", "hota"]) == 2
-
-
-def test_scores_of_other_data_are_not_compared(tmp_path, capsys):
-    before, now = (stored(tmp_path / name, BASE, truth=name) for name in ("a", "b"))
-    assert run(["compare", before, now]) == 2
-    assert "s0: truth" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("sequences", "by", "words"), [(1, [], "too few"), (2, ["--by", "HOTA"], "HOTA: got known in 0 sequences")]
+)
+def test_too_few_known_scores(sequences, by, words, tmp_path, capsys):
+    few = stored(tmp_path / "a.json", BASE[:sequences])
+    assert run(["compare", few, few, *by]) == 2
+    assert words in capsys.readouterr().err

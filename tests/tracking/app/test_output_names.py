@@ -8,10 +8,10 @@ import shutil
 import sys
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from sim.io.store.seal import read_manifest, with_hash
+from tests.recordings import mot_folder
 from tracking.app.cli import run
 
 ROWS = "1,1,10,10,20,40,1,1,1\n2,1,11,10,20,40,1,1,1\n3,1,12,10,20,40,1,1,1\n"
@@ -19,14 +19,8 @@ NAMES = ("../../escaped", "{outside}/absolute", "..", "con", "x" * 300, "a/b\\c"
 
 
 def recording(folder: Path, name: str) -> Path:
-    for part, text in (("gt/gt.txt", ROWS), ("seqinfo.ini", f"[Sequence]\nname={name}\nframeRate=5\n")):
-        (folder / part).parent.mkdir(parents=True, exist_ok=True)
-        (folder / part).write_text(text, encoding="utf-8")
-    (folder / "img1").mkdir()
-    _, picture = cv2.imencode(".png", np.full((96, 128, 3), 90, np.uint8))
-    for k in (1, 2, 3):
-        (folder / "img1" / f"{k:06d}.png").write_bytes(picture.tobytes())
-    return folder
+    shown = {f"img1/{k:06d}.png": np.full((96, 128, 3), 90, np.uint8) for k in (1, 2, 3)}
+    return mot_folder(folder, ROWS, ini=f"name={name}\nframeRate=5\n", pictures=shown)
 
 
 def tree(folder: Path) -> set[str]:

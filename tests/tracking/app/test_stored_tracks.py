@@ -17,6 +17,8 @@ from sim.io.source import open_source
 from sim.io.store.seal import read_run
 from sim.io.store.validate import validate
 from sim.types import Sequence
+from tests.processes import FAKE
+from tests.recordings import mot_folder
 from tests.refusals import refused
 from tests.short_scene import SCENE, write_short_scene
 from tracking.app.cli import run
@@ -107,15 +109,9 @@ def test_a_file_of_a_run_is_of_its_sequence(made, capsys, name):
     assert "tracks of another scene-s40001" in refused(capsys, "score", second, path)
 
 
-def recording(folder: Path, rows: str) -> Path:
-    (folder / "gt").mkdir(parents=True)
-    (folder / "gt" / "gt.txt").write_text(rows)
-    return folder
-
-
 def test_python_stores_what_was_tracked(tmp_path, capsys):
     """The same run.json as the command's, so that tracks of another recording are refused."""
-    walk = recording(tmp_path / "walk", ROWS)
+    walk = mot_folder(tmp_path / "walk", ROWS)
     (sequence,) = open_source(walk, fps=5.0)
     made = track("blob", sequence, detections="truth")
     made.write(tmp_path / "t", sequence)
@@ -130,13 +126,12 @@ def test_python_stores_what_was_tracked(tmp_path, capsys):
 
 def test_what_was_tracked_before_anybody_labelled_it(tmp_path):
     """Tracks of a recording without labels are scored with labels of that name."""
-    walk = tmp_path / "walk"
-    (walk / "det").mkdir(parents=True)
-    (walk / "det" / "det.txt").write_text("".join(f"{k},-1,{10 + k},10,20,40,1\n" for k in range(1, 9)))
+    rows = "".join(f"{k},-1,{10 + k},10,20,40,1\n" for k in range(1, 9))
+    walk = mot_folder(tmp_path / "walk", det=rows)
     line = ["track", "blob", str(walk), "--fps", "5", "--px-per-m", "24", "--out", str(tmp_path / "t")]
     assert run(line) == 0
     assert json.loads((tmp_path / "t" / "run.json").read_text())["truth_hash"] is None
-    recording(walk, ROWS)
+    mot_folder(walk, ROWS)
     assert run(["score", str(walk), str(tmp_path / "t"), "--fps", "5"]) == 0
 
 
@@ -229,9 +224,8 @@ def test_a_sequence_that_kills_its_worker_is_named(data: Path) -> None:
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_the_files_of_track_are_the_same(data: Path, tmp_path: Path) -> None:
-    tracker = f"{Path(__file__).resolve().parents[2] / 'fake_tracker.py'}:Nearest"
     for n in "12":
-        assert run(["track", tracker, str(data), "--workers", n, "--out", str(tmp_path / n)]) == 0
+        assert run(["track", FAKE, str(data), "--workers", n, "--out", str(tmp_path / n)]) == 0
     files = [p.relative_to(tmp_path / "1") for p in sorted((tmp_path / "1").rglob("*")) if p.is_file()]
     assert len(files) > 4 * 4
     for file in files:

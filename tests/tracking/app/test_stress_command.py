@@ -9,10 +9,9 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from tests.tuning_toys import TOY, write_scenes
+from tests.processes import FAKE
+from tests.tuning_toys import write_scenes
 from tracking.app.cli import run
-
-FAKE = f"{Path(TOY.rpartition(':')[0]).parent / 'fake_tracker.py'}:Nearest"
 
 
 @pytest.fixture

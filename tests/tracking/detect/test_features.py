@@ -8,7 +8,7 @@ import pytest
 
 from sim.scene.camera import project, project_pair
 from tests.sim.scene.test_stereo import rig
-from tracking.detect.features import Features, slopes
+from tracking.detect.features import Features, SpacePoints, slopes
 
 FPS, D = 30.0, 6.0
 SPACING, DEVIATIONS = 4.0, (0.3, 0.3, 0.15)
@@ -73,16 +73,27 @@ def test_they_keep_their_distance_and_stay_in_the_mask() -> None:
     assert (apart < SPACING - 1.5).mean() < 0.01
 
 
+CAMERA = rig(0.0, baseline=0.5)
+
+
+def watched(image: np.ndarray, area: tuple[slice, slice], disparity: np.ndarray) -> tuple[Features, SpacePoints]:
+    """Features after ten pictures of something in this area that does not move, and what was returned last."""
+    features, mask = Features(CAMERA, FPS), np.zeros((240, 320), bool)
+    mask[area] = True
+    for _ in range(10):
+        found = features.step(image, mask, disparity, *RULES)
+    return features, found
+
+
+BOARD = np.s_[60:180, 60:160]
+
+
 def test_a_point_without_disparity_is_not_returned() -> None:
-    camera = rig(0.0, baseline=0.5)
-    features, mask = Features(camera, FPS), np.zeros((240, 320), bool)
-    mask[60:180, 60:160] = True
     disparity = np.full((240, 320), D, np.float32)
     disparity[:, :110] = np.nan
-    for _ in range(9):
-        found = features.step(picture(0.0), mask, disparity, *RULES)
+    features, found = watched(picture(0.0), BOARD, disparity)
     assert (features.uv[:, 0] < 105).any()
-    u = (found.pos - camera.position) @ camera.rotation.T
+    u = (found.pos - CAMERA.position) @ CAMERA.rotation.T
     assert (160 + 246 * u[:, 0] / u[:, 2] > 108).all()
 
 
@@ -105,27 +116,19 @@ def test_the_stated_covariance_of_a_velocity_is_that_of_its_errors() -> None:
 
 def test_a_feature_lies_in_space_where_the_camera_sees_it() -> None:
     """Pixel (row, column) has its centre at (column + 0.5, row + 0.5); for OpenCV that place is (column, row)."""
-    camera = rig(0.0, baseline=0.5)
     spot = np.array([[150.5, 120.5, D]])
     v, u = np.mgrid[:240, :320] + 0.5
     image = np.rint(255 * np.exp(-((u - spot[0, 0]) ** 2 + (v - spot[0, 1]) ** 2) / 8)).astype(np.uint8)
-    mask, features = np.zeros((240, 320), bool), Features(camera, FPS)
-    mask[100:140, 130:170] = True
-    for _ in range(8):
-        found = features.step(image, mask, np.full((240, 320), D, np.float32), *RULES)
-    nearest = np.linalg.norm(project_pair(camera, found.pos) - spot, axis=1).min()
+    _, found = watched(image, np.s_[100:140, 130:170], np.full((240, 320), D, np.float32))
+    nearest = np.linalg.norm(project_pair(CAMERA, found.pos) - spot, axis=1).min()
     assert nearest < 0.1
 
 
 def test_a_disparity_that_is_mostly_noise_is_not_used() -> None:
-    camera = rig(0.0, baseline=0.5)
-    features, mask = Features(camera, FPS), np.zeros((240, 320), bool)
-    mask[60:180, 60:160] = True
     sd = DEVIATIONS[2]
     disparity = np.full((240, 320), 3.9 * sd, np.float32)
     disparity[:, :110] = 4.1 * sd
-    for _ in range(10):
-        found = features.step(picture(0.0), mask, disparity, *RULES)
+    _, found = watched(picture(0.0), BOARD, disparity)
     assert len(found) > 10
-    uv, _ = project(camera, found.pos)
+    uv, _ = project(CAMERA, found.pos)
     assert uv[:, 0].max() < 112

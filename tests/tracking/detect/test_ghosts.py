@@ -22,11 +22,15 @@ def picture(people, seed, look="colour"):
     return image if look == "colour" else np.repeat(image[..., 1:2], 3, -1)
 
 
+def trained(sample, fps=10.0, **settings):
+    """The pipeline that has seen these people in its sample: (people, look) of each picture."""
+    pictures = np.stack([picture(people, seed, look) for seed, (people, look) in enumerate(sample)])
+    context = Context(fps, SCALE, image_size=(painted.WIDE, painted.HIGH), background=pictures)
+    return Foreground(context, BackgroundSettings(**settings))
+
+
 def made(people, look="colour", fps=10.0, **settings):
-    sample = np.stack([picture(people, seed, look) for seed in range(20)])
-    return Foreground(
-        Context(fps, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample), BackgroundSettings(**settings)
-    )
+    return trained([(people, look)] * 20, fps, **settings)
 
 
 def watch(pipeline, people, seconds, look="colour", protected=None):
@@ -56,11 +60,10 @@ def test_who_stood_in_the_whole_sample_leaves_no_ghost(fps, look):
 def test_who_stood_through_a_part_of_the_sample_is_no_background(stay, look):
     """However long they stayed, if the others of the sample show the ground."""
     pair = [PERSON, (184.0, 181.0, TALL)]
-    sample = np.stack([picture(pair if k < 30 * stay else [], k, look) for k in range(30)])
-    context = Context(10.0, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample)
-    found = learned_ground(Foreground(context, BackgroundSettings()), look)[painted.shape(PERSON)]
+    sample = [(pair if k < 30 * stay else [], look) for k in range(30)]
+    found = learned_ground(trained(sample), look)[painted.shape(PERSON)]
     assert (found < 10).mean() > 0.95
-    kept = learned_ground(Foreground(context, BackgroundSettings(background="trained")), look)[painted.shape(PERSON)]
+    kept = learned_ground(trained(sample, background="trained"), look)[painted.shape(PERSON)]
     assert (kept < 10).mean() < 0.2 or stay < 0.5
 
 
@@ -72,9 +75,8 @@ def learned_ground(pipeline, look):
 
 def test_a_thing_that_passes_often_does_not_replace_the_ground():
     """Nor does a colour that a quarter of the frames show."""
-    sample = np.stack([picture([PERSON] if k % 4 == 0 else [], k) for k in range(40)])
-    context = Context(10.0, SCALE, image_size=(painted.WIDE, painted.HIGH), background=sample)
-    assert np.quantile(learned_ground(Foreground(context, BackgroundSettings()), "colour"), 0.999) < 10
+    pipeline = trained([([PERSON] if k % 4 == 0 else [], "colour") for k in range(40)])
+    assert np.quantile(learned_ground(pipeline, "colour"), 0.999) < 10
 
 
 def test_surroundings_are_filled_in_and_known_pixels_stay():

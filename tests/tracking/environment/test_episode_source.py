@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from tracking.environment.episode_cache import sources
+from tracking.environment.episodes import play, sources
 
 
 def test_a_suite_with_seeds_in_order():
@@ -53,3 +54,9 @@ def test_settings_without_a_scenario_are_refused():
     sequence = simulate(load("cross", ["duration=4"]), 3, 0, ())
     with pytest.raises(InputError, match="leave the settings out"):
         sources(sequence, set=["camera.fps=5"])
+
+
+def test_without_labels_there_is_no_episode():
+    bare = replace(simulate(load("cross", ["camera.fps=5", "duration=8"]), 3, 0, ()), load_truth=None)
+    with pytest.raises(InputError, match="nothing to score by"):
+        play("blob", sources(bare)[0])

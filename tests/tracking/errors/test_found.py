@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,15 +27,12 @@ def scene(k: int, swapped: bool = False) -> Scene:
     return Scene(people, {1: ([1, 2], None), 2: ([3, 4], None)})
 
 
-@dataclass
-class Made:
-    """A truth and tracks that equal it, frame by frame, to be spoiled."""
+SCENES = [scene(n) for n in range(FRAMES)]
 
-    scenes: list[Scene]
 
-    def sequence(self, **changes) -> Sequence:
-        made = truth(self.scenes, **changes)
-        return Sequence("made", made.fps, made.length, lambda: iter(()), load_truth=lambda: made)
+def sequence_of(scenes: list[Scene], **changes) -> Sequence:
+    made = truth(scenes, **changes)
+    return Sequence("made", made.fps, made.length, lambda: iter(()), load_truth=lambda: made)
 
 
 def changed(t: Tracks, keep=None, id=None, group=None, pos=None) -> Tracks:
@@ -121,9 +118,8 @@ def spans(kind: str, k: int, expected):
 @pytest.mark.parametrize("fault", FAULTS)
 def test_the_fault_and_nothing_else(fault: str, k: int) -> None:
     spoil, expected = FAULTS[fault]
-    scenes = [scene(n) for n in range(FRAMES)]
-    run = [spoil(t, k) for t in tracks(scenes)]
-    found = find_errors(Made(scenes).sequence(), run)
+    run = [spoil(t, k) for t in tracks(SCENES)]
+    found = find_errors(sequence_of(SCENES), run)
     listed = [(one.error.kind, one.error.start, one.error.end) for one in found.errors]
     assert sorted(listed) == sorted(spans(fault, k, expected))
     assert all(one.cost > 0 for one in found.errors)
@@ -131,16 +127,14 @@ def test_the_fault_and_nothing_else(fault: str, k: int) -> None:
 
 
 def test_the_truth_has_no_errors() -> None:
-    scenes = [scene(n) for n in range(FRAMES)]
-    found = find_errors(Made(scenes).sequence(), tracks(scenes))
+    found = find_errors(sequence_of(SCENES), tracks(SCENES))
     assert found.errors == []
     assert found.scores == {"HOTA": 1, "IDF1": 1, "group_F1": 1}
 
 
 def test_gains_add_up() -> None:
-    scenes = [scene(n) for n in range(FRAMES)]
-    run = [with_ghost(swapped(lost(regrouped(t, [1, 2], -1, 10, 20), 2, 25, 40), 30), 5, 50) for t in tracks(scenes)]
-    found = find_errors(Made(scenes).sequence(), run)
+    run = [with_ghost(swapped(lost(regrouped(t, [1, 2], -1, 10, 20), 2, 25, 40), 30), 5, 50) for t in tracks(SCENES)]
+    found = find_errors(sequence_of(SCENES), run)
     for key, score in found.scores.items():
         assert score + sum(row.gains[key] for row in found.causes) + found.left[key] == pytest.approx(1)
         assert found.left[key] == pytest.approx(0, abs=1e-9)
@@ -153,24 +147,30 @@ def meeting(n: int) -> Scene:
     return Scene(people, one if 20 <= n + 1 < 40 else {1: ([1, 2], None), 2: ([3, 4], None)})
 
 
+def reported(scenes: list[Scene], start: int, end: int, groups, unit: str) -> list[Tracks]:
+    """A tracker that reports other groups in some frames."""
+    told = [Scene(s.people, groups) if start <= k <= end else s for k, s in enumerate(scenes, 1)]
+    return tracks(told, unit=unit)
+
+
+TWO, ONE = {1: ([1, 2], None), 2: ([3, 4], None)}, {3: ([1, 2, 3, 4], None)}
+
+
+@pytest.mark.parametrize("unit", ["person", "group"])
 @pytest.mark.parametrize(
     ("start", "end", "groups", "kinds"),
     [
-        (20, 29, {1: [1, 2], 2: [3, 4]}, ["late merge"]),
-        (20, 39, {1: [1, 2], 2: [3, 4]}, ["missed merge"]),
-        (40, 49, {3: [1, 2, 3, 4]}, ["late split", "late split"]),
-        (40, 60, {3: [1, 2, 3, 4]}, ["missed split", "missed split"]),
+        (20, 29, TWO, ["late merge"]),
+        (20, 39, TWO, ["missed merge"]),
+        (40, 49, ONE, ["late split", "late split"]),
+        (40, 60, ONE, ["missed split", "missed split"]),
     ],
 )
-def test_merges_and_splits(start: int, end: int, groups: dict[int, list[int]], kinds: list[str]) -> None:
-    scenes = [meeting(n) for n in range(FRAMES)]
-    events = [event("merge", 20, [1, 2, 3, 4]), event("split", 40, [1, 2, 3, 4])]
-    label = {person: g for g, members in groups.items() for person in members}
-    run = [
-        changed(t, group=np.array([label[int(i)] for i in t.id])) if start <= t.index <= end else t
-        for t in tracks(scenes)
-    ]
-    found = find_errors(Made(scenes).sequence(events=tuple(events)), run)
+def test_merges_and_splits(start: int, end: int, groups, kinds: list[str], unit: str) -> None:
+    """Pairs are so far from each other that the hulls of whole groups hold no others."""
+    far = [Scene({i: (x, 3 * y) for i, (x, y) in meeting(n).people.items()}, meeting(n).given) for n in range(FRAMES)]
+    events = (event("merge", 20, [1, 2, 3, 4]), event("split", 40, [1, 2, 3, 4]))
+    found = find_errors(sequence_of(far, events=events), reported(far, start, end, groups, unit))
     assert [one.error.kind for one in found.errors] == kinds
     assert all(isinstance(one.error, GroupError) for one in found.errors)
     assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
@@ -178,29 +178,17 @@ def test_merges_and_splits(start: int, end: int, groups: dict[int, list[int]], k
 
 @pytest.mark.parametrize(
     ("cause", "changes"),
-    [
-        ("hidden", {"visibility": 0.1}),
-        ("edge", {"truncation": 0.6}),
-        ("tracker", {}),
-    ],
+    [("hidden", {"visibility": 0.1}), ("edge", {"truncation": 0.6}), ("tracker", {}), ("undetected", {})],
 )
 def test_causes_of_a_gap(cause: str, changes: dict[str, float]) -> None:
-    scenes = [scene(n) for n in range(FRAMES)]
-    made = truth(scenes)
+    made = truth(SCENES)
     gap = (made.id == 5) & (made.frame >= 20) & (made.frame <= 30)
     columns = {"visibility": np.ones(len(made.id)), "truncation": np.zeros(len(made.id))}
     for name, value in changes.items():
         columns[name][gap] = value
-    run = [lost(t, 5, 20, 30) for t in tracks(scenes)]
-    (one,) = find_errors(Made(scenes).sequence(**columns), run).errors
+    run = [lost(t, 5, 20, 30) for t in tracks(SCENES)]
+    (one,) = find_errors(sequence_of(SCENES, **columns), run, seen=run if cause == "undetected" else None).errors
     assert one.cause.name == cause
-
-
-def test_the_detector_did_not_see_the_person() -> None:
-    scenes = [scene(n) for n in range(FRAMES)]
-    run = [lost(t, 5, 20, 30) for t in tracks(scenes)]
-    (one,) = find_errors(Made(scenes).sequence(), run, seen=run).errors
-    assert one.cause.name == "undetected"
 
 
 @pytest.mark.parametrize(("where", "cause"), [((20.0, 20.0), "clutter"), ((0.5, 0.4), "double")])
@@ -208,7 +196,7 @@ def test_causes_of_a_ghost(where: tuple[float, float], cause: str) -> None:
     scenes = [scene(0) for _ in range(FRAMES)]
     run = [with_ghost(t, 20, 30) for t in tracks(scenes)]
     run = [t.replace(pos=np.where(t.id[:, None] == 99, np.array(where), t.pos)) for t in run]
-    (one,) = find_errors(Made(scenes).sequence(), run).errors
+    (one,) = find_errors(sequence_of(scenes), run).errors
     assert one.error.kind == "ghost"
     assert one.cause.name == cause
 
@@ -221,16 +209,9 @@ def test_causes_of_a_ghost(where: tuple[float, float], cause: str) -> None:
     ],
 )
 def test_what_cannot_be_compared_is_an_error_of_one_line(spoil, words: str) -> None:
-    scenes = [scene(n) for n in range(FRAMES)]
-    run = TrackingRun(tuple(spoil(t) for t in tracks(scenes)), {})
+    run = TrackingRun(tuple(spoil(t) for t in tracks(SCENES)), {})
     with pytest.raises(InputError, match=words):
-        errors_of_run(Made(scenes).sequence(px_per_m=np.nan), run)
-
-
-def hulls(scenes: list[Scene], start: int, end: int, groups: dict[int, tuple[list[int], object]]) -> list[Tracks]:
-    """A tracker of whole groups that reports other groups in some frames."""
-    told = [Scene(s.people, groups) if start <= k <= end else s for k, s in enumerate(scenes, 1)]
-    return tracks(told, unit="group")
+        errors_of_run(sequence_of(SCENES, px_per_m=np.nan), run)
 
 
 @pytest.mark.parametrize("k", range(12, 42, 6))
@@ -247,7 +228,7 @@ def hulls(scenes: list[Scene], start: int, end: int, groups: dict[int, tuple[lis
 )
 def test_errors_of_a_tracker_of_whole_groups(groups, kinds: list[str], k: int) -> None:
     scenes = [Scene({**scene(n).people, 5: (SPEED * n, 2.0), 6: (SPEED * n, -1.5)}, scene(n).given) for n in range(60)]
-    run, sequence = hulls(scenes, k, k + 9, groups), Made(scenes).sequence()
+    run, sequence = reported(scenes, k, k + 9, groups, "group"), sequence_of(scenes)
     found = find_errors(sequence, run)
     assert [(one.error.kind, one.error.start, one.error.end) for one in found.errors] == [(x, k, k + 9) for x in kinds]
     assert all(one.cost > 0 for one in found.errors)
@@ -256,26 +237,11 @@ def test_errors_of_a_tracker_of_whole_groups(groups, kinds: list[str], k: int) -
     assert found.scores["group_F1"] == pytest.approx(evaluate(sequence.truth, run)["group_F1"])
 
 
-@pytest.mark.parametrize(
-    ("start", "end", "groups", "kinds"),
-    [
-        (20, 29, {1: ([1, 2], None), 2: ([3, 4], None)}, ["late merge"]),
-        (40, 60, {3: ([1, 2, 3, 4], None)}, ["missed split", "missed split"]),
-    ],
-)
-def test_merges_and_splits_of_whole_groups(start: int, end: int, groups, kinds: list[str]) -> None:
-    far = [Scene({i: (x, 3 * y) for i, (x, y) in meeting(n).people.items()}, meeting(n).given) for n in range(FRAMES)]
-    events = (event("merge", 20, [1, 2, 3, 4]), event("split", 40, [1, 2, 3, 4]))
-    found = find_errors(Made(far).sequence(events=events), hulls(far, start, end, groups))
-    assert [one.error.kind for one in found.errors] == kinds
-    assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
-
-
 def test_a_part_of_a_group_that_is_found_is_an_error() -> None:
     people = {k: (0.0, 0.8 * k) for k in range(1, 6)}
     scenes = [Scene(people, {1: ([1, 2, 3, 4, 5], None)}) for _ in range(FRAMES)]
     run = [regrouped(t, [4, 5], 8, 20, 29) for t in tracks(scenes)]
-    (one,) = find_errors(Made(scenes).sequence(), run).errors
+    (one,) = find_errors(sequence_of(scenes), run).errors
     assert (one.error.kind, one.error.start, one.error.end) == ("divided group", 20, 29)
     assert one.error.people == (1, 2, 3, 4, 5)
 
@@ -284,7 +250,7 @@ def test_nothing_is_left_of_a_group_with_people_who_are_found_elsewhere() -> Non
     people = {1: (0.0, 0.0), 2: (0.0, 0.9), **{k: (0.0, 0.9 * k) for k in range(11, 17)}}
     scenes = [Scene(people, {1: ([1, 2], None), 2: (list(range(11, 17)), None)}) for _ in range(FRAMES)]
     run = [regrouped(t, [1, 2, 15, 16], 8, 20, 29) for t in tracks(scenes)]
-    found = find_errors(Made(scenes).sequence(), run)
+    found = find_errors(sequence_of(scenes), run)
     assert [one.error.kind for one in found.errors] == ["strangers joined"]
     assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
 
@@ -294,7 +260,7 @@ def test_a_pair_that_parts_late_is_a_late_split(end: int, kind: str) -> None:
     people = {1: (0.0, 0.0), 2: (0.0, 0.9)}
     scenes = [Scene(people, {1: ([1, 2], None)} if n < 39 else {}) for n in range(FRAMES)]
     run = [regrouped(t, [1, 2], 1, 40, end) for t in tracks(scenes)]
-    (one,) = find_errors(Made(scenes).sequence(events=(event("dissolve", 40, [1, 2]),)), run).errors
+    (one,) = find_errors(sequence_of(scenes, events=(event("dissolve", 40, [1, 2]),)), run).errors
     assert (one.error.kind, one.error.start, one.error.end) == (kind, 40, end)
 
 
@@ -307,7 +273,7 @@ def test_wrong_lineage(unit: str, more: list[int], kinds: list[str]) -> None:
     members = (1, 2, 3, 4, *more) if unit == "person" else ()
     told = GroupEvent("merge", 20, 20, 22, (1, 2, *more), (3,), members, (2.0, 1.35))
     run = [t.replace(own_events=("merge", "split")) for t in tracks(scenes, [told], unit=unit)]
-    found = find_errors(Made(scenes).sequence(events=(true,)), run)
+    found = find_errors(sequence_of(scenes, events=(true,)), run)
     assert [one.error.kind for one in found.errors] == kinds
     for one in found.errors:
         assert (one.error.start, one.error.end, one.error.people) == (20, 22, (1, 2, 3, 4))
@@ -319,20 +285,18 @@ def test_wrong_lineage(unit: str, more: list[int], kinds: list[str]) -> None:
     [("image", 1.5, "light"), ("image", 1.05, "tracker"), ("file", 1.5, "tracker")],
 )
 def test_a_change_of_the_light_is_a_cause_of_errors_from_pixels(mode: str, change: float, cause: str) -> None:
-    scenes = [scene(n) for n in range(FRAMES)]
     light = np.where(np.arange(FRAMES) < 24, 1.0, change)
-    sequence = replace(Made(scenes).sequence(), load_light=lambda: light)
+    sequence = replace(sequence_of(SCENES), load_light=lambda: light)
     run = TrackingRun(
-        tuple(lost(regrouped(t, [1, 2], -1, 25, 30), 5, 25, 30) for t in tracks(scenes)), {"detections": mode}
+        tuple(lost(regrouped(t, [1, 2], -1, 25, 30), 5, 25, 30) for t in tracks(SCENES)), {"detections": mode}
     )
     found = find_errors(sequence, run)
     assert {one.error.kind: one.cause.name for one in found.errors} == {"fragment": cause, "missed group": cause}
 
 
 def test_the_table_by_cause_needs_no_single_costs() -> None:
-    scenes = [scene(n) for n in range(FRAMES)]
-    run = [with_ghost(swapped(lost(regrouped(t, [1, 2], -1, 10, 20), 2, 25, 40), 30), 5, 50) for t in tracks(scenes)]
-    with_costs, without = (find_errors(Made(scenes).sequence(), run, costs=costs) for costs in (EVERY, 0))
+    run = [with_ghost(swapped(lost(regrouped(t, [1, 2], -1, 10, 20), 2, 25, 40), 30), 5, 50) for t in tracks(SCENES)]
+    with_costs, without = (find_errors(sequence_of(SCENES), run, costs=costs) for costs in (EVERY, 0))
     assert without.causes == with_costs.causes
     assert without.left == with_costs.left
     assert all(one.cost is None for one in without.errors)
@@ -341,7 +305,6 @@ def test_the_table_by_cause_needs_no_single_costs() -> None:
 
 
 def test_a_page_is_written_without_errors_that_cannot_be_found() -> None:
-    scenes = [scene(n) for n in range(FRAMES)]
-    run = TrackingRun(tuple(t.replace(plane="image") for t in tracks(scenes)), {})
+    run = TrackingRun(tuple(t.replace(plane="image") for t in tracks(SCENES)), {})
     with pytest.warns(UserWarning, match="made: the page shows no errors"):
-        assert shown_errors(Made(scenes).sequence(), run).errors == []
+        assert shown_errors(sequence_of(SCENES), run).errors == []

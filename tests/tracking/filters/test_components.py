@@ -13,10 +13,6 @@ LINK = 1.5
 RULE = Constraint(LINK, 9.21, 0.09 * np.eye(2), 3.0)
 
 
-def same(label, expected):
-    return np.array_equal(label, expected)
-
-
 def random_set(r):
     """Up to 16 points in clumps or all over, with weights; a rule that leaves some of them apart."""
     count = int(r.integers(1, 14))
@@ -40,7 +36,7 @@ def test_every_prefix_of_random_sets() -> None:
         points, weights, rule = random_set(r)
         start = int(r.integers(0, len(points) + 1))
         found = prefixes(points, weights, start, rule)
-        assert same(found, reference.prefixes(points, weights, start, rule)), seed
+        assert np.array_equal(found, reference.prefixes(points, weights, start, rule)), seed
         verdicts += found.tolist()
     assert 0.2 < np.mean(verdicts) < 0.8
 
@@ -50,8 +46,8 @@ def test_partitions_of_random_sets() -> None:
     for seed in range(300):
         points, weights, rule = random_set(np.random.default_rng(seed))
         label, group = linked(points, rule.link), partition(points, weights, rule)
-        assert same(label, reference.linked(points, rule.link)), seed
-        assert same(group, reference.partition(points, weights, rule)), seed
+        assert np.array_equal(label, reference.linked(points, rule.link)), seed
+        assert np.array_equal(group, reference.partition(points, weights, rule)), seed
         joined += group.max() < label.max()
         noise += group.min() < 0
     assert min(joined, noise) > 30
@@ -63,7 +59,7 @@ def test_the_order_of_points_changes_nothing(seed: int) -> None:
     points, weights, rule = random_set(r)
     order = r.permutation(len(points))
     group, moved = partition(points, weights, rule), partition(points[order], weights[order], rule)
-    assert same(reference.by_first(group[order]), moved)
+    assert np.array_equal(reference.by_first(group[order]), moved)
     verdict = [prefixes(p, w, len(p), rule)[0] for p, w in ((points, weights), (points[order], weights[order]))]
     assert verdict[0] == verdict[1]
 

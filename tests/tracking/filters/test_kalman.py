@@ -46,17 +46,6 @@ def test_bank_equals_filterpy_over_random_misses(seed):
             assert np.allclose(bank[kalman.VAR :, i], expected, rtol=1e-9, atol=1e-9)
 
 
-def test_miss_leaves_the_prediction_exactly():
-    r = np.random.default_rng(0)
-    dt, sigma, noise, var, rate_var, place = make(r)
-    bank = kalman.born(place, var, rate_var)
-    bank[kalman.RATE] = r.normal(size=place.shape)
-    expected = place + dt * bank[kalman.RATE]
-    kalman.predict(bank, dt, kalman.white_acceleration(dt, sigma))
-    kalman.update(bank, np.zeros(0, np.int64), np.zeros((0, 4)), noise)
-    assert np.array_equal(bank[kalman.PLACE], expected)
-
-
 @pytest.mark.parametrize("index", [0.01, 0.1, 1.0, 5.0])
 def test_asymptote_is_the_riccati_solution_and_the_limit_of_updates(index):
     dt, noise = 0.2, 0.7

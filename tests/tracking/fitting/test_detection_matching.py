@@ -16,6 +16,7 @@ from sim.detector.draws import correlated_normals
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth
+from tests.recordings import mot_folder
 from tracking.fitting.detection_matching import (
     MatchedRecording,
     box_intersections,
@@ -72,14 +73,10 @@ def test_hits_misses_and_false_alarms() -> None:
 
 @pytest.mark.filterwarnings("ignore:.*rows of class 7 are left out")
 def test_what_motchallenge_leaves_out_is_no_false_alarm(tmp_path: Path) -> None:
-    for name in ("gt", "det"):
-        (tmp_path / name).mkdir()
     person, static, other = "1,1,100,100,40,100,1,1,1", "1,2,300,100,40,100,1,7,1", "1,3,500,100,40,100,0,3,1"
-    (tmp_path / "gt" / "gt.txt").write_text("\n".join([person, static, other]))
     boxes = [f"1,-1,{x},100,40,100,0.9" for x in (100, 300, 500, 10)]
-    (tmp_path / "det" / "det.txt").write_text("\n".join(boxes))
-    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nname=x\nframeRate=10\nseqLength=1\nimWidth=640\nimHeight=480\n")
-    m = match_sequence(open_source(tmp_path)[0])
+    ini = "name=x\nframeRate=10\nseqLength=1\nimWidth=640\nimHeight=480\n"
+    m = match_sequence(open_source(mot_folder(tmp_path, "\n".join([person, static, other]), "\n".join(boxes), ini))[0])
     assert m.box[:, 0].tolist() == [100.0, 10.0]
     assert m.false.tolist() == [False, True]
     assert m.match.tolist() == [0]

@@ -9,9 +9,8 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tests import reference_belief as slow
-from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs, pair_probabilities
+from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
 from tracking.grouping.grouping_choice import belief_groups, groups_of_steps
-from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.pair_evidence import NAMES, evidence
 
 
@@ -108,17 +107,6 @@ def test_a_chain_of_strangers_is_no_group_and_a_stretched_group_is_one():
         assert max(map(len, parts(label[0]))) == size
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_nothing_looks_ahead(seed):
-    pos, belief = places(seed), default_belief()
-    time = times(pos, 0.4)
-    whole, part = pair_beliefs(pos, time, 0.4, belief), pair_beliefs(pos[:8], time[:8], 0.4, belief)
-    count = len(part.step)
-    assert (whole.step[:count] == part.step).all()
-    assert whole.step[count:].min() == 8
-    np.testing.assert_array_equal(whole.log_odds[:count], part.log_odds)
-
-
 def test_the_file_is_read_as_written(tmp_path):
     belief = default_belief()
     (tmp_path / "b.toml").write_text(belief.toml_text("two\nlines"))
@@ -156,18 +144,6 @@ def scene():
     truth = simulate(load("mixed"), 20000, streams=()).truth
     r = np.random.default_rng(0)
     return truth.replace(pos=truth.pos + r.normal(0, 0.02, truth.pos.shape), vel=None, box=None)
-
-
-def test_probabilities_are_those_of_the_pairs(scene):
-    people = people_as_tracks(scene)
-    found = pair_probabilities(people, scene.fps, 1.0, default_belief())
-    assert ((found.probability > 0) & (found.probability < 1)).all()
-    assert (found.a < found.b).all()
-    assert found.frame.min() == 1
-    label = {(f, p): g for f, p, g in zip(scene.frame.tolist(), scene.id.tolist(), scene.group.tolist(), strict=True)}
-    rows = zip(found.frame.tolist(), found.a.tolist(), found.b.tolist(), strict=True)
-    same = np.array([label[f, a] == label[f, b] >= 0 for f, a, b in rows])
-    assert found.probability[same].mean() > found.probability[~same].mean() + 0.4
 
 
 def test_stay_and_come_decide_how_long_links_last(scene):

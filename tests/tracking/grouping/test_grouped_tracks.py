@@ -4,18 +4,13 @@ import numpy as np
 import pytest
 
 from sim.types import GroupEvent, Groups, Tracks
+from tests.reference_sense import paced
 from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.grouping.link_rule import LinkRule
 
 FPS = 10.0
 RULE = LinkRule()
 """Whose times follow from the paths by hand."""
-
-
-def walk(*pieces, start=(0.0, 0.0)):
-    """A path from velocities: pieces (seconds, (vx, vy))."""
-    vel = np.concatenate([np.tile(np.array(v, float), (round(s * FPS), 1)) for s, v in pieces])
-    return np.array(start) + np.concatenate([[[0, 0]], np.cumsum(vel[:-1], axis=0)]) / FPS, vel
 
 
 def tracks(people, *, scale=1.0, there=None, boxes=False, group=None, vel=True, ids=None):
@@ -43,18 +38,18 @@ def events(made):
 
 
 def side_by_side(seconds=20.0, n=2):
-    return [walk((seconds, (1, 0)), start=(0, 0.7 * k)) for k in range(n)]
+    return [paced((seconds, (1, 0)), start=(0, 0.7 * k)) for k in range(n)]
 
 
 def joining(speed=0.4, near=0.8):
     """A pair, and one who drifts towards it: 6 - 0.4 t < 1.5 from frame 114 on."""
     seconds = round((6 - near) / speed, 1)
-    return [*side_by_side(), walk((seconds, (1, -speed)), (20 - seconds, (1, 0)), start=(0, 6.7))]
+    return [*side_by_side(), paced((seconds, (1, -speed)), (20 - seconds, (1, 0)), start=(0, 6.7))]
 
 
 def leaving():
     """A pair, and one 0.69 m beside it who drifts away at 0.4 m/s from 5 s on."""
-    return [*side_by_side(), walk((5, (1, 0)), (15, (1, 0.4)), start=(0, 1.39))]
+    return [*side_by_side(), paced((5, (1, 0)), (15, (1, 0.4)), start=(0, 1.39))]
 
 
 def test_a_pair_is_a_group_once_it_is_acquainted():
@@ -103,14 +98,14 @@ def test_what_a_tracker_says_is_kept():
 
 def test_crossings_and_queues_of_tracks():
     """The hulls come within 1 m in frame 44 and part after frame 58; 20 frames later it is known."""
-    people = [walk((12, (v, 0)), start=(x, 5 + y)) for x, v in ((0, 1), (10, -1)) for y in (0, 0.7)]
+    people = [paced((12, (v, 0)), start=(x, 5 + y)) for x, v in ((0, 1), (10, -1)) for y in (0, 0.7)]
     found = events(derive(tracks(people), FPS))
     assert [(i, kind, start, members) for i, kind, start, _, _, members in found] == [(78, "cross", 44, (1, 2, 3, 4))]
-    still = [walk((5, (-1, 0)), (7, (0, 0)), start=(5 + 0.8 * k, 0)) for k in range(3)]
+    still = [paced((5, (-1, 0)), (7, (0, 0)), start=(5 + 0.8 * k, 0)) for k in range(3)]
     (row,) = [e for e in events(derive(tracks(still), FPS)) if e[1] == "queue"]
     assert row[2] == 51
     assert row[0] == 120, "it lasts to the end, and is not known before"
-    gone = [walk((5, (-1, 0)), (7, (0, 0)), (8, (0, 1)), start=(5 + 0.8 * k, 0)) for k in range(3)]
+    gone = [paced((5, (-1, 0)), (7, (0, 0)), (8, (0, 1)), start=(5 + 0.8 * k, 0)) for k in range(3)]
     (row,) = [e for e in derive(tracks(gone), FPS) for e in e.events if e.kind == "queue"]
     assert row.emitted == row.end + 30 + 15, "3 s until leaving is told from advancing, 1.5 s for a line that is lost"
 
@@ -136,28 +131,22 @@ def test_a_group_waits_for_a_member_who_is_not_seen():
 
 
 @pytest.mark.parametrize(
-    ("changed", "told"),
+    ("people", "changed", "told"),
     [
-        (LinkRule(near=1.0), 142),  # 6 - 0.4 t < 1 from frame 127 on
-        (LinkRule(share=1.0), 133),
-        (LinkRule(window=1.0), 121),
-        (LinkRule(alike=0.3), 146),  # not before it stops drifting, in frame 131
+        (joining(), LinkRule(near=1.0), 142),  # 6 - 0.4 t < 1 from frame 127 on
+        (joining(), LinkRule(share=1.0), 133), (joining(), LinkRule(window=1.0), 121),
+        (joining(), LinkRule(alike=0.3), 146),  # not before it stops drifting, in frame 131
+        (leaving(), LinkRule(apart=2.0), 103), (leaving(), LinkRule(patience=1.0), 106),
+        (leaving(), LinkRule(diverge=0.3), 91),
     ],
-)
-def test_parameters_of_joining(changed, told):
-    assert [e[0] for e in events(derive(tracks(joining()), FPS, rule=changed))] == [told]
-
-
-@pytest.mark.parametrize(
-    ("changed", "told"), [(LinkRule(apart=2.0), 103), (LinkRule(patience=1.0), 106), (LinkRule(diverge=0.3), 91)]
-)
-def test_parameters_of_parting(changed, told):
-    assert [e[0] for e in events(derive(tracks(leaving()), FPS, rule=changed))] == [told]
+)  # fmt: skip
+def test_parameters_of_the_rule(people, changed, told):
+    assert [e[0] for e in events(derive(tracks(people), FPS, rule=changed))] == [told]
 
 
 def passing():
     """Two pairs that walk through each other."""
-    return [walk((12, (v, 0)), start=(x, 5 + y)) for x, v in ((0, 1), (10, -1)) for y in (0, 0.7)]
+    return [paced((12, (v, 0)), start=(x, 5 + y)) for x, v in ((0, 1), (10, -1)) for y in (0, 0.7)]
 
 
 def test_named_groups_without_events_get_them():
@@ -182,13 +171,3 @@ def test_a_kind_that_is_told_is_not_derived_but_the_others_are():
     for told, kinds in ((merge, ["merge", "cross"]), (cross, ["cross"]), (queue, ["queue", "cross"])):
         given = [t.replace(events=(told,) if t.index == 6 else (), derived=False) for t in named]
         assert [e[1] for e in events(with_groups(given, FPS, 1.0))] == kinds
-
-
-@pytest.mark.parametrize("people", [side_by_side(), joining(), leaving(), passing()])
-def test_deriving_again_changes_nothing(people):
-    """Also of beginnings in which nothing has happened yet."""
-    made = derive(tracks(people), FPS)
-    for length in (9, 40, 100, len(made)):
-        again = derive(made[:length], FPS)
-        assert events(again) == events(made[:length])
-        assert [t.group.tolist() for t in again] == [t.group.tolist() for t in made[:length]]

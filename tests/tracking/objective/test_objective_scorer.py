@@ -29,8 +29,12 @@ def crowd():
     return simulate(load("crowd", ["camera.fps=5", "duration=10", "sensor.clutter_rate=2"]), 3, 0, ())
 
 
-def same(found, expected):
+def agree(truth, answers, scale, fps=5.0, last=None):
+    """Whether the scores of the first answers are those of `evaluate`, which are returned."""
+    found = ObjectiveScorer(truth).scores(answers[:last], scale)
+    expected = evaluate(truth, with_groups(answers[:last], fps, scale), frames=last)
     assert [found[k] for k in KEYS] == pytest.approx([expected[k] for k in KEYS], abs=1e-12, nan_ok=True)
+    return expected
 
 
 def raw(name, sequence, **options):
@@ -48,38 +52,25 @@ def raw(name, sequence, **options):
 def test_on_scenes(name, scenario):
     sequence = simulate(load(scenario, ["camera.fps=5"]), 7, 0, ())
     made, scale = raw(name, sequence)
-    scorer = ObjectiveScorer(sequence.truth)
     for last in (1, 9, 30, len(made)):
-        answers = with_groups(made[:last], sequence.fps, scale)
-        same(scorer.scores(made[:last], scale), evaluate(sequence.truth, answers, frames=last))
-    assert 0 < scorer.scores(made, scale)["objective"] < 1
+        whole = agree(sequence.truth, made, scale, last=last)
+    assert 0 < whole["objective"] < 1
 
 
 @pytest.mark.parametrize("name", ["blob", "group-pda"])
 def test_in_a_crowd_with_false_alarms(name, crowd):
-    made, scale = raw(name, crowd)
-    same(ObjectiveScorer(crowd.truth).scores(made, scale), evaluate(crowd.truth, with_groups(made, crowd.fps, scale)))
+    agree(crowd.truth, *raw(name, crowd))
 
 
 def test_in_the_image(crowd):
-    flat = dataclasses.replace(crowd, camera=None, px_per_m=40.0, load_truth=lambda: in_image(crowd.truth))
-    made, scale = raw("blob", flat)
+    labels = dataclasses.replace(crowd.truth, px_per_m=40.0)
+    flat = dataclasses.replace(crowd, camera=None, px_per_m=40.0, load_truth=lambda: labels)
+    truth, (made, scale) = flat.truth, raw("blob", flat)
     assert made[5].plane == "image"
-    expected = evaluate(flat.truth, with_groups(made, flat.fps, scale))
-    same(ObjectiveScorer(flat.truth).scores(made, scale), expected)
-    assert expected["group_F1"] > 0
+    assert agree(truth, made, scale)["group_F1"] > 0
     unboxed = [t.replace(box=None) for t in made]
-    same(
-        ObjectiveScorer(flat.truth).scores(unboxed, scale), evaluate(flat.truth, with_groups(unboxed, flat.fps, scale))
-    )
-    same(
-        ObjectiveScorer(flat.truth).scores(unboxed, np.nan),
-        evaluate(flat.truth, with_groups(unboxed, flat.fps, np.nan)),
-    )
-
-
-def in_image(truth):
-    return dataclasses.replace(truth, px_per_m=40.0)
+    for unit in (scale, np.nan):
+        agree(truth, unboxed, unit)
 
 
 def test_what_a_tracker_names_itself(crowd):
@@ -88,17 +79,14 @@ def test_what_a_tracker_names_itself(crowd):
     labelled = [t.replace(group=np.where(t.id % 3 == 0, t.id // 9, -1)) for t in made]
     derived = with_groups(made, crowd.fps, scale)
     own = [t.replace(group=np.full(len(t.id), -1), derived=False, events=()) for t in derived]
-    scorer = ObjectiveScorer(crowd.truth)
     for answers in (labelled, derived, own):
-        same(scorer.scores(answers, scale), evaluate(crowd.truth, with_groups(answers, crowd.fps, scale)))
+        agree(crowd.truth, answers, scale)
 
 
 def test_wholes_of_every_shape(crowd):
     """Hulls without vertices, of one or two, clockwise, not convex, on top of each other; no groups at all."""
     made, scale = raw("group-pda", crowd)
-    rng = np.random.default_rng(4)
-
-    answers = []
+    rng, answers = np.random.default_rng(4), []
     for t in made:
         g, hulls = t.groups, []
         for h in g.hull:
@@ -108,7 +96,7 @@ def test_wholes_of_every_shape(crowd):
         answers.append(t.replace(groups=g.replace(hull=tuple(hulls))))
     answers[3] = answers[3].replace(groups=None)
     answers[4] = answers[4].replace(groups=Groups.none())
-    same(ObjectiveScorer(crowd.truth).scores(answers, scale), evaluate(crowd.truth, answers))
+    agree(crowd.truth, answers, scale)
 
 
 def test_nothing_answered_and_nothing_labelled(crowd):
@@ -116,9 +104,9 @@ def test_nothing_answered_and_nothing_labelled(crowd):
     assert np.isnan(scorer.scores([], 1.0)["group_F1"]) or scorer.scores([], 1.0)["group_F1"] == 0
     bare = dataclasses.replace(crowd.truth, groups=None, groups_px=None, events=None)
     made, scale = raw("blob", crowd)
-    same(ObjectiveScorer(bare).scores(made, scale), evaluate(bare, made))
+    agree(bare, made, scale)
     part = dataclasses.replace(crowd.truth, labelled=np.arange(crowd.truth.length) % 3 == 0)
-    same(ObjectiveScorer(part).scores(made, scale), evaluate(part, with_groups(made, crowd.fps, scale)))
+    agree(part, made, scale)
 
 
 @settings(max_examples=20, deadline=None)

@@ -61,14 +61,6 @@ class Stranger:
         return Tracks(frame.index, frame.t, plane, "person", id, alone, detections.pos, vel, cov, groups=groups)
 
 
-class Wrong(Stranger):
-    """Forgets the velocities in frame 3."""
-
-    def step(self, frame, detections):
-        made = super().step(frame, detections)
-        return made if frame.index < 3 else made.replace(vel=np.zeros((1, 2)))
-
-
 def test_file_mode_never_looks_at_the_truth():
     run = track("blob", source())
     assert isinstance(run, TrackingRun)
@@ -157,27 +149,6 @@ def test_params_by_config_values_and_file(tmp_path):
         track("blob", source(), params={"gat": 0.9})
     with pytest.raises(InputError, match="a tracker with parameters"):
         track(Stranger, source(), params={"gate": 0.9})
-
-
-def test_a_strangers_wrong_answer_is_named():
-    with pytest.raises(WorkError, match="Wrong: frame 3: got vel of shape"):
-        track(Wrong, source())
-
-
-@pytest.mark.parametrize(
-    ("method", "words"),
-    [
-        ("__init__", r"Raises: before the first frame: got ValueError: boo; .*__init__\(\)"),
-        ("reset", r"Raises: made: got ValueError: boo; .*reset\(\)"),
-        ("step", r"Raises: made, frame 1: got ValueError: boo; .*step\(\)"),
-    ],
-)
-def test_a_stranger_that_raises_is_named_in_one_line(method, words):
-    def boo(self, *given):
-        raise ValueError("boo\nand more")
-
-    with pytest.raises(WorkError, match=words):
-        track(type("Raises", (Stranger,), {method: boo}), source())
 
 
 def test_combinations_that_cannot_work():

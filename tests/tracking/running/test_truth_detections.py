@@ -8,7 +8,8 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from sim.types import Detections, Sequence, Tracks
+from sim.types import Detections, Sequence
+from tests.tracking.running.test_run import Stranger
 from tracking.running.detection_mode import check_detections, choose_mode, from_truth
 from tracking.running.prepare import prepare
 from tracking.running.run import track
@@ -19,22 +20,7 @@ def merge() -> Sequence:
     return simulate(load("merge", ["camera.fps=5"]), 40_001)
 
 
-class RowNumbers:
-    """Takes the number of a row for the id of a person."""
-
-    needs = ("boxes", "points")
-
-    def reset(self, context, seed):
-        pass
-
-    def step(self, frame, detections):
-        n = len(detections.pos)
-        alone, cov, unknown = np.full(n, -1), np.tile(np.eye(4), (n, 1, 1)), np.full((n, 2), np.nan)
-        plane, pos, box = detections.plane, detections.pos, detections.box
-        return Tracks(frame.index, frame.t, plane, "person", np.arange(n), alone, pos, unknown, cov, box)
-
-
-class Writing(RowNumbers):
+class Writing(Stranger):
     """Tries to overwrite everything that it is given and all arrays behind it."""
 
     def step(self, frame, detections):
@@ -60,7 +46,7 @@ def test_the_order_depends_on_seed_and_frame_alone(merge):
 
 @pytest.mark.parametrize("mode", ["truth", "file"])
 def test_arrays_lead_to_no_other_frame(merge, mode):
-    frames = prepare(RowNumbers, merge, detections=mode).frames_given
+    frames = prepare(Stranger, merge, detections=mode).frames_given
     for frame in frames:
         for array in (frame.detections.pos, frame.detections.box, frame.detections.score):
             assert array.base is None
@@ -70,9 +56,9 @@ def test_arrays_lead_to_no_other_frame(merge, mode):
 @pytest.mark.parametrize("mode", ["truth", "file"])
 def test_what_a_tracker_writes_reaches_neither_truth_nor_the_next_run(merge, mode):
     before = merge.truth.pos.copy(), merge.truth.box.copy()
-    clean = track(RowNumbers, merge, detections=mode)
+    clean = track(Stranger, merge, detections=mode)
     track(Writing, merge, detections=mode)
-    again = track(RowNumbers, merge, detections=mode)
+    again = track(Stranger, merge, detections=mode)
     assert np.array_equal(merge.truth.pos, before[0])
     assert np.array_equal(merge.truth.box, before[1])
     assert all(np.array_equal(a.pos, b.pos) for a, b in zip(clean, again, strict=True))

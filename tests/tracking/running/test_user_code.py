@@ -10,6 +10,7 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from sim.types import Detections, Frame, Sequence
+from tests.tracking.running.test_run import Stranger
 from tracking.app.cli import run
 from tracking.config import Config, param
 from tracking.running.interrupts import recorded_interrupts
@@ -53,7 +54,11 @@ class Tracker:
         none, ids = np.zeros((0, 2)), np.zeros(0, int)
         return Tracks(frame.index, frame.t, detections.plane, "person", ids, ids, none, none, np.zeros((0, 4, 4)))
 """
-STATEMENTS = ["sys.exit(0)", "raise KeyboardInterrupt", "raise GeneratorExit"]
+STATEMENTS = {
+    "sys.exit(0)": "SystemExit: 0", "raise KeyboardInterrupt": "KeyboardInterrupt",
+    "raise GeneratorExit": "GeneratorExit", "raise ValueError('boo\\nand more')": "ValueError: boo;",
+}  # fmt: skip
+"""What a part of a tracker does, and what is said of it."""
 
 
 def command(tmp_path, part, statement):
@@ -74,8 +79,7 @@ def test_track_fails_with_one_line(tmp_path, capsys, part, statement):
     assert not tmp_path.joinpath("out").exists()
     lines = printed.err.strip().splitlines()
     assert len(lines) == 1
-    kind = {"s": "SystemExit: 0", "K": "KeyboardInterrupt", "G": "GeneratorExit"}[statement.removeprefix("raise ")[0]]
-    assert kind in lines[0]
+    assert STATEMENTS[statement] in lines[0]
     assert "mine" in lines[0]
     assert "bug" not in lines[0]
     if part == "step":
@@ -93,12 +97,7 @@ def test_ctrl_c_stays_an_interruption_whatever_the_tracker_makes_of_it(tmp_path,
         assert "interrupted" in capsys.readouterr().err
 
 
-class Abrupt:
-    needs = ("points",)
-
-    def reset(self, context, seed):
-        pass
-
+class Abrupt(Stranger):
     def step(self, frame, detections):
         raise self.error
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sim.types import Tracks, Truth
+from tests.recordings import mot_folder
 from tracking.app.cli import run
 from tracking.scoring.misreading import likely_misreading
 
@@ -131,16 +132,6 @@ def test_positions(wrong, words):
     assert words in text.replace("Give", "give")
 
 
-def recording(tmp_path, rows):
-    folder = tmp_path / "cam"
-    (folder / "gt").mkdir(parents=True)
-    (folder / "seqinfo.ini").write_text(
-        f"[Sequence]\nname=cam\nframeRate=25\nseqLength={FRAMES}\nimWidth=1920\nimHeight=1080\n"
-    )
-    np.savetxt(folder / "gt" / "gt.txt", np.c_[rows, np.ones((len(rows), 3))], fmt="%.6g", delimiter=",")
-    return folder
-
-
 def score(capsys, *words):
     import json
 
@@ -152,7 +143,9 @@ def score(capsys, *words):
 
 def test_the_warning_of_score_and_its_remedy(tmp_path, capsys):
     rows = walk()
-    folder, text = recording(tmp_path, rows), tmp_path / "res.txt"
+    ini = f"name=cam\nframeRate=25\nseqLength={FRAMES}\nimWidth=1920\nimHeight=1080\n"
+    folder, text = mot_folder(tmp_path / "cam", "", ini=ini), tmp_path / "res.txt"
+    np.savetxt(folder / "gt" / "gt.txt", np.c_[rows, np.ones((len(rows), 3))], fmt="%.6g", delimiter=",")
     wrong = np.c_[rows[:, :2], corners(rows[:, 2:]) / 2, np.ones(len(rows))]
     np.savetxt(text, wrong, fmt="%.6g", delimiter=",")
     low, told = score(capsys, folder, text)

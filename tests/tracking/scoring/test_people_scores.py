@@ -64,17 +64,3 @@ def test_equal_to_trackeval_in_a_crowd(seed: int) -> None:
 )  # fmt: skip
 def test_equal_to_trackeval_at_the_edges(case) -> None:
     assert_equal_to_trackeval(*case)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_numbers_of_ids_and_order_of_rows_change_nothing(seed: int) -> None:
-    true, est, similarity = random_case(seed)
-    r = np.random.default_rng(seed)
-    other = r.permutation(10_000)
-    moved = []
-    for i, j, s in zip(true, est, similarity, strict=True):
-        a, b = r.permutation(len(i)), r.permutation(len(j))
-        moved.append((other[i[a]], other[j[b]], s[a][:, b]))
-    assert people_scores(matrix_pairs(*zip(*moved, strict=True))) == pytest.approx(
-        people_scores(matrix_pairs(true, est, similarity)), abs=1e-12
-    )

@@ -31,16 +31,8 @@ def test_truth_as_tracks_is_perfect(merge: Truth, names: tuple[str, ...]) -> Non
     true = columns(merge, *names)
     found = score_arrays(true, true, fps=merge.fps)
     assert found.surface == ("ground" if "pos" in names else "image")
-    for key in (
-        "objective",
-        "HOTA",
-        "IDF1",
-        "group_F1",
-        "pairwise_F1",
-        "exact_groups_F1",
-        "event_F1",
-        "lineage_accuracy",
-    ):
+    groups = ("group_F1", "pairwise_F1", "exact_groups_F1", "event_F1", "lineage_accuracy")
+    for key in ("objective", "HOTA", "IDF1", *groups):
         assert found[key] == pytest.approx(1, abs=1e-12), key
 
 

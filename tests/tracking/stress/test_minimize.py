@@ -252,20 +252,13 @@ def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
     assert Path("scene.toml").read_text() == SCENE
 
 
-ONE_GROUP = """import numpy as np
-from sim.types import Tracks
+ONE_GROUP = """
+from tests.fake_tracker import Nearest
 
-class OneGroup:
-    needs = ("points",)
-
-    def reset(self, context, seed):
-        pass
-
-    def step(self, frame, detections):  # everybody is in one group
-        n = len(detections.pos)
-        none, cov = np.full((n, 2), np.nan), np.tile(np.eye(4), (n, 1, 1))
-        who = np.arange(n), np.zeros(n, int)
-        return Tracks(frame.index, frame.t, "ground", "person", *who, detections.pos, none, cov)
+class OneGroup(Nearest):
+    def step(self, frame, detections):
+        found = super().step(frame, detections)
+        return found.replace(group=0 * found.id)
 """
 
 
@@ -303,12 +296,9 @@ def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, c
 
 
 CRASHES = """
-class Crashes:
-    needs = ("points",)
+from tests.fake_tracker import Nearest
 
-    def reset(self, context, seed):
-        pass
-
+class Crashes(Nearest):
     def step(self, frame, detections):
         raise ValueError("no")
 """

@@ -8,12 +8,12 @@ import pytest
 
 import tracking
 from scenarios.errors import InputError
+from tests.processes import FAKE
 from tests.tuning_toys import TOY, write_scenes
 from tracking.environment.episode_cache import sources
 from tracking.stress.episodes import ORACLE, OracleTask, contender, play_scene, scene_player
 from tracking.tuning.parallel_episodes import EpisodeTask
 
-FAKE = f"{Path(TOY.rpartition(':')[0]).parent / 'fake_tracker.py'}:Nearest"
 RAISING = """
 import os
 

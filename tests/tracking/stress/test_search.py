@@ -11,12 +11,12 @@ import optuna
 import pytest
 
 from scenarios.errors import InputError
+from tests.tracking.stress.test_stress import sweep_of
 from tracking.stress.axes import parse_axes
-from tracking.stress.episodes import Outcome, Store, Tasks
+from tracking.stress.episodes import Outcome, Tasks
 from tracking.stress.search import NEAR, Failure, search, worst
-from tracking.stress.sweep import Plan, Sweep
+from tracking.stress.sweep import Sweep
 from tracking.tuning.parallel_episodes import EpisodeTask
-from tracking.tuning.tuned_tracker import TunedTracker
 
 HOLES = {"cross": (0.5, 4.0), "pass-by": (0.9, 1.0)}  # by scenario, detection and clutter where the tracker is worst
 
@@ -31,18 +31,11 @@ def score(scenario) -> float:
 
 
 def sweep(tmp_path: Path, seen: list[EpisodeTask], **changes) -> Sweep:
-    def play(scenes: Sequence[Tasks]):
-        for tasks in scenes:
-            seen.extend(task for task in tasks if isinstance(task, EpisodeTask))
-            yield [
-                Outcome({"HOTA": score(t.source.entry.scenario) if isinstance(t, EpisodeTask) else 0.9}) for t in tasks
-            ]
-
     given = {
         "scenarios": ("crossing",), "axes": parse_axes(["detection", "clutter"]), "seeds": tuple(range(20)), "start": 2,
-        "by": "HOTA", "share": 0.8, "detections": "file", "settings": ("duration=4",), **changes,
+        "share": 0.8, "settings": ("duration=4",), **changes,
     }  # fmt: skip
-    return Sweep(Plan(**given), {"t": TunedTracker("blob", "t", ("points",))}, play, Store(tmp_path / "e.jsonl"))
+    return sweep_of(lambda source: score(source.entry.scenario), tmp_path, seen, 0.9, **given)
 
 
 def test_both_holes_are_found(tmp_path: Path) -> None:

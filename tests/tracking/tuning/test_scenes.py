@@ -50,12 +50,6 @@ def test_a_recording_is_never_tuned_on(tmp_path):
         assert f"--{option}" in str(caught.value)
 
 
-def test_unknown_scenes_are_named(tmp_path):
-    with pytest.raises(InputError, match="crossing") as caught:
-        toy_plan(tmp_path, suite="crosing")
-    assert "--suite" in str(caught.value)
-
-
 @pytest.mark.parametrize(
     ("names", "expected"),
     [
@@ -97,7 +91,8 @@ def test_settings_reach_the_scenes(tmp_path):
         ({"only": ["reach"], "set": ["reach=1"]}, "reach, which is set"), ({"only": ["steps"]}, "about pixels alone"),
         ({"set": ["reach=99"]}, "from 0.05 to 5"), ({"detections": "image"}, "--detections"),
         ({"tracker": "tests/fake_tracker.py:Nearest"}, "a tracker with parameters"),
-        ({"tracker": "blobb"}, "did you mean blob"),
+        ({"tracker": "blobb"}, "did you mean blob"), ({"suite": "crosing"}, "--suite.*crossing"),
+        ({"seeds": 5}, r"--seeds: got 5; expected a range of seeds; .* range\(0, 4\)"),
         ({"set": ["sensor.detect_prob=0.5"], "detections": "truth"}, "remove the sensor"),
         ({"tracker": "grouping", "detections": "file"}, "whose identity is known"),
         ({"set": [f"{name}=0.1" for name in ("reach", "skip", "colour", "forbidden")]}, "skip|colour"),
@@ -106,8 +101,3 @@ def test_settings_reach_the_scenes(tmp_path):
 def test_wrong_options_are_one_line(tmp_path, change, words):
     with pytest.raises(InputError, match=words):
         toy_plan(tmp_path, **change)
-
-
-def test_one_number_is_no_range(tmp_path):
-    with pytest.raises(InputError, match=r"--seeds: got 5; expected a range of seeds; .* range\(0, 4\)"):
-        toy_plan(tmp_path, seeds=5)

@@ -18,7 +18,7 @@ from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.tuning.sampler import distribution
-from tracking.tuning.study import FINISHED, LockedJournal, TrialLocks, open_study
+from tracking.tuning.study import FINISHED, TrialLocks, open_study
 
 
 def test_distributions_are_the_declarations(tmp_path):
@@ -87,19 +87,6 @@ def test_killed_between_two_lines(tmp_path):
             assert len(told) == 2, k
             assert told[0].params == made.defaults
             assert sum(t.state in FINISHED for t in study.trials()) == 2
-
-
-def test_a_half_line_is_cut_off(tmp_path):
-    path, locks = tmp_path / "j", TrialLocks(tmp_path / "j.locks")
-    LockedJournal(path, locks).append_logs([{"op_code": 1}])
-    with path.open("ab") as file:
-        file.write(b'{"b"')
-    journal = LockedJournal(path, locks)
-    journal.append_logs([{"op_code": 2}])
-    assert list(journal.read_logs(0)) == [{"op_code": 1}, {"op_code": 2}]
-    path.write_bytes(b'{"op_c')
-    assert list(LockedJournal(path, locks).read_logs(0)) == []
-    locks.close()
 
 
 @pytest.mark.parametrize("content", [b"tracker = 'blob'", b'{"seed": 1}', b"\x00\x01"])

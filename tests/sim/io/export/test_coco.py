@@ -1,7 +1,6 @@
 import json
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 
@@ -9,9 +8,11 @@ from scenarios.errors import InputError
 from sim.io.export.coco import coco
 from sim.io.store import sequence_folder
 from sim.io.store.validate import content_hash
+from tests.made_up import make_pictured, make_sequence
+from tests.recordings import mot_folder
 
 
-def test_coco_has_every_box(tmp_path, make_sequence):
+def test_coco_has_every_box(tmp_path):
     for k, name in enumerate(("a", "b")):
         live = replace(make_sequence(k), name=name)
         sequence_folder.write_sequence(tmp_path / "data" / name, live, scenario="schema = 1\n", seed=k)
@@ -49,15 +50,11 @@ def stored(folder, sequence, seed=1, **options):
 
 def labelled_folder(path, rows, *, pictures=(), ini=""):
     """A MOTChallenge folder; pictures: names below it, of 64 × 48 px."""
-    (path / "gt").mkdir(parents=True)
-    (path / "gt/gt.txt").write_text("".join(f"{row}\n" for row in rows))
-    (path / "seqinfo.ini").write_text(f"[Sequence]\nname={path.name}\nframeRate=5\n{ini}")
-    for name in pictures:
-        (path / name).parent.mkdir(exist_ok=True)
-        cv2.imwrite(str(path / name), np.zeros((48, 64, 3), np.uint8))
+    shown = dict.fromkeys(pictures, np.zeros((48, 64, 3), np.uint8))
+    mot_folder(path, "\n".join(rows), ini=f"name={path.name}\nframeRate=5\n{ini}", pictures=shown)
 
 
-def test_each_split_has_its_own_file(tmp_path, make_sequence):
+def test_each_split_has_its_own_file(tmp_path):
     """By the seeds of generated sequences, wherever they lie."""
     for seed in (1, 2, 10_001, 20_001):
         stored(tmp_path / f"data/mixed/s{seed}", replace(make_sequence(seed), name=f"s{seed}"), seed)
@@ -123,7 +120,7 @@ def decoded(segmentation):
     return flat.reshape(width, height).T.astype(bool)
 
 
-def test_masks_are_the_visible_pixels(tmp_path, make_pictured):
+def test_masks_are_the_visible_pixels(tmp_path):
     live = make_pictured(1, ("left", "ids"))
     stored(tmp_path / live.name, live, streams=("left", "ids"))
     (path,) = coco(tmp_path / live.name, tmp_path / "c.json")

@@ -10,6 +10,7 @@ from sim.io.export.kitti import calibration, kitti
 from sim.io.store import sequence_folder
 from sim.scene.camera import project_pair
 from sim.streams import decode_disparity
+from tests.made_up import make_pictured
 from tests.sim.scene.test_stereo import rig
 
 
@@ -28,7 +29,7 @@ def test_the_calibration_projects_as_the_camera_does() -> None:
     assert left[:, 0] / left[:, 2] - right[:, 0] / right[:, 2] == pytest.approx(uvd[:, 2])
 
 
-def test_pairs_and_disparities_are_those_of_the_dataset(tmp_path, make_pictured) -> None:
+def test_pairs_and_disparities_are_those_of_the_dataset(tmp_path) -> None:
     live = make_pictured(3, ("left", "right", "disparity"))
     folder = tmp_path / "flockscope-train/a"
     sequence_folder.write_sequence(

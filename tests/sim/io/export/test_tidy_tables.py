@@ -15,6 +15,7 @@ from scenarios.errors import InputError
 from sim.io.export.tidy_tables import run_tables, truth_tables, write_tables
 from sim.io.source import open_source
 from sim.types import GroupEvent, Groups, Tracks
+from tests.made_up import make_sequence
 
 NAMES = ["counts", "events", "groups", "members", "people", "people_summary"]
 
@@ -130,7 +131,7 @@ def test_csv_and_parquet_hold_the_same(tmp_path: Path):
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("k", [0, 1, 2])
-def test_people_of_a_truth_are_read_back(make_sequence, tmp_path: Path, k: int):
+def test_people_of_a_truth_are_read_back(tmp_path: Path, k: int):
     truth = make_sequence(k).truth
     write_tables(truth_tables(truth), tmp_path, "csv", {})
     again = open_source(tmp_path / "people.csv", fps=truth.fps)[0].truth
@@ -140,7 +141,7 @@ def test_people_of_a_truth_are_read_back(make_sequence, tmp_path: Path, k: int):
         assert np.array_equal(again.pos, truth.pos)
 
 
-def test_a_truth_states_its_groups_and_events(make_sequence):
+def test_a_truth_states_its_groups_and_events():
     truth = make_sequence(0).truth
     tables = truth_tables(truth)
     stated = {
@@ -160,7 +161,7 @@ def test_a_truth_states_its_groups_and_events(make_sequence):
     assert sorted(e.start for e in truth.events) == [e["start_frame"] for e in rows(tables.events)]
 
 
-def test_people_are_counted_in_frames_without_labels_of_groups(make_sequence):
+def test_people_are_counted_in_frames_without_labels_of_groups():
     truth = make_sequence(0).truth
     (minute,) = rows(truth_tables(truth).counts)
     assert not truth.labelled.all()

@@ -8,6 +8,7 @@ from sim.io.formats.calibration import read_tsai, scaled_to_image
 from sim.io.source import open_source
 from sim.io.store.camera_files import camera_document, read_camera
 from sim.scene.camera import project
+from tests.made_up import same
 
 XML = """<?xml version="1.0" encoding="UTF-8"?>
 <Camera name="c">
@@ -42,7 +43,7 @@ def test_tsai_by_the_book(tmp_path):
         assert uv[0] - 0.5 == pytest.approx(by_the_book(*(1000 * xyz)), abs=1e-6)
 
 
-def test_a_bent_camera_comes_back_and_a_straight_one_says_nothing_of_it(tmp_path, same):
+def test_a_bent_camera_comes_back_and_a_straight_one_says_nothing_of_it(tmp_path):
     (tmp_path / "c.xml").write_text(XML)
     bent = read_tsai(tmp_path / "c.xml")
     for camera in (bent, bent.replace(radial=0.0)):

@@ -6,6 +6,7 @@ from sim.io.formats import mot_text
 from sim.io.formats.labels import chords, differentiate
 from sim.io.formats.mot_text import unit_scores
 from sim.io.source import open_source
+from tests.recordings import mot_folder
 from tests.small_videos import write_video
 
 DRAWN = {
@@ -36,14 +37,7 @@ def test_the_map_is_said(tmp_path):
     assert [f.detections.score[0] >= 0.5 for f in sequence] == [False] * 2 + [True] * 6
 
 
-def folder(tmp_path, gt=None, det=None, ini="name=x\nframeRate=10\nseqLength=3\nimWidth=64\nimHeight=48\n"):
-    for name, text in (("gt/gt.txt", gt), ("det/det.txt", det)):
-        if text is not None:
-            (tmp_path / name).parent.mkdir(exist_ok=True)
-            (tmp_path / name).write_text(text)
-    if ini is not None:
-        (tmp_path / "seqinfo.ini").write_text("[Sequence]\n" + ini)
-    return tmp_path
+INI = "name=x\nframeRate=10\nseqLength=3\nimWidth=64\nimHeight=48\n"
 
 
 def test_pets_is_read_with_its_ground_positions(shared_data):
@@ -68,7 +62,7 @@ def test_pets_is_read_with_its_ground_positions(shared_data):
 
 def test_nine_columns_are_flag_class_visibility(tmp_path):
     rows = "1,1,0,0,5,5,1,1,0.25\n1,2,0,0,5,5,0,1,1\n1,3,0,0,5,5,0,7,1\n2,1,1,0,5,5,1,1,-1\n"
-    (s,) = open_source(folder(tmp_path, rows))
+    (s,) = open_source(mot_folder(tmp_path, rows, ini=INI))
     assert s.truth.id.tolist() == [1, 1]
     assert s.truth.visibility.tolist() == [0.25, 1.0]
     assert s.truth.pos is None
@@ -76,13 +70,13 @@ def test_nine_columns_are_flag_class_visibility(tmp_path):
 
 
 def test_ten_columns_are_confidence_and_ground(tmp_path):
-    (s,) = open_source(folder(tmp_path, "1,1,0,0,5,5,1,2.5,3.5,0\n2,1,0,0,5,5,1,-1,-1,-1\n"))
+    (s,) = open_source(mot_folder(tmp_path, "1,1,0,0,5,5,1,2.5,3.5,0\n2,1,0,0,5,5,1,-1,-1,-1\n", ini=INI))
     assert s.truth.pos[0].tolist() == [2.5, 3.5]
     assert np.isnan(s.truth.pos[1]).all()
 
 
 def test_detections_with_points_are_on_the_ground(tmp_path):
-    (s,) = open_source(folder(tmp_path, det="1,-1,0,0,4,6,0.5,2,3,0\n3,-1,0,0,4,6,0.7,2,4,0\n"))
+    (s,) = open_source(mot_folder(tmp_path, det="1,-1,0,0,4,6,0.5,2,3,0\n3,-1,0,0,4,6,0.7,2,4,0\n", ini=INI))
     first, empty, last = (f.detections for f in s)
     assert first.plane == last.plane == "ground"
     assert last.pos.tolist() == [[2, 4]]
@@ -108,7 +102,7 @@ GOOD = "1,1,0,0,5,5,1,1,1\n"
 )  # fmt: skip
 def test_bad_rows_are_one_line(tmp_path, gt, line, word):
     with pytest.raises(InputError, match=word) as error:
-        open_source(folder(tmp_path, gt))[0].truth  # noqa: B018
+        open_source(mot_folder(tmp_path, gt, ini=INI))[0].truth  # noqa: B018
     assert error.value.place == f"line {line}"
     assert error.value.file.endswith("gt.txt")
     assert error.value.exit_code == 2
@@ -146,8 +140,8 @@ def test_nothing_says_how_long_it_is(tmp_path):
     with pytest.raises(InputError, match="no row"):
         open_source(tmp_path / "x.txt", fps=10)
     with pytest.raises(InputError, match="tells its length"):
-        open_source(folder(tmp_path, det="", ini="frameRate=10\n"))
-    (s,) = open_source(folder(tmp_path, det="", ini="frameRate=10\nseqLength=3\n"))
+        open_source(mot_folder(tmp_path, det="", ini="frameRate=10\n"))
+    (s,) = open_source(mot_folder(tmp_path, det="", ini="frameRate=10\nseqLength=3\n"))
     assert [len(f.detections.pos) for f in s] == [0, 0, 0]
 
 

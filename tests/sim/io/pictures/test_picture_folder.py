@@ -11,6 +11,7 @@ from sim.io.pictures import picture_folder as pictures
 from sim.io.pictures.background_sample import BackgroundChoice, parse_choice, with_copies
 from sim.io.pictures.picture_folder import declared_size, read_picture
 from sim.io.source import open_source
+from tests.recordings import mot_folder
 from tests.small_videos import SIZE, picture
 
 
@@ -60,14 +61,8 @@ ROWS = "1,1,10,10,8,16,1,-1,-1,-1\n9,1,10,10,8,16,1,-1,-1,-1\n"
 def folder(tmp_path, names, *, gt="", det="", ini="", size=SIZE):
     """A MOTChallenge folder whose k-th picture shows disc k."""
     (tmp_path / "img1").mkdir(parents=True)
-    for k, name in enumerate(names):
-        cv2.imwrite(str(tmp_path / "img1" / name), picture(k, size))
-    for part, text in (("gt", gt), ("det", det)):
-        if text:
-            (tmp_path / part).mkdir()
-            (tmp_path / part / f"{part}.txt").write_text(text)
-    (tmp_path / "seqinfo.ini").write_text(f"[Sequence]\nframeRate=10\n{ini}")
-    return tmp_path
+    shown = {f"img1/{name}": picture(k, size) for k, name in enumerate(names)}
+    return mot_folder(tmp_path, gt or None, det or None, f"frameRate=10\n{ini}", shown)
 
 
 def shown(path, **options):

@@ -12,6 +12,7 @@ from sim.io.source import open_source
 from sim.io.store import sequence_folder
 from sim.io.store.seal import with_hash
 from sim.io.store.validate import validate
+from tests.made_up import make_pictured, same
 
 SCENARIO = 'schema = 1\nname = "fake"\n'
 ALL = ("left", "right", "disparity", "ids", "background")
@@ -30,7 +31,7 @@ def names(folder):
     return sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
 
 
-def test_png_comes_back_exactly(tmp_path, make_pictured, same):
+def test_png_comes_back_exactly(tmp_path):
     live = make_pictured(3, ALL)
     read = stored(tmp_path / "a", live, images="png")
     same(live, read)
@@ -46,7 +47,7 @@ def test_png_comes_back_exactly(tmp_path, make_pictured, same):
 
 
 @pytest.mark.parametrize(("images", "off"), [("jpg", 4.0), ("mp4", 12.0)])
-def test_jpg_and_mp4_come_back_nearly(tmp_path, make_pictured, same, images, off):
+def test_jpg_and_mp4_come_back_nearly(tmp_path, images, off):
     live = make_pictured(3, ALL)
     read = stored(tmp_path / "a", live, images=images)
     for a, b in zip(live, read, strict=True):
@@ -59,7 +60,7 @@ def test_jpg_and_mp4_come_back_nearly(tmp_path, make_pictured, same, images, off
     assert validate(tmp_path / "a") == []
 
 
-def test_where_pictures_lie(tmp_path, make_pictured):
+def test_where_pictures_lie(tmp_path):
     live = make_pictured(3, ALL)
     stored(tmp_path / "jpg", live)
     found = names(tmp_path / "jpg")
@@ -91,7 +92,7 @@ def test_codes_there_and_back():
         streams.encode_disparity(np.array([[256.0]]))
 
 
-def test_one_content_however_it_is_stored(tmp_path, make_pictured):
+def test_one_content_however_it_is_stored(tmp_path):
     """The content hash and the pixels' hashes are of what was drawn; truth_hash does not know of pictures."""
     seen = {}
     for images in ("jpg", "png", "mp4"):
@@ -113,7 +114,7 @@ def test_one_content_however_it_is_stored(tmp_path, make_pictured):
 
 
 @pytest.mark.parametrize("images", ["jpg", "png", "mp4"])
-def test_pictures_are_checked_when_they_are_read(tmp_path, make_pictured, images):
+def test_pictures_are_checked_when_they_are_read(tmp_path, images):
     stored(tmp_path / "a", make_pictured(3, ALL), images=images)
     every = names(tmp_path / "a")
     for name in [n for n in every if n.endswith(("left.mp4", "img1/000005.jpg", "img1/000005.png"))]:
@@ -133,7 +134,7 @@ def test_pictures_are_checked_when_they_are_read(tmp_path, make_pictured, images
     assert validate(tmp_path / "a") == []
 
 
-def test_streams_that_are_not_there(tmp_path, make_pictured):
+def test_streams_that_are_not_there(tmp_path):
     for wanted, images in ((("right",), "jpg"), (("right",), "mp4"), (("disparity",), "jpg")):
         with pytest.raises(InputError, match=wanted[0]):
             stored(tmp_path / "a", make_pictured(3, ("left",)), wanted, images)
@@ -152,7 +153,7 @@ def test_streams_that_are_not_there(tmp_path, make_pictured):
 
 
 @pytest.mark.parametrize("images", ["jpg", "mp4"])
-def test_a_renderer_that_fails_leaves_nothing(tmp_path, make_pictured, images):
+def test_a_renderer_that_fails_leaves_nothing(tmp_path, images):
     live = make_pictured(3, ALL)
 
     def failing():
@@ -166,7 +167,7 @@ def test_a_renderer_that_fails_leaves_nothing(tmp_path, make_pictured, images):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_another_sample_than_its_own(tmp_path, make_pictured):
+def test_another_sample_than_its_own(tmp_path):
     live = make_pictured(3, ("left",))
     own = stored(tmp_path / "a", live, ("left",), "png")
     assert own.source["background"] == "50 empty frames before frame 1"
@@ -192,7 +193,7 @@ def relisted(folder, change):
 
 
 @pytest.mark.parametrize("name", ["img1/000003.png", "ids/000003.png", "disparity/000003.png", "background/000003.png"])
-def test_validate_looks_at_every_exact_picture(tmp_path, make_pictured, name):
+def test_validate_looks_at_every_exact_picture(tmp_path, name):
     """Even one whose hash the manifest was made to name."""
     folder = tmp_path / "a"
     stored(folder, make_pictured(3, ALL), images="png")
@@ -207,7 +208,7 @@ def test_validate_looks_at_every_exact_picture(tmp_path, make_pictured, name):
 
 
 @pytest.mark.parametrize("images", ["jpg", "png", "mp4"])
-def test_validate_counts_and_measures(tmp_path, make_pictured, images):
+def test_validate_counts_and_measures(tmp_path, images):
     folder = tmp_path / "a"
     stored(folder, make_pictured(3, ("left",)), ("left",), images)
     relisted(folder, lambda m: m["sequence"].update(image_size=[32, 48]))

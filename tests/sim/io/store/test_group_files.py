@@ -10,6 +10,7 @@ from sim.io.store.camera_files import camera_document, read_camera, read_scene, 
 from sim.io.store.group_files import read_events, read_groups_csv, read_near, read_script
 from sim.scene.camera import camera_rotation
 from sim.types import Camera, Scene
+from tests.made_up import make_sequence, same
 
 EVENT = {"kind": "merge", "start": 1, "end": 3, "emitted": None, "before": [-1, 2], "after": [2], "members": [1, 2],
          "pos": [1.5, None]}  # fmt: skip
@@ -83,7 +84,7 @@ def test_groups(row, tmp_path):
     assert error.value.place.startswith("line ")
 
 
-def test_cameras_and_scenes_come_back_exactly(tmp_path, make_sequence, same):
+def test_cameras_and_scenes_come_back_exactly(tmp_path):
     down = camera_rotation(np.pi / 2, 0.3)
     top = Camera("top", (640, 480), (1.0, 1.0), (320.0, 240.0), np.array([1.7, -2.3, 20.0]), down, 0.0, 40.3)
     for camera in (top, make_sequence(1).camera):

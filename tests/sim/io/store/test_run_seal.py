@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import pickle
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +19,11 @@ from sim.io.store import seal
 from sim.io.store.seal import NAMES, check_run, read_run, with_hash
 from sim.io.store.track_files import read_tracks, tracks_files, write_tracks
 from sim.io.store.validate import validate
+from tests.made_up import make_tracks, same
+from tests.processes import python
 from tests.sealing import seal_again
 from tracking.app.stored_tracks import find_tracks
 
-ROOT = Path(__file__).resolve().parents[4]
 PAIRS = bytes(range(256))
 INFO = {"tracker": "blob", "config": {"a": 1.5e-7}, "seed": 0, "sequence": "s", "fps": 10.0}
 
@@ -37,7 +35,7 @@ def write(folder: Path, files: dict[str, bytes]) -> Path:
     return folder
 
 
-def test_the_seal_names_every_file(tmp_path, make_tracks):
+def test_the_seal_names_every_file(tmp_path):
     folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO, pairs=PAIRS)
     run = read_run(folder)
     assert set(run["files"]) == {p.name for p in folder.iterdir()} - {"run.json"} == set(NAMES) - {"run.json"}
@@ -47,7 +45,7 @@ def test_the_seal_names_every_file(tmp_path, make_tracks):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_no_flipped_bit_is_accepted(tmp_path, make_tracks, name):
+def test_no_flipped_bit_is_accepted(tmp_path, name):
     """One bit in each of 60 places of every file, spread over the whole of it; every fiftieth bit of run.json."""
     folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO, pairs=PAIRS)
     path, right = folder / name, (folder / name).read_bytes()
@@ -68,7 +66,7 @@ def test_no_flipped_bit_is_accepted(tmp_path, make_tracks, name):
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "run.json"])
-def test_a_deleted_or_cut_file_is_named(tmp_path, make_tracks, name):
+def test_a_deleted_or_cut_file_is_named(tmp_path, name):
     folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO, pairs=PAIRS)
     (folder / name).write_bytes((folder / name).read_bytes()[:-1])
     with pytest.raises(InputError, match=r"truncated.*track again") as error:
@@ -80,7 +78,7 @@ def test_a_deleted_or_cut_file_is_named(tmp_path, make_tracks, name):
     assert error.value.file == str(folder / name)
 
 
-def test_a_run_without_hashes_is_one_line(tmp_path, make_tracks):
+def test_a_run_without_hashes_is_one_line(tmp_path):
     folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
     (folder / "run.json").write_bytes(tables.json_document({"format": 1, **INFO, "boxes": "measured"}))
     for _ in range(2):
@@ -89,7 +87,7 @@ def test_a_run_without_hashes_is_one_line(tmp_path, make_tracks):
         (folder / "tracks.parquet").unlink(missing_ok=True)
 
 
-def test_files_of_two_runs_are_refused(tmp_path, make_tracks):
+def test_files_of_two_runs_are_refused(tmp_path):
     """Whichever file is of the other run; and one that this run would not have."""
     one, two = (tracks_files(make_tracks(seed), fps=10.0, info=INFO, pairs=PAIRS + bytes([seed])) for seed in (1, 2))
     for name in NAMES:
@@ -116,7 +114,7 @@ FOREIGN = {
 
 
 @pytest.mark.parametrize("kind", FOREIGN)
-def test_a_file_with_our_name_and_words_is_not_replaced(tmp_path, make_tracks, kind):
+def test_a_file_with_our_name_and_words_is_not_replaced(tmp_path, kind):
     name = kind.split()[-1]
     (tmp_path / name).write_bytes(FOREIGN[kind])
     with pytest.raises(InputError, match=r"another program.*choose another --out") as error:
@@ -138,7 +136,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_sealed_fault_is_a_fault(tmp_path, make_tracks, monkeypatch, fault):
+def test_a_sealed_fault_is_a_fault(tmp_path, monkeypatch, fault):
     """Neither the writer nor the reader takes it, even with right hashes."""
     spoil, words = FAULTS[fault]
     wrong = [spoil(t.replace(id=t.id + 1)) if len(t.id) > 1 else t for t in make_tracks(1)]
@@ -153,7 +151,7 @@ def test_a_sealed_fault_is_a_fault(tmp_path, make_tracks, monkeypatch, fault):
     assert error.value.place.startswith("frame ")
 
 
-def test_groups_of_other_frames_or_ids(tmp_path, make_tracks):
+def test_groups_of_other_frames_or_ids(tmp_path):
     one = tracks_files(make_tracks(1), fps=10.0, info=INFO)
     for name, groups in (
         ("fewer", tracks_files(make_tracks(1)[:5], fps=10.0)["groups.parquet"]),
@@ -209,7 +207,7 @@ print(k)
 
 
 @pytest.mark.parametrize("before", ["another run", "nothing"])
-def test_killed_at_any_moment(tmp_path, make_tracks, same, before):
+def test_killed_at_any_moment(tmp_path, before):
     """The old run is whole, or the new one is, or the folder is refused."""
     old, new = make_tracks(1), [t.replace(groups=None) for t in make_tracks(2)]
     (tmp_path / "program.py").write_text(PROGRAM)
@@ -219,14 +217,11 @@ def test_killed_at_any_moment(tmp_path, make_tracks, same, before):
     for k in range(1, 60):
         if before == "another run":
             shutil.copytree(first, tmp_path / "out" / str(k))
-    done = subprocess.run(
-        [sys.executable, str(tmp_path / "program.py"), str(tmp_path / "out"), str(tmp_path / "files")],
-        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
+    done = python(tmp_path / "program.py", tmp_path / "out", tmp_path / "files")
     assert done.returncode == 0, done.stderr
     last = int(done.stdout)
     assert 5 < last < 60
-    ended = [ending(tmp_path / "out" / str(k), old, new, same) for k in range(1, last + 1)]
+    ended = [ending(tmp_path / "out" / str(k), old, new) for k in range(1, last + 1)]
     assert any((tmp_path / "out").glob(".partial-*"))
     (tmp_path / "out" / ".partial-9-9-0123456789ab").write_text("of another target")
     for k in range(1, 60):
@@ -238,7 +233,7 @@ def test_killed_at_any_moment(tmp_path, make_tracks, same, before):
     assert "refused" in ended
 
 
-def ending(folder: Path, old: list, new: list, same) -> str:
+def ending(folder: Path, old: list, new: list) -> str:
     """What a reader gets of a folder after a kill."""
     try:
         found = read_tracks(folder, fps=10.0)
@@ -265,7 +260,7 @@ RIGHT = {"sha256": "x", "bytes": 3}
         {"/a": RIGHT}, {"a\0": RIGHT},
     ],
 )  # fmt: skip
-def test_a_seal_that_names_what_cannot_be(tmp_path, make_tracks, files):
+def test_a_seal_that_names_what_cannot_be(tmp_path, files):
     """With a right hash of its own."""
     folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
     run = {**tables.read_json(folder / "run.json"), "files": files}
@@ -283,7 +278,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("key", "value"), [(key, value) for key, values in WRONG.items() for value in values])
-def test_values_of_another_kind(tmp_path, make_tracks, key, value):
+def test_values_of_another_kind(tmp_path, key, value):
     folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info={"sequence": "s"})
     run = {**json.loads((folder / "run.json").read_bytes()), key: value}
     (folder / "run.json").write_bytes(json_document(with_hash(run)))
@@ -293,13 +288,13 @@ def test_values_of_another_kind(tmp_path, make_tracks, key, value):
     assert "track again" in error.value.remedy
 
 
-def test_right_values_and_further_keys(tmp_path, make_tracks):
+def test_right_values_and_further_keys(tmp_path):
     for info in ({}, dict.fromkeys(WRONG.keys() - {"tracker", "sequence", "boxes"}), {"mine": [1, {"a": None}]}):
         assert info.items() <= read_run(write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=info)).items()
 
 
 @pytest.mark.parametrize("body", [b'{"boxes": "measured"', b"", b"[]"])
-def test_texts_beside_a_damaged_run_json_are_no_other_program_s(tmp_path, make_tracks, body):
+def test_texts_beside_a_damaged_run_json_are_no_other_program_s(tmp_path, body):
     folder = write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=INFO)
     (folder / "run.json").write_bytes(body)
     for _ in range(2):

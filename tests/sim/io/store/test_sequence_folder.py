@@ -18,12 +18,13 @@ from sim.io.store.seal import MANIFEST, with_hash
 from sim.io.store.sequence_folder import open_sequence, write_sequence
 from sim.io.store.validate import validate
 from sim.types import Frame, Sequence
+from tests.made_up import make_sequence, same
 
 SCENARIO = 'schema = 1\nname = "fake"\n'
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_stored_sequence_is_equal(tmp_path, make_sequence, same, seed):
+def test_a_stored_sequence_is_equal(tmp_path, seed):
     live = make_sequence(seed)
     sequence_folder.write_sequence(tmp_path / "a", live, scenario=SCENARIO, seed=seed)
     (stored,) = open_source(tmp_path / "a")
@@ -34,7 +35,7 @@ def test_a_stored_sequence_is_equal(tmp_path, make_sequence, same, seed):
     assert validate(tmp_path / "a") == []
 
 
-def test_a_sequence_of_nobody_is_equal(tmp_path, same):
+def test_a_sequence_of_nobody_is_equal(tmp_path):
     live = Sequence("empty", 10.0, 3, lambda: (Frame(k, (k - 1) / 10) for k in (1, 2, 3)))
     sequence_folder.write_sequence(tmp_path / "a", live, scenario=SCENARIO, seed=0)
     (stored,) = open_source(tmp_path / "a")
@@ -48,7 +49,7 @@ def files_of(folder):
     )
 
 
-def test_each_missing_or_altered_file_is_named(tmp_path, make_sequence):
+def test_each_missing_or_altered_file_is_named(tmp_path):
     folder = tmp_path / "a"
     sequence_folder.write_sequence(folder, make_sequence(3), scenario=SCENARIO, seed=3)
     for name in files_of(folder):
@@ -66,7 +67,7 @@ def test_each_missing_or_altered_file_is_named(tmp_path, make_sequence):
         open_source(folder)
 
 
-def test_each_altered_or_missing_field_of_the_manifest_is_told(tmp_path, make_sequence):
+def test_each_altered_or_missing_field_of_the_manifest_is_told(tmp_path):
     folder = tmp_path / "a"
     sequence_folder.write_sequence(folder, make_sequence(3), scenario=SCENARIO, seed=3)
     path = folder / "manifest.json"
@@ -80,7 +81,7 @@ def test_each_altered_or_missing_field_of_the_manifest_is_told(tmp_path, make_se
             assert [str(p) for p in validate(folder)] == [str(error.value)]
 
 
-def test_points_of_the_sensor_stand_on_the_stairs(tmp_path, make_sequence):
+def test_points_of_the_sensor_stand_on_the_stairs(tmp_path):
     from sim.scene.terrain import height_at
 
     live = make_sequence(3)
@@ -115,7 +116,7 @@ def swap(path, old, new):
         ("scenario.toml", "fake", "fakes"),
     ],
 )  # fmt: skip
-def test_validate_sees_what_disagrees(tmp_path, make_sequence, name, old, new):
+def test_validate_sees_what_disagrees(tmp_path, name, old, new):
     folder = tmp_path / "a"
     sequence_folder.write_sequence(folder, make_sequence(5), scenario=SCENARIO, seed=5)
     swap(folder / name, old, new)
@@ -125,7 +126,7 @@ def test_validate_sees_what_disagrees(tmp_path, make_sequence, name, old, new):
     assert all("\n" not in str(p) for p in problems)
 
 
-def test_validate_reports_strangers_files_and_leftovers(tmp_path, make_sequence):
+def test_validate_reports_strangers_files_and_leftovers(tmp_path):
     root = tmp_path / "flockscope-train"
     sequence_folder.write_sequence(root / "a", make_sequence(5), scenario=SCENARIO, seed=5)
     (root / "a" / "note.txt").write_text("x")
@@ -145,7 +146,7 @@ def test_validate_reports_strangers_files_and_leftovers(tmp_path, make_sequence)
 
 @pytest.mark.parametrize(("number", "kind"), [(errno.ENOSPC, WorkError), (errno.EACCES, InputError)])
 @pytest.mark.parametrize("after", [0, 3, 8])
-def test_a_failing_write_leaves_nothing(tmp_path, make_sequence, monkeypatch, number, kind, after):
+def test_a_failing_write_leaves_nothing(tmp_path, monkeypatch, number, kind, after):
     done, write = [], atomic.write_inside
 
     def fail(path, body):
@@ -161,7 +162,7 @@ def test_a_failing_write_leaves_nothing(tmp_path, make_sequence, monkeypatch, nu
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_failing_write_keeps_what_was_there(tmp_path, make_sequence, monkeypatch):
+def test_a_failing_write_keeps_what_was_there(tmp_path, monkeypatch):
     sequence_folder.write_sequence(tmp_path / "a", make_sequence(1), scenario=SCENARIO, seed=1)
     before = {n: (tmp_path / "a" / n).read_bytes() for n in files_of(tmp_path / "a")}
 
@@ -175,7 +176,7 @@ def test_a_failing_write_keeps_what_was_there(tmp_path, make_sequence, monkeypat
     assert [p.name for p in tmp_path.iterdir()] == ["a"]
 
 
-def test_a_line_break_in_a_name_is_no_line_of_the_ini_file(tmp_path, make_sequence):
+def test_a_line_break_in_a_name_is_no_line_of_the_ini_file(tmp_path):
     named = replace(make_sequence(1), name="x\nseqLength=1")
     folder = sequence_folder.write_sequence(tmp_path / "a", named, scenario="a = 1\n", seed=1)
     assert read_seqinfo(folder / "seqinfo.ini").length == named.length
@@ -202,7 +203,7 @@ def sealed(folder, change):
     ("place", "value"),
     [(f"sequence.{key}", v) for key, some in WRONG.items() for v in some] + [(k, v) for k, w in TOP.items() for v in w],
 )
-def test_values_of_another_kind(tmp_path, make_sequence, place, value):
+def test_values_of_another_kind(tmp_path, place, value):
     folder = write_sequence(tmp_path / "a", make_sequence(1), scenario="a = 1\n", seed=1)
     key = place.removeprefix("sequence.")
     sealed(folder, lambda m: (m["sequence"] if key != place else m).__setitem__(key, value))
@@ -212,7 +213,7 @@ def test_values_of_another_kind(tmp_path, make_sequence, place, value):
     assert error.value.file == str(folder / MANIFEST)
 
 
-def test_another_length_than_the_files(tmp_path, make_sequence):
+def test_another_length_than_the_files(tmp_path):
     folder = write_sequence(tmp_path / "a", make_sequence(1), scenario="a = 1\n", seed=1)
     sealed(folder, lambda m: m["sequence"].__setitem__("length", 7))
     with pytest.raises(InputError, match="7 frames"):

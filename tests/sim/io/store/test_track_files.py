@@ -7,6 +7,7 @@ from scenarios.errors import InputError
 from sim.io.store.track_files import WIDTH, read_tracks, tracks_files, upright_boxes, write_tracks
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Camera
+from tests.made_up import make_tracks, same
 from tests.sealing import seal_again
 
 # Level, at (0, 0, 1.7), looking along +y: x right, z down, y forward.
@@ -16,7 +17,7 @@ LEVEL = Camera(
 )  # fmt: skip
 
 
-def test_upright_people_on_stairs_are_seen_higher_up(make_tracks):
+def test_upright_people_on_stairs_are_seen_higher_up():
     from sim.types import Scene, Stairs
 
     flight = Stairs(np.array([0.0, 9.0]), np.array([0.0, 11.0]), 4.0, 1.0, 4)
@@ -42,7 +43,7 @@ def test_boxes_of_upright_people():
     assert upright_boxes(LEVEL, np.zeros((0, 2))).shape == (0, 4)
 
 
-def test_a_tracker_without_boxes_gets_them_in_text_only(tmp_path, make_tracks):
+def test_a_tracker_without_boxes_gets_them_in_text_only(tmp_path):
     live = [t.replace(pos=t.pos + np.array([0, 10])) for t in make_tracks(2, boxed=False)]
     write_tracks(tmp_path, live, fps=10.0, camera=LEVEL)
     assert json.loads((tmp_path / "run.json").read_text())["boxes"] == "projected"
@@ -55,14 +56,14 @@ def test_a_tracker_without_boxes_gets_them_in_text_only(tmp_path, make_tracks):
 @pytest.mark.parametrize("plane", ["ground", "space", "image"])
 @pytest.mark.parametrize("unit", ["person", "group"])
 @pytest.mark.parametrize("boxed", [True, False])
-def test_tracks_come_back_equal(tmp_path, make_tracks, same, plane, unit, boxed):
+def test_tracks_come_back_equal(tmp_path, plane, unit, boxed):
     live = make_tracks(1, plane=plane, unit=unit, boxed=boxed)
     write_tracks(tmp_path / "t", live, fps=10.0)
     same(live, read_tracks(tmp_path / "t"))
     same(live, read_tracks(tmp_path / "t" / "tracks.txt"))
 
 
-def test_no_tracks_at_all(tmp_path, make_tracks, same):
+def test_no_tracks_at_all(tmp_path):
     write_tracks(tmp_path / "t", [], fps=10.0)
     assert read_tracks(tmp_path / "t") == []
     bare = [t.replace(groups=None, events=()) for t in make_tracks(1)]
@@ -71,14 +72,14 @@ def test_no_tracks_at_all(tmp_path, make_tracks, same):
     assert not (tmp_path / "t" / "groups.csv").exists()
 
 
-def test_whether_groups_and_events_were_derived_is_kept(tmp_path, make_tracks):
+def test_whether_groups_and_events_were_derived_is_kept(tmp_path):
     tracks = make_tracks(1)
     for derived in (True, False):
         write_tracks(tmp_path, [t.replace(derived=derived) for t in tracks], fps=10.0)
         assert {t.derived for t in read_tracks(tmp_path)} == {derived}
 
 
-def test_what_an_earlier_run_left_goes_away_but_no_more(tmp_path, make_tracks):
+def test_what_an_earlier_run_left_goes_away_but_no_more(tmp_path):
     write_tracks(tmp_path / "t", make_tracks(1), fps=10.0)
     (tmp_path / "t" / "mine.txt").write_text("x")
     write_tracks(tmp_path / "t", [t.replace(groups=None) for t in make_tracks(1)], fps=10.0, info={"tracker": "blob"})
@@ -92,7 +93,7 @@ def test_what_an_earlier_run_left_goes_away_but_no_more(tmp_path, make_tracks):
     }
 
 
-def test_text_alone(tmp_path, make_tracks):
+def test_text_alone(tmp_path):
     live = make_tracks(4)
     files = tracks_files(live, fps=10.0)
     (tmp_path / "tracks.txt").write_bytes(files["tracks.txt"])
@@ -121,7 +122,7 @@ EVENT = '"kind": "merge", "before": [1, 2], "after": [1], "members": [1, 2], "po
 
 
 @pytest.mark.parametrize("frames", ['"start": 1, "end": 2, "emitted": 99', '"start": 1, "end": 99, "emitted": null'])
-def test_events_that_no_frame_can_hold_are_one_line(tmp_path, make_tracks, frames):
+def test_events_that_no_frame_can_hold_are_one_line(tmp_path, frames):
     ours, others = write_tracks(tmp_path / "ours", make_tracks(1), fps=10.0), tmp_path / "others"
     others.mkdir()
     (others / "tracks.txt").write_bytes((ours / "tracks.txt").read_bytes())

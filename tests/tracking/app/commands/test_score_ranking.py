@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
 import tracking
 from sim.io.source import open_source
+from tests.processes import FAKE
+from tests.refusals import answer
 from tests.short_scene import write_short_scene
 from tracking import track
 from tracking.app.cli import run
 from tracking.app.commands.score_ranking import run_differences
-
-FAKE = f"{Path(__file__).resolve().parents[3] / 'fake_tracker.py'}:Nearest"
 
 
 @pytest.fixture(scope="module")
@@ -31,17 +30,11 @@ def made(tmp_path_factory) -> Path:
     return folder
 
 
-def ranked(capsys, made: Path, *words: str) -> dict:
-    capsys.readouterr()
-    assert run(["score", str(made / "data"), *words, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_the_ranking_is_that_of_compare(made: Path, capsys) -> None:
     runs = [str(made / "good"), str(made / "bad"), FAKE]
-    found = ranked(capsys, made, *runs, "--by", "HOTA")
-    assert ranked(capsys, made, *runs[::-1], "--by", "HOTA")["ranking"] == found["ranking"]
+    found = answer(capsys, "score", made / "data", *runs, "--by", "HOTA")
+    assert answer(capsys, "score", made / "data", *runs[::-1], "--by", "HOTA")["ranking"] == found["ranking"]
     sequences = open_source(made / "data")
     config = {"good": {}, "bad": {"gate": 0.6}}
     mine = {name: [track("blob", s, params=p) for s in sequences] for name, p in config.items()}

@@ -3,59 +3,17 @@
 from __future__ import annotations
 
 import itertools
-import json
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.geometry.polygons import area, convex_hull, footprint_hull
 from sim.types import GroupEvent, Sequence
 from tests.groups_as_wholes import wholes
-from tests.tracking.app.replay_page.test_page import column
 from tracking.app.replay_page import page_rows
 from tracking.app.replay_page.page import Run, page_data
 from tracking.app.replay_page.page_rows import Bar, Link, bars, links
-
-
-def rows_of(side: dict) -> dict[str, np.ndarray]:
-    """What decode.js does with the columns of groups."""
-    table, scale = np.array(side["stints"]).reshape(-1, 3), side["scale"]
-    own = side["wholes"]
-    return {
-        "id": np.repeat(table[:, 0], table[:, 2]),
-        "frame": np.concatenate([np.arange(a, a + n) for _, a, n in table]),
-        "size": column(own["size"]) / 10,
-        "speed": column(own["speed"]) / (1 if side["plane"] == "image" else 10),
-        "axes": np.stack([column(c) for c in own["ellipse"]], axis=1) / [scale, scale, 180 / np.pi],
-        "hull": [np.cumsum(np.reshape(steps, (-1, 2)), axis=0) / scale for steps in own["hull"]],
-    }
-
-
-@pytest.mark.parametrize("plane", ["ground", "image"])
-def test_groups_come_back(sequence: Sequence, plane: str) -> None:
-    answers = wholes(sequence, plane)
-    side = json.loads(json.dumps(page_data(sequence, Run(answers))))["tracks"]
-    rows, unit = rows_of(side), 1 / side["scale"]
-    assert side["plane"] == plane
-    for t in (answers[0], answers[70], answers[-1]):
-        now = np.flatnonzero(rows["frame"] == t.index)
-        order = np.argsort(t.id)
-        groups = t.groups
-        np.testing.assert_array_equal(rows["id"][now], t.id[order])
-        np.testing.assert_allclose(rows["size"][now], groups.size[order], atol=0.051)
-        np.testing.assert_allclose(
-            rows["speed"][now], np.hypot(*t.vel[order].T), atol=0.51 if plane == "image" else 0.051
-        )
-        for k, row in zip(order, now, strict=True):
-            long, wide, turn = rows["axes"][row]
-            spin = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-            values = np.linalg.eigvalsh(groups.extent[k])[::-1]
-            np.testing.assert_allclose([long, wide], np.sqrt(values), atol=0.51 * unit)
-            made = spin @ np.diag([long**2, wide**2]) @ spin.T
-            np.testing.assert_allclose(made, groups.extent[k], atol=3 * unit * np.sqrt(values[0]))
-            assert area(rows["hull"][row]) == pytest.approx(area(groups.hull[k]), rel=0.05)
 
 
 def test_bars_and_links_of_groups(sequence: Sequence) -> None:

@@ -33,21 +33,15 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out / "pages" / "index.html"
 
 
-BAD = """import numpy as np
-from sim.types import Groups, Tracks
+BAD = """
+import numpy as np
+from sim.types import Groups
+from tests.fake_tracker import Nearest
 
-class Bad:
-    needs = ("boxes", "points")
-
-    def reset(self, context, seed):
-        self.next = 0
-
+class Bad(Nearest):
     def step(self, frame, detections):  # a new id for everybody, twice a second
-        n = len(detections.pos)
-        id, none = np.arange(n) + 100 * (frame.index // 3), np.full((n, 2), np.nan)
-        cov = np.tile(np.eye(4), (n, 1, 1))
-        return Tracks(frame.index, frame.t, detections.plane, "person", id, np.full(n, -1), detections.pos, none, cov,
-                      detections.box, np.ones(n), Groups.none())
+        found = super().step(frame, detections)
+        return found.replace(id=np.arange(len(found.id)) + 100 * (frame.index // 3), groups=Groups.none())
 """
 
 

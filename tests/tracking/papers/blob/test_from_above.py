@@ -8,7 +8,7 @@ import pytest
 from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context, Frame
 from tests import painted
-from tests.painted import overlap
+from tests.painted import ids, overlap
 from tracking.papers.blob.tracker import Blob
 
 HIGH, WIDE, FPS = 120, 160, 10.0
@@ -49,10 +49,6 @@ def track(scale, frames, **kind):
     sample = np.stack([picture(r, scale, []) for _ in range(20)])
     tracker.reset(Context(FPS, scale, camera=seen, image_size=(WIDE, HIGH), background=sample), 0)
     return [tracker.step(Frame(k + 1, k / FPS, image=picture(r, scale, p, **kind)), None) for k, p in enumerate(frames)]
-
-
-def ids(tracks):
-    return {int(i) for t in tracks for i in t.id}
 
 
 @pytest.mark.parametrize("scale", [20.0, 40.0])

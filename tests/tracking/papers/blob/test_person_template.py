@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 
 from tests import reference_templates as slow
+from tests.tracking.papers.blob.test_new_people import mask_of
 from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob import person_template_search_kernels
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 from tracking.papers.blob.person_template_kernels import EXPLAINED
 
 HIGH, WIDE = 90, 120
-
-
-def mask_of(*templates):
-    """(H, W) foreground of ellipses."""
-    return np.any([slow.pixels((HIGH, WIDE), *t) for t in templates], 0)
 
 
 def somewhere(r, n):

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.types import Camera, Context, Detections, Frame
+from sim.types import Context, Detections, Frame
+from tests.painted import ids
+from tests.reference_sense import above, pinhole
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
 
@@ -15,16 +17,17 @@ BOX = np.array([0.0, 0.0, 28.0, 68.0])  # a person at 40 px per m
 CONTEXT = Context(fps=FPS, px_per_m=40.0, image_size=(2000, 1000))
 
 
-def run(boxes, config=None, scores=None, context=CONTEXT):
-    """Tracks of frames given as lists of boxes."""
-    tracker = Blob(config)
+def run(boxes, config=None, scores=None, context=CONTEXT, tracker=None, before=lambda k: None):
+    """Tracks of frames given as lists of boxes; before: called with the number of each frame, from 0."""
+    tracker = tracker or Blob(config)
     tracker.reset(context, 0)
     made = []
     for k, rows in enumerate(boxes):
         box = np.array(rows, float).reshape(-1, 4)
         score = np.ones(len(box)) if scores is None else np.array(scores[k], float)
-        found = Detections(k + 1, k / FPS, "image", box[:, :2] + box[:, 2:] / 2, None, box, score)
-        made.append(tracker.step(Frame(k + 1, k / FPS, detections=found), found))
+        found = Detections(k + 1, k / context.fps, "image", box[:, :2] + box[:, 2:] / 2, None, box, score)
+        before(k)
+        made.append(tracker.step(Frame(k + 1, k / context.fps, detections=found), found))
     return made
 
 
@@ -44,10 +47,6 @@ def crowd(seed, frames=60, people=8):
         false = [[*r.uniform(0, 1000, 2), 28, 68] for _ in range(r.poisson(0.7))]
         out.append([*boxes[seen], *false])
     return out
-
-
-def ids(tracks):
-    return {int(i) for t in tracks for i in t.id}
 
 
 @pytest.fixture(params=["rho", "existence"])
@@ -97,13 +96,8 @@ def test_crossing_people_keep_their_ids():
 
 def test_a_hidden_person_lasts_longer_than_one_who_is_merely_missed():
     def existence(front):
-        blocker = [[540, 150, 140, 320]] if front else []
-        tracker = Blob()
-        tracker.reset(CONTEXT, 0)
-        for k in range(40):
-            box = np.array(blocker + ([] if k >= 20 else at((500 + 4 * k, 200)))).reshape(-1, 4)
-            found = Detections(k + 1, k / FPS, "image", box[:, :2] + box[:, 2:] / 2, None, box, np.ones(len(box)))
-            tracker.step(Frame(k + 1, k / FPS, detections=found), found)
+        blocker, tracker = [[540, 150, 140, 320]] if front else [], Blob()
+        run([blocker + ([] if k >= 20 else at((500 + 4 * k, 200))) for k in range(40)], tracker=tracker)
         walker = tracker.people.bank[0, :, 2] < 100
         return tracker.people.existence()[walker].sum()
 
@@ -115,29 +109,24 @@ def test_a_second_box_of_a_person_and_a_coasting_track_on_a_body_are_nobody():
     made = run([[*at((100 + 4 * k, 200)), *([double[k]] if k % 4 == 0 else [])] for k in range(40)])
     assert len(ids(made)) == 1
     tracker, frames = Blob(), [at((100, 200), (340, 200))] * 12 + [at((100, 200))] * 40
-    tracker.reset(CONTEXT, 0)
-    for k, rows in enumerate(frames):
-        box = np.array(rows)
-        found = Detections(k + 1, k / FPS, "image", box[:, :2] + box[:, 2:] / 2, None, box, np.ones(len(box)))
-        if k == 12:  # the second track is put on the first one's body
+
+    def put_the_second_on_the_first(k):
+        if k == 12:
             tracker.people.bank[:, 1] = tracker.people.bank[:, 0]
-        tracks = tracker.step(Frame(k + 1, k / FPS, detections=found), found)
-    assert tracker.people.id.tolist() == tracks.id.tolist() == [1]
+
+    made = run(frames, tracker=tracker, before=put_the_second_on_the_first)
+    assert tracker.people.id.tolist() == made[-1].id.tolist() == [1]
 
 
 @pytest.mark.parametrize("detected", [0.5, 0.7, 1.0])
 @pytest.mark.parametrize("fps", [2.5, 5.0, 25.0])
 def test_people_are_tracked_at_each_rate_of_frames_and_detections(fps, detected):
-    r, tracker, n = np.random.default_rng(1), Blob(), int(20 * fps)
-    tracker.reset(Context(fps=fps, px_per_m=40.0, image_size=(2000, 1000)), 0)
-    count, found = [], set()
+    r, n, frames = np.random.default_rng(1), int(20 * fps), []
     for k in range(n):
         rows = at((100 + 40 * k / fps, 200), (1500 - 40 * k / fps, 600))
-        box = np.array([b for b in rows if r.random() < detected]).reshape(-1, 4) + r.normal(0, 1)
-        d = Detections(k + 1, k / fps, "image", box[:, :2] + box[:, 2:] / 2, None, box, np.ones(len(box)))
-        tracks = tracker.step(Frame(k + 1, k / fps, detections=d), d)
-        count.append(len(tracks.id))
-        found |= set(tracks.id.tolist())
+        frames.append(np.array([b for b in rows if r.random() < detected]).reshape(-1, 4) + r.normal(0, 1))
+    made = run(frames, context=Context(fps=fps, px_per_m=40.0, image_size=(2000, 1000)))
+    count, found = [len(t.id) for t in made], ids(made)
     assert np.mean(count[n // 10 :]) > (1.0 if detected < 0.7 and fps < 5 else 1.5)
     assert max(count) <= 3
     assert len(found) <= (8 if detected < 1 else 2)
@@ -152,12 +141,7 @@ def test_scores_are_learned_from_what_becomes_of_their_boxes(low, high):
         frames.append([*at((100 + 4 * k, 200), (900, 100 + 3 * k)), *false])
         scores.append([high, high, *[low] * 4])
     tracker = Blob()
-    tracker.reset(CONTEXT, 0)
-    for k, rows in enumerate(frames):
-        box, score = np.array(rows), np.array(scores[k])
-        d = Detections(k + 1, k / FPS, "image", box[:, :2] + box[:, 2:] / 2, None, box, score)
-        tracks = tracker.step(Frame(k + 1, k / FPS, detections=d), d)
-    assert tracks.id.tolist() == [1, 2] or len(tracks.id) == 2
+    assert len(run(frames, scores=scores, tracker=tracker)[-1].id) == 2
     ratio = tracker.updater.scores.ratios(np.array([low, high]))
     assert ratio[0] < 0.5 < 2 < ratio[1]
 
@@ -169,10 +153,7 @@ def test_scores_are_learned_from_what_becomes_of_their_boxes(low, high):
 @pytest.mark.parametrize("fps", [2.5, 7.0, 10.0, 25.0])
 def test_whoever_is_always_seen_is_confirmed(config, fps):
     tracker = Blob(config)
-    tracker.reset(Context(fps=fps, px_per_m=40.0), 0)
-    for k in range(int(5 * fps)):
-        box = np.array(at((100, 200)))
-        tracker.step(Frame(k + 1, k / fps), Detections(k + 1, k / fps, "image", box[:, :2], None, box, np.ones(1)))
+    run([at((100, 200))] * int(5 * fps), context=Context(fps=fps, px_per_m=40.0), tracker=tracker)
     assert tracker.people.id.tolist() == [1]
     assert tracker.people.confirmed.all()
 
@@ -180,11 +161,8 @@ def test_whoever_is_always_seen_is_confirmed(config, fps):
 @pytest.mark.parametrize("seed", range(6))
 def test_moving_the_scene_moves_the_answer(config, seed):
     boxes, shift = crowd(seed), np.array([333.0, -77.0, 0, 0])
-    open_context = Context(fps=FPS, px_per_m=40.0)
-    first, second = (
-        run(boxes, config, context=open_context),
-        run([list(np.array(b) + shift) if len(b) else b for b in boxes], config, context=open_context),
-    )
+    moved, context = [[box + shift for box in b] for b in boxes], Context(fps=FPS, px_per_m=40.0)
+    first, second = run(boxes, config, context=context), run(moved, config, context=context)
     for a, b in zip(first, second, strict=True):
         assert np.array_equal(a.id, b.id)
         assert np.allclose(a.pos + shift[:2], b.pos, rtol=0, atol=1e-6)
@@ -230,24 +208,12 @@ def test_innovations_are_white_and_of_unit_size_on_the_model_itself():
         assert abs(np.mean(found[lag:] * found[:-lag])) < 0.06
 
 
-def pinhole(tilt_deg=25.0, height=4.0):
-    tilt = np.radians(tilt_deg)
-    forward, right = np.array([0.0, np.cos(tilt), -np.sin(tilt)]), np.array([1.0, 0, 0])
-    rotation = np.stack([right, np.cross(forward, right), forward])
-    return Camera("pinhole", (640, 480), (500.0, 500.0), (320.0, 240.0), np.array([0.0, 0, height]), rotation)
-
-
-def above():
-    up = np.diag([1.0, -1.0, -1.0])
-    return Camera("top", (640, 480), (1.0, 1.0), (320.0, 240.0), np.array([0.0, 0, 10]), up, px_per_m=40.0)
-
-
-@pytest.mark.parametrize("camera", [pinhole(), above()], ids=["pinhole", "top"])
+@pytest.mark.parametrize("camera", [pinhole(25.0, at=(0.0, 0.0, 4.0)), above()], ids=["pinhole", "top"])
 def test_reports_on_the_ground_where_the_camera_is_known(camera):
     from sim.scene.camera import project, px_per_m_at_centre
 
     context = Context(fps=FPS, px_per_m=px_per_m_at_centre(camera), camera=camera, image_size=camera.image)
-    middle = np.array([0.0, 9.0]) if camera.kind == "pinhole" else np.zeros(2)
+    middle = np.array([0.0, 9.0] if camera.kind == "pinhole" else [8.0, 5.0])
     path = middle + np.array([[-2 + 0.1 * k, 0.03 * k] for k in range(40)])
     boxes = []
     for x, y in path:

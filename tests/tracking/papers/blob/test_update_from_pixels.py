@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests import painted
-from tests.painted import TALL, box, overlap, track
+from tests.painted import TALL, box, ids, overlap, track
 from tracking.filters import kalman
 from tracking.papers.blob.config import BlobConfig
 
@@ -14,10 +14,6 @@ from tracking.papers.blob.config import BlobConfig
 def walk(x, foot, step, frames):
     """One person who walks to the right."""
     return [(x + step * k, foot, TALL) for k in range(frames)]
-
-
-def ids(tracks):
-    return {int(i) for t in tracks for i in t.id}
 
 
 def mine(tracks, person, least=0.5):

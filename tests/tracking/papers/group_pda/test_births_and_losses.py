@@ -9,7 +9,8 @@ import pytest
 
 from sim.truth.merge_split_rules import SPLIT_VELOCITY
 from sim.types import Array
-from tests.tracking.papers.group_pda.test_tracker import FPS, GROUND, block, changes, events, ids, noisy, sizes, track
+from tests.painted import ids
+from tests.tracking.papers.group_pda.test_tracker import FPS, GROUND, block, changes, events, noisy, sizes, track
 from tracking.papers.group_pda.config import GroupPdaConfig
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.types import Array, Context, Detections, Frame, Tracks
+from tests.painted import ids
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.tracker import GroupPda
 
@@ -71,10 +72,6 @@ def events(made: list[Tracks], *kinds: str) -> list[tuple[str, int, tuple[int, .
 
 def changes(made: list[Tracks]) -> list[tuple[str, int, tuple[int, ...], tuple[int, ...]]]:
     return events(made, "merge", "split")
-
-
-def ids(made: list[Tracks]) -> set[int]:
-    return {int(i) for t in made for i in t.id}
 
 
 def sizes(tracks: Tracks) -> Array:

@@ -7,8 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-from sim.types import Context, Detections, Frame
+from sim.types import Context
 from tests.reference_relational import drawn, relate
+from tests.tracking.papers.joint.test_tracker import stepped
 from tracking.papers.relational import sensor, sensor_kernels
 from tracking.papers.relational.association_sums_kernels import exact_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
@@ -20,7 +21,7 @@ def sight(detect, missed=None, cut=None, eye=(np.nan, np.nan)):
     detect = np.asarray(detect, float)
     none = np.zeros(len(detect))
     return sensor.Sight(
-        detect, none > 0 if missed is None else missed, none if cut is None else np.array(cut), np.array(eye)
+        detect, none > 0 if missed is None else np.array(missed), none if cut is None else np.array(cut), np.array(eye)
     )
 
 
@@ -227,11 +228,7 @@ def test_a_miss_leaves_weights_if_everybody_who_exists_is_detected():
 def test_a_detection_that_is_certainly_nobodys_starts_a_person_at_the_largest_doubt(monkeypatch):
     monkeypatch.setattr("tracking.papers.relational.tracker.BIRTH_DOUBT", 1.0)
     tracker = Particle(ParticleConfig())
-    tracker.reset(Context(10.0, float("nan")), 0)
-    for k in range(5):
-        found = Detections(k + 1, k / 10, "ground", np.zeros((1, 2)), None, None, np.ones(1))
-        tracks = tracker.step(Frame(k + 1, k / 10), found)
-    assert len(tracks.id) == 1
+    assert len(stepped(tracker, [[(0, 0)]] * 5)[-1].id) == 1
 
 
 def test_probabilities_of_pairs_are_those_of_the_reported_people():
@@ -239,9 +236,7 @@ def test_probabilities_of_pairs_are_those_of_the_reported_people():
     tracker = Relational()
     tracker.reset(Context(10.0, float("nan")), 0)
     assert tracker.walking_together()[1].shape == (0, 0)
-    for k in range(40):
-        pos = np.array([[0.12 * k, 0.0], [0.12 * k, 0.6], [0.12 * k, 9.0]])
-        tracks = tracker.step(Frame(k + 1, k / 10), Detections(k + 1, k / 10, "ground", pos, score=np.ones(3)))
+    tracks = stepped(tracker, [[(0.12 * k, 0.0), (0.12 * k, 0.6), (0.12 * k, 9.0)] for k in range(40)])[-1]
     id, together = tracker.walking_together()
     assert id.tolist() == tracks.id.tolist()
     assert np.array_equal(together, together.T)

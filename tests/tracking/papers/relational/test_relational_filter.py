@@ -12,6 +12,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context, Detections, Frame
 from tests.reference_relational import drawn, relate, relations
+from tests.tracking.papers.relational.test_particle_weights import sight
 from tracking.filters.person_streams import birth_keys
 from tracking.grouping.belief import UNSEEN
 from tracking.papers.relational import sensor, transition_kernels
@@ -78,13 +79,6 @@ def seat(tracker, particles):
     tracker.slots.extend(
         id=np.full(people, -1), size=np.full((people, 2), np.nan), key=birth_keys(np.zeros((people, 2)), 1)
     )
-
-
-def sight(detect, missed=None):
-    """Nothing is hidden behind another person, and the camera is unknown."""
-    detect = np.asarray(detect, float)
-    none = np.zeros(len(detect))
-    return sensor.Sight(detect, none > 0 if missed is None else np.array(missed), none, np.full(2, np.nan))
 
 
 # E1

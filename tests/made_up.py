@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
-import pytest
 
 from sim.scene.camera import camera_rotation
 from sim.types import (
@@ -27,7 +26,7 @@ from sim.types import (
 )
 
 
-def assert_same(a: Any, b: Any, place: str = "") -> None:
+def same(a: Any, b: Any, place: str = "") -> None:
     """Equal kinds, shapes and bits, all the way down."""
     assert type(a) is type(b), f"{place}: {type(a)} {type(b)}"
     if isinstance(a, np.ndarray):
@@ -37,11 +36,11 @@ def assert_same(a: Any, b: Any, place: str = "") -> None:
     elif is_dataclass(a):
         for f in fields(a):
             if not callable(getattr(a, f.name)) and f.name not in ("source", "load_people", "load_light"):
-                assert_same(getattr(a, f.name), getattr(b, f.name), f"{place}.{f.name}")
+                same(getattr(a, f.name), getattr(b, f.name), f"{place}.{f.name}")
     elif isinstance(a, (tuple, list)):
         assert len(a) == len(b), place
         for k, (x, y) in enumerate(zip(a, b, strict=True)):
-            assert_same(x, y, f"{place}[{k}]")
+            same(x, y, f"{place}[{k}]")
     else:
         assert a == b or (a != a and b != b), f"{place}: {a} {b}"
 
@@ -94,7 +93,7 @@ def detections(r: np.random.Generator, index: int, fps: float = 10.0) -> Detecti
     return Detections(index, (index - 1) / fps, "ground", r.normal(size=(m, 2)), None, box, r.random(m))
 
 
-def sequence(seed: int, length: int = 12) -> Sequence:
+def make_sequence(seed: int, length: int = 12) -> Sequence:
     r = np.random.default_rng(seed)
     found = truth(r, length)
     camera = Camera(
@@ -128,9 +127,9 @@ def pixel_truth(r: np.random.Generator, rows: int, stereo: bool) -> PixelTruth:
     )  # fmt: skip
 
 
-def pictured(seed: int, streams: tuple[str, ...], length: int = 12) -> Sequence:
+def make_pictured(seed: int, streams: tuple[str, ...], length: int = 12) -> Sequence:
     """A sequence with random soft pictures: each a function of seed and frame alone."""
-    plain = sequence(seed, length)
+    plain = make_sequence(seed, length)
     truth = plain.truth
 
     def picture(kind: int, k: int) -> np.ndarray:
@@ -153,7 +152,9 @@ def pictured(seed: int, streams: tuple[str, ...], length: int = 12) -> Sequence:
     )  # fmt: skip
 
 
-def tracks(seed: int, length: int = 9, plane: str = "ground", unit: str = "person", boxed: bool = True) -> list[Tracks]:
+def make_tracks(
+    seed: int, length: int = 9, plane: str = "ground", unit: str = "person", boxed: bool = True
+) -> list[Tracks]:
     r = np.random.default_rng(seed)
     d = 3 if plane == "space" else 2
     found = []
@@ -172,23 +173,3 @@ def tracks(seed: int, length: int = 9, plane: str = "ground", unit: str = "perso
             )
         )  # fmt: skip
     return found
-
-
-@pytest.fixture
-def same() -> Callable[..., None]:
-    return assert_same
-
-
-@pytest.fixture
-def make_sequence() -> Callable[..., Sequence]:
-    return sequence
-
-
-@pytest.fixture
-def make_pictured() -> Callable[..., Sequence]:
-    return pictured
-
-
-@pytest.fixture
-def make_tracks() -> Callable[..., list[Tracks]]:
-    return tracks
