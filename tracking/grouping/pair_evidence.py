@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.truth.merge_split_rules import close_pairs
-from sim.types import Array, Ints
+from sim.types import Array, Bools, Ints
 
 STEP = 0.4  # s: longest step, unless one frame lasts longer.
 CHORD = 0.8  # s over which velocities are measured: two frames of a recording with 2.5 frames/s.
@@ -69,6 +69,14 @@ def step_positions(frame: Ints, column: Ints, pos: Array, length: int, people: i
     np.divide(total, count[:, None], out=mean, where=count[:, None] > 0)
     by_person = mean.reshape(steps, people, 3)
     return by_person[..., :2], by_person[..., 2]
+
+
+def in_steps(frame: Ints, column: Ints, steps: int, people: int, size: int) -> Bools:
+    """Returns flags (steps, people): True in steps of `size` frames, as of `step_positions`, with a row of a person."""
+    step = -(-frame // size)
+    out, whole = np.zeros((steps, people), bool), step < steps
+    out[step[whole], column[whole]] = True
+    return out
 
 
 def step_velocities(pos: Array, time: Array, seconds: float) -> Array:

@@ -179,3 +179,29 @@ def test_stay_and_come_decide_how_long_links_last(scene):
 
     forgetful, default, late = changes(stay=0.0, come=0.0), changes(), changes(stay=30.0, come=30.0)
     assert forgetful > default > late
+
+
+def side_by_side(apart):
+    """Rows of two people who walk at 1 m/s, their distances apart (T,), m, at 2.5 frames per s."""
+    length = len(apart)
+    x = np.arange(length) / 2.5
+    pos = np.stack([np.column_stack([x, 0 * x]), np.column_stack([x, np.asarray(apart, float)])], axis=1)
+    return np.repeat(np.arange(length), 2), np.tile([0, 1], length), pos.reshape(-1, 2), length, 2.5
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_predictions_neither_link_nor_part(together):
+    drift = 1 + np.clip((np.arange(60) - 30) / 3, 0, 8)  # the second person is predicted away, or near
+    rows = side_by_side(drift if together else 10 - drift)
+    seen = (rows[1] == 0) | (rows[0] < 30)
+    held, free = (belief_groups(*rows, default_belief(), some) for some in (seen, None))
+    assert held.links.on.tolist() == [True] * together
+    assert free.links.on.tolist() == [True] + [False] * together
+    assert ((held.now[30:] >= 0) == together).all()
+    assert ((free.now[-1] >= 0) != together).all()
+
+
+def test_a_missed_pair_that_was_seen_apart_is_not_together():
+    rows = side_by_side([*[1.0] * 30, *[20.0] * 3, *[20.0] * 10])
+    seen = (rows[1] == 0) | (rows[0] < 33)
+    assert (belief_groups(*rows, default_belief(), seen).now[30:] < 0).all()
