@@ -20,7 +20,7 @@ from sim.truth.merge_split_rules import frames_of, runs, stretches
 from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import KIND, UNSEEN, Belief, default_belief, pair_beliefs
 from tracking.grouping.link_rule import LinkRule, Links, find_links
-from tracking.grouping.pair_evidence import frames_per_step, in_steps, step_positions
+from tracking.grouping.pair_evidence import frames_per_step, in_steps, lately_measured, step_positions
 from tracking.grouping.tracks_table import TracksTable
 
 
@@ -57,16 +57,16 @@ def groups_of_steps(
 
 
 def belief_groups(
-    frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief, seen: Bools | None = None,
+    frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief, measured: Bools | None = None,
     *, events: bool = True,
 ) -> FoundGroups:  # fmt: skip
     """Returns the groups of a sequence of `length` frames; any two members of a group of events are linked.
 
-    seen (R,): False in rows of people who are reported by prediction only, which are no evidence; None: all are seen.
+    measured (R,): False in rows of people who are predicted only; these are no evidence after `PREDICTED` s. None: all.
     """
     size = frames_per_step(fps)
     people = int(column.max(initial=0)) + 1
-    rows = np.ones(len(frame), bool) if seen is None else seen
+    rows = lately_measured(frame, column, np.ones(len(frame), bool) if measured is None else measured, fps)
     places, times = step_positions(frame[rows], column[rows], pos[rows], length, people, fps)
     shape = (len(places), people)
     found = pair_beliefs(places, times, size / fps, belief)

@@ -12,7 +12,7 @@ from tests import reference_belief as slow
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs, pair_probabilities
 from tracking.grouping.grouping_choice import belief_groups, groups_of_steps
 from tracking.grouping.known_people import people_as_tracks
-from tracking.grouping.pair_evidence import NAMES, evidence
+from tracking.grouping.pair_evidence import NAMES, evidence, lately_measured
 
 
 def walk(seed: int, frames: int, people: int):
@@ -199,6 +199,15 @@ def test_predictions_neither_link_nor_part(together):
     assert free.links.on.tolist() == [True] + [False] * together
     assert ((held.now[30:] >= 0) == together).all()
     assert ((free.now[-1] >= 0) != together).all()
+
+
+def test_short_predictions_are_evidence():
+    measured = np.array([1, 0, 0, 0, 1, 0, 0, 0, 1], bool)
+    frame, column = np.array([0, 1, 2, 3, 4, 0, 1, 2, 3]), np.repeat([0, 1], [5, 4])
+    order = np.lexsort((column, frame))
+    found = lately_measured(frame[order], column[order], measured[order], 10.0)
+    expected = np.array([1, 1, 1, 0, 1, 0, 0, 0, 1], bool)  # the second person is predicted before any measurement
+    assert found.tolist() == expected[order].tolist()
 
 
 def test_a_missed_pair_that_was_seen_apart_is_not_together():
