@@ -173,9 +173,10 @@ def read_named(path: Path, names: list[str], frames_at: FramesAt | None = None) 
         return replace(rows, values=np.zeros((0, 6))), None
     if "time" in found and frames_at is not None:
         found["frame"] = found.pop("time")
-        frame = frames_at(rows.values[:, use.index(found["frame"])])
-        rows.values[:, use.index(found["frame"])] = frame
-        rows = replace(rows, values=rows.values[frame > 0], line=rows.line[frame > 0])
+        k = use.index(found["frame"])
+        numbers = frames_at(rows.values[:, k])
+        rows.values[:, k] = numbers
+        rows = replace(rows, values=rows.values[numbers > 0], line=rows.line[numbers > 0])
 
     def column(name: str, default: float = -1.0) -> Column:
         return rows.values[:, use.index(found[name])] if name in found else np.full(len(rows.line), default)
