@@ -104,7 +104,8 @@ class Tracks(Frozen):
     group, -1 for alone. unit "group": rows are groups, group == id. pos, vel (N, D): plane's unit, and per s. cov (N,
     2D, 2D): covariance of x, y, (z), vx, vy, (vz). box (N, 4): left, top, width, height in px, or None. score (N,): in
     [0, 1], or empty. groups, events: None and () if the tracker of people leaves them to the grouping, which fills them
-    in and sets `derived`. own_events: kinds of events that the tracker reports itself; they are never filled in."""
+    in and sets `derived`. own_events: kinds of events that the tracker reports itself; they are never filled in.
+    seen (N,): False for people who were not measured in this frame, only predicted; empty: all were measured."""
 
     index: int
     t: float
@@ -121,6 +122,7 @@ class Tracks(Frozen):
     events: tuple[GroupEvent, ...] = ()
     derived: bool = False
     own_events: tuple[str, ...] = ()
+    seen: Bools = field(default_factory=lambda: np.zeros(0, bool))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -169,7 +169,7 @@ def make_tracks(
             Tracks(
                 index, (index - 1) / 10, plane, unit, id, group, r.normal(size=(n, d)), r.normal(size=(n, d)),
                 r.normal(size=(n, 2 * d, 2 * d)), box, r.random(n), known if index != 2 else None,
-                (event(r, length, index),) if index % 4 == 0 else (),
+                (event(r, length, index),) if index % 4 == 0 else (), seen=id % 2 == 0,
             )
         )  # fmt: skip
     return found

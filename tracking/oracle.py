@@ -108,7 +108,7 @@ def _rows(t: Tracks, kept: Bools) -> Tracks:
     box = None if t.box is None else t.box[kept]
     return t.replace(
         id=t.id[kept], group=t.group[kept], pos=t.pos[kept], vel=t.vel[kept], cov=t.cov[kept], box=box,
-        score=t.score[kept] if len(t.score) else t.score,
+        score=t.score[kept] if len(t.score) else t.score, seen=t.seen[kept] if len(t.seen) else t.seen,
     )  # fmt: skip
 
 

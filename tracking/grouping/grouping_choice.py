@@ -20,7 +20,7 @@ from sim.truth.merge_split_rules import frames_of, runs, stretches
 from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import KIND, UNSEEN, Belief, default_belief, pair_beliefs
 from tracking.grouping.link_rule import LinkRule, Links, find_links
-from tracking.grouping.pair_evidence import frames_per_step, step_positions
+from tracking.grouping.pair_evidence import frames_per_step, in_steps, lately_measured, step_positions
 from tracking.grouping.tracks_table import TracksTable
 
 
@@ -57,22 +57,32 @@ def groups_of_steps(
 
 
 def belief_groups(
-    frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief, *, events: bool = True
-) -> FoundGroups:
-    """Returns the groups of a sequence of `length` frames; any two members of a group of events are linked."""
+    frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief, measured: Bools | None = None,
+    *, events: bool = True,
+) -> FoundGroups:  # fmt: skip
+    """Returns the groups of a sequence of `length` frames; any two members of a group of events are linked.
+
+    measured (R,): False in rows of people who are predicted only; these are no evidence after `PREDICTED` s. None: all.
+    """
     size = frames_per_step(fps)
     people = int(column.max(initial=0)) + 1
-    places, times = step_positions(frame, column, pos, length, people, fps)
+    rows = lately_measured(frame, column, np.ones(len(frame), bool) if measured is None else measured, fps)
+    places, times = step_positions(frame[rows], column[rows], pos[rows], length, people, fps)
+    shape = (len(places), people)
     found = pair_beliefs(places, times, size / fps, belief)
     pair = found.a * people + found.b
     order = np.lexsort((found.step, pair))
-    row, at = _remembered(pair[order], found.step[order], np.isfinite(places[..., 0]), belief.memory * fps / size)
+    reported = in_steps(frame, column, *shape, size)
+    memory = frames_of(belief.memory * fps / size, 1.0)
+    row, at = _missed(pair[order], found.step[order], np.isfinite(places[..., 0]), reported, memory)
     row = np.concatenate([np.arange(len(pair)), order[row]])
     step = np.concatenate([found.step, at])
+    # What cannot be seen changes nothing: such pairs are linked if they were in one group in the step before.
+    log_odds = np.concatenate([found.log_odds[:, 1], np.full(len(at), (belief.come - belief.stay) / 2)])
     order = np.argsort(step, kind="stable")
-    row, step = row[order], step[order]
-    pairs, shape = (step, found.a[row], found.b[row]), (len(places), people)
-    gain, log_odds = _gain(found.log_odds[row, 0], belief), found.log_odds[row, 1]
+    row, step, log_odds = row[order], step[order], log_odds[order]
+    pairs = (step, found.a[row], found.b[row])
+    gain = _gain(found.log_odds[row, 0], belief)
     now = groups_of_steps(shape, *pairs, gain, float(_gain(UNSEEN, belief)))
     if not events:
         return FoundGroups(None, now, size)
@@ -82,7 +92,7 @@ def belief_groups(
 
 def groups_now(table: TracksTable, fps: float, belief: Belief) -> Ints:
     """Returns a label of each row of a table, (R,), equal for people of one frame who are together now, -1 alone."""
-    found = belief_groups(table.frame, table.column, table.pos, table.length, fps, belief, events=False)
+    found = belief_groups(table.frame, table.column, table.pos, table.length, fps, belief, table.seen, events=False)
     assert found.now is not None
     return found.now[table.frame // found.size, table.column]
 
@@ -112,13 +122,19 @@ def _links(label: Ints, size: int) -> Links:
     return Links(t * size, both // people, both % people, on)
 
 
-def _remembered(pair: Ints, step: Ints, seen: Bools, memory: float) -> tuple[Ints, Ints]:
-    """Returns (row, step) of rows that stand for steps in which one of a pair was missed; seen (S, P)."""
-    (steps, people), memory = seen.shape, frames_of(memory, 1.0)
+def _missed(pair: Ints, step: Ints, seen: Bools, reported: Bools, memory: int) -> tuple[Ints, Ints]:
+    """Returns (row, step) of rows that stand for steps in which one of a pair was missed, up to `memory` steps after
+    both were last reported; seen, reported (S, P)."""
+    steps, people = seen.shape
+    a, b = pair // people, pair % people
     last = np.concatenate([np.diff(pair) != 0, [True]])[: len(pair)]
     following = np.where(last, steps, np.append(step[1:], steps)[: len(step)])
-    row, at = runs(step + 1, np.minimum(following, step + memory + 1))
-    missed = ~(seen[at, pair[row] // people] & seen[at, pair[row] % people])
+    gone = np.where(reported, steps, np.arange(steps)[:, None])
+    gone = np.minimum.accumulate(gone[::-1])[::-1]  # by step: the next one in which a person is not reported
+    row, at = runs(step + 1, np.minimum(following, np.minimum(gone[step, a], gone[step, b]) + memory))
+    # a pair that is seen again without a row is far apart
+    both = np.cumsum(seen[at, a[row]] & seen[at, b[row]])
+    missed = both == np.append(0, both)[np.searchsorted(row, row)]
     return row[missed], at[missed]
 
 
@@ -142,5 +158,5 @@ def grouping_of(source: str | Path) -> Grouping:
 def find_groups(table: TracksTable, fps: float, grouping: Grouping) -> FoundGroups:
     """Returns the groups of the people of a table, by the rule or the belief."""
     if isinstance(grouping, Belief):
-        return belief_groups(table.frame, table.column, table.pos, table.length, fps, grouping)
+        return belief_groups(table.frame, table.column, table.pos, table.length, fps, grouping, table.seen)
     return FoundGroups(find_links(table.frame, table.column, table.pos, table.vel, table.length, fps, grouping))

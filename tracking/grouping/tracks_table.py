@@ -26,6 +26,7 @@ class TracksTable:
     group: Ints  # (R,): the tracker's own group id, -1 for a person alone
     length: int  # frames T of the sequence, the number of the last
     scale: float  # px per m by which pos and vel were divided if the tracks are in the image, else 1
+    seen: Bools | None = None  # (R,): False where a person is reported by prediction only; None: all are seen
 
     def positions(self) -> Array:
         """Returns positions (T, P, 2): x, y in m by frame (from 0) and column; nan where a person is absent."""
@@ -62,7 +63,9 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, smooth: floa
     frame = np.repeat(np.array([t.index for t in tracks], np.int64) - 1, count)
     id, group = np.concatenate([t.id for t in tracks]), np.concatenate(_named_groups(tracks))
     pos, vel = (np.concatenate([getattr(t, name)[:, :2] for t in tracks]) / scale for name in ("pos", "vel"))
+    seen = np.concatenate([t.seen if len(t.seen) else np.ones(len(t.id), bool) for t in tracks])
     order = np.lexsort((id, frame))
+    seen = seen[order]
     frame, id, group, pos, vel = frame[order], id[order], group[order], pos[order], vel[order]
     ids, column = np.unique(id, return_inverse=True)
     length = int(max(t.index for t in tracks))
@@ -70,7 +73,7 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, smooth: floa
     if smooth > 0 or unknown.any():
         chord = chords(frame, id, pos, fps, smooth or WINDOW)
         vel = chord if smooth > 0 else np.where(unknown[:, None], chord, vel)
-    return TracksTable(frame, id, column, ids, pos, vel, group, length, scale)
+    return TracksTable(frame, id, column, ids, pos, vel, group, length, scale, seen)
 
 
 def _named_groups(tracks: Sequence[Tracks]) -> list[Ints]:

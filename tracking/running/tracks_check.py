@@ -47,6 +47,8 @@ def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory |
 def _filled(tracks: Tracks) -> Tracks:
     if not np.size(tracks.score) and np.ndim(tracks.id) == 1:
         tracks = tracks.replace(score=np.ones(len(tracks.id)))
+    if not np.size(tracks.seen) and np.ndim(tracks.id) == 1:
+        tracks = tracks.replace(seen=np.ones(len(tracks.id), bool))
     if isinstance(tracks.events, tuple) and any(map(_has_open_frames, tracks.events)):
         tracks = tracks.replace(events=tuple(_with_frames(e, tracks.index) for e in tracks.events))
     return tracks
@@ -105,6 +107,8 @@ def _row_faults(tracks: Tracks) -> Iterator[Any]:
     types = [getattr(a, "dtype", type(a).__name__) for a in (tracks.id, tracks.group)]
     whole = isinstance(tracks.id, np.ndarray) and all(kind == np.int64 for kind in types)
     yield not whole and (f"ids of type {types[0]}, groups of type {types[1]}", "int64")
+    seen = tracks.seen if isinstance(tracks.seen, np.ndarray) else np.zeros(0)
+    yield (seen.dtype != bool or seen.shape != (n,)) and (f"seen of shape {seen.shape}, {seen.dtype}", f"({n},), bool")
     same = tracks.unit != "group" or np.array_equal(tracks.id, tracks.group)
     yield not same and ("group that is not id", "group equal to id where the unit is group")
     least = int(tracks.group.min(initial=0))

@@ -1,14 +1,17 @@
 """Boxes of a detector in a file of their own, put on the pictures of a video or of another sequence.
 
 The file is a MOT text (det.txt), a table whose first line names its columns, or the JSON of COCO results: a list of
-objects with image_id (the frame, from 1), category_id, bbox [left, top, width, height] and score.
+objects with image_id (the frame, from 1), category_id, bbox [left, top, width, height] and score. A table may have
+times in place of frames: each belongs to the nearest frame.
 """
 
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +21,10 @@ from scenarios.errors import InputError
 from scenarios.limits import is_number
 from sim.io.formats import mot_text
 from sim.io.formats.options import BoxScale
-from sim.types import Frame, Sequence
+from sim.types import Array, Frame, Ints, Sequence
 
 PERSON = 1  # COCO's category of people.
+HALF = 0.5 + 1e-6  # frames: a time belongs to a frame that is so near; times may be rounded.
 OUTSIDE = 1.1  # Boxes that end farther right or lower than this share of the picture are of another picture size.
 
 
@@ -32,8 +36,11 @@ def with_boxes(
 
     Raises InputError if the file cannot be read, has no boxes, or does not fit the sequence's frames and pictures.
     """
-    results = path.suffix.lower() == ".json"
-    found = (_coco_results if results else mot_text.read_detections)(path, None, person_class, box_scale, min_score)
+    if path.suffix.lower() == ".json":
+        found = _coco_results(path, person_class, box_scale, min_score)
+    else:
+        frames_at = partial(_frames_at, path, sequence)
+        found = mot_text.read_detections(path, None, person_class, box_scale, min_score, frames_at)
     if found.plane != "image" or found.box is None:
         raise InputError(file=path, got="points", expected="boxes, px", remedy="give the detector's boxes")
     last = int(found.frame.max(initial=0))
@@ -56,7 +63,29 @@ def with_boxes(
     )  # fmt: skip
 
 
-def _check_size(path: Path, box: np.ndarray, size: tuple[int, int]) -> None:
+def _frames_at(path: Path, sequence: Sequence, seconds: Array) -> Ints:
+    """Returns the frames (N,) from 1 of times (N,): the nearest within half a frame, 0 if none or of a nearer time."""
+    times = np.array([frame.t for frame in sequence.without_pictures()])
+    k = np.searchsorted((times[1:] + times[:-1]) / 2, seconds)
+    away = np.abs(seconds - times[k])
+    # Pictures that the detector saw between two frames would give a person two boxes in one frame.
+    order = np.lexsort((seconds, away, k))
+    frames, first = np.unique(k[order], return_index=True)
+    nearest = seconds[order[first]][np.searchsorted(frames, k)]
+    fits = (away <= HALF / sequence.fps) & (seconds == nearest)
+    out = f"{(~fits).sum()} of {len(fits)} boxes have times of no frame"
+    if fits.mean() < 0.5:
+        raise InputError(
+            file=path, place="times", got=f"{seconds.min():g} to {seconds.max():g} s: {out}",
+            expected=f"times of {len(times)} frames, {times[0]:g} to {times[-1]:g} s",
+            remedy="give seconds since the first frame, and the recording's --fps",
+        )  # fmt: skip
+    if not fits.all():
+        warnings.warn(f"{path}: {out}, and are left out", stacklevel=2)
+    return np.where(fits, k + 1, 0)
+
+
+def _check_size(path: Path, box: Array, size: tuple[int, int]) -> None:
     far = np.quantile(box[:, :2] + box[:, 2:], 0.95, axis=0) / size
     if (far > OUTSIDE).any():
         x, y = far * size
@@ -66,7 +95,7 @@ def _check_size(path: Path, box: np.ndarray, size: tuple[int, int]) -> None:
 
 
 def _coco_results(
-    path: Path, _: int | None, person_class: int | None, box_scale: BoxScale | None, min_score: float | None
+    path: Path, person_class: int | None, box_scale: BoxScale | None, min_score: float | None
 ) -> mot_text.DetectionTable:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))

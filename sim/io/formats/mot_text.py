@@ -28,7 +28,7 @@ from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.biwi import read_groups
 from sim.io.formats.labels import CHORD, differentiate, labelled_truth_fields, require_size
-from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable, corner_doubt, read_table, require_pixels
+from sim.io.formats.mot_table import GROUND_COLUMNS, FramesAt, MotTable, corner_doubt, read_table, require_pixels
 from sim.io.formats.options import BoxScale
 from sim.scene.visibility import scale_of_all_boxes
 from sim.truth.group_hulls import box_groups
@@ -340,13 +340,13 @@ class DetectionTable:
 
 def read_detections(
     path: Path, length: int | None, person_class: int | None = None, box_scale: BoxScale | None = None,
-    min_score: float | None = None,
+    min_score: float | None = None, frames_at: FramesAt | None = None,
 ) -> DetectionTable:  # fmt: skip
     """Reads a det.txt: points on the ground (m) if every row has one, else the boxes' centres (px).
 
-    min_score: rows with a lower score in the file are left out.
+    min_score: rows with a lower score in the file are left out. frames_at: as `read_named` takes it.
     """
-    table = read_table(path, length=length, boxless=True, box_scale=box_scale)
+    table = read_table(path, length=length, boxless=True, box_scale=box_scale, frames_at=frames_at)
     _check_boxes(table)
     ground = ground_positions(table)
     boxless = _reject_placeless(table, ground)

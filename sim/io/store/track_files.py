@@ -62,6 +62,7 @@ class RunRows:
     box: Array  # (R, 4) left, top, width, height in px, nan in a frame without boxes
     boxless: Any  # (R,) True in such a frame
     score: Array  # (R,) 1 if the tracker gives none
+    seen: Any  # (R,) False for people who are predicted only
 
     def reject_faults(self, file: object, remedy: str) -> None:
         """Raises InputError for the first fault, with its frame: a wrong id or group, or number."""
@@ -110,6 +111,7 @@ def flatten(every: list[Tracks]) -> RunRows:
         join([t.cov for t in every], np.zeros((0, 2 * d, 2 * d))), join(no_box, np.zeros((0, 4))),
         np.repeat(np.array([t.box is None for t in every], bool), counts),
         join([scores_or_ones(t.score, len(t.id)) for t in every], np.zeros(0)),
+        join([t.seen if len(t.seen) else np.ones(len(t.id), bool) for t in every], np.zeros(0, bool)),
     )  # fmt: skip
 
 
@@ -130,6 +132,7 @@ def track_table(rows: RunRows, every: list[Tracks], fps: float) -> bytes:
         *(Column(name, values[:, k], u) for k, (name, u) in enumerate(zip(state, units, strict=True))),
         *(Column(name, rows.box[:, k], "px") for k, name in enumerate(BOX)),
         Column("score", rows.score),
+        Column("seen", rows.seen),
         *(
             Column(f"cov_{a}_{b}", rows.cov[:, i, j], f"{units[i]} {units[j]}")
             for i, a in enumerate(state)
@@ -175,6 +178,7 @@ def read_track_table(folder: Path) -> list[Tracks]:
     rows = RunRows(
         f.plane, f.unit, frame, table.ints("id"), table.ints("group"), values[:, :d], values[:, d:], cov,
         table.floats(*BOX), np.isin(frame, list(f.boxless)), table.floats("score"),
+        table.floats("seen") > 0 if table.has("seen") else np.ones(len(frame), bool),
     )  # fmt: skip
     rows.reject_faults(table.file, tables.REDO)
     groups, found = _groups(folder / "groups.parquet", f.first, f.frames), []
@@ -183,7 +187,7 @@ def read_track_table(folder: Path) -> list[Tracks]:
         found.append(
             Tracks(
                 index, (index - 1) / f.fps, f.plane, f.unit, rows.id[r], rows.group[r], rows.pos[r], rows.vel[r],
-                rows.cov[r], box, rows.score[r], groups[index - f.first], derived=f.derived,
+                rows.cov[r], box, rows.score[r], groups[index - f.first], derived=f.derived, seen=rows.seen[r],
             )
         )  # fmt: skip
     return found

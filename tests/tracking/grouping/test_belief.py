@@ -11,7 +11,8 @@ from sim.sequence import simulate
 from tests import reference_belief as slow
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
 from tracking.grouping.grouping_choice import belief_groups, groups_of_steps
-from tracking.grouping.pair_evidence import NAMES, evidence
+from tracking.grouping.known_people import people_as_tracks
+from tracking.grouping.pair_evidence import NAMES, evidence, lately_measured
 
 
 def walk(seed: int, frames: int, people: int):
@@ -155,3 +156,38 @@ def test_stay_and_come_decide_how_long_links_last(scene):
 
     forgetful, default, late = changes(stay=0.0, come=0.0), changes(), changes(stay=30.0, come=30.0)
     assert forgetful > default > late
+
+
+def side_by_side(apart):
+    """Rows of two people who walk at 1 m/s, their distances apart (T,), m, at 2.5 frames per s."""
+    length = len(apart)
+    x = np.arange(length) / 2.5
+    pos = np.stack([np.column_stack([x, 0 * x]), np.column_stack([x, np.asarray(apart, float)])], axis=1)
+    return np.repeat(np.arange(length), 2), np.tile([0, 1], length), pos.reshape(-1, 2), length, 2.5
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_predictions_neither_link_nor_part(together):
+    drift = 1 + np.clip((np.arange(60) - 30) / 3, 0, 8)  # the second person is predicted away, or near
+    rows = side_by_side(drift if together else 10 - drift)
+    seen = (rows[1] == 0) | (rows[0] < 30)
+    held, free = (belief_groups(*rows, default_belief(), some) for some in (seen, None))
+    assert held.links.on.tolist() == [True] * together
+    assert free.links.on.tolist() == [True] + [False] * together
+    assert ((held.now[30:] >= 0) == together).all()
+    assert ((free.now[-1] >= 0) != together).all()
+
+
+def test_short_predictions_are_evidence():
+    measured = np.array([1, 0, 0, 0, 1, 0, 0, 0, 1], bool)
+    frame, column = np.array([0, 1, 2, 3, 4, 0, 1, 2, 3]), np.repeat([0, 1], [5, 4])
+    order = np.lexsort((column, frame))
+    found = lately_measured(frame[order], column[order], measured[order], 10.0)
+    expected = np.array([1, 1, 1, 0, 1, 0, 0, 0, 1], bool)  # the second person is predicted before any measurement
+    assert found.tolist() == expected[order].tolist()
+
+
+def test_a_missed_pair_that_was_seen_apart_is_not_together():
+    rows = side_by_side([*[1.0] * 30, *[20.0] * 3, *[20.0] * 10])
+    seen = (rows[1] == 0) | (rows[0] < 33)
+    assert (belief_groups(*rows, default_belief(), seen).now[30:] < 0).all()

@@ -154,3 +154,10 @@ def test_a_tracker_may_use_its_arrays_again():
         assert type(array) is np.ndarray
         assert array.base is None
         assert not array.flags.writeable
+
+
+def test_without_seen_all_are_measured():
+    assert check(answer()).seen.tolist() == [True, True]
+    assert check(answer(seen=np.array([True, False]))).seen.tolist() == [True, False]
+    for wrong in (np.array([True]), np.array([1.0, 0.0])):
+        refused(answer(seen=wrong), r"seen of shape .*expected \(2,\), bool")

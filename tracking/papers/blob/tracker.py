@@ -160,10 +160,12 @@ class Blob:
             cov, plane = image_covariance(state, scale), "image"
         else:
             state[kalman.PLACE] = place
-            pos, vel, cov, seen = on_ground(camera, state, scale)
-            rows, box, alone, plane = rows[seen], box[seen], alone[seen], "ground"
-        id, score = people.id[rows], people.score[rows]
-        return Tracks(frame.index, frame.t, cast(Plane, plane), "person", id, alone, pos, vel, cov, box, score)
+            pos, vel, cov, shown = on_ground(camera, state, scale)
+            rows, box, alone, plane = rows[shown], box[shown], alone[shown], "ground"
+        id, score, seen = people.id[rows], people.score[rows], people.measured[rows]
+        return Tracks(
+            frame.index, frame.t, cast(Plane, plane), "person", id, alone, pos, vel, cov, box, score, seen=seen
+        )
 
 
 def image_covariance(state: Array, scale: Array) -> Array:

@@ -1,6 +1,7 @@
 """Boxes of a detector beside a video: both forms give the same tracks, and what does not fit is refused."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.formats.detector_boxes import with_boxes
 from sim.io.source import open_source
+from sim.types import Frame
 from tests.small_videos import picture, write_video
 from tracking.app.cli import run
 
@@ -55,6 +57,50 @@ def test_tracks_of_boxes_on_a_video(tmp_path, video):
     assert json.loads((tmp_path / "a" / "run.json").read_text())["detections"] == "file"
     assert run(["overlay", str(video), str(tmp_path / "a"), "--out", str(tmp_path / "a.mp4")]) == 0
     assert run([*command, "--detections", "image", "--out", str(tmp_path / "b")]) == 2
+
+
+def timed(path, times, name="t"):
+    rows = [f"{t},{x},{y},{w},{h}" for t, (_, x, y, w, h, _) in zip(times, ROWS, strict=True)]
+    path.write_text("\n".join([f"{name},left,top,width,height", *rows]))
+    return path
+
+
+@pytest.mark.parametrize("name", ["t", "time", "timestamp"])
+def test_times_belong_to_the_nearest_frame(tmp_path, video, name):
+    (plain,) = open_source(video)
+    times = [frame.t + off / plain.fps for frame, off in zip(plain, [0.4, -0.4] * 6, strict=True)]
+    for frame in with_boxes(plain, timed(tmp_path / "det.csv", times, name)):
+        assert frame.detections.box.tolist() == [list(ROWS[frame.index - 1][1:5])]
+
+
+def test_times_of_frames_at_a_varying_rate(tmp_path, video):
+    (plain,) = open_source(video)
+    times = (np.arange(12) + np.arange(12) ** 2 / 8) / plain.fps
+    varying = replace(plain, bare=lambda: (Frame(k, t) for k, t in enumerate(times, 1)))
+    for frame in with_boxes(varying, timed(tmp_path / "det.csv", times)):
+        assert frame.detections.box.tolist() == [list(ROWS[frame.index - 1][1:5])]
+
+
+def test_times_of_no_frame_are_left_out(tmp_path, video):
+    (plain,) = open_source(video)
+    step = 1 / plain.fps
+    # before and after the video, and a second picture of frame 5
+    times = [-step, *(k * step for k in range(1, 10)), 4.3 * step, 20 * step]
+    with pytest.warns(UserWarning, match="3 of 12 boxes have times of no frame, and are left out"):
+        found = with_boxes(plain, timed(tmp_path / "det.csv", times))
+    assert [len(frame.detections.box) for frame in found] == [0, *[1] * 9, 0, 0]
+    for wrong in (np.arange(12) / 4 * step, np.arange(12) * 1000 * step):  # another frame rate, milliseconds
+        with pytest.raises(InputError, match=r"\d+ of 12 boxes have times of no frame.* expected times of 12 frames"):
+            with_boxes(plain, timed(tmp_path / "det.csv", wrong))
+
+
+def test_frames_are_used_if_there_are_times_too(tmp_path, video):
+    (plain,) = open_source(video)
+    path = tmp_path / "det.csv"
+    path.write_text("t,frame,left,top,width,height\n99,3,10,20,12,30\n")
+    with pytest.warns(UserWarning, match="not used: t"):
+        found = with_boxes(plain, path)
+    assert [len(frame.detections.box) for frame in found] == [0, 0, 1, *[0] * 9]
 
 
 @pytest.mark.parametrize(

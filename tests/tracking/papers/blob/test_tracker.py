@@ -63,6 +63,12 @@ def test_one_person_is_one_track(config):
     assert made[-1].box[0] == pytest.approx(at((100 + 4 * 49, 200))[0], abs=1.0)
 
 
+def test_who_was_measured_is_reported(config):
+    made = run([at((100 + 4 * k, 200)) if k not in (20, 21) else [] for k in range(30)], config)
+    assert [t.index - 1 for t in made[5:] if not t.seen.all()] == [20, 21]
+    assert all(len(t.seen) == len(t.id) == 1 for t in made[5:])
+
+
 def test_a_jump_is_one_new_track_and_the_old_one_dies(config):
     frames = [at((100, 200))] * 30 + [at((500, 200))] * 30
     made = run(frames, config)
