@@ -49,9 +49,7 @@ class GroupPdaConfig(BackgroundSettings):
     confirm_time: float = param(0.3, (0.0, 3.0), "s",
         "a new group is confirmed after so long with measurements and removed after so long without (ours)")
     coast_time: float = param(1.5, (0.0, 10.0), "s",
-        "time without a measurement after which a group is lost and claims no points (ours)")
-    recapture_time: float = param(3.0, (0.0, 10.0), "s",
-        "time after the last measurement for which a newborn group that fits takes a group's id over; 0: never (ours)")
+        "time without a measurement after which a group is lost (ours)")
     report_coast: float = param(0.5, (0.0, 5.0), "s",
         "time after the last measurement for which a group is reported (ours)")
     carry_time: float = param(0.9, (0.0, 3.0), "s",

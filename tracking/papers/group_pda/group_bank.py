@@ -1,8 +1,7 @@
 """The groups that `group-pda` follows: their states as arrays, their prediction, and newborn groups from points.
 
 A group is *tentative* until it has been measured for `confirm_time`; then it is *confirmed* and gets an id. Without a
-measurement it *coasts*. After `coast_time` it is *lost*: it claims no points, but a newborn group may take its id back
-until `recapture_time` is over.
+measurement it *coasts*. After `coast_time` it is *lost*, and removed.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or 
 
 The grouping functions G_0, G_x, G_y of points (sec. 3.1, 3.3, 4.2.1) are in tracking.filters.components: G_y links
 points at most 2 x `radius` apart, and joins linked sets whose regions overlap. A group that is not measured for
-`coast_time` is lost: it claims no points. `association = "none"` is section 5.2.1: a group takes all points in its
+`coast_time` is lost. `association = "none"` is section 5.2.1: a group takes all points in its
 region.
 
 Departures. Those marked (c) are off with `corrections` off.
@@ -64,7 +64,6 @@ Departures. Those marked (c) are off with `corrections` off.
 - enter: no merge if at most one group is older or a child. Paper: none. Why: they came together.
 - duplicates: of two groups on the same people for `coast_time` one is lost. Paper: none. Why: hidden groups follow
   others.
-- recapture: a newborn group takes the id of one that is not measured (`recapture_time`). Paper: none. Why: occlusion.
 - reports: until `report_coast` after a measurement, with hulls of points. Paper: every group. Why: lost groups are
   guesses.
 - onsets: dated back. Paper: none. Why: decisions lag.
@@ -244,7 +243,7 @@ class GroupPda:
     def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> list[WholeGroupEvent]:
         bank = self.bank
         region = search_regions(bank, scaled)
-        d2 = gated_distances(bank, points, region, scaled, t)
+        d2 = gated_distances(bank, points, region, scaled)
         claims = with_missed_members(claimed(points, weights, d2, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
         log_ratio = colour_log_ratio(bank, claims.d2, self.colours) if scaled.colour_bins else np.zeros((len(bank), 0))
