@@ -54,33 +54,34 @@ def add_newborns(
 
 
 def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
-    share = bank.size[row] / (bank.size[row] + born.size[k])
-    born.parent[k] = bank.id[row]
-    born.origin[k] = share * bank.x[row, :2] + (1 - share) * born.x[k, :2]
+    born.parent[k], born.first_seen[k] = bank.group[row], bank.first_seen[row]
     if scaled.config.corrections:
         born.x[k, 2:] = bank.x[row, 2:]
         born.P[k, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * SPLIT_SPEED) ** 2 * np.eye(2)
 
 
 def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[WholeGroupEvent]:
-    """Give ids to tentative groups that were measured for longer than `confirm_time`; yield their events. t: s."""
+    """Give ids to tentative groups that were measured for longer than `confirm_time`; yield an event of each that is no
+    part of a group."""
     for row in np.flatnonzero(~bank.confirmed & (bank.measured_time > scaled.config.confirm_time + 1e-9)).tolist():
+        if not (bank.group == bank.parent[row]).any():
+            bank.parent[row] = NO_ID
         bank.id[row] = ids.new()
-        id, parent = int(bank.id[row]), int(bank.parent[row])
-        place = tuple(bank.x[row, :2].tolist())
-        if parent != NO_ID and (bank.id == parent).any():
-            place = tuple(bank.origin[row].tolist())
-            yield WholeGroupEvent("split", float(bank.first_seen[row]), (parent,), tuple(sorted((parent, id))), place)
-        else:
-            yield WholeGroupEvent("enter", float(bank.first_seen[row]), (), (id,), place)
+        if bank.parent[row] == NO_ID:
+            place = tuple(bank.x[row, :2].tolist())
+            yield WholeGroupEvent("enter", float(bank.first_seen[row]), (), (int(bank.id[row]),), place)
 
 
 def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-    """Remove groups that were not measured for too long, at time t (s); yield a leave event of each confirmed one."""
-    c = scaled.config
-    patience = np.where(bank.confirmed, c.coast_time, c.confirm_time)
+    """Remove groups that were not measured for too long, at time t (s); yield a leave event of each without parts."""
+    patience = np.where(bank.confirmed, scaled.config.coast_time, scaled.config.confirm_time)
     dead: Bools = t - bank.last_seen > patience + 1e-9
-    for row in np.flatnonzero(dead & bank.confirmed).tolist():
+    for row in np.flatnonzero(dead & bank.confirmed & (bank.parent == NO_ID)).tolist():
+        parts = np.flatnonzero(~dead & (bank.group == bank.id[row]))
+        if len(parts):
+            heir = parts[bank.size[parts].argmax()]
+            bank.id[heir], bank.parent[heir] = bank.id[row], NO_ID
+            continue
         last_seen = float(bank.last_seen[row])
         place = bank.x[row, :2] - (t - last_seen) * bank.x[row, 2:]
         yield WholeGroupEvent("leave", last_seen, (int(bank.id[row]),), (), tuple(place.tolist()))

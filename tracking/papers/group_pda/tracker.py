@@ -101,7 +101,7 @@ from tracking.papers.group_pda.from_pixels import (
     update_histograms,
 )
 from tracking.papers.group_pda.group_bank import GroupBank
-from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, GroupMerging, split
+from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, GroupChanges, split, whole_groups
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters, scale_parameters
 from tracking.running.image_scale import required
 
@@ -111,8 +111,8 @@ SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 class GroupPda:
     """The tracker `group-pda`: groups of people tracked as wholes, from points or from foreground pixels.
 
-    State: config, which may be replaced between two frames; bank, the groups; ids, which gives the next id; merging,
-    the past of pairs that may merge; duplicates, the clocks of duplicate groups; pixels: grid points and
+    State: config, which may be replaced between two frames; bank, the groups; ids, which gives the next id; changes,
+    the past of pairs that may merge or split; duplicates, the clocks of duplicate groups; pixels: grid points and
     background model, None from points; plane: "ground" or "image"; context. All but config exist after `reset` only.
     """
 
@@ -133,7 +133,7 @@ class GroupPda:
         """
         self.context = context
         self.bank, self.ids = GroupBank.empty(), GroupIds()
-        self.merging, self.duplicates = GroupMerging(), DuplicateGroups()
+        self.changes, self.duplicates = GroupChanges(), DuplicateGroups()
         self.pixels = None if context.background is None else ForegroundPoints(self.config, context)
         if self.pixels is not None:
             self.context = context.replace(px_per_m=self.pixels.scale)
@@ -172,9 +172,9 @@ class GroupPda:
         bank.predict(scaled)
         events: list[WholeGroupEvent] = []
         if points is not None:
-            events += self._measure(points, weights, scaled, t)
+            self._measure(points, weights, scaled, t)
         self.duplicates.step(bank, scaled, t)
-        events += self.merging.step(bank, scaled, t)
+        events += self.changes.step(bank, scaled, t)
         events += confirm(bank, scaled, t, self.ids)
         events += remove_lost(bank, scaled, t)
         return self._report(frame, events, scaled, self._outline(detections))
@@ -184,9 +184,9 @@ class GroupPda:
 
         outline (V, 2): a polygon round the origin, in the plane's unit, that stands for what covers the ground or the
         image about one member's place: a footprint, a usual box, or a cell of the pixel grid."""
-        bank = self.bank
-        rows = np.flatnonzero(bank.confirmed & (frame.t - bank.last_seen <= self.config.report_coast + 1e-9))
-        rows = rows[np.argsort(bank.id[rows])]
+        seen = self.bank.confirmed & (frame.t - self.bank.last_seen <= self.config.report_coast + 1e-9)
+        bank = whole_groups(self.bank, np.flatnonzero(seen))
+        rows = np.argsort(bank.id)
         # The places on their own hull suffice, and are few.
         corners = convex_hulls([bank.positions(r) for r in rows.tolist()])
         hulls = convex_hulls([(c[:, None] + outline).reshape(-1, 2) for c in corners])
@@ -240,7 +240,7 @@ class GroupPda:
         self.scaled = scale_parameters(self.config, self.context.fps, scale, sine_tilt=sine)
         return self.scaled
 
-    def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> list[WholeGroupEvent]:
+    def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> None:
         bank = self.bank
         region = search_regions(bank, scaled)
         d2 = gated_distances(bank, points, region, scaled)
@@ -251,15 +251,12 @@ class GroupPda:
         remember(bank, claims, mine, scaled, t)
         if scaled.colour_bins:
             update_histograms(bank, mine, claims.claimants, self.colours, claims.weights, scaled)
-        events = self._split(claims, mine, scaled, t)
+        self._split(claims, mine, scaled, t)
         free = claims.claimants[: len(points)] == 0
         add_newborns(bank, points[free], weights[free], expected, scaled, t)
-        return events
 
-    def _split(self, claims: PointClaims, mine: Bools, scaled: ScaledParameters, t: float) -> list[WholeGroupEvent]:
-        bank, events = self.bank, []
+    def _split(self, claims: PointClaims, mine: Bools, scaled: ScaledParameters, t: float) -> None:
+        bank = self.bank
         due = np.flatnonzero((bank.null_time >= self.config.split_time - 1e-9) & (bank.null_time > 0))
         for row in due.tolist()[::-1]:  # from the last row on, as children are appended
-            event = split(bank, row, claims.points[mine[row]], claims.weights[mine[row]], scaled, t, self.ids)
-            events += [] if event is None else [event]
-        return events
+            split(bank, row, claims.points[mine[row]], claims.weights[mine[row]], scaled, t, self.ids)
