@@ -40,8 +40,8 @@ class GroupBank:
     covariance of the members' positions about the centroid; size (G,): N, people. id (G,): NO_ID = -1 for a tentative
     group. first_seen, last_seen (G,): times of first and last measurement. measured_time (G,): total time measured.
     null_time (G,): time without a feasible association, less measured frames in it. own_people (G,): people of the
-    group expected among its points of this frame. parent (G,): id of the group that the row is a part of, or NO_ID if it
-    is the group itself (see `parts`). colour_hist (G, C): people by colour; C = 0 without colours. members: a
+    group expected among its points of this frame. parent (G,): id of the group that the row is a part of, or NO_ID if
+    it is no part (see merging_and_splitting). colour_hist (G, C): people by colour; C = 0 without colours. members: a
     MemberPlaces of each group. recent_points: of each group, a list of (time, points (K, 2)) of the last seconds.
     """
 

@@ -5,18 +5,20 @@ groups after the update of a frame; output: the bank with merged groups, and the
 groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
 components of groups under R_x; each becomes one group. With `corrections` velocities are alike if their difference, on
 the mean of two steps, is at most `merge_velocity`, people of both are at most 1.5 m apart, and R_x must hold for
-`merge_time`; without, if the regions SR_v overlap. Only groups that are measured well merge (see `GroupMerging.step`).
-
-Onsets (ours): when an event that is known now began. A merge is known `merge_time` after its onset. A split is known
-when its parts have long been apart; its onset is measured from the group's earlier points, divided among the parts.
-Distances are metres on the ground (in an image depth is stretched to it). The distances and velocities of the truth's
-rules come from sim.truth.merge_split_rules.
+`merge_time`; without, if the regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
 
 Splitting (sec. 3.3): a group without feasible associations falls apart. An association (a set of points that may be a
-group's) is feasible if its points form one group under the group constraint G_y (tracking.filters.components). `split`
-partitions the points (M, 2) of a group without feasible associations by G_y and replaces its row of the bank by one row
-per part. A group of one part stays, one of noise only is removed. `children` makes the rows of the parts. Lengths are
-in the unit of the points (m on the ground or px), times in s.
+group's) is feasible if its points form one group under the group constraint G_y (tracking.filters.components).
+`fall_apart` partitions the points (M, 2) of such a group by G_y and replaces its row of the bank by one row per part.
+A group that G_y leaves whole stays. With `corrections` the parts stay parts of one group (ours), and so do newborn
+groups beside a member: misses, sway and noise take people apart for a moment. Each part is tracked by itself; the
+group is their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates become one row again.
+Parts whose people have been more than 1.5 m from all others for `confirm_time` split off.
+
+Onsets (ours): when an event that is known now began. A merge is known `merge_time` after its onset. The onset of a
+split is measured from the group's earlier points, divided among the parts. Distances are metres on the ground (in an
+image depth is stretched to it). The distances and velocities of the truth's rules come from
+sim.truth.merge_split_rules. Lengths are in the unit of the points (m on the ground or px), times in s.
 
 Of two groups that follow the same people the one with fewer people of its own becomes lost (ours). Groups that share
 points are each measured by all of them. Without this rule a group that is hidden or has left would follow another one
@@ -52,9 +54,9 @@ REACH = 1.1
 class PairMoment(NamedTuple):
     """Two groups a and b at one time; a has the smaller id.
 
-    t: s. velocity (2,): that of b less that of a, as filtered, m/s on the ground. middle (2,): point half-way between
-    the centroids, in the unit of the points. gap: distance of their nearest people, m; negative if, from pixels, they
-    overlap.
+    t: s. velocity (2,): that of b less that of a, as filtered, m/s on the ground. middle (2,): mean of the centroids,
+    weighted by people, in the unit of the points. gap: distance of their nearest people, m; negative if, from pixels,
+    they overlap.
     """
 
     t: float
@@ -145,83 +147,58 @@ class GroupChanges:
         self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= PATIENCE}
 
     def _split(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-        for group in np.unique(bank.parent[bank.confirmed & (bank.parent != NO_ID)]).tolist():
+        for group in np.unique(bank.group[bank.confirmed & (bank.parent != NO_ID)]).tolist():
             rows = np.flatnonzero(bank.group == group)
-            able = rows[_able(bank, rows, t)]
-            for i, j in combinations(able.tolist(), 2):
+            for i, j in combinations(rows[_measured(bank, t)[rows]].tolist(), 2):
                 self._extend(bank, i, j, scaled, t)
-            linked = [
-                p for i, j in combinations(rows.tolist(), 2) if not self._parted(p := _pair(bank, i, j), scaled, t)
-            ]
-            parts = [np.flatnonzero(np.isin(bank.id, p)) for p in _connected(linked, bank.id[rows].tolist())]
+            pairs = [_pair(bank, i, j) for i, j in combinations(rows.tolist(), 2)]
+            linked = [pair for pair in pairs if not self._apart(pair, scaled, t)]
+            parts = [np.flatnonzero(np.isin(bank.id, ids)) for ids in _connected(linked, bank.id[rows].tolist())]
             if len(parts) > 1:
-                yield self._split_into(bank, group, parts, scaled, t)
+                yield _split_into(bank, group, parts, scaled, t)
 
-    def _parted(self, pair: Pair, scaled: ScaledParameters, t: float) -> bool:
+    def _apart(self, pair: Pair, scaled: ScaledParameters, t: float) -> bool:
+        if not scaled.config.corrections:
+            return True
         moments = self.moments.get(pair, [])
-        if not moments or moments[-1].t < t or not scaled.config.corrections:
-            return not scaled.config.corrections
-        return has_split(moments, scaled.config.confirm_time)
-
-    def _split_into(
-        self, bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledParameters, t: float
-    ) -> WholeGroupEvent:
-        parts = sorted(parts, key=lambda rows: (-bank.size[rows].sum(), bank.id[rows].min()))
-        recent = pooled([bank.recent_points[r] for rows in parts for r in rows.tolist()])
-        two = [np.concatenate([bank.positions(r) for r in rows.tolist()]) for rows in parts[:2]]
-        onset, place = split_onset(recent, two, scaled.metres_per_unit, scaled.body_cov, t)
-        head = int(np.flatnonzero(bank.id == group)[0])
-        if head not in parts[0]:
-            heir = int(parts[0][bank.size[parts[0]].argmax()])
-            swapped = {group, int(bank.id[heir])}
-            self.moments = {p: past for p, past in self.moments.items() if not swapped & set(p)}
-            bank.id[[head, heir]] = bank.id[[heir, head]]
-        for rows in parts:
-            first = rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]]
-            bank.parent[rows] = bank.id[first]
-            bank.parent[first] = NO_ID
-        after = tuple(sorted(set(bank.group[np.concatenate(parts)].tolist())))
-        return WholeGroupEvent("split", onset, (group,), after, tuple(place.tolist()))
+        if not moments or moments[-1].t < t:
+            return False  # one of them is not measured
+        near = max((m.t for m in moments if m.gap <= MERGE_DISTANCE), default=moments[0].t)
+        return t - near > scaled.config.confirm_time + 1e-9
 
     def _join_parts(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
-        rows = np.flatnonzero(bank.confirmed)
-        rows = rows[_able(bank, rows, t)]
-        pairs = [
-            _pair(bank, i, j) for i, j in _overlapping(bank, rows, scaled.config.gate) if bank.group[i] == bank.group[j]
-        ]
-        due = [p for p in pairs if p in self.moments and _onset(bank, p, self.moments[p], scaled)]
-        for ids in _connected(due):
-            rows = np.flatnonzero(np.isin(bank.id, ids))
-            union = merged(bank, rows)
-            bank.keep(~np.isin(np.arange(len(bank)), rows))
+        near = _overlapping(bank, np.flatnonzero(bank.confirmed & _measured(bank, t)), scaled.config.gate)
+        pairs = [_pair(bank, i, j) for i, j in near if bank.group[i] == bank.group[j]]
+        for ids in _connected([pair for pair in pairs if _onset(bank, pair, self.moments[pair], scaled)]):
+            joined = np.isin(bank.id, ids)
+            union = merged(bank, np.flatnonzero(joined))
+            bank.keep(~joined)
             bank.add(union)
 
     def _merge(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-        heads = np.flatnonzero(bank.confirmed & (bank.parent == NO_ID))
-        heads = heads[_able(bank, heads, t)]
-        rows = np.flatnonzero(np.isin(bank.group, bank.id[heads]) & bank.confirmed)
-        rows = rows[_able(bank, rows, t)]
-        whole = whole_groups(bank, rows)
+        measured = bank.confirmed & _measured(bank, t)
+        heads = bank.id[measured & (bank.parent == NO_ID)]
+        whole = whole_groups(bank, np.flatnonzero(measured & np.isin(bank.group, heads)))
         onset = {}
         for i, j in _overlapping(whole, np.arange(len(whole)), scaled.config.gate):
-            moments = self._extend(whole, i, j, scaled, t)
-            if found := _onset(whole, _pair(whole, i, j), moments, scaled):
-                onset[_pair(whole, i, j)] = found
+            pair = _pair(whole, i, j)
+            if found := _onset(whole, pair, self._extend(whole, i, j, scaled, t), scaled):
+                onset[pair] = found
         for ids in _connected(list(onset)):
             old = np.flatnonzero(np.isin(whole.id, ids))
             first = min((m for pair, m in onset.items() if pair[0] in ids), key=lambda m: m.t)
             union, present = merged(whole, old), first.t - whole.first_seen[old] > ARRIVAL
             heir = int(union.id[0])
-            bank.keep(~(np.isin(bank.group, ids) & _measured(bank, t) & bank.confirmed))
+            bank.keep(~(np.isin(bank.group, ids) & _measured(bank, t)))
             bank.parent[np.isin(bank.parent, ids)] = heir
             bank.add(union)
             kind = "merge" if present.sum() > 1 else "enter"
             yield WholeGroupEvent(kind, first.t, tuple(sorted(ids)), (heir,), tuple(first.middle.tolist()))
 
     def _extend(self, bank: GroupBank, i: int, j: int, scaled: ScaledParameters, t: float) -> list[PairMoment]:
-        pair = _pair(bank, i, j)
-        past = [m for m in self.moments.get(pair, []) if t - HISTORY_TIME < m.t < t and t - m.t <= HISTORY_TIME]
-        self.moments[pair] = [*past, _moment(bank, *((i, j) if bank.id[i] < bank.id[j] else (j, i)), scaled, t)]
+        pair, (a, b) = _pair(bank, i, j), sorted((i, j), key=lambda row: bank.id[row])
+        past = [m for m in self.moments.get(pair, []) if t - HISTORY_TIME < m.t < t]
+        self.moments[pair] = [*past, _moment(bank, a, b, scaled, t)]
         return self.moments[pair]
 
 
@@ -229,30 +206,28 @@ def _measured(bank: GroupBank, t: float) -> Bools:
     return np.asarray((bank.last_seen >= t) & (bank.null_time <= 0))
 
 
-def _able(bank: GroupBank, rows: Ints, t: float) -> Bools:
-    return np.asarray((bank.last_seen[rows] >= t) & (bank.null_time[rows] <= 0))
-
-
 def _pair(bank: GroupBank, i: int, j: int) -> Pair:
     a, b = sorted((int(bank.id[i]), int(bank.id[j])))
     return a, b
 
 
+def _split_into(bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledParameters, t: float) -> WholeGroupEvent:
+    parts = sorted(parts, key=lambda rows: (group not in bank.id[rows], -bank.size[rows].sum()))
+    recent = pooled([bank.recent_points[r] for rows in parts for r in rows.tolist()])
+    two = [np.concatenate([bank.positions(r) for r in rows.tolist()]) for rows in parts[:2]]
+    onset, place = split_onset(recent, two, scaled.metres_per_unit, scaled.body_cov, t)
+    heads = [rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]] for rows in parts]
+    for rows, head in zip(parts, heads, strict=True):
+        bank.parent[rows], bank.parent[head] = bank.id[head], NO_ID
+    return WholeGroupEvent("split", onset, (group,), tuple(sorted(bank.id[heads].tolist())), tuple(place.tolist()))
+
+
 def pooled(recent: list[list[tuple[float, Array]]]) -> list[tuple[float, Array]]:
-    """Returns the points of several rows' recent points together, by time, oldest first."""
+    """Returns the recent points of several rows together, by time, oldest first."""
     by_time: dict[float, list[Array]] = {}
     for t, points in (moment for past in recent for moment in past):
         by_time.setdefault(t, []).append(points)
     return [(t, np.concatenate(by_time[t])) for t in sorted(by_time)]
-
-
-def has_split(moments: list[PairMoment], hold: float) -> bool:
-    """Returns True if two parts have been apart for `hold` s: far, or less far with unlike velocities on the mean of
-    two steps."""
-    gap = np.array([m.gap for m in moments])
-    apart = (gap > SPLIT_DISTANCE) | ((gap > MERGE_DISTANCE) & (step_speeds(moments) > SPLIT_VELOCITY))
-    k = int(np.flatnonzero(~apart)[-1]) + 1 if not apart.all() else 0
-    return k < len(moments) and moments[-1].t - moments[k].t >= hold - 1e-9
 
 
 def whole_groups(bank: GroupBank, rows: Ints) -> GroupBank:
@@ -335,10 +310,10 @@ def _connected(pairs: list[Pair], alone: Iterable[int] = ()) -> list[list[int]]:
     return [sorted(p) for p in parts]
 
 
-def split(
+def fall_apart(
     bank: GroupBank, row: int, points: Array, weights: Array, scaled: ScaledParameters, t: float, ids: GroupIds
 ) -> None:
-    """Replace the group in `row` by the parts that its points (M, 2) form under G_y; the largest is the group."""
+    """Replace the row of the bank by one for each part of its points (M, 2) under G_y; the largest keeps its id."""
     group = partition(points, weights, scaled.constraint)
     bank.null_time[row] = 0.0
     if group.max(initial=-1) < 1:

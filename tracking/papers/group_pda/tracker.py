@@ -51,17 +51,19 @@ Departures. Those marked (c) are off with `corrections` off.
   similar groups cross.
 - split: after `split_time`; measured frames count back; (c) parent's velocity. Paper: after infeasible frames, at
   rest. Why: misses.
+- parts, (c): what falls apart stays one group until it is 1.5 m apart for `confirm_time`. Paper: at once. Why: misses
+  and sway take people apart for a moment.
 - split into one part: the group stays as it is. Paper: initialised anew. Why: others' points made it infeasible.
 - divided points: those most probably the group's. Paper: all in the region. Why: others' people stay out.
 - ids: the largest part or merged group keeps its id. Paper: none. Why: tracks need ids.
-- walking out: a new group within reach of a member is a child, (c) with its velocity. Paper: none. Why: splits without
+- walking out: a new group within reach of a member is a part, (c) with its velocity. Paper: none. Why: splits without
   shared points.
 - like velocities, (c): difference up to `merge_velocity` on the mean of two steps. Paper: SR_v overlap. Why: P does
   not measure likeness; people sway with each step.
 - SR_v, without corrections: of the updated velocity. Paper: of the predicted one. Why: Fig. 1 merges after the update.
 - near groups, (c): people at most 1.5 m apart, too. Paper: regions overlap. Why: no merge after a split.
 - merge: of confirmed, measured, feasible groups; (c) after `merge_time`. Paper: at once. Why: crossing groups.
-- enter: no merge if at most one group is older or a child. Paper: none. Why: they came together.
+- enter: no merge if at most one group is older. Paper: none. Why: they came together.
 - duplicates: of two groups on the same people for `coast_time` one is lost. Paper: none. Why: hidden groups follow
   others.
 - reports: until `report_coast` after a measurement, with hulls of points. Paper: every group. Why: lost groups are
@@ -101,7 +103,7 @@ from tracking.papers.group_pda.from_pixels import (
     update_histograms,
 )
 from tracking.papers.group_pda.group_bank import GroupBank
-from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, GroupChanges, split, whole_groups
+from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, GroupChanges, fall_apart, whole_groups
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters, scale_parameters
 from tracking.running.image_scale import required
 
@@ -152,7 +154,8 @@ class GroupPda:
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
-        Order: predict; gate, associate, update, split (Fig. 1), births; duplicates; merge; confirm; remove lost groups.
+        Order: predict; gate, associate, update, fall apart (Fig. 1), births; duplicates; split, merge; confirm; remove
+        lost groups.
         From points `detections.pos` is used (x, y), from pixels `frame.image`. A frame without them (None), and from
         pixels one with too much foreground, is predicted only; before the first detections the Tracks are empty. A
         config that has replaced `config` since the last frame holds from this frame on; the groups stay.
@@ -259,4 +262,4 @@ class GroupPda:
         bank = self.bank
         due = np.flatnonzero((bank.null_time >= self.config.split_time - 1e-9) & (bank.null_time > 0))
         for row in due.tolist()[::-1]:  # from the last row on, as children are appended
-            split(bank, row, claims.points[mine[row]], claims.weights[mine[row]], scaled, t, self.ids)
+            fall_apart(bank, row, claims.points[mine[row]], claims.weights[mine[row]], scaled, t, self.ids)
