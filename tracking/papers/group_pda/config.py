@@ -40,7 +40,7 @@ class GroupPdaConfig(BackgroundSettings):
         "R, misses, rest and gate of extents, velocities of merges and children (ours)", "categorical")
     appearance: float = param(0.5, (0.0, 5.0), "",
         "from pixels: weight of colours in the log masses (future work of sec. 6; ours)", sees="pixels")
-    merge_velocity: float = param(0.5, (0.05, 3.0), "m/s",
+    merge_velocity: float = param(0.65, (0.05, 3.0), "m/s",
         "largest difference of velocities at which groups merge (ours, in place of SR_v)")
     merge_time: float = param(0.75, (0.0, 3.0), "s",
         "time for which groups must be near, with like velocities on the mean of two steps, before they merge (ours)")
