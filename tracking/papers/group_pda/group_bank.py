@@ -6,8 +6,8 @@ measurement it *coasts*. After `coast_time` it is *lost*, and removed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -85,11 +85,11 @@ class GroupBank:
 
     def at(self, rows: Ints | Bools) -> GroupBank:
         """Returns a bank of these rows, a copy."""
-        rows = np.arange(len(self))[rows]
-        return GroupBank(*(
-            [value[r] for r in rows.tolist()] if f.name in LISTS else value[rows]
-            for f in fields(self) for value in [getattr(self, f.name)]
-        ))  # fmt: skip
+        rows, chosen = np.arange(len(self))[rows], dict[str, Any]()
+        for f in fields(self):
+            value = getattr(self, f.name)
+            chosen[f.name] = [value[r] for r in rows.tolist()] if f.name in LISTS else value[rows]
+        return replace(self, **chosen)
 
     def positions(self, row: int) -> Array:
         """Returns the positions (K, 2) x, y of the members of the group in `row`: last measured places, moved with its
@@ -98,10 +98,9 @@ class GroupBank:
 
     def keep(self, kept: Bools) -> None:
         """Remove the rows that are False in kept (G,) bool, in place."""
+        chosen = self.at(kept)
         for f in fields(self):
-            value = getattr(self, f.name)
-            new = [v for v, k in zip(value, kept, strict=True) if k] if f.name in LISTS else value[kept]
-            setattr(self, f.name, new)
+            setattr(self, f.name, getattr(chosen, f.name))
 
     def remove(self, row: int) -> None:
         """Remove the group in `row` (from 0; another row changes nothing), in place; later rows move up by one."""
