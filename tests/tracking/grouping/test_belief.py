@@ -11,7 +11,6 @@ from sim.sequence import simulate
 from tests import reference_belief as slow
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
 from tracking.grouping.grouping_choice import belief_groups, groups_of_steps
-from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.pair_evidence import NAMES, evidence, lately_measured
 
 

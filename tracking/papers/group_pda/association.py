@@ -53,13 +53,10 @@ def search_regions(bank: GroupBank, scaled: ScaledParameters) -> Array:
     return np.asarray(bank.extent + bank.P[:, :2, :2] + (scaled.point_sd**2 + wider)[:, None, None] * np.eye(2))
 
 
-def gated_distances(bank: GroupBank, points: Array, region: Array, scaled: ScaledParameters, t: float) -> Array:
+def gated_distances(bank: GroupBank, points: Array, region: Array, scaled: ScaledParameters) -> Array:
     """Returns squared Mahalanobis distances (G, M) of the points (M, 2) from the groups, inf outside a search region
     (eq. 2.2)."""
-    config = scaled.config
-    lost = bank.confirmed & (t - bank.last_seen > max(config.coast_time, scaled.dt) + 1e-9)
-    d2 = kernels.search(points, bank.x, region, config.gate)
-    d2[lost] = np.inf
+    d2 = kernels.search(points, bank.x, region, scaled.config.gate)
     tentative = ~bank.confirmed
     if tentative.any():
         claimed_by_confirmed = np.isfinite(d2[~tentative]).any(0)

@@ -1,7 +1,8 @@
-"""Births, confirmation, recapture and loss of `group-pda`'s groups: how a group's life begins and ends.
+"""Births, confirmation and loss of `group-pda`'s groups: how a group's life begins and ends.
 
-A new group is tentative (without id). It is confirmed, and gets an id, once it has been measured long enough. A group
-without measurements for too long is lost; recapture gives its id to a newborn group that fits.
+A new group is tentative (without id). It is confirmed, and gets an id, once it has been measured long enough. A new
+group beside a member of a group is a part of that group (see merging_and_splitting). A group without measurements for
+too long is lost.
 
 Each function changes the bank of groups in place. Events of confirmed groups are returned as `WholeGroupEvent`s.
 """
@@ -18,9 +19,6 @@ from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.association import walking_reach
 from tracking.papers.group_pda.group_bank import GroupBank, newborn
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
-
-# Squared Mahalanobis radius of a recapture: 99 % quantile of chi-square with 4 degrees of freedom.
-RECAPTURE_GATE = 13.28
 
 ExpectedMembers = tuple[Array, Array, Ints]
 
@@ -57,60 +55,34 @@ def add_newborns(
 
 
 def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
-    share = bank.size[row] / (bank.size[row] + born.size[k])
-    born.parent[k] = bank.id[row]
-    born.origin[k] = share * bank.x[row, :2] + (1 - share) * born.x[k, :2]
+    born.parent[k], born.first_seen[k] = bank.group[row], bank.first_seen[row]
     if scaled.config.corrections:
         born.x[k, 2:] = bank.x[row, 2:]
         born.P[k, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * SPLIT_SPEED) ** 2 * np.eye(2)
 
 
 def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[WholeGroupEvent]:
-    """Give ids to tentative groups that were measured for longer than `confirm_time`; yield their events. t: s."""
-    c = scaled.config
-    new = np.flatnonzero(~bank.confirmed & (bank.measured_time > c.confirm_time + 1e-9))
-    old = np.flatnonzero(bank.confirmed & (bank.last_seen < t)) if c.recapture_time > 0 else new[:0]
-    recaptured = dict(_recaptured(bank, new, old, scaled)) if len(new) and len(old) else {}
-    for row in new.tolist():
-        place = tuple(bank.x[row, :2].tolist())
-        if row in recaptured:
-            lost = recaptured[row]
-            bank.id[row], bank.first_seen[row] = bank.id[lost], bank.first_seen[lost]
-            bank.id[lost], bank.last_seen[lost] = NO_ID, -np.inf
-        else:
-            bank.id[row] = ids.new()
-            id, parent = int(bank.id[row]), int(bank.parent[row])
-            if parent != NO_ID and (bank.id == parent).any():
-                place = tuple(bank.origin[row].tolist())
-                yield WholeGroupEvent(
-                    "split", float(bank.first_seen[row]), (parent,), tuple(sorted((parent, id))), place
-                )
-            else:
-                yield WholeGroupEvent("enter", float(bank.first_seen[row]), (), (id,), place)
-
-
-def _recaptured(bank: GroupBank, new: Ints, old: Ints, scaled: ScaledParameters) -> Iterator[tuple[int, int]]:
-    d = bank.x[new][:, None] - bank.x[old]
-    S = bank.P[new][:, None] + bank.P[old]
-    S[..., :2, :2] += bank.extent[old]
-    d2 = np.einsum("nki,nki->nk", d, np.linalg.solve(S, d[..., None])[..., 0])
-    metres = scaled.metres_per_unit
-    doubt = np.sqrt(np.einsum("...aa,a->...", S[..., 2:, 2:], np.square(metres)) / 2)
-    alike = np.hypot(*np.moveaxis(d[..., 2:] * metres, -1, 0)) <= scaled.config.merge_velocity + doubt
-    gone = bank.last_seen[old] < bank.first_seen[new][:, None]
-    d2 = np.where(alike & gone & (d2 <= RECAPTURE_GATE), d2, np.inf)
-    while np.isfinite(d2).any():
-        i, j = np.unravel_index(int(d2.argmin()), d2.shape)
-        yield int(new[i]), int(old[j])
-        d2[i], d2[:, j] = np.inf, np.inf
+    """Give ids to tentative groups that were measured for longer than `confirm_time`; yield an event of each that is no
+    part of a group."""
+    for row in np.flatnonzero(~bank.confirmed & (bank.measured_time > scaled.config.confirm_time + 1e-9)).tolist():
+        if not (bank.group == bank.parent[row]).any():
+            bank.parent[row] = NO_ID
+        bank.id[row] = ids.new()
+        if bank.parent[row] == NO_ID:
+            place = tuple(bank.x[row, :2].tolist())
+            yield WholeGroupEvent("enter", float(bank.first_seen[row]), (), (int(bank.id[row]),), place)
 
 
 def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-    """Remove groups that were not measured for too long, at time t (s); yield a leave event of each confirmed one."""
-    c = scaled.config
-    patience = np.where(bank.confirmed, max(c.coast_time, c.recapture_time), c.confirm_time)
+    """Remove groups that were not measured for too long, at time t (s); yield a leave event of each without parts."""
+    patience = np.where(bank.confirmed, scaled.config.coast_time, scaled.config.confirm_time)
     dead: Bools = t - bank.last_seen > patience + 1e-9
-    for row in np.flatnonzero(dead & bank.confirmed).tolist():
+    for row in np.flatnonzero(dead & bank.confirmed & (bank.parent == NO_ID)).tolist():
+        parts = np.flatnonzero(~dead & (bank.group == bank.id[row]))
+        if len(parts):
+            heir = parts[bank.size[parts].argmax()]
+            bank.id[heir], bank.parent[heir] = bank.id[row], NO_ID
+            continue
         last_seen = float(bank.last_seen[row])
         place = bank.x[row, :2] - (t - last_seen) * bank.x[row, 2:]
         yield WholeGroupEvent("leave", last_seen, (int(bank.id[row]),), (), tuple(place.tolist()))

@@ -40,7 +40,7 @@ class GroupPdaConfig(BackgroundSettings):
         "R, misses, rest and gate of extents, velocities of merges and children (ours)", "categorical")
     appearance: float = param(0.5, (0.0, 5.0), "",
         "from pixels: weight of colours in the log masses (future work of sec. 6; ours)", sees="pixels")
-    merge_velocity: float = param(0.5, (0.05, 3.0), "m/s",
+    merge_velocity: float = param(0.65, (0.05, 3.0), "m/s",
         "largest difference of velocities at which groups merge (ours, in place of SR_v)")
     merge_time: float = param(0.75, (0.0, 3.0), "s",
         "time for which groups must be near, with like velocities on the mean of two steps, before they merge (ours)")
@@ -49,9 +49,7 @@ class GroupPdaConfig(BackgroundSettings):
     confirm_time: float = param(0.3, (0.0, 3.0), "s",
         "a new group is confirmed after so long with measurements and removed after so long without (ours)")
     coast_time: float = param(1.5, (0.0, 10.0), "s",
-        "time without a measurement after which a group is lost and claims no points (ours)")
-    recapture_time: float = param(3.0, (0.0, 10.0), "s",
-        "time after the last measurement for which a newborn group that fits takes a group's id over; 0: never (ours)")
+        "time without a measurement after which a group is lost (ours)")
     report_coast: float = param(0.5, (0.0, 5.0), "s",
         "time after the last measurement for which a group is reported (ours)")
     carry_time: float = param(0.9, (0.0, 3.0), "s",

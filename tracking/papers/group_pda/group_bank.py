@@ -1,14 +1,13 @@
 """The groups that `group-pda` follows: their states as arrays, their prediction, and newborn groups from points.
 
 A group is *tentative* until it has been measured for `confirm_time`; then it is *confirmed* and gets an id. Without a
-measurement it *coasts*. After `coast_time` it is *lost*: it claims no points, but a newborn group may take its id back
-until `recapture_time` is over.
+measurement it *coasts*. After `coast_time` it is *lost*, and removed.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import NamedTuple
+from dataclasses import dataclass, fields, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,8 +40,8 @@ class GroupBank:
     covariance of the members' positions about the centroid; size (G,): N, people. id (G,): NO_ID = -1 for a tentative
     group. first_seen, last_seen (G,): times of first and last measurement. measured_time (G,): total time measured.
     null_time (G,): time without a feasible association, less measured frames in it. own_people (G,): people of the
-    group expected among its points of this frame. parent (G,): id of the group that a tentative group has left, or
-    NO_ID; origin (G, 2): where it left it. colour_hist (G, C): people by colour; C = 0 without colours. members: a
+    group expected among its points of this frame. parent (G,): id of the group that the row is a part of, or NO_ID if
+    it is no part (see merging_and_splitting). colour_hist (G, C): people by colour; C = 0 without colours. members: a
     MemberPlaces of each group. recent_points: of each group, a list of (time, points (K, 2)) of the last seconds.
     """
 
@@ -57,7 +56,6 @@ class GroupBank:
     null_time: Array
     own_people: Array
     parent: Ints
-    origin: Array
     colour_hist: Array
     members: list[MemberPlaces]
     recent_points: list[list[tuple[float, Array]]]
@@ -65,10 +63,10 @@ class GroupBank:
     @classmethod
     def empty(cls, colour_bins: int = 0) -> GroupBank:
         """Returns a bank without groups; colour_bins: columns C of colour_hist, 0 without colours."""
-        none, ids, two = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 2))
+        none, ids = np.zeros(0), np.zeros(0, np.int64)
         four = np.zeros((0, 4))
         return cls(
-            four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, none, ids, two,
+            four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, none, ids,
             np.zeros((0, colour_bins)), [], [],
         )  # fmt: skip
 
@@ -80,6 +78,19 @@ class GroupBank:
         """Flags (G,): True for groups with an id; the others are tentative."""
         return np.asarray(self.id != NO_ID)
 
+    @property
+    def group(self) -> Ints:
+        """Id (G,) of the group that each row is a part of, or is; NO_ID of tentative groups."""
+        return np.where(self.confirmed & (self.parent != NO_ID), self.parent, self.id)
+
+    def at(self, rows: Ints | Bools) -> GroupBank:
+        """Returns a bank of these rows, a copy."""
+        rows, chosen = np.arange(len(self))[rows], dict[str, Any]()
+        for f in fields(self):
+            value = getattr(self, f.name)
+            chosen[f.name] = [value[r] for r in rows.tolist()] if f.name in LISTS else value[rows]
+        return replace(self, **chosen)
+
     def positions(self, row: int) -> Array:
         """Returns the positions (K, 2) x, y of the members of the group in `row`: last measured places, moved with its
         centroid."""
@@ -87,10 +98,9 @@ class GroupBank:
 
     def keep(self, kept: Bools) -> None:
         """Remove the rows that are False in kept (G,) bool, in place."""
+        chosen = self.at(kept)
         for f in fields(self):
-            value = getattr(self, f.name)
-            new = [v for v, k in zip(value, kept, strict=True) if k] if f.name in LISTS else value[kept]
-            setattr(self, f.name, new)
+            setattr(self, f.name, getattr(chosen, f.name))
 
     def remove(self, row: int) -> None:
         """Remove the group in `row` (from 0; another row changes nothing), in place; later rows move up by one."""
@@ -131,6 +141,6 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
     zero, now = np.zeros(count), np.full(count, t)
     return GroupBank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, NO_ID),
-        now, now.copy(), zero + scaled.dt, zero, people.copy(), np.full(count, NO_ID), mean.copy(),
+        now, now.copy(), zero + scaled.dt, zero, people.copy(), np.full(count, NO_ID),
         np.zeros((count, scaled.colour_bins)), members, [[] for _ in range(count)],
     )  # fmt: skip

@@ -5,18 +5,20 @@ groups after the update of a frame; output: the bank with merged groups, and the
 groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
 components of groups under R_x; each becomes one group. With `corrections` velocities are alike if their difference, on
 the mean of two steps, is at most `merge_velocity`, people of both are at most 1.5 m apart, and R_x must hold for
-`merge_time`; without, if the regions SR_v overlap. Only groups that are measured well merge (see `GroupMerging.step`).
-
-Onsets (ours): when an event that is known now began. A merge is known `merge_time` after its onset. A split is known
-when its parts have long been apart; its onset is measured from the group's earlier points, divided among the parts.
-Distances are metres on the ground (in an image depth is stretched to it). The distances and velocities of the truth's
-rules come from sim.truth.merge_split_rules.
+`merge_time`; without, if the regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
 
 Splitting (sec. 3.3): a group without feasible associations falls apart. An association (a set of points that may be a
-group's) is feasible if its points form one group under the group constraint G_y (tracking.filters.components). `split`
-partitions the points (M, 2) of a group without feasible associations by G_y and replaces its row of the bank by one row
-per part. A group of one part stays, one of noise only is removed. `children` makes the rows of the parts. Lengths are
-in the unit of the points (m on the ground or px), times in s.
+group's) is feasible if its points form one group under the group constraint G_y (tracking.filters.components).
+`fall_apart` partitions the points (M, 2) of such a group by G_y and replaces its row of the bank by one row per part.
+A group that G_y leaves whole stays. With `corrections` the parts stay parts of one group (ours), and so do newborn
+groups beside a member: misses, sway and noise take people apart for a moment. Each part is tracked by itself; the
+group is their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates become one row again.
+Parts whose people have been more than 1.5 m from all others for `confirm_time` split off.
+
+Onsets (ours): when an event that is known now began. A merge is known `merge_time` after its onset. The onset of a
+split is measured from the group's earlier points, divided among the parts. Distances are metres on the ground (in an
+image depth is stretched to it). The distances and velocities of the truth's rules come from
+sim.truth.merge_split_rules. Lengths are in the unit of the points (m on the ground or px), times in s.
 
 Of two groups that follow the same people the one with fewer people of its own becomes lost (ours). Groups that share
 points are each measured by all of them. Without this rule a group that is hidden or has left would follow another one
@@ -25,18 +27,18 @@ for ever. For `coast_time` that is allowed, as hidden people come out again.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
-from sim.types import Array, Ints
+from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition, regions_overlap
 from tracking.grouping.link_rule import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
-from tracking.papers.group_pda.association import thinned
 from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
@@ -52,9 +54,9 @@ REACH = 1.1
 class PairMoment(NamedTuple):
     """Two groups a and b at one time; a has the smaller id.
 
-    t: s. velocity (2,): that of b less that of a, as filtered, m/s on the ground. middle (2,): point half-way between
-    the centroids, in the unit of the points. gap: distance of their nearest people, m; negative if, from pixels, they
-    overlap.
+    t: s. velocity (2,): that of b less that of a, as filtered, m/s on the ground. middle (2,): mean of the centroids,
+    weighted by people, in the unit of the points. gap: distance of their nearest people, m; negative if, from pixels,
+    they overlap.
     """
 
     t: float
@@ -66,12 +68,17 @@ class PairMoment(NamedTuple):
 def merge_onset(moments: list[PairMoment], most: float) -> int:
     """Returns the index of the moment since which two groups have been near with velocities that differ by at most
     `most`, m/s, on the mean of two steps; the number of moments if they are not."""
+    before = (step_speeds(moments) > most) | (np.array([m.gap for m in moments]) > MERGE_DISTANCE)
+    return int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0
+
+
+def step_speeds(moments: list[PairMoment]) -> Array:
+    """Returns the lengths (K,) of the difference of velocities, on the mean of two steps, m/s, at each moment."""
     t, v = np.array([m.t for m in moments]), np.array([m.velocity for m in moments])
     first, last = windows(t, STEP_TIME)
     total = np.concatenate([np.zeros((1, 2)), np.cumsum(v, 0)])
     mean = (total[last + 1] - total[first]) / (last + 1 - first)[:, None]
-    before = (np.hypot(*mean.T) > most) | (np.array([m.gap for m in moments]) > MERGE_DISTANCE)
-    return int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0
+    return np.asarray(np.hypot(*mean.T))
 
 
 def windows(t: Array, half: float) -> tuple[Ints, Ints]:
@@ -122,38 +129,118 @@ PATIENCE = 1.5  # s for which the past of a pair is kept while the two are not n
 Pair = tuple[int, int]  # Ids of two groups, the smaller first.
 
 
-class GroupMerging:
-    """Merges groups that stay near with like velocities.
+class GroupChanges:
+    """Splits groups whose parts have come apart, and merges parts and groups that stay near with like velocities.
 
-    State: moments, a dict by pair of ids (the smaller first): a `PairMoment` for each frame of the last 5 s in which
-    the two groups were near and could merge, oldest first. A pair is kept for 1.5 s after the last of them.
+    State: moments, a dict by pair of ids (the smaller first): a `PairMoment` for each of the last 5 s in which the two
+    were near, or parts of one group, and could merge, oldest first. A pair is kept for 1.5 s after the last of them.
     """
 
     def __init__(self) -> None:
         self.moments: dict[Pair, list[PairMoment]] = {}
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-        """Merge the groups for which R_x (near, with like velocities) holds; yield their events. t: s."""
-        able = np.flatnonzero(bank.confirmed & (bank.last_seen >= t) & (bank.null_time <= 0))
-        near = {ids: self._extended(ids, now) for ids, now in _near_pairs(bank, able, scaled, t)}
-        self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= PATIENCE} | near
-        onset = {pair: k for pair, moments in near.items() if (k := _onset(bank, pair, moments, scaled))}
-        for ids in _connected(list(onset)):
-            rows = np.flatnonzero(np.isin(bank.id, ids))
-            first = min((m for pair, m in onset.items() if pair[0] in ids), key=lambda m: m.t)
-            union = merged(bank, rows)
-            present = bank.id[rows][(first.t - bank.first_seen[rows] > ARRIVAL) | (bank.parent[rows] != NO_ID)]
-            keep = np.ones(len(bank), bool)
-            keep[rows] = False
-            bank.keep(keep)
+        """Split groups, and merge parts and groups; yield the events of groups. t: s."""
+        yield from self._split(bank, scaled, t)
+        self._join_parts(bank, scaled, t)
+        yield from self._merge(bank, scaled, t)
+        self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= PATIENCE}
+
+    def _split(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
+        for group in np.unique(bank.group[bank.confirmed & (bank.parent != NO_ID)]).tolist():
+            rows = np.flatnonzero(bank.group == group)
+            for i, j in combinations(rows[_measured(bank, t)[rows]].tolist(), 2):
+                self._extend(bank, i, j, scaled, t)
+            pairs = [_pair(bank, i, j) for i, j in combinations(rows.tolist(), 2)]
+            linked = [pair for pair in pairs if not self._apart(pair, scaled, t)]
+            parts = [np.flatnonzero(np.isin(bank.id, ids)) for ids in _connected(linked, bank.id[rows].tolist())]
+            if len(parts) > 1:
+                yield _split_into(bank, group, parts, scaled, t)
+
+    def _apart(self, pair: Pair, scaled: ScaledParameters, t: float) -> bool:
+        if not scaled.config.corrections:
+            return True
+        moments = self.moments.get(pair, [])
+        if not moments or moments[-1].t < t:
+            return False  # one of them is not measured
+        near = max((m.t for m in moments if m.gap <= MERGE_DISTANCE), default=moments[0].t)
+        return t - near > scaled.config.confirm_time + 1e-9
+
+    def _join_parts(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
+        near = _overlapping(bank, np.flatnonzero(bank.confirmed & _measured(bank, t)), scaled.config.gate)
+        pairs = [_pair(bank, i, j) for i, j in near if bank.group[i] == bank.group[j]]
+        for ids in _connected([pair for pair in pairs if _onset(bank, pair, self.moments[pair], scaled)]):
+            joined = np.isin(bank.id, ids)
+            union = merged(bank, np.flatnonzero(joined))
+            bank.keep(~joined)
             bank.add(union)
+
+    def _merge(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
+        measured = bank.confirmed & _measured(bank, t)
+        heads = bank.id[measured & (bank.parent == NO_ID)]
+        whole = whole_groups(bank, np.flatnonzero(measured & np.isin(bank.group, heads)))
+        onset = {}
+        for i, j in _overlapping(whole, np.arange(len(whole)), scaled.config.gate):
+            pair = _pair(whole, i, j)
+            if found := _onset(whole, pair, self._extend(whole, i, j, scaled, t), scaled):
+                onset[pair] = found
+        for ids in _connected(list(onset)):
+            old = np.flatnonzero(np.isin(whole.id, ids))
+            first = min((m for pair, m in onset.items() if pair[0] in ids), key=lambda m: m.t)
+            union, present = merged(whole, old), first.t - whole.first_seen[old] > ARRIVAL
             heir = int(union.id[0])
+            bank.keep(~(np.isin(bank.group, ids) & _measured(bank, t)))
             bank.parent[np.isin(bank.parent, ids)] = heir
-            kind = "merge" if len(present) > 1 else "enter"
+            bank.add(union)
+            kind = "merge" if present.sum() > 1 else "enter"
             yield WholeGroupEvent(kind, first.t, tuple(sorted(ids)), (heir,), tuple(first.middle.tolist()))
 
-    def _extended(self, pair: Pair, now: PairMoment) -> list[PairMoment]:
-        return [*(m for m in self.moments.get(pair, []) if m.t > now.t - HISTORY_TIME), now]
+    def _extend(self, bank: GroupBank, i: int, j: int, scaled: ScaledParameters, t: float) -> list[PairMoment]:
+        pair, (a, b) = _pair(bank, i, j), sorted((i, j), key=lambda row: bank.id[row])
+        past = [m for m in self.moments.get(pair, []) if t - HISTORY_TIME < m.t < t]
+        self.moments[pair] = [*past, _moment(bank, a, b, scaled, t)]
+        return self.moments[pair]
+
+
+def _measured(bank: GroupBank, t: float) -> Bools:
+    return np.asarray((bank.last_seen >= t) & (bank.null_time <= 0))
+
+
+def _pair(bank: GroupBank, i: int, j: int) -> Pair:
+    a, b = sorted((int(bank.id[i]), int(bank.id[j])))
+    return a, b
+
+
+def _split_into(bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledParameters, t: float) -> WholeGroupEvent:
+    parts = sorted(parts, key=lambda rows: (group not in bank.id[rows], -bank.size[rows].sum()))
+    recent = pooled([bank.recent_points[r] for rows in parts for r in rows.tolist()])
+    two = [np.concatenate([bank.positions(r) for r in rows.tolist()]) for rows in parts[:2]]
+    onset, place = split_onset(recent, two, scaled.metres_per_unit, scaled.body_cov, t)
+    heads = [rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]] for rows in parts]
+    for rows, head in zip(parts, heads, strict=True):
+        bank.parent[rows], bank.parent[head] = bank.id[head], NO_ID
+    return WholeGroupEvent("split", onset, (group,), tuple(sorted(bank.id[heads].tolist())), tuple(place.tolist()))
+
+
+def pooled(recent: list[list[tuple[float, Array]]]) -> list[tuple[float, Array]]:
+    """Returns the recent points of several rows together, by time, oldest first."""
+    by_time: dict[float, list[Array]] = {}
+    for t, points in (moment for past in recent for moment in past):
+        by_time.setdefault(t, []).append(points)
+    return [(t, np.concatenate(by_time[t])) for t in sorted(by_time)]
+
+
+def whole_groups(bank: GroupBank, rows: Ints) -> GroupBank:
+    """Returns a bank with one row per group of these rows of the bank: the union of its parts."""
+    group = bank.group[rows]
+    found = GroupBank.empty(bank.colour_hist.shape[1])
+    many = np.isin(group, bank.parent[rows])
+    found.add(bank.at(rows[~many]))
+    for id in np.unique(group[many]).tolist():
+        union = merged(bank, rows[group == id])
+        union.id[:], union.parent[:] = id, NO_ID
+        found.add(union)
+    return found
 
 
 def _onset(bank: GroupBank, pair: Pair, moments: list[PairMoment], scaled: ScaledParameters) -> PairMoment | None:
@@ -175,28 +262,24 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     d = bank.x[rows, :2] - x[:2]
     extent = np.einsum("k,kij->ij", w, bank.extent[rows] + d[:, :, None] * d[:, None, :])
     P = np.einsum("k,kij->ij", w * w, bank.P[rows])
-    heir = rows[np.lexsort((bank.id[rows], bank.first_seen[rows], -np.rint(bank.size[rows])))[0]]
+    age = bank.first_seen[rows]
+    heir = rows[np.lexsort((bank.id[rows], age, -np.rint(bank.size[rows]), bank.parent[rows] != NO_ID))[0]]
     members = [bank.members[r] for r in rows.tolist()]
     offset = np.concatenate([bank.positions(r) - x[:2] for r in rows.tolist()])
     last_seen, known = (np.concatenate([getattr(m, name) for m in members]) for name in ("last_seen", "known"))
-    one = slice(heir, heir + 1)
+    one = np.array([heir])  # a copy, not a view
     return GroupBank(
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1), size[None],
-        np.full(1, NO_ID), x[None, :2].copy(), bank.colour_hist[rows].sum(0, keepdims=True),
-        [MemberPlaces(offset, last_seen, known)], [[]],
+        bank.parent[one], bank.colour_hist[rows].sum(0, keepdims=True),
+        [MemberPlaces(offset, last_seen, known)], [pooled([bank.recent_points[r] for r in rows.tolist()])],
     )  # fmt: skip
 
 
-def _near_pairs(bank: GroupBank, rows: Ints, scaled: ScaledParameters, t: float) -> Iterator[tuple[Pair, PairMoment]]:
-    """Yields the pairs of groups whose search regions overlap: ids, the smaller first; the pair in this frame."""
-    close = regions_overlap(bank.x[rows, :2], bank.extent[rows], scaled.config.gate)
-    for i, j in np.argwhere(np.triu(close, 1)).tolist():
-        i, j = sorted((i, j), key=lambda k: bank.id[rows[k]])
-        a, b = bank.x[rows[i], :2], bank.x[rows[j], :2]
-        d, v = ((q[1] - q[0]) * scaled.metres_per_unit for q in ((a, b), bank.x[rows[[i, j]], 2:]))
-        gap = _gap(bank, rows[i], rows[j], d, scaled)
-        yield (int(bank.id[rows[i]]), int(bank.id[rows[j]])), PairMoment(t, v, (a + b) / 2, gap)
+def _moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float) -> PairMoment:
+    d, v = ((bank.x[b, k : k + 2] - bank.x[a, k : k + 2]) * scaled.metres_per_unit for k in (0, 2))
+    w = bank.size[[a, b]] / bank.size[[a, b]].sum()
+    return PairMoment(t, v, w @ bank.x[[a, b], :2], _gap(bank, a, b, d, scaled))
 
 
 def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) -> float:
@@ -219,56 +302,37 @@ def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) 
     return float(np.sqrt(max(along @ people @ along, 0.0)))
 
 
-def _connected(pairs: list[Pair]) -> list[list[int]]:
-    parts: list[set[int]] = []
+def _connected(pairs: list[Pair], alone: Iterable[int] = ()) -> list[list[int]]:
+    parts: list[set[int]] = [{id} for id in alone]
     for pair in pairs:
         touched = [p for p in parts if p & set(pair)]
         parts = [p for p in parts if not p & set(pair)] + [set(pair).union(*touched)]
     return [sorted(p) for p in parts]
 
 
-def split(
+def fall_apart(
     bank: GroupBank, row: int, points: Array, weights: Array, scaled: ScaledParameters, t: float, ids: GroupIds
-) -> WholeGroupEvent | None:
-    """Replace the group in `row` by those that its points (M, 2) form under G_y; return the event of a confirmed
-    group."""
+) -> None:
+    """Replace the row of the bank by one for each part of its points (M, 2) under G_y; the largest keeps its id."""
     group = partition(points, weights, scaled.constraint)
-    confirmed = bank.id[row] != NO_ID
+    bank.null_time[row] = 0.0
     if group.max(initial=-1) < 1:
-        bank.null_time[row] = 0.0
-        if group.max(initial=-1) == 0:
-            return None
-        leave = WholeGroupEvent("leave", t, (int(bank.id[row]),), (), tuple(bank.x[row, :2].tolist()))
-        bank.remove(row)
-        return leave if confirmed else None
-    parts = children(bank, row, points, weights, group, scaled, t)
-    away = np.hypot(*(parts.x[:, :2] - bank.x[row, :2]).T)
-    largest, other = np.lexsort((parts.x[:, 1], parts.x[:, 0], away, -parts.size))[:2].tolist()
-    if confirmed:
-        parts.id[:] = [bank.id[row] if k == largest else ids.new() for k in range(len(parts))]
-    two = [thinned(points[group == k]) for k in (largest, other)]
-    onset, place = split_onset(bank.recent_points[row], two, scaled.metres_per_unit, scaled.body_cov, t)
-    event = WholeGroupEvent(
-        "split", onset, (int(bank.id[row]),), tuple(sorted(parts.id.tolist())), tuple(place.tolist())
-    )
-    bank.remove(row)
-    bank.add(parts)
-    return event if confirmed else None
-
-
-def children(
-    bank: GroupBank, row: int, points: Array, weights: Array, group: Ints, scaled: ScaledParameters, t: float
-) -> GroupBank:
-    """Returns a bank of the groups into which the group in `row` splits; `bank` is not changed."""
+        return
     parts = newborn(points, weights, group, scaled, t)
+    away = np.hypot(*(parts.x[:, :2] - bank.x[row, :2]).T)
+    largest = int(np.lexsort((parts.x[:, 1], parts.x[:, 0], away, -parts.size))[0])
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
-    parts.colour_hist[:] = bank.colour_hist[row]
-    if bank.id[row] == NO_ID:
-        parts.parent[:], parts.origin[:] = bank.parent[row], bank.origin[row]
+    parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
+    parts.recent_points[largest] = bank.recent_points[row]
+    if bank.id[row] != NO_ID:
+        parts.parent[:] = bank.group[row]
+        parts.parent[largest] = bank.parent[row]
+        parts.id[:] = [bank.id[row] if k == largest else ids.new() for k in range(len(parts))]
     if scaled.config.corrections:
         parts.x[:, 2:] = bank.x[row, 2:]
         parts.P[:, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * SPLIT_SPEED) ** 2 * np.eye(2)
-    return parts
+    bank.remove(row)
+    bank.add(parts)
 
 
 LEAST_MEASURED = 0.55  # Two groups may be one and the same if a smaller share of their people together is measured.

@@ -21,7 +21,7 @@ number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or 
 
 The grouping functions G_0, G_x, G_y of points (sec. 3.1, 3.3, 4.2.1) are in tracking.filters.components: G_y links
 points at most 2 x `radius` apart, and joins linked sets whose regions overlap. A group that is not measured for
-`coast_time` is lost: it claims no points. `association = "none"` is section 5.2.1: a group takes all points in its
+`coast_time` is lost. `association = "none"` is section 5.2.1: a group takes all points in its
 region.
 
 Departures. Those marked (c) are off with `corrections` off.
@@ -51,20 +51,21 @@ Departures. Those marked (c) are off with `corrections` off.
   similar groups cross.
 - split: after `split_time`; measured frames count back; (c) parent's velocity. Paper: after infeasible frames, at
   rest. Why: misses.
+- parts, (c): what falls apart stays one group until it is 1.5 m apart for `confirm_time`. Paper: at once. Why: misses
+  and sway take people apart for a moment.
 - split into one part: the group stays as it is. Paper: initialised anew. Why: others' points made it infeasible.
 - divided points: those most probably the group's. Paper: all in the region. Why: others' people stay out.
 - ids: the largest part or merged group keeps its id. Paper: none. Why: tracks need ids.
-- walking out: a new group within reach of a member is a child, (c) with its velocity. Paper: none. Why: splits without
+- walking out: a new group within reach of a member is a part, (c) with its velocity. Paper: none. Why: splits without
   shared points.
 - like velocities, (c): difference up to `merge_velocity` on the mean of two steps. Paper: SR_v overlap. Why: P does
   not measure likeness; people sway with each step.
 - SR_v, without corrections: of the updated velocity. Paper: of the predicted one. Why: Fig. 1 merges after the update.
 - near groups, (c): people at most 1.5 m apart, too. Paper: regions overlap. Why: no merge after a split.
 - merge: of confirmed, measured, feasible groups; (c) after `merge_time`. Paper: at once. Why: crossing groups.
-- enter: no merge if at most one group is older or a child. Paper: none. Why: they came together.
+- enter: no merge if at most one group is older. Paper: none. Why: they came together.
 - duplicates: of two groups on the same people for `coast_time` one is lost. Paper: none. Why: hidden groups follow
   others.
-- recapture: a newborn group takes the id of one that is not measured (`recapture_time`). Paper: none. Why: occlusion.
 - reports: until `report_coast` after a measurement, with hulls of points. Paper: every group. Why: lost groups are
   guesses.
 - onsets: dated back. Paper: none. Why: decisions lag.
@@ -102,7 +103,7 @@ from tracking.papers.group_pda.from_pixels import (
     update_histograms,
 )
 from tracking.papers.group_pda.group_bank import GroupBank
-from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, GroupMerging, split
+from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, GroupChanges, fall_apart, whole_groups
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters, scale_parameters
 from tracking.running.image_scale import required
 
@@ -112,8 +113,8 @@ SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 class GroupPda:
     """The tracker `group-pda`: groups of people tracked as wholes, from points or from foreground pixels.
 
-    State: config, which may be replaced between two frames; bank, the groups; ids, which gives the next id; merging,
-    the past of pairs that may merge; duplicates, the clocks of duplicate groups; pixels: grid points and
+    State: config, which may be replaced between two frames; bank, the groups; ids, which gives the next id; changes,
+    the past of pairs that may merge or split; duplicates, the clocks of duplicate groups; pixels: grid points and
     background model, None from points; plane: "ground" or "image"; context. All but config exist after `reset` only.
     """
 
@@ -134,7 +135,7 @@ class GroupPda:
         """
         self.context = context
         self.bank, self.ids = GroupBank.empty(), GroupIds()
-        self.merging, self.duplicates = GroupMerging(), DuplicateGroups()
+        self.changes, self.duplicates = GroupChanges(), DuplicateGroups()
         self.pixels = None if context.background is None else ForegroundPoints(self.config, context)
         if self.pixels is not None:
             self.context = context.replace(px_per_m=self.pixels.scale)
@@ -153,7 +154,8 @@ class GroupPda:
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
-        Order: predict; gate, associate, update, split (Fig. 1), births; duplicates; merge; confirm; remove lost groups.
+        Order: predict; gate, associate, update, fall apart (Fig. 1), births; duplicates; split, merge; confirm; remove
+        lost groups.
         From points `detections.pos` is used (x, y), from pixels `frame.image`. A frame without them (None), and from
         pixels one with too much foreground, is predicted only; before the first detections the Tracks are empty. A
         config that has replaced `config` since the last frame holds from this frame on; the groups stay.
@@ -173,9 +175,9 @@ class GroupPda:
         bank.predict(scaled)
         events: list[WholeGroupEvent] = []
         if points is not None:
-            events += self._measure(points, weights, scaled, t)
+            self._measure(points, weights, scaled, t)
         self.duplicates.step(bank, scaled, t)
-        events += self.merging.step(bank, scaled, t)
+        events += self.changes.step(bank, scaled, t)
         events += confirm(bank, scaled, t, self.ids)
         events += remove_lost(bank, scaled, t)
         return self._report(frame, events, scaled, self._outline(detections))
@@ -185,9 +187,9 @@ class GroupPda:
 
         outline (V, 2): a polygon round the origin, in the plane's unit, that stands for what covers the ground or the
         image about one member's place: a footprint, a usual box, or a cell of the pixel grid."""
-        bank = self.bank
-        rows = np.flatnonzero(bank.confirmed & (frame.t - bank.last_seen <= self.config.report_coast + 1e-9))
-        rows = rows[np.argsort(bank.id[rows])]
+        seen = self.bank.confirmed & (frame.t - self.bank.last_seen <= self.config.report_coast + 1e-9)
+        bank = whole_groups(self.bank, np.flatnonzero(seen))
+        rows = np.argsort(bank.id)
         # The places on their own hull suffice, and are few.
         corners = convex_hulls([bank.positions(r) for r in rows.tolist()])
         hulls = convex_hulls([(c[:, None] + outline).reshape(-1, 2) for c in corners])
@@ -241,10 +243,10 @@ class GroupPda:
         self.scaled = scale_parameters(self.config, self.context.fps, scale, sine_tilt=sine)
         return self.scaled
 
-    def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> list[WholeGroupEvent]:
+    def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> None:
         bank = self.bank
         region = search_regions(bank, scaled)
-        d2 = gated_distances(bank, points, region, scaled, t)
+        d2 = gated_distances(bank, points, region, scaled)
         claims = with_missed_members(claimed(points, weights, d2, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
         log_ratio = colour_log_ratio(bank, claims.d2, self.colours) if scaled.colour_bins else np.zeros((len(bank), 0))
@@ -252,15 +254,12 @@ class GroupPda:
         remember(bank, claims, mine, scaled, t)
         if scaled.colour_bins:
             update_histograms(bank, mine, claims.claimants, self.colours, claims.weights, scaled)
-        events = self._split(claims, mine, scaled, t)
+        self._split(claims, mine, scaled, t)
         free = claims.claimants[: len(points)] == 0
         add_newborns(bank, points[free], weights[free], expected, scaled, t)
-        return events
 
-    def _split(self, claims: PointClaims, mine: Bools, scaled: ScaledParameters, t: float) -> list[WholeGroupEvent]:
-        bank, events = self.bank, []
+    def _split(self, claims: PointClaims, mine: Bools, scaled: ScaledParameters, t: float) -> None:
+        bank = self.bank
         due = np.flatnonzero((bank.null_time >= self.config.split_time - 1e-9) & (bank.null_time > 0))
         for row in due.tolist()[::-1]:  # from the last row on, as children are appended
-            event = split(bank, row, claims.points[mine[row]], claims.weights[mine[row]], scaled, t, self.ids)
-            events += [] if event is None else [event]
-        return events
+            fall_apart(bank, row, claims.points[mine[row]], claims.weights[mine[row]], scaled, t, self.ids)

@@ -11,6 +11,7 @@ from filterpy.kalman import KalmanFilter
 
 from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
+from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association import PointClaims, point_log_density, shares
 from tracking.papers.group_pda.association_kernels import any_within
@@ -282,7 +283,7 @@ def bank(**given):
         nil = [[] for _ in range(n)] if isinstance(none, list) else np.zeros((n, *none.shape[1:]), none.dtype)
         setattr(made, f.name, given.get(f.name, nil))
     one_place = MemberPlaces(np.zeros((1, 2)), np.zeros(1), np.ones(1, bool))
-    return replace(made, id=np.arange(n), members=given.get("members", [one_place] * n))
+    return replace(made, id=np.arange(n), parent=np.full(n, NO_ID), members=given.get("members", [one_place] * n))
 
 
 def samples(r, count):

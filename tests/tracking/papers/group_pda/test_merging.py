@@ -8,7 +8,7 @@ import pytest
 from tests.tracking.papers.group_pda.test_association_kernels import bank
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import MemberPlaces
-from tracking.papers.group_pda.merging_and_splitting import GroupMerging, _gap
+from tracking.papers.group_pda.merging_and_splitting import GroupChanges, _gap
 from tracking.papers.group_pda.scaled_parameters import scale_parameters
 
 FPS = 10.0
@@ -18,12 +18,12 @@ FPS = 10.0
 def test_a_moment_without_velocity_does_not_restart_the_time_to_merge(why: str) -> None:
     scaled, when = scale_parameters(GroupPdaConfig(merge_time=0.8), FPS, 1.0), []
     for pause in (range(0), range(4, 6)):
-        merging, two = GroupMerging(), bank(size=np.ones(2), extent=np.tile(0.1 * np.eye(2), (2, 1, 1)))
+        changes, two = GroupChanges(), bank(size=np.ones(2), extent=np.tile(0.1 * np.eye(2), (2, 1, 1)))
         for k in range(30):
             here = k not in pause
             two.last_seen[:] = k / FPS if here or why != "unmeasured" else [k / FPS, (k - 1) / FPS]
             two.null_time[:] = [0.0, 0.1 * (not here and why == "infeasible")]
-            if list(merging.step(two, scaled, k / FPS)):
+            if list(changes.step(two, scaled, k / FPS)):
                 when.append(k)
                 break
     assert when == [8, 8]
