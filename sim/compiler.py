@@ -4,7 +4,7 @@ numba caches compiled kernels beside their files or in the user's cache folder. 
 and numba then refuses to compile. The cache goes to a temporary folder of the user in that case, or is left out. numba
 looks at the file of a kernel alone; here, a change of what a kernel imports makes it compile anew, too.
 
-Five things save over half of the time that compilation takes. What other kernels call is compiled without the wrappers
+Five things save about half of the time that compilation takes. What other kernels call is compiled without the wrappers
 for calls from Python, and LLVM optimises it within its callers only. Constants in such a call are no types of their
 own. numba's answers to what type `a + b` has are remembered. Python collects no garbage meanwhile.
 """
@@ -94,10 +94,6 @@ class _InnerCode(JITCodeLibrary):  # type: ignore[misc]
 
     def set_env(self, name: str, env: Any) -> None:
         """Does nothing: only the wrappers for calls from Python use env."""
-
-    def get_pointer_to_function(self, name: str) -> int:
-        self._ensure_finalized()
-        return 0
 
     def _optimize_functions(self, ll_module: Any) -> None:
         ll_module.data_layout = self._codegen._data_layout
