@@ -4,8 +4,9 @@ numba caches compiled kernels beside their files or in the user's cache folder. 
 and numba then refuses to compile. The cache goes to a temporary folder of the user in that case, or is left out. numba
 looks at the file of a kernel alone; here, a change of what a kernel imports makes it compile anew, too.
 
-Three things save a quarter of the time that compilation takes. What other kernels call is compiled without the wrappers
-for calls from Python. Constants in such a call are no types of their own. Python collects no garbage meanwhile.
+Five things save about half of the time that compilation takes. What other kernels call is compiled without the wrappers
+for calls from Python, and LLVM optimises it within its callers only. Constants in such a call are no types of their
+own. numba's answers to what type `a + b` has are remembered. Python collects no garbage meanwhile.
 """
 
 from __future__ import annotations
@@ -18,17 +19,21 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache, partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
-from numba.core import event, types
+from numba.core import codegen, compiler, event, targetconfig, types
 
 config: Any = numba.config
 unliteral: Any = types.unliteral
 register: Any = event.register
+function_type: Any = types.BaseFunction
+compilation_flags: Any = targetconfig.ConfigStack.top_or_none
+JITCodeLibrary: Any = codegen.JITCodeLibrary
+Compiler: Any = compiler.Compiler
 NO_CACHE = (
     "kernels are compiled anew in every process: their cache has no place, because neither the installation nor the "
     "home folder nor the temporary folder can be written; set NUMBA_CACHE_DIR to a folder that can"
@@ -40,6 +45,8 @@ def cached_njit(shared: bool = False, **options: Any) -> Callable[[Any], Any]:
 
     shared: the kernel is called from Python and from kernels with the same types, so that one form serves both.
     """
+
+    options["no_cfunc_wrapper"] = True  # it serves kernels that are arguments of others
 
     def compiled(function: Any) -> Any:
         if not options.get("cache"):
@@ -55,7 +62,7 @@ def cached_njit(shared: bool = False, **options: Any) -> Callable[[Any], Any]:
             return numba.njit(**{**options, "cache": False})(function)
         stored = _stored(kernel)
         stored._source_stamp = (stored._source_stamp, _used_by(function))
-        inner_options = {**options, "cache": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        inner_options = {**options, "cache": False, "no_cpython_wrapper": True, "pipeline_class": _InnerCompiler}
         _call_by_kernels(kernel, kernel if shared else numba.njit(**inner_options)(function))
         return kernel
 
@@ -78,6 +85,54 @@ def _call_by_kernels(kernel: Any, inner: Any) -> None:
         return (own_overload if tuple(arguments) in kernel.overloads else inner.get_overload)(arguments)
 
     kernel.get_call_template, kernel.get_overload = get_call_template, get_overload
+
+
+class _InnerCode(JITCodeLibrary):  # type: ignore[misc]
+    """LLVM code that others link. It has no machine code, and is optimised in what links it."""
+
+    codegen = property(lambda self: self)
+
+    def set_env(self, name: str, env: Any) -> None:
+        """Does nothing: only the wrappers for calls from Python use env."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class _InnerCompiler(Compiler):  # type: ignore[misc]
+    def define_pipelines(self) -> Any:
+        self.state.library = _InnerCode(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        return super().define_pipelines()
+
+
+def _with_memory(resolve: Any) -> Any:
+    """Returns numba's BaseFunction.get_call_type with a memory.
+
+    It asks some thirty templates, each time anew, what type `a + b` has.
+    """
+
+    @wraps(resolve)
+    def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
+        known = vars(self).setdefault("known_calls", {})
+        call = context, tuple(args), tuple(dict(kws).items()), compilation_flags()
+        if call not in known:
+            signature = resolve(self, context, args, kws)
+            known[call] = signature, self._impl_keys[signature.args]
+        signature, implementation = known[call]
+        self._impl_keys[signature.args] = implementation
+        return signature
+
+    return get_call_type
+
+
+function_type.get_call_type = _with_memory(function_type.get_call_type)
 
 
 class _Compiling(event.Listener):
