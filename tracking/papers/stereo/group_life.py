@@ -8,8 +8,7 @@ MR_i is the ellipsoid (x - X_i)' Sigma_i^-1 (x - X_i) <= merge_gate in six dimen
 Two ellipsoids are tested exactly, see below.
 
 Tentative groups merge, too: without an event, as nobody knows of them. The paper does not say what P of a merged group
-is: here it is that of a weighted mean, sum of n_i^2 P_i. The group with most points keeps its id, of those that have
-been there for SETTLED if there are any, else of the confirmed ones (ours).
+is: here it is that of a weighted mean, sum of n_i^2 P_i. The confirmed group with most points keeps its id (ours).
 
 The test (`separation`): Gilitschenski & Hanebeck, "A robust computational test for overlap of two arbitrary-dimensional
 ellipsoids in fault-detection of Kalman filters", 2012: the ellipsoids y' A^-1 y <= 1 and (y - d)' B^-1 (y - d) <= 1 are
@@ -69,15 +68,8 @@ def separation(d: Array, A: Array, B: Array) -> float:
     return float((e2 * s * (1 - s) / (s * values + (1 - s))).sum())
 
 
-# s: a group that came less long ago, and did not split from another one, enters with the other one; that is no merge
-# (ours).
-SETTLED = 1.0
-
-
 def merge(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[WholeGroupEvent]:
-    """Merge groups of the list, in place, at time t (s), and return the events of unions of two or more confirmed
-    groups: merge, or enter if at most one of these has been there for 1 s or split from another one.
-    """
+    """Merge groups of the list, in place, at time t (s); return an event for each union of two or more confirmed ones."""
     events = [_merge(groups, parts, t) for parts in connected(groups, config.merge_gate)]
     return [event for event in events if event is not None]
 

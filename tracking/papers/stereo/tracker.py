@@ -55,10 +55,9 @@ Departures. Without a parameter that switches it off, one holds in the preset `p
 - R: of the mean of the points, and `centroid_noise`. Paper: one, not printed. Why: points come and go.
 - first P: of the points' mean position and velocity. Paper: covariance of the points. Why: a member is no centroid.
 - k_p, k_v: exponents, 1 and `velocity_weight`. Paper: factors. Why: factors have no effect.
-- merged id: of the largest group that has been there for 1 s or was split off, else of the largest confirmed one.
-  Paper: a new number (Fig. 7). Why: a group keeps its identity, as in the scores.
-- young groups: tentative ones without event; one that just arrived, no child, enters. Paper: merge. Why: no false
-  merges.
+- merged id: of the largest confirmed group. Paper: a new number (Fig. 7). Why: a group keeps its identity, as in the
+  scores.
+- young groups: tentative ones merge without event. Paper: merge. Why: nobody knows of them.
 - splits: linked parts for `split_time`, unless they would merge again. Paper: none. Why: groups part.
 - parts: start anew from their points, with the group's velocity; the largest keeps the id. Paper: none. Why: tracks
   need ids.

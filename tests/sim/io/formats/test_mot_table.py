@@ -61,7 +61,7 @@ def test_named_boxes_without_ids_are_detections(tmp_path):
 def test_other_names_are_refused(tmp_path, header):
     path = tmp_path / "a.csv"
     path.write_text(header + "\n1,1,2,3,4,5\n")
-    with pytest.raises(InputError, match=f"line 1: got columns {header}; expected frame and a box"):
+    with pytest.raises(InputError, match=f"line 1: got columns {header}; expected frame "):
         open_source(path, fps=25)
 
 

@@ -184,13 +184,11 @@ def people(*groups: tuple[int, int, float, float]) -> list[SpaceGroup]:
     return made
 
 
-@pytest.mark.parametrize(("before", "event"), [(1.1, "merge"), (0.7, "enter")])
-def test_a_group_that_has_just_come_enters_with_the_other_one(before: float, event: str) -> None:
-    """before: s for which the second group was there when the two merge. The older one keeps its id."""
-    groups = people((1, 12, 1.0, 0.0), (2, 30, 1.0, 5.0 - before))
+def test_the_larger_group_keeps_its_id_when_two_merge() -> None:
+    groups = people((1, 12, 1.0, 0.0), (2, 30, 1.0, 4.3))
     (found,) = merge(groups, StereoConfig(), 5.0)
-    assert (found.kind, found.before) == (event, (1, 2))
-    assert [g.id for g in groups] == [2 if event == "merge" else 1]
+    assert (found.kind, found.before) == ("merge", (1, 2))
+    assert [g.id for g in groups] == [2]
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.1, 0.5, 1.0, 2.0, 4.0])
