@@ -26,7 +26,7 @@ from sim.types import Array, Bools, Context, Detections, Frame, Ints
 from tracking.detect import blobs
 from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground
-from tracking.detect.person_size import PersonSize
+from tracking.detect.person_size import KEPT, PersonSize
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry, new_people
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
@@ -65,7 +65,7 @@ def union(area: Array, ellipse: Array) -> tuple[Array, float]:
     return made[0], float(angle_var[0])
 
 
-SIZE_TIME = 0.5  # s between pictures from which sizes are learned: what is remembered must be of many people
+SIZE_TIME = 0.5  # s between pictures from which sizes are learned once enough is remembered: it must be of many people
 EVIDENCE = 10.0  # nats, log-likelihood of a template with full support; d^2 / 2 of its place is subtracted
 TRACK_SUPPORT = 0.3  # least foreground share in the part of a confirmed track's template that no other covers
 ENTRY_SUPPORT = 0.5  # least support of the template of a new person or of a tentative track
@@ -146,7 +146,7 @@ class PixelUpdater:
         found = foreground.person_blobs(seen.mask)
         self._measure(frame.t, seen.mask, found)
         foreground.adapt(seen, self._protected())
-        if len(found) and frame.t >= self.learn_at:
+        if len(found) and (frame.t >= self.learn_at or len(self.size.lone) < KEPT):
             self.learn_at = frame.t + SIZE_TIME
             alone = ~self._several_expected(found.box, people.upright_boxes())
             if self.size.reliable:

@@ -21,8 +21,7 @@ number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or 
 
 The grouping functions G_0, G_x, G_y of points (sec. 3.1, 3.3, 4.2.1) are in tracking.filters.components: G_y links
 points at most 2 x `radius` apart, and joins linked sets whose regions overlap. A group that is not measured for
-`coast_time` is lost. `association = "none"` is section 5.2.1: a group takes all points in its
-region.
+`coast_time` is lost. `association = "none"` is section 5.2.1: a group takes all points in its region.
 
 Departures. Those marked (c) are off with `corrections` off.
 

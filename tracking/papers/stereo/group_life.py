@@ -69,7 +69,7 @@ def separation(d: Array, A: Array, B: Array) -> float:
 
 
 def merge(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[WholeGroupEvent]:
-    """Merge groups of the list, in place, at time t (s); return an event for each union of two or more confirmed ones."""
+    """Merge groups of the list, in place, at t (s); return an event for each union of two or more confirmed ones."""
     events = [_merge(groups, parts, t) for parts in connected(groups, config.merge_gate)]
     return [event for event in events if event is not None]
 
