@@ -44,7 +44,7 @@ $(RUNTIME): pyproject.toml constraints.txt
 	rm -rf $(VENV)
 	$(PYTHON) -m venv $(VENV)
 	$(PIP) setuptools
-	$(PIP) --no-build-isolation -e .
+	$(PIP) --no-build-isolation -e ".[report,tune]"
 	@touch $@
 
 $(ENVIRONMENT): $(RUNTIME)
