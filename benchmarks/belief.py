@@ -45,7 +45,7 @@ from tracking.grouping.grouped_tracks import derive, without_groups
 from tracking.grouping.grouping_choice import Grouping, grouping_of
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
-from tracking.grouping.pair_evidence import NAMES, NOW, QUANTITIES, TIMES
+from tracking.grouping.pair_evidence import NAMES, NEAR, QUANTITIES, TIMES
 from tracking.scoring.evaluation import evaluate
 from tracking.stats import block_intervals, mean_interval
 
@@ -202,7 +202,7 @@ def calibration(names: Sequence[str], seeds: range, belief: Belief, out: Path | 
 
 
 FAMILIES: Mapping[str, tuple[str, ...]] = {
-    **{name: (name,) for name in (*QUANTITIES, *NOW)},
+    **{name: (name,) for name in (*QUANTITIES, *NEAR)},
     **{f"means over {time:g} s": (f"{time:g} s",) for time in TIMES[1:]},
 }  # fmt: skip
 """Words of the names of tables that are left out together."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 from pathlib import Path
 
 import pytest
 
+import benchmarks
 from benchmarks import results
 from scenarios.loading.resolve import read_suite, resolve
 
@@ -47,3 +50,9 @@ SUITES = Path(__file__).resolve().parents[1] / "benchmarks" / "tuning_suites"
 @pytest.mark.parametrize("path", sorted(SUITES.glob("*.toml")), ids=lambda path: path.stem)
 def test_each_can_be_read(path: Path) -> None:
     assert [entry.name for entry in resolve(str(path))] == [line.name for line in read_suite(path).entry]
+
+
+@pytest.mark.parametrize("name", sorted(m.name for m in pkgutil.walk_packages(benchmarks.__path__, "benchmarks.")))
+def test_a_benchmark_finds_what_it_imports(name: str) -> None:
+    if not name.endswith("__main__"):
+        importlib.import_module(name)
