@@ -1,7 +1,7 @@
 """Data association of `group-pda`: which points a group may have (gate), and its update by them (sec. 4).
 
 Input: points (M, 2), in m on the ground or px, and the bank of G groups. Output: which points each group takes
-(`Associated`); the groups' states in the bank are updated in place. Order in a frame: `gated_distances`, `claimed`,
+(a bool array); the groups' states in the bank are updated in place. Order in a frame: `gated_distances`, `claimed`,
 `with_missed_members`, `associate`. The masses and the update are in association_kernels and association_mass_kernels.
 
 Members that the detector missed in a frame stand in at their predicted places (ours), so that misses do not move or
@@ -35,7 +35,7 @@ class PointClaims:
 
     points (M, 2): x, y; weights (M,): people that each stands for; last_seen (M,): time, s, when it was measured,
     before this frame for a missed member; d2 (G, M): squared Mahalanobis distances of points from groups, inf outside a
-    group's search region; owner (M,): row of the one group that may have the point although it is in no region, or -1;
+    group's search region; owner (M,): row whose missed member the point is, or -1;
     claimants (M,): number of groups that may have the point.
     """
 

@@ -26,7 +26,8 @@ ExpectedMembers = tuple[Array, Array, Ints]
 def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> ExpectedMembers:
     """Returns where the K members of the confirmed groups that were measured lately should be at time t (s).
 
-    place (K, 2), reach (K,): how far from it each may be; in the unit of the points. group (K,): its id."""
+    place (K, 2), reach (K,): how far from it each may be; in the unit of the points. group (K,): id of its row, a
+    group's or a part's."""
     recent = t - bank.last_seen <= max(scaled.config.carry_time, scaled.dt) + 1e-9
     rows = np.flatnonzero(bank.confirmed & recent).tolist()
     places = [bank.positions(r) for r in rows]
@@ -74,7 +75,8 @@ def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) 
 
 
 def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-    """Remove groups that were not measured for too long, at time t (s); yield a leave event of each without parts."""
+    """Remove groups that were not measured for too long, at time t (s); yield a leave event of each of
+    which no part is left."""
     patience = np.where(bank.confirmed, scaled.config.coast_time, scaled.config.confirm_time)
     dead: Bools = t - bank.last_seen > patience + 1e-9
     for row in np.flatnonzero(dead & bank.confirmed & (bank.parent == NO_ID)).tolist():

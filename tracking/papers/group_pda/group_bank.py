@@ -34,15 +34,16 @@ class MemberPlaces(NamedTuple):
 
 @dataclass
 class GroupBank:
-    """The state of G groups, a row each. Lengths are in the unit of the points (m or px), times in s.
+    """The state of G groups or parts of groups, a row each. Lengths: in the unit of the points (m or px), times: in s.
 
     x (G, 4): centroid xi and velocity v, in order x, y, vx, vy; P (G, 4, 4) their covariance. extent (G, 2, 2): Sigma,
     covariance of the members' positions about the centroid; size (G,): N, people. id (G,): NO_ID = -1 for a tentative
-    group. first_seen, last_seen (G,): times of first and last measurement. measured_time (G,): total time measured.
-    null_time (G,): time without a feasible association, less measured frames in it. own_people (G,): people of the
-    group expected among its points of this frame. parent (G,): id of the group that the row is a part of, or NO_ID if
-    it is no part (see merging_and_splitting). colour_hist (G, C): people by colour; C = 0 without colours. members: a
-    MemberPlaces of each group. recent_points: of each group, a list of (time, points (K, 2)) of the last seconds.
+    group; a part has one of its own. first_seen (G,): time of the first points, of a part those of its group; last_seen
+    (G,): of the last points. measured_time (G,): total time measured. null_time (G,): time without a feasible
+    association, less measured frames in it. own_people (G,): people of the group expected among its points of this
+    frame. parent (G,): id of the group that the row is a part of, or NO_ID if it is no part (see
+    merging_and_splitting). colour_hist (G, C): people by colour; C = 0 without colours. members: a MemberPlaces of each
+    group. recent_points: of each group, a list of (time, points (K, 2)) of the last seconds.
     """
 
     x: Array

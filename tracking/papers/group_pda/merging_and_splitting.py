@@ -4,25 +4,26 @@ Merging (sec. 3.1, 3.2): which groups are near with like velocities, for how lon
 groups after the update of a frame; output: the bank with merged groups, and the events. The relation R_x holds for two
 groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
 components of groups under R_x; each becomes one group. With `corrections` velocities are alike if their difference, on
-the mean of two steps, is at most `merge_velocity`, people of both are at most 1.5 m apart, and R_x must hold for
-`merge_time`; without, if the regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
+the mean of two steps, is at most `merge_velocity`; R_x also needs people of both at most 1.5 m apart, and must hold for
+`merge_time`. Without, velocities are alike if the regions SR_v overlap. Groups that are not measured, or infeasible, do
+not merge.
 
-Splitting (sec. 3.3): a group without feasible associations falls apart. An association (a set of points that may be a
-group's) is feasible if its points form one group under the group constraint G_y (tracking.filters.components).
-`fall_apart` partitions the points (M, 2) of such a group by G_y and replaces its row of the bank by one row per part.
-A group that G_y leaves whole stays. With `corrections` the parts stay parts of one group (ours), and so do newborn
-groups beside a member: misses, sway and noise take people apart for a moment. Each part is tracked by itself; the
-group is their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates become one row again.
-Parts whose people have been more than 1.5 m from all others for `confirm_time` split off.
+Splitting (sec. 3.3): a group without feasible associations for `split_time` falls apart. An association (a set of
+points that may be a group's) is feasible if its points form one group under the group constraint G_y
+(tracking.filters.components). `fall_apart` partitions the points (M, 2) of such a group by G_y and replaces its row of
+the bank by one row per part. A group that G_y leaves whole stays. With `corrections` the parts stay parts of one group
+(ours), and so do newborn groups beside a member: misses, sway and noise take people apart for a moment. Each part is
+tracked by itself; the group is their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates
+become one row again. Sets of parts whose people have been more than 1.5 m from the rest's for `confirm_time` split off.
 
 Onsets (ours): when an event that is known now began. A merge is known `merge_time` after its onset. The onset of a
 split is measured from the group's earlier points, divided among the parts. Distances are metres on the ground (in an
 image depth is stretched to it). The distances and velocities of the truth's rules come from
 sim.truth.merge_split_rules. Lengths are in the unit of the points (m on the ground or px), times in s.
 
-Of two groups that follow the same people the one with fewer people of its own becomes lost (ours). Groups that share
-points are each measured by all of them. Without this rule a group that is hidden or has left would follow another one
-for ever. For `coast_time` that is allowed, as hidden people come out again.
+Of two groups that follow the same people the one with the smaller share of people of its own becomes lost (ours).
+Groups that share points are each measured by all of them. Without this rule a group that is hidden or has left would
+follow another one for ever. For `coast_time` that is allowed, as hidden people come out again.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.config import GroupPdaConfig
 
 SPEED_PRIOR = 1.3  # m/s: standard deviation of a newborn group's velocity, per axis, that of walking people.
-# m/s: standard deviation of a child's velocity about its parent's, and speed at which a group's region widens while it
+# m/s: standard deviation of a part's velocity about its group's, and speed at which a group's region widens while it
 # has no feasible association (ours).
 SPLIT_SPEED = 0.5
 # sigma_n of m_N: the part that grows with N, per N; ours and, for next to none, with corrections off.

@@ -1,8 +1,9 @@
 """`group-pda`: groups of people tracked as wholes, from points or from foreground pixels.
 
-Gennari & Hager, "Probabilistic data association methods in visual tracking of groups", CVPR 2004. A group's state is
-(xi, v, Sigma, N): centroid xi and velocity v, together x with covariance P; extent Sigma of the members' positions;
-number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or section (sec.) and the module:
+Gennari & Hager, "Probabilistic data association methods in visual tracking of groups", CVPR 2004. The state of a group,
+or of each part of one, is (xi, v, Sigma, N): centroid xi and velocity v, together x with covariance P; extent Sigma of
+the members' positions; number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or section (sec.)
+and the module:
 
     (F, Q: transition and process noise of x; S: covariance of a point about xi, in the paper Sigma; y: a point; gamma:
     squared Mahalanobis radius `gate`; m_d, m_N, m_g: masses by the centroid's place, the number of people and the group
@@ -20,8 +21,9 @@ number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or 
     birth      unclaimed points, grouped by G_y                        sec. 3.3           births_and_losses
 
 The grouping functions G_0, G_x, G_y of points (sec. 3.1, 3.3, 4.2.1) are in tracking.filters.components: G_y links
-points at most 2 x `radius` apart, and joins linked sets whose regions overlap. A group that is not measured for
-`coast_time` is lost. `association = "none"` is section 5.2.1: a group takes all points in its region.
+points at most 2 x `radius` apart, and joins linked sets whose regions overlap. A group or part that is not measured for
+`coast_time` is lost; a group leaves with its last part. `association = "none"` is section 5.2.1: a group takes all
+points in its region.
 
 Departures. Those marked (c) are off with `corrections` off.
 
@@ -31,8 +33,10 @@ Departures. Those marked (c) are off with `corrections` off.
 - G_x in G_y: repeated until nothing changes. Paper: applied once. Why: joined regions overlap others.
 - noise, (c): from pixels, components below 0.25 people do not count in G_y. Paper: all count. Why: specks of
   foreground.
-- births: after `confirm_time`; until then no points of a confirmed group. Paper: at once. Why: false alarms.
-- P: Σ w² P of merged groups; 1.3 m/s per axis of new ones. Paper: none. Why: the filter and SR_v need one.
+- births: after `confirm_time`, removed after as long without points; until then no points of a confirmed group. Paper:
+  at once. Why: false alarms.
+- P: Σ w² P of merged groups; new ones r² (1 + 1/N) and 1.3 m/s per axis, (c) parts the group's and 0.5 m/s. Paper:
+  none. Why: the filter and SR_v need one.
 - R, (c): members keep places, some are missed. Paper: a member's place and noise, read as Σ / m, of m people. Why:
   less noise.
 - m_d: S with the R of each association's m. Paper: one P_yc. Why: fewer people measure a centroid worse.
@@ -50,22 +54,27 @@ Departures. Those marked (c) are off with `corrections` off.
   similar groups cross.
 - split: after `split_time`; measured frames count back; (c) parent's velocity. Paper: after infeasible frames, at
   rest. Why: misses.
-- parts, (c): what falls apart stays one group until it is 1.5 m apart for `confirm_time`. Paper: at once. Why: misses
-  and sway take people apart for a moment.
-- split into one part: the group stays as it is. Paper: initialised anew. Why: others' points made it infeasible.
+- parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
+  some have been more than 1.5 m from the rest for `confirm_time`; a part that is not measured holds the others; R_x
+  joins parts again. Paper: new groups at once. Why: misses and sway take people apart for a moment.
+- split into one part or none: the group stays as it is. Paper: initialised anew. Why: others' points made it
+  infeasible.
 - divided points: those most probably the group's. Paper: all in the region. Why: others' people stay out.
-- ids: the largest part or merged group keeps its id. Paper: none. Why: tracks need ids.
-- walking out: a new group within reach of a member is a part, (c) with its velocity. Paper: none. Why: splits without
-  shared points.
+- ids: the part that was largest when the group fell apart keeps the id, after its loss the largest left; of merged
+  groups the largest. Paper: none. Why: tracks need ids.
+- walking out: a new group within reach of a member is a part of its group and as old, (c) with its velocity; without
+  corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
 - like velocities, (c): difference up to `merge_velocity` on the mean of two steps. Paper: SR_v overlap. Why: P does
   not measure likeness; people sway with each step.
 - SR_v, without corrections: of the updated velocity. Paper: of the predicted one. Why: Fig. 1 merges after the update.
-- near groups, (c): people at most 1.5 m apart, too. Paper: regions overlap. Why: no merge after a split.
-- merge: of confirmed, measured, feasible groups; (c) after `merge_time`. Paper: at once. Why: crossing groups.
-- enter: no merge if at most one group is older. Paper: none. Why: they came together.
-- duplicates: of two groups on the same people for `coast_time` one is lost. Paper: none. Why: hidden groups follow
-  others.
-- reports: until `report_coast` after a measurement, with hulls of points. Paper: every group. Why: lost groups are
+- near groups, (c): people at most 1.5 m apart, too; from pixels by centroids and extents. Paper: regions overlap. Why:
+  no merge after a split.
+- merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) after `merge_time`, in
+  which gaps up to 1.5 s count. Paper: at once. Why: crossing groups.
+- enter: so is a merge reported if at most one of the groups was there 1 s before. Paper: none. Why: they came together.
+- duplicates: of two groups or parts on the same people for `coast_time` the one with the smaller share of own people is
+  lost. Paper: none. Why: hidden groups follow others.
+- reports: parts that had points within `report_coast`, with hulls of points. Paper: every group. Why: lost groups are
   guesses.
 - onsets: dated back. Paper: none. Why: decisions lag.
 - depth: divided by the sine of the tilt. Paper: px. Why: oblique views.
