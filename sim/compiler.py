@@ -115,13 +115,16 @@ class _InnerCompiler(Compiler):  # type: ignore[misc]
 def _with_memory(resolve: Any) -> Any:
     """Returns numba's BaseFunction.get_call_type with a memory.
 
-    It asks some thirty templates, each time anew, what type `a + b` has.
+    It asks some thirty templates, each time anew, what type `a + b` has. Only answers about operators are remembered:
+    those do not change.
     """
+    known: dict[Any, Any] = {}
 
     @wraps(resolve)
     def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
-        known = vars(self).setdefault("known_calls", {})
-        call = context, tuple(args), tuple(dict(kws).items()), compilation_flags()
+        if getattr(self.typing_key, "__module__", "") != "_operator":
+            return resolve(self, context, args, kws)
+        call = self, context, tuple(args), tuple(dict(kws).items()), compilation_flags()
         if call not in known:
             signature = resolve(self, context, args, kws)
             known[call] = signature, self._impl_keys[signature.args]

@@ -124,6 +124,11 @@ class Tracks(Frozen):
     own_events: tuple[str, ...] = ()
     seen: Bools = field(default_factory=lambda: np.zeros(0, bool))
 
+    @property
+    def measured(self) -> Bools:
+        """Flags (N,): `seen`, or all True if it is empty."""
+        return self.seen if len(self.seen) else np.ones(len(self.id), bool)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stairs(Frozen):

@@ -53,7 +53,7 @@ Similarity = Literal["boxes", "ground", "image"] | None
 class DemoOptions:
     """Generate scenes, track them, score the tracks and write a page with the results."""
 
-    quick: bool = option("Only the short scenes of the suite quick, with one seed.", False)
+    quick: bool = option("Only the short scenes of the suite quick, with one seed, and two trackers.", False)
     out: Path = OUT(default=Path("flockscope-demo"))
 
 
@@ -96,7 +96,8 @@ class TrackOptions:
         "Detections that the tracker gets. Default: the first of image, file, truth that it and the source allow.",
         None)
     boxes: Path | None = option(
-        "Boxes of a detector on the source's pictures: MOT text, table with named columns, or COCO results.", None,
+        "Boxes of a detector on the source's pictures: MOT text, table with named columns (frames or times), or COCO "
+        "results.", None,
         metavar="FILE")
     sensor: Path | None = SENSOR()
     grouping: Path | None = GROUPING()

@@ -131,7 +131,9 @@ def _missed(pair: Ints, step: Ints, seen: Bools, reported: Bools, memory: int) -
     following = np.where(last, steps, np.append(step[1:], steps)[: len(step)])
     gone = np.where(reported, steps, np.arange(steps)[:, None])
     gone = np.minimum.accumulate(gone[::-1])[::-1]  # by step: the next one in which a person is not reported
-    row, at = runs(step + 1, np.minimum(following, np.minimum(gone[step, a], gone[step, b]) + memory))
+    end = np.minimum(following, np.minimum(gone[step, a], gone[step, b]) + memory)
+    after = np.minimum(step + 1, steps - 1)
+    row, at = runs(step + 1, np.where(seen[after, a] & seen[after, b], step + 1, end))
     # a pair that is seen again without a row is far apart
     both = np.cumsum(seen[at, a[row]] & seen[at, b[row]])
     missed = both == np.append(0, both)[np.searchsorted(row, row)]

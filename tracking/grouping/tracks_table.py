@@ -63,7 +63,7 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, smooth: floa
     frame = np.repeat(np.array([t.index for t in tracks], np.int64) - 1, count)
     id, group = np.concatenate([t.id for t in tracks]), np.concatenate(_named_groups(tracks))
     pos, vel = (np.concatenate([getattr(t, name)[:, :2] for t in tracks]) / scale for name in ("pos", "vel"))
-    seen = np.concatenate([t.seen if len(t.seen) else np.ones(len(t.id), bool) for t in tracks])
+    seen = np.concatenate([t.measured for t in tracks])
     order = np.lexsort((id, frame))
     seen = seen[order]
     frame, id, group, pos, vel = frame[order], id[order], group[order], pos[order], vel[order]

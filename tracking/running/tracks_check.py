@@ -107,8 +107,10 @@ def _row_faults(tracks: Tracks) -> Iterator[Any]:
     types = [getattr(a, "dtype", type(a).__name__) for a in (tracks.id, tracks.group)]
     whole = isinstance(tracks.id, np.ndarray) and all(kind == np.int64 for kind in types)
     yield not whole and (f"ids of type {types[0]}, groups of type {types[1]}", "int64")
-    seen = tracks.seen if isinstance(tracks.seen, np.ndarray) else np.zeros(0)
-    yield (seen.dtype != bool or seen.shape != (n,)) and (f"seen of shape {seen.shape}, {seen.dtype}", f"({n},), bool")
+    seen = tracks.seen
+    flags = isinstance(seen, np.ndarray) and seen.dtype == bool and seen.shape == (n,)
+    kind = f"shape {seen.shape}, {seen.dtype}" if isinstance(seen, np.ndarray) else f"type {type(seen).__name__}"
+    yield not flags and (f"seen of {kind}", f"({n},), bool")
     same = tracks.unit != "group" or np.array_equal(tracks.id, tracks.group)
     yield not same and ("group that is not id", "group equal to id where the unit is group")
     least = int(tracks.group.min(initial=0))

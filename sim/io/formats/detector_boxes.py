@@ -24,6 +24,7 @@ from sim.io.formats.options import BoxScale
 from sim.types import Array, Frame, Ints, Sequence
 
 PERSON = 1  # COCO's category of people.
+SAME = 1e-3  # s: boxes of one picture have times that differ by at most this.
 HALF = 0.5 + 1e-6  # frames: a time belongs to a frame that is so near; times may be rounded.
 OUTSIDE = 1.1  # Boxes that end farther right or lower than this share of the picture are of another picture size.
 
@@ -72,9 +73,10 @@ def _frames_at(path: Path, sequence: Sequence, seconds: Array) -> Ints:
     order = np.lexsort((seconds, away, k))
     frames, first = np.unique(k[order], return_index=True)
     nearest = seconds[order[first]][np.searchsorted(frames, k)]
-    fits = (away <= HALF / sequence.fps) & (seconds == nearest)
-    out = f"{(~fits).sum()} of {len(fits)} boxes have times of no frame"
-    if fits.mean() < 0.5:
+    near = away <= HALF / sequence.fps
+    fits = near & (np.abs(seconds - nearest) <= SAME)
+    out = f"{(~fits).sum()} of {len(fits)} boxes have times of no frame, or of one that has nearer ones"
+    if near.mean() < 0.5:
         raise InputError(
             file=path, place="times", got=f"{seconds.min():g} to {seconds.max():g} s: {out}",
             expected=f"times of {len(times)} frames, {times[0]:g} to {times[-1]:g} s",

@@ -111,7 +111,7 @@ def flatten(every: list[Tracks]) -> RunRows:
         join([t.cov for t in every], np.zeros((0, 2 * d, 2 * d))), join(no_box, np.zeros((0, 4))),
         np.repeat(np.array([t.box is None for t in every], bool), counts),
         join([scores_or_ones(t.score, len(t.id)) for t in every], np.zeros(0)),
-        join([t.seen if len(t.seen) else np.ones(len(t.id), bool) for t in every], np.zeros(0, bool)),
+        join([t.measured for t in every], np.zeros(0, bool)),
     )  # fmt: skip
 
 

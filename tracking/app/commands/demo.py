@@ -1,4 +1,4 @@
-"""`flockscope demo`: generates scenes, tracks them with every tracker, scores the tracks and writes pages to open.
+"""`flockscope demo`: generates scenes, tracks them, scores the tracks and writes pages to open.
 
 The first page has videos of one scene, and tables of scores whose rows link to replays.
 """
@@ -220,11 +220,11 @@ def demo(options: DemoOptions) -> CommandResult:
         )  # fmt: skip
     sequences = [open_source(folder)[0] for folder in folders]
     trackers = QUICK_TRACKERS if quick else tracker_registry.names()
-    jobs = [_TrackJob(name, "file", folders, out / "tracks" / name) for name in trackers]
-    jobs += [
+    jobs = [
         _TrackJob(name, "image", [rendered], out / "tracks" / f"{name}-image", _pictures(out) / f"{name}.mp4")
         for name in trackers if "pixels" in tracker_registry.find(name).needs
     ]  # fmt: skip
+    jobs += [_TrackJob(name, "file", folders, out / "tracks" / name) for name in trackers]
     runs = _run(jobs, workers)
     from_points, from_pixels = (
         {j.tracker: runs[j] for j in jobs if j.detections == mode} for mode in ("file", "image")

@@ -123,7 +123,6 @@ RECENT_POINTS = 64  # At most so many points of a group are kept of each frame.
 def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledParameters, t: float) -> PointClaims:
     """Returns new claims with the members missed at time t (s) appended as points of their own group alone."""
     has_points = np.asarray(np.isfinite(claims.d2).any(axis=1))
-    has_points[claims.owner[claims.owner >= 0]] = True
     place, row, last_seen = missed_members(bank, claims.points, scaled, t)
     kept = has_points[row]
     place, row, last_seen = place[kept], row[kept], last_seen[kept]

@@ -49,9 +49,8 @@ def add_newborns(
     for k in range(len(born) if len(place) else 0):
         d2 = np.square(points[group == k][:, None] - place).sum(2).min(0)
         d2[d2 > reach**2] = np.inf
-        row = np.flatnonzero(bank.id == of[d2.argmin()])
-        if len(row) and np.isfinite(d2.min()):
-            _set_parent(born, k, bank, int(row[0]), scaled)
+        if np.isfinite(d2.min()):
+            _set_parent(born, k, bank, int(np.flatnonzero(bank.id == of[d2.argmin()])[0]), scaled)
     bank.add(born)
 
 
@@ -66,8 +65,9 @@ def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) 
     """Give ids to tentative groups that were measured for longer than `confirm_time`; yield an event of each that is no
     part of a group."""
     for row in np.flatnonzero(~bank.confirmed & (bank.measured_time > scaled.config.confirm_time + 1e-9)).tolist():
-        if not (bank.group == bank.parent[row]).any():
-            bank.parent[row] = NO_ID
+        if bank.parent[row] != NO_ID and not (bank.group == bank.parent[row]).any():
+            # its group is gone
+            bank.parent[row], bank.first_seen[row] = NO_ID, t - bank.measured_time[row] + scaled.dt
         bank.id[row] = ids.new()
         if bank.parent[row] == NO_ID:
             place = tuple(bank.x[row, :2].tolist())
@@ -75,8 +75,8 @@ def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) 
 
 
 def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-    """Remove groups that were not measured for too long, at time t (s); yield a leave event of each of
-    which no part is left."""
+    """Remove groups and parts that were not measured for too long, at time t (s); yield a leave event of each group of
+    which no part is left. Else the largest part has its id."""
     patience = np.where(bank.confirmed, scaled.config.coast_time, scaled.config.confirm_time)
     dead: Bools = t - bank.last_seen > patience + 1e-9
     for row in np.flatnonzero(dead & bank.confirmed & (bank.parent == NO_ID)).tolist():

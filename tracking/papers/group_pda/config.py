@@ -37,17 +37,17 @@ class GroupPdaConfig(BackgroundSettings):
     association: str = param("pda", ("pda", "nearest", "all", "none"), "",
         "pda: by masses (sec. 4.2); nearest, all: one association; none: no constraint (sec. 5.2.1)", "categorical")
     corrections: bool = param(True, (True, False), "",
-        "R, misses, rest and gate of extents, velocities of merges and children (ours)", "categorical")
+        "R, misses, rest and gate of extents, parts, velocities of merges and parts (ours)", "categorical")
     appearance: float = param(0.5, (0.0, 5.0), "",
         "from pixels: weight of colours in the log masses (future work of sec. 6; ours)", sees="pixels")
     merge_velocity: float = param(0.65, (0.05, 3.0), "m/s",
-        "largest difference of velocities at which groups merge (ours, in place of SR_v)")
+        "largest difference of velocities at which groups and parts merge (ours, in place of SR_v)")
     merge_time: float = param(0.75, (0.0, 3.0), "s",
         "time for which groups must be near, with like velocities on the mean of two steps, before they merge (ours)")
     split_time: float = param(0.5, (0.0, 3.0), "s",
-        "time without a feasible association, less the measured frames in it, after which a group splits")
+        "time without a feasible association, less the measured frames in it, after which a group falls apart")
     confirm_time: float = param(0.3, (0.0, 3.0), "s",
-        "a new group is confirmed after so long with measurements and removed after so long without (ours)")
+        "a new group is confirmed after so long with measurements, removed after so long without; parts split (ours)")
     coast_time: float = param(1.5, (0.0, 10.0), "s",
         "time without a measurement after which a group is lost (ours)")
     report_coast: float = param(0.5, (0.0, 5.0), "s",

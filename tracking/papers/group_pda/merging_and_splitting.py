@@ -69,11 +69,11 @@ class PairMoment(NamedTuple):
 def merge_onset(moments: list[PairMoment], most: float) -> int:
     """Returns the index of the moment since which two groups have been near with velocities that differ by at most
     `most`, m/s, on the mean of two steps; the number of moments if they are not."""
-    before = (step_speeds(moments) > most) | (np.array([m.gap for m in moments]) > MERGE_DISTANCE)
+    before = (_step_speeds(moments) > most) | (np.array([m.gap for m in moments]) > MERGE_DISTANCE)
     return int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0
 
 
-def step_speeds(moments: list[PairMoment]) -> Array:
+def _step_speeds(moments: list[PairMoment]) -> Array:
     """Returns the lengths (K,) of the difference of velocities, on the mean of two steps, m/s, at each moment."""
     t, v = np.array([m.t for m in moments]), np.array([m.velocity for m in moments])
     first, last = windows(t, STEP_TIME)
@@ -214,8 +214,8 @@ def _pair(bank: GroupBank, i: int, j: int) -> Pair:
 
 def _split_into(bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledParameters, t: float) -> WholeGroupEvent:
     parts = sorted(parts, key=lambda rows: (group not in bank.id[rows], -bank.size[rows].sum()))
-    recent = pooled([bank.recent_points[r] for rows in parts for r in rows.tolist()])
-    two = [np.concatenate([bank.positions(r) for r in rows.tolist()]) for rows in parts[:2]]
+    recent = pooled_points([bank.recent_points[r] for rows in parts for r in rows.tolist()])
+    two = [np.concatenate([_latest_points(bank, r) for r in rows.tolist()]) for rows in parts[:2]]
     onset, place = split_onset(recent, two, scaled.metres_per_unit, scaled.body_cov, t)
     heads = [rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]] for rows in parts]
     for rows, head in zip(parts, heads, strict=True):
@@ -223,7 +223,12 @@ def _split_into(bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledPa
     return WholeGroupEvent("split", onset, (group,), tuple(sorted(bank.id[heads].tolist())), tuple(place.tolist()))
 
 
-def pooled(recent: list[list[tuple[float, Array]]]) -> list[tuple[float, Array]]:
+def _latest_points(bank: GroupBank, row: int) -> Array:
+    recent = bank.recent_points[row]
+    return recent[-1][1] if recent else bank.positions(row)
+
+
+def pooled_points(recent: list[list[tuple[float, Array]]]) -> list[tuple[float, Array]]:
     """Returns the recent points of several rows together, by time, oldest first."""
     by_time: dict[float, list[Array]] = {}
     for t, points in (moment for past in recent for moment in past):
@@ -273,7 +278,7 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1), size[None],
         bank.parent[one], bank.colour_hist[rows].sum(0, keepdims=True),
-        [MemberPlaces(offset, last_seen, known)], [pooled([bank.recent_points[r] for r in rows.tolist()])],
+        [MemberPlaces(offset, last_seen, known)], [pooled_points([bank.recent_points[r] for r in rows.tolist()])],
     )  # fmt: skip
 
 
@@ -370,8 +375,7 @@ class DuplicateGroups:
             if ids not in self.clock:
                 continue  # one of them has just become lost
             row = _with_fewer_own(bank, *pairs[ids])
-            lost_at = t - max(scaled.config.coast_time, scaled.dt) - 1e-6
-            bank.last_seen[row] = min(bank.last_seen[row], lost_at)
+            bank.last_seen[row] = t - scaled.config.coast_time - 1e-6
             self.clock = {pair: s for pair, s in self.clock.items() if bank.id[row] not in pair}
 
 
