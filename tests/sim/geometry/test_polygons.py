@@ -48,13 +48,13 @@ def test_overlap_is_that_of_a_dense_raster():
     assert (got > 0.05).sum() > 20
 
 
-@pytest.mark.parametrize(
-    ("moved", "common"),
-    [
-        ((0.5, 0), 0.5), ((0.5, 0.5), 0.25), ((0, 0), 1), ((1, 0), 0), ((0, -1), 0), ((1, 1), 0), ((3, 0), 0),
-        ((1e-12, 0), 1),
-    ],
-)  # fmt: skip
+SQUARES = [
+    ((0.5, 0), 0.5), ((0.5, 0.5), 0.25), ((0, 0), 1), ((1, 0), 0), ((0, -1), 0), ((1, 1), 0), ((3, 0), 0),
+    ((1e-12, 0), 1),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("moved", "common"), SQUARES)
 def test_squares(moved, common):
     zero = np.zeros(1, np.int64)
     a, b = pack([SQUARE]), pack([SQUARE + np.array(moved)])

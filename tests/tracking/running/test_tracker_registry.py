@@ -79,21 +79,21 @@ def test_a_file_is_loaded_anew_where_it_has_changed(tmp_path):
     assert tracker_registry.find(f"{path}:Mine").needs == ("boxes",)
 
 
-@pytest.mark.parametrize(
-    ("spec", "words"),
-    [
-        ("blop", "did you mean blob"), ("{file}:None_", "a class of this module"),
-        ("{file}:NoNeeds", "needs = 'points'"), ("{file}:Nothing", "no needs, reset, step"),
-        ("{file}:Number", "needs = 5"), ("{file}:Listed", "needs = "), ("{file}:Unknown", "sound"),
-        ("{file}:Short", r"step\(self, frame\); expected a class"),
-        ("{file}:Blind", r"reset\(self\); expected a class"),
-        ("{file}:Demanding", r"__init__\(x\), called with nothing"), ("{file}:Unset", "step = None"),
-        ("{file}:Wild", "config_class = "), ("{file}:function", "got a function; expected a class"),
-        ("{file}:", "a class of this module"), ("{leaves}:Mine", "SystemExit: 3"), (":Mine", "Empty module name"),
-        ("{missing}:Mine", "no such file"), ("{broken}:Mine", "ZeroDivisionError"),
-        ("no.such.module:Mine", "ModuleNotFoundError"),
-    ],
-)  # fmt: skip
+SPECS = [
+    ("blop", "did you mean blob"), ("{file}:None_", "a class of this module"),
+    ("{file}:NoNeeds", "needs = 'points'"), ("{file}:Nothing", "no needs, reset, step"),
+    ("{file}:Number", "needs = 5"), ("{file}:Listed", "needs = "), ("{file}:Unknown", "sound"),
+    ("{file}:Short", r"step\(self, frame\); expected a class"),
+    ("{file}:Blind", r"reset\(self\); expected a class"),
+    ("{file}:Demanding", r"__init__\(x\), called with nothing"), ("{file}:Unset", "step = None"),
+    ("{file}:Wild", "config_class = "), ("{file}:function", "got a function; expected a class"),
+    ("{file}:", "a class of this module"), ("{leaves}:Mine", "SystemExit: 3"), (":Mine", "Empty module name"),
+    ("{missing}:Mine", "no such file"), ("{broken}:Mine", "ZeroDivisionError"),
+    ("no.such.module:Mine", "ModuleNotFoundError"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("spec", "words"), SPECS)
 def test_wrong_trackers_are_one_line(tmp_path, spec, words):
     (tmp_path / "mine.py").write_text(STRANGER)
     (tmp_path / "broken.py").write_text("1 / 0")

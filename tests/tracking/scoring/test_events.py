@@ -37,18 +37,18 @@ def test_one_second_to_either_side(start, hit):
     assert hits("merge", found) == (hit, 1 - hit, 1 - hit)
 
 
-@pytest.mark.parametrize(
-    ("members", "hit"),
-    [
-        ((1, 2, 3), 1),
-        ((1, 2), 1),  # 2/3
-        ((1, 2, 3, 4, 5, 6), 1),  # 3/6, exactly one half
-        ((1, 2, 3, 4, 5, 6, 7), 0),  # 3/7
-        ((1,), 0),  # 1/3
-        ((1, 2, 30), 1),  # 2 of {1, 2, 3, nobody}
-        ((1, 2, 30, 31), 0),  # 2/5: with those who are nobody left out it would be 2/3
-    ],
-)
+MEMBERS = [
+    ((1, 2, 3), 1),
+    ((1, 2), 1),  # 2/3
+    ((1, 2, 3, 4, 5, 6), 1),  # 3/6, exactly one half
+    ((1, 2, 3, 4, 5, 6, 7), 0),  # 3/7
+    ((1,), 0),  # 1/3
+    ((1, 2, 30), 1),  # 2 of {1, 2, 3, nobody}
+    ((1, 2, 30, 31), 0),  # 2/5: with those who are nobody left out it would be 2/3
+]
+
+
+@pytest.mark.parametrize(("members", "hit"), MEMBERS)
 def test_half_of_all_people_concerned(members, hit):
     ghosts = {30: (4.0, 99.0), 31: (8.0, 99.0)}
     found = scores([event("split", 30, (1, 2, 3))], [event("split", 30, members, emitted=31)], CROWD | ghosts)
@@ -112,16 +112,16 @@ def changing(before, after, at):
 AB, CD, EF, ABCD = (1, 2), (3, 4), (5, 6), (1, 2, 3, 4)
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "right"),
-    [
-        ([AB, CD], [ABCD], 1),
-        ([AB], [ABCD], 0),  # 3 and 4 are said to have come alone: three parents
-        ([(1, 2, 3), (4,)], [ABCD], 0),  # two parents, but 4 alone is not {3, 4}: 1/2 is not more than half
-        ([AB, CD], [(1, 2, 3)], 0),  # 4 stayed outside: two children
-        ([ABCD], [ABCD], 0),  # the tracker's groups did not change at all
-    ],
-)
+MERGE_LINEAGES = [
+    ([AB, CD], [ABCD], 1),
+    ([AB], [ABCD], 0),  # 3 and 4 are said to have come alone: three parents
+    ([(1, 2, 3), (4,)], [ABCD], 0),  # two parents, but 4 alone is not {3, 4}: 1/2 is not more than half
+    ([AB, CD], [(1, 2, 3)], 0),  # 4 stayed outside: two children
+    ([ABCD], [ABCD], 0),  # the tracker's groups did not change at all
+]
+
+
+@pytest.mark.parametrize(("before", "after", "right"), MERGE_LINEAGES)
 def test_lineage_of_a_merge(before, after, right):
     true = truth(changing([AB, CD, EF], [ABCD, EF], 30), [event("merge", 30, ABCD)])
     told = tracks(changing(before, after, 35), [event("merge", 31, ABCD, emitted=35)])

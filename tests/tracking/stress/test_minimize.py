@@ -190,14 +190,14 @@ def test_a_scene_without_the_failure_is_refused_with_its_score() -> None:
         search(lambda scenario, seed: False).run(HARD)
 
 
-@pytest.mark.parametrize(
-    ("text", "got"),
-    [
-        ("HOTA", "choose one of switch"), ("HOTTA<0.7", "did you mean HOTA"), ("HOTA=0.7", "SCORE<NUMBER"),
-        ("HOTA<0..7", "correct the number"),
-        ("swich", "'switch'"), ("switch:hiden", "'hidden'"), ("switch:", "a cause"),
-    ],
-)  # fmt: skip
+WRONG_CONDITIONS = [
+    ("HOTA", "choose one of switch"), ("HOTTA<0.7", "did you mean HOTA"), ("HOTA=0.7", "SCORE<NUMBER"),
+    ("HOTA<0..7", "correct the number"),
+    ("swich", "'switch'"), ("switch:hiden", "'hidden'"), ("switch:", "a cause"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "got"), WRONG_CONDITIONS)
 def test_wrong_conditions(text: str, got: str) -> None:
     with pytest.raises(InputError, match=got):
         parse_failure(text)
