@@ -143,17 +143,11 @@ def test_lineage_does_not_mind_ids_nor_a_late_word():
 def test_as_many_hits_as_there_can_be(seed):
     r = np.random.default_rng(seed)
 
-    def some(n):
-        return [
-            (
-                int(r.integers(1, 40)),
-                frozenset(r.choice(5, int(r.integers(2, 5)), replace=False).tolist()),
-                int(r.integers(0, 2)),
-            )
-            for _ in range(n)
-        ]
+    def one(most_wrong):
+        people = frozenset(r.choice(5, int(r.integers(2, 5)), replace=False).tolist())
+        return int(r.integers(1, 40)), people, int(r.integers(0, most_wrong + 1))
 
-    happened, said = [(s, people, 0) for s, people, _ in some(4)], some(4)
+    happened, said = [one(0) for _ in range(4)], [one(1) for _ in range(4)]
     true, told = (
         [ComparableEvent("merge", s, s, EventMembers(people, wrong), (0.0, 0.0)) for s, people, wrong in side]
         for side in (happened, said)
@@ -165,10 +159,9 @@ def test_as_many_hits_as_there_can_be(seed):
 def test_latency_is_to_the_answer_that_told_whatever_it_claims():
     told = tracks([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2), emitted=45)])
     claimed = [t.replace(events=tuple(replace(e, emitted=30) for e in t.events)) for t in told]
+    true = truth([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2))])
     for said in (told, claimed):
-        assert evaluate(truth([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2))]), said)["merge_latency"] == near(
-            1.5
-        )
+        assert evaluate(true, said)["merge_latency"] == near(1.5)
 
 
 def test_crossings_and_queues_of_a_method_without_people_are_unknown_unless_it_tells_some():
