@@ -156,6 +156,13 @@ def test_as_many_hits_as_there_can_be(seed):
     assert found["merge_TP"] == event_hits(happened, said, 10.0)
 
 
+def test_two_hits_by_half_are_more_than_a_whole_one():
+    """The merge of (1, 2) is told exactly; the best pairing gives it to another event, by half, and that one too."""
+    happened = [event("merge", 30, (1, 2)), event("merge", 40, (1, 2, 3, 4))]
+    said = [event("merge", 30, (1, 2), emitted=45), event("merge", 40, (1,), emitted=45)]
+    assert hits("merge", scores(happened, said)) == (2, 0, 0)
+
+
 def test_latency_is_to_the_answer_that_told_whatever_it_claims():
     told = tracks([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2), emitted=45)])
     claimed = [t.replace(events=tuple(replace(e, emitted=30) for e in t.events)) for t in told]
