@@ -32,3 +32,18 @@ class Nearest:
         self.pos, self.id, self.next = found.pos, id, self.next + int(born.sum())
         alone, cov = np.full(n, -1), np.tile(np.eye(4), (n, 1, 1))
         return Tracks(frame.index, frame.t, found.plane, "person", id, alone, found.pos, vel, cov, found.box)
+
+
+class OneGroup(Nearest):
+    """All people are one group."""
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        found = super().step(frame, detections)
+        return found.replace(group=0 * found.id)
+
+
+class Crashes(Nearest):
+    """Raises in the first frame."""
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        raise ValueError("no")

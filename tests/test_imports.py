@@ -20,15 +20,15 @@ def loaded(code: str) -> set[str]:
     return set(run.stdout.splitlines()[-1].split())
 
 
-@pytest.mark.parametrize(
-    ("code", "needed"),
-    [
-        ("import sim, tracking, scenarios", set()),
-        ("from tracking.app.cli import run\nassert run(['--help']) == 0", set()),
-        ("from tracking.app.cli import run\nassert run(['track', '--help']) == 0", {"pydantic"}),
-        ("from tracking import evaluate", {"numpy", "scipy"}),
-    ],
-)
+LOADED = [
+    ("import sim, tracking, scenarios", set()),
+    ("from tracking.app.cli import run\nassert run(['--help']) == 0", set()),
+    ("from tracking.app.cli import run\nassert run(['track', '--help']) == 0", {"pydantic"}),
+    ("from tracking import evaluate", {"numpy", "scipy"}),
+]
+
+
+@pytest.mark.parametrize(("code", "needed"), LOADED)
 def test_no_more_is_loaded_than_is_needed(code, needed):
     assert loaded(code).isdisjoint(HEAVY - needed)
 
@@ -38,14 +38,14 @@ def test_a_listing_of_scenarios_does_without_arrays_of_the_world():
     assert found.isdisjoint({"numba", "cv2", "pymunk", "pyarrow"})
 
 
-@pytest.mark.parametrize(
-    ("package", "names"),
-    [
-        ("sim", ["replay", "simulate"]),
-        ("scenarios", ["load", "sensor_settings"]),
-        ("tracking", ["compare", "evaluate", "group", "track", "tune"]),
-    ],
-)
+LAZY_NAMES = [
+    ("sim", ["replay", "simulate"]),
+    ("scenarios", ["load", "sensor_settings"]),
+    ("tracking", ["compare", "evaluate", "group", "track", "tune"]),
+]
+
+
+@pytest.mark.parametrize(("package", "names"), LAZY_NAMES)
 def test_lazy_names(package, names):
     module = __import__(package)
     assert sorted(module.__all__) == names

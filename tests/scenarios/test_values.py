@@ -8,21 +8,20 @@ from scenarios.errors import InputError
 from scenarios.schema.values import Distribution
 from sim.rng import draw
 
+OUT_OF_RANGE = [
+    "crowd.free_speed=-5", "crowd.free_speed=100", "crowd.free_speed={normal=[-3, 0.2]}", "crowd.height=0",
+    "crowd.spacing=-1", "group.a.speed={normal=[0.5, 0.4]}", "group.a.speed=0", "group.a.size=100000",
+    "group.a.size={uniform=[10, 9000]}", "camera.fps=1e5", "camera.fps=0.001",
+    "camera.image=[8192, 8192]",
+    "sensor.clutter_rate=1e5", "world.size=[1e5, 10]", "duration=1e200", "light.sun_azimuth_deg=1e200",
+    "crowd.free_speed={normal=[1.3, 0.2], clip=[5, 6]}", "crowd.height={choice=[1.6, 1.7], clip=[1.8, 2]}",
+    "lead={uniform=[0, 1], clip=[2, 3]}", "lead={exponential=1, clip=[-2, -1]}",
+    "lead={normal=[0, 0], clip=[1, 2]}",
+    "group.a.size={poisson=2, clip=[50, 60]}", "group.a.size={poisson=1e5, clip=[1, 1e6]}",
+]  # fmt: skip
 
-@pytest.mark.parametrize(
-    "setting",
-    [
-        "crowd.free_speed=-5", "crowd.free_speed=100", "crowd.free_speed={normal=[-3, 0.2]}", "crowd.height=0",
-        "crowd.spacing=-1", "group.a.speed={normal=[0.5, 0.4]}", "group.a.speed=0", "group.a.size=100000",
-        "group.a.size={uniform=[10, 9000]}", "camera.fps=1e5", "camera.fps=0.001",
-        "camera.image=[8192, 8192]",
-        "sensor.clutter_rate=1e5", "world.size=[1e5, 10]", "duration=1e200", "light.sun_azimuth_deg=1e200",
-        "crowd.free_speed={normal=[1.3, 0.2], clip=[5, 6]}", "crowd.height={choice=[1.6, 1.7], clip=[1.8, 2]}",
-        "lead={uniform=[0, 1], clip=[2, 3]}", "lead={exponential=1, clip=[-2, -1]}",
-        "lead={normal=[0, 0], clip=[1, 2]}",
-        "group.a.size={poisson=2, clip=[50, 60]}", "group.a.size={poisson=1e5, clip=[1, 1e6]}",
-    ],
-)  # fmt: skip
+
+@pytest.mark.parametrize("setting", OUT_OF_RANGE)
 def test_values_out_of_range(setting):
     with pytest.raises(InputError) as error:
         load("merge", set=[setting])
@@ -39,14 +38,14 @@ def test_too_much_in_all():
             load("merge", set=settings)
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"normal": (1.3, 0.3), "clip": (1, 1.4)}, {"poisson": 3, "clip": (1, 4)}, {"poisson": 3.0},
-        {"choice": (1, 2, 2, 5), "clip": (2, 5)}, {"uniform": (0, 4), "clip": (1, 2)}, {"normal": (1, 0)},
-        {"exponential": 3.0, "clip": (3, 8)}, {"uniform": (2, 2)}, {"poisson": 900.0}, {"exponential": 0.5},
-    ],
-)  # fmt: skip
+SHARES = [
+    {"normal": (1.3, 0.3), "clip": (1, 1.4)}, {"poisson": 3, "clip": (1, 4)}, {"poisson": 3.0},
+    {"choice": (1, 2, 2, 5), "clip": (2, 5)}, {"uniform": (0, 4), "clip": (1, 2)}, {"normal": (1, 0)},
+    {"exponential": 3.0, "clip": (3, 8)}, {"uniform": (2, 2)}, {"poisson": 900.0}, {"exponential": 0.5},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("given", SHARES)
 def test_shares_are_those_of_the_draws(given):
     made, r = Distribution(**given), np.random.default_rng(0)
     drawn = np.array([draw(made, r) for _ in range(4000)])

@@ -35,14 +35,14 @@ def test_set_parses_each_kind():
     assert type(config.rate) is float
 
 
-@pytest.mark.parametrize(
-    ("assignment", "words"),
-    [
-        ("raet=2", "did you mean rate?"), ("rate=11", "a number from 0.1 to 10"),
-        ("rate=nan", "a number from 0.1 to 10"), ("rate=x", "a number from 0.1 to 10"), ("count=2.5", "an integer"),
-        ("kind=c", "one of a, b"), ("rate", "name=value"),
-    ],
-)  # fmt: skip
+WRONG_ASSIGNMENTS = [
+    ("raet=2", "did you mean rate?"), ("rate=11", "a number from 0.1 to 10"),
+    ("rate=nan", "a number from 0.1 to 10"), ("rate=x", "a number from 0.1 to 10"), ("count=2.5", "an integer"),
+    ("kind=c", "one of a, b"), ("rate", "name=value"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("assignment", "words"), WRONG_ASSIGNMENTS)
 def test_wrong_assignments_name_what_was_expected(assignment, words):
     with pytest.raises(InputError, match=words.replace("?", r"\?")):
         Small().with_set(assignment)
@@ -60,13 +60,13 @@ def test_toml_round_trip(tmp_path):
     assert Small.from_toml(path) == config
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ('tracker = "blob"', "expected small"), ("[params]\nrat = 1", "did you mean rate"), ("rate = 1", "under"),
-        ("params = 3", "under"), ("x = = 1", "TOML"),
-    ],
-)  # fmt: skip
+WRONG_FILES = [
+    ('tracker = "blob"', "expected small"), ("[params]\nrat = 1", "did you mean rate"), ("rate = 1", "under"),
+    ("params = 3", "under"), ("x = = 1", "TOML"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "words"), WRONG_FILES)
 def test_wrong_files_are_one_line(tmp_path, text, words):
     path = tmp_path / "p.toml"
     path.write_text(text)

@@ -57,13 +57,13 @@ def test_wilson_as_in_tables(hits: int, count: int, low: float, high: float) -> 
     assert wilson(hits, count) == pytest.approx((hits / count, low, high), abs=5e-5)
 
 
-@pytest.mark.parametrize(
-    ("frames", "fps", "likeness", "expected"),
-    [
-        (1000, 10, 1.0, 50), (1000, 10, 60.3, 121), (1000, 10, 900.0, 200), (100, 10, 1.0, 10), (71, 25, 1.0, 25),
-        (10, 25, 1.0, 10), (7, 0.3, 1.0, 2), (0, 10, 1.0, 0),
-    ],
-)  # fmt: skip
+BLOCKS = [
+    (1000, 10, 1.0, 50), (1000, 10, 60.3, 121), (1000, 10, 900.0, 200), (100, 10, 1.0, 10), (71, 25, 1.0, 25),
+    (10, 25, 1.0, 10), (7, 0.3, 1.0, 2), (0, 10, 1.0, 0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("frames", "fps", "likeness", "expected"), BLOCKS)
 def test_a_block_is_as_long_as_errors_last(frames: int, fps: float, likeness: float, expected: int) -> None:
     assert block_length(frames, fps, likeness) == expected
 

@@ -86,23 +86,23 @@ def test_extends_chain_and_circle(path: Path) -> None:
     assert "nowhere.toml" in error_of(folder / "z.toml").got
 
 
-@pytest.mark.parametrize(
-    ("setting", "value"),
-    [
-        ("duration=25", lambda s: s.duration == 25.0), ("camera.kind=top", lambda s: s.camera.kind == "top"),
-        ("group.a.size=5", lambda s: s.group[0].size == 5), ("group.0.size=5", lambda s: s.group[0].size == 5),
-        ("group.w.repeat=4", lambda s: s.group[2].repeat == 4),
-        ("group.b.start.1=3.5", lambda s: s.group[1].start == (11, 3.5)),
-        ("group.a.size={ uniform = [3, 3] }", lambda s: s.group[0].size.uniform == (3, 3)),
-        ("event.s1.parts.d.goal=[7, 8]", lambda s: s.event[1].parts[1].goal == (7, 8)),
-        ("event.m1.when.delay=1", lambda s: s.event[0].when.delay == 1),
-        ("sensor.box=amodal", lambda s: s.sensor.box == "amodal"), ("warmup=0", lambda s: s.warmup == 0),
-        ("group.e={ size = 2, start = [1, 7], goal = [3, 7] }", lambda s: s.group[3].id == "e"),
-        ("world.pillars=[]", lambda s: s.world.pillars == ()), ("about=a word", None), ("group.z.size=3", None),
-        ("group.7.size=3", None), ("duration.x=3", None), ("duration", None), ("=3", None), ("a..b=3", None),
-        ("duration=3\nwarmup=2", None),
-    ],
-)  # fmt: skip
+SETTINGS = [
+    ("duration=25", lambda s: s.duration == 25.0), ("camera.kind=top", lambda s: s.camera.kind == "top"),
+    ("group.a.size=5", lambda s: s.group[0].size == 5), ("group.0.size=5", lambda s: s.group[0].size == 5),
+    ("group.w.repeat=4", lambda s: s.group[2].repeat == 4),
+    ("group.b.start.1=3.5", lambda s: s.group[1].start == (11, 3.5)),
+    ("group.a.size={ uniform = [3, 3] }", lambda s: s.group[0].size.uniform == (3, 3)),
+    ("event.s1.parts.d.goal=[7, 8]", lambda s: s.event[1].parts[1].goal == (7, 8)),
+    ("event.m1.when.delay=1", lambda s: s.event[0].when.delay == 1),
+    ("sensor.box=amodal", lambda s: s.sensor.box == "amodal"), ("warmup=0", lambda s: s.warmup == 0),
+    ("group.e={ size = 2, start = [1, 7], goal = [3, 7] }", lambda s: s.group[3].id == "e"),
+    ("world.pillars=[]", lambda s: s.world.pillars == ()), ("about=a word", None), ("group.z.size=3", None),
+    ("group.7.size=3", None), ("duration.x=3", None), ("duration", None), ("=3", None), ("a..b=3", None),
+    ("duration=3\nwarmup=2", None),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("setting", "value"), SETTINGS)
 def test_set(path: Path, setting: str, value) -> None:  # type: ignore[no-untyped-def]
     if value is None:
         settings = [setting, "event=[]"] if "duration" not in setting else [setting]
@@ -114,27 +114,27 @@ def test_set(path: Path, setting: str, value) -> None:  # type: ignore[no-untype
     assert value(load(path, settings))
 
 
-@pytest.mark.parametrize(
-    ("setting", "place", "got", "expected", "remedy"),
-    [
-        ("sensor.detect_probb=1", "sensor.detect_probb", "unknown key", "known key", "'detect_prob'"),
-        ("group.a.sped=2", "group.a.sped", "unknown key 'sped'", "", "'speed'"),
-        ("group.a.size={norml=[1,2]}", "group.a.size", "'norml'", "", "'normal'"),
-        ("event.s1.parts.c.sze=2", "parts.c.sze", "'sze'", "", "'size'"),
-        ("event.m1.when.reach={gruop='a'}", "when.reach", "'gruop'", "", "'group'"),
-        ("group.a.size=big", "", "'big'", "a number, or a distribution", ""),
-        ("group.a.size=true", "", "true", "a number, or a distribution", ""),
-        ("group.a.start=[1, 'x']", "", "'x'", "a number, or a distribution", ""),
-        ("group.a.start=[1]", "", "[1]", "at least 2", ""), ("group.a.start=5", "", "5", "a list", ""),
-        ("group.a.size={normal=[1,2], uniform=[1,2]}", "", "uniform", "exactly one of normal", ""),
-        ("duration='20'", "", "'20'", "number", ""), ("duration=nan", "", "nan", "finite", ""),
-        ("duration=2020-01-01", "", "2020-01-01", "number", ""), ("camera.fps=-1", "", "-1", "from 0.01 to 1000", ""),
-        ("event.m1.type=mrge", "", "'mrge'", "'merge'", ""), ("event.m1.goal=mete", "", "'mete'", "'meet'", ""),
-        ("event.m1.when={time=1, after='x'}", "", "after", "exactly one of time", ""),
-        ("event.m1.groups=['a']", "", "['a']", "at least 2", ""), ("group.a.id='1 2'", "", "'1 2'", "a name", ""),
-        ("schema=2", "", "2", "1", ""),
-    ],
-)  # fmt: skip
+REFUSED = [
+    ("sensor.detect_probb=1", "sensor.detect_probb", "unknown key", "known key", "'detect_prob'"),
+    ("group.a.sped=2", "group.a.sped", "unknown key 'sped'", "", "'speed'"),
+    ("group.a.size={norml=[1,2]}", "group.a.size", "'norml'", "", "'normal'"),
+    ("event.s1.parts.c.sze=2", "parts.c.sze", "'sze'", "", "'size'"),
+    ("event.m1.when.reach={gruop='a'}", "when.reach", "'gruop'", "", "'group'"),
+    ("group.a.size=big", "", "'big'", "a number, or a distribution", ""),
+    ("group.a.size=true", "", "true", "a number, or a distribution", ""),
+    ("group.a.start=[1, 'x']", "", "'x'", "a number, or a distribution", ""),
+    ("group.a.start=[1]", "", "[1]", "at least 2", ""), ("group.a.start=5", "", "5", "a list", ""),
+    ("group.a.size={normal=[1,2], uniform=[1,2]}", "", "uniform", "exactly one of normal", ""),
+    ("duration='20'", "", "'20'", "number", ""), ("duration=nan", "", "nan", "finite", ""),
+    ("duration=2020-01-01", "", "2020-01-01", "number", ""), ("camera.fps=-1", "", "-1", "from 0.01 to 1000", ""),
+    ("event.m1.type=mrge", "", "'mrge'", "'merge'", ""), ("event.m1.goal=mete", "", "'mete'", "'meet'", ""),
+    ("event.m1.when={time=1, after='x'}", "", "after", "exactly one of time", ""),
+    ("event.m1.groups=['a']", "", "['a']", "at least 2", ""), ("group.a.id='1 2'", "", "'1 2'", "a name", ""),
+    ("schema=2", "", "2", "1", ""),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("setting", "place", "got", "expected", "remedy"), REFUSED)
 def test_strict(path: Path, setting: str, place: str, got: str, expected: str, remedy: str) -> None:
     error = error_of(path, setting)
     assert error.file == str(path)
@@ -178,18 +178,18 @@ def test_settings_after_it_win_and_hiding_stays(tmp_path: Path) -> None:
     assert found == MINE.model_copy(update={"detect_prob": 0.5, "hide": found.hide})
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "'sensor'"), ("[sensor]\ndetect_prop = 0.5", "detect_prob"),
-        ("[sensor]\ndetect_prob = 1.5", "sensor.detect_prob"), ("[camera]\nfps = 5\n[sensor]\n", "'camera'"),
-        ("[sensor]\nnoise_px = 3", "or 'box_noise'"), ("[sensor]\nbox_noise = { acros = [0, 1] }", "'across'"),
-        ("[sensor]\nmiss_memory = [{ share = 0.5, time = 1.0 }]\npersistence = 0.5", "miss_memory or persistence"),
-        ("[sensor]\nmiss_memory = [{ share = 0.6, time = 1.0 }, { share = 0.6, time = 2.0 }]", "at most 1"),
-        ("[sensor]\ntrue_scores = [0.5, 0.4]", "do not decrease"), ("schema = 2\n[sensor]\n", "schema"),
-        ("[sensor", "TOML"),
-    ],
-)  # fmt: skip
+WRONG = [
+    ("", "'sensor'"), ("[sensor]\ndetect_prop = 0.5", "detect_prob"),
+    ("[sensor]\ndetect_prob = 1.5", "sensor.detect_prob"), ("[camera]\nfps = 5\n[sensor]\n", "'camera'"),
+    ("[sensor]\nnoise_px = 3", "or 'box_noise'"), ("[sensor]\nbox_noise = { acros = [0, 1] }", "'across'"),
+    ("[sensor]\nmiss_memory = [{ share = 0.5, time = 1.0 }]\npersistence = 0.5", "miss_memory or persistence"),
+    ("[sensor]\nmiss_memory = [{ share = 0.6, time = 1.0 }, { share = 0.6, time = 2.0 }]", "at most 1"),
+    ("[sensor]\ntrue_scores = [0.5, 0.4]", "do not decrease"), ("schema = 2\n[sensor]\n", "schema"),
+    ("[sensor", "TOML"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "words"), WRONG)
 def test_what_is_wrong_is_one_line(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "bad.toml"
     path.write_text(text)

@@ -35,22 +35,22 @@ def test_entries_expand_in_order(path: Path) -> None:
     assert resolve(f"suite:{file}") == entries
 
 
-@pytest.mark.parametrize(
-    ("text", "place", "got"),
-    [
-        ("entry = []", "entry", "[]"),
-        ("entrys = []", "entrys", "unknown key"),
-        ("entry = [{ name = 'a' }]", "entry.0.scenario", "nothing"),
-        ("entry = [{ scenario = 'tour.toml', repet = 2 }]", "entry.0.repet", "unknown key"),
-        ("entry = [{ scenario = 'tour.toml', repeat = 0 }]", "entry.0.repeat", "0"),
-        ("entry = [{ scenario = 'tour.toml', repeat = 1000000000 }]", "entry.0.repeat", "1000000000"),
-        ("entry = [{ scenario = 'tour.toml', repeat = true }]", "entry.0.repeat", "true"),
-        ("entry = [{ scenario = 'tour.toml', set = [3] }]", "entry.0.set.0", "3"),
-        ("entry = [{ scenario = 'tour.toml' }, { scenario = 'tour.toml' }]", "entry", "two entries"),
-        ("entry = [3]", "entry.0", "3"),
-        ("entry = [{ scenario = 'tour.toml', name = 'a b' }]", "entry.0.name", "'a b'"),
-    ],
-)
+WRONG = [
+    ("entry = []", "entry", "[]"),
+    ("entrys = []", "entrys", "unknown key"),
+    ("entry = [{ name = 'a' }]", "entry.0.scenario", "nothing"),
+    ("entry = [{ scenario = 'tour.toml', repet = 2 }]", "entry.0.repet", "unknown key"),
+    ("entry = [{ scenario = 'tour.toml', repeat = 0 }]", "entry.0.repeat", "0"),
+    ("entry = [{ scenario = 'tour.toml', repeat = 1000000000 }]", "entry.0.repeat", "1000000000"),
+    ("entry = [{ scenario = 'tour.toml', repeat = true }]", "entry.0.repeat", "true"),
+    ("entry = [{ scenario = 'tour.toml', set = [3] }]", "entry.0.set.0", "3"),
+    ("entry = [{ scenario = 'tour.toml' }, { scenario = 'tour.toml' }]", "entry", "two entries"),
+    ("entry = [3]", "entry.0", "3"),
+    ("entry = [{ scenario = 'tour.toml', name = 'a b' }]", "entry.0.name", "'a b'"),
+]
+
+
+@pytest.mark.parametrize(("text", "place", "got"), WRONG)
 def test_wrong(path: Path, text: str, place: str, got: str) -> None:
     file = suite(path, text)
     with pytest.raises(InputError) as caught:

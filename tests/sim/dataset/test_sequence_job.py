@@ -11,13 +11,7 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import Entry
 from sim.dataset import generate as jobs
-from sim.dataset.generate import (
-    JobOutcome,
-    SequenceJob,
-    is_stored,
-    run_job,
-    stored_manifest,
-)
+from sim.dataset.generate import JobOutcome, SequenceJob, is_stored, run_job, stored_manifest
 from sim.io.files import atomic
 from tests.fake_simulator import FakeSimulator, scenario
 
@@ -96,16 +90,16 @@ def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: F
     assert (mine.read_text(), made.made) == ("mine", [])
 
 
-@pytest.mark.parametrize(
-    ("more", "change", "words"),
-    [
-        ({"camera": {"fps": 5}}, {}, "camera.fps 10 → 5)"),
-        ({"duration": 3.0, "camera": {"fps": 5}}, {"streams": ("left",)}, "duration 20 → 3, camera.fps 10 → 5, "
-         "streams none → left,background, images none → jpg)"),
-        ({"group": [{"id": "b", "start": [1, 1], "goal": [2, 2]}]}, {}, "group[0].id a → b)"),
-        ({}, {"stride": 4}, "stride 1 → 4)"),
-    ],
-)  # fmt: skip
+DIFFERENCES = [
+    ({"camera": {"fps": 5}}, {}, "camera.fps 10 → 5)"),
+    ({"duration": 3.0, "camera": {"fps": 5}}, {"streams": ("left",)}, "duration 20 → 3, camera.fps 10 → 5, "
+     "streams none → left,background, images none → jpg)"),
+    ({"group": [{"id": "b", "start": [1, 1], "goal": [2, 2]}]}, {}, "group[0].id a → b)"),
+    ({}, {"stride": 4}, "stride 1 → 4)"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("more", "change", "words"), DIFFERENCES)
 def test_what_differs_is_named(
     job: SequenceJob, made: FakeSimulator, more: dict[str, Any], change: dict[str, Any], words: str
 ) -> None:

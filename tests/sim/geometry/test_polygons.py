@@ -6,28 +6,15 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from sim.geometry import polygons
 from sim.geometry.hull_kernels import convex_hulls
-from sim.geometry.polygons import (
-    FOOTPRINT,
-    area,
-    contains,
-    convex_hull,
-    footprint_hull,
-    footprint_hulls,
-    gap_pairs,
-    intersection_pairs,
-    iou_matrix,
-    iou_pairs,
-    pack,
-    polygon_gap,
-)
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
 
 
-def polygons(seed, n, spread=3.0):
+def random_hulls(seed, n, spread=3.0):
     r = np.random.default_rng(seed)
-    return [convex_hull(r.uniform(0, spread, (r.integers(3, 20), 2)) + r.uniform(-1, 1, 2)) for _ in range(n)]
+    return [polygons.convex_hull(r.uniform(0, spread, (r.integers(3, 20), 2)) + r.uniform(-1, 1, 2)) for _ in range(n)]
 
 
 def raster_iou(a, b, step=0.01):
@@ -41,43 +28,43 @@ def raster_iou(a, b, step=0.01):
 
 
 def test_overlap_is_that_of_a_dense_raster():
-    some = polygons(1, 24)
-    got = iou_matrix(some[:12], some[12:])
+    some = random_hulls(1, 24)
+    got = polygons.iou_matrix(some[:12], some[12:])
     for k in range(12):
         assert got[k, k] == pytest.approx(raster_iou(some[k], some[12 + k]), abs=5e-3)
     assert (got > 0.05).sum() > 20
 
 
-@pytest.mark.parametrize(
-    ("moved", "common"),
-    [
-        ((0.5, 0), 0.5), ((0.5, 0.5), 0.25), ((0, 0), 1), ((1, 0), 0), ((0, -1), 0), ((1, 1), 0), ((3, 0), 0),
-        ((1e-12, 0), 1),
-    ],
-)  # fmt: skip
+SQUARES = [
+    ((0.5, 0), 0.5), ((0.5, 0.5), 0.25), ((0, 0), 1), ((1, 0), 0), ((0, -1), 0), ((1, 1), 0), ((3, 0), 0),
+    ((1e-12, 0), 1),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("moved", "common"), SQUARES)
 def test_squares(moved, common):
     zero = np.zeros(1, np.int64)
-    a, b = pack([SQUARE]), pack([SQUARE + np.array(moved)])
-    assert intersection_pairs(a, b, zero, zero)[0] == pytest.approx(common, abs=1e-9)
-    assert iou_pairs(a, b, zero, zero)[0] == pytest.approx(common / (2 - common), abs=1e-9)
+    a, b = polygons.pack([SQUARE]), polygons.pack([SQUARE + np.array(moved)])
+    assert polygons.intersection_pairs(a, b, zero, zero)[0] == pytest.approx(common, abs=1e-9)
+    assert polygons.iou_pairs(a, b, zero, zero)[0] == pytest.approx(common / (2 - common), abs=1e-9)
 
 
 def test_no_area_no_overlap():
     none = np.zeros((0, 2))
-    assert iou_matrix([none, SQUARE[:1], SQUARE[:2]], [SQUARE, none]).tolist() == [[0, 0]] * 3
-    assert iou_matrix([], [SQUARE]).shape == (0, 1)
-    assert np.isnan(gap_pairs(pack([none]), pack([SQUARE]), *np.zeros((2, 1), np.int64)))
+    assert polygons.iou_matrix([none, SQUARE[:1], SQUARE[:2]], [SQUARE, none]).tolist() == [[0, 0]] * 3
+    assert polygons.iou_matrix([], [SQUARE]).shape == (0, 1)
+    assert np.isnan(polygons.gap_pairs(polygons.pack([none]), polygons.pack([SQUARE]), *np.zeros((2, 1), np.int64)))
 
 
 def test_hull_of_points():
     for seed in range(50):
         points = np.random.default_rng(seed).normal(size=(12, 2))
-        hull = convex_hull(points)
-        assert area(hull) == pytest.approx(ConvexHull(points).volume)
+        hull = polygons.convex_hull(points)
+        assert polygons.area(hull) == pytest.approx(ConvexHull(points).volume)
         assert len(hull) == len(ConvexHull(points).vertices)
-    assert convex_hull(np.array([[0, 0], [1, 1], [2, 2], [1, 1.0]])).tolist() == [[0, 0], [2, 2]]
-    assert convex_hull(np.zeros((3, 2))).tolist() == [[0, 0]]
-    assert convex_hull(np.zeros((0, 2))).shape == (0, 2)
+    assert polygons.convex_hull(np.array([[0, 0], [1, 1], [2, 2], [1, 1.0]])).tolist() == [[0, 0], [2, 2]]
+    assert polygons.convex_hull(np.zeros((3, 2))).tolist() == [[0, 0]]
+    assert polygons.convex_hull(np.zeros((0, 2))).shape == (0, 2)
 
 
 def places_of(kind, r):
@@ -87,7 +74,7 @@ def places_of(kind, r):
     if kind == "row":
         return places * [1, 0]
     if kind == "along an edge":
-        return np.outer(places[:, 0], FOOTPRINT[4] - FOOTPRINT[3]) / 0.1
+        return np.outer(places[:, 0], polygons.FOOTPRINT[4] - polygons.FOOTPRINT[3]) / 0.1
     if kind == "one place":
         return np.repeat(places[:1], len(places), axis=0)
     return places
@@ -98,39 +85,42 @@ def test_footprint_hull_is_the_hull_of_all_footprints(kind):
     r = np.random.default_rng(4)
     for _ in range(200):
         places = places_of(kind, r)
-        hull, slow = footprint_hull(places), convex_hull((places[:, None] + FOOTPRINT).reshape(-1, 2))
-        assert area(hull) == pytest.approx(area(slow), abs=1e-9)
+        hull, slow = (
+            polygons.footprint_hull(places),
+            polygons.convex_hull((places[:, None] + polygons.FOOTPRINT).reshape(-1, 2)),
+        )
+        assert polygons.area(hull) == pytest.approx(polygons.area(slow), abs=1e-9)
         edge = np.roll(hull, -1, axis=0) - hull
         after = np.roll(edge, -1, axis=0)
         assert (edge[:, 0] * after[:, 1] - edge[:, 1] * after[:, 0] > 0).all(), "strictly convex, counter-clockwise"
-        assert contains(hull, places).all()
+        assert polygons.contains(hull, places).all()
 
 
 def test_footprints_of_many_groups_at_once():
     r = np.random.default_rng(5)
     count = np.array([2, 1, 3, 2, 5])
     places = r.uniform(0, 4, (count.sum(), 2))
-    for hull, own in zip(footprint_hulls(places, count), np.split(places, np.cumsum(count)[:-1]), strict=True):
-        np.testing.assert_array_equal(hull, footprint_hull(own))
+    for hull, own in zip(polygons.footprint_hulls(places, count), np.split(places, np.cumsum(count)[:-1]), strict=True):
+        np.testing.assert_array_equal(hull, polygons.footprint_hull(own))
 
 
 @pytest.mark.parametrize(
     ("moved", "gap"), [((3, 0), 2), ((2, 2), 2**0.5), ((0.5, 0.5), 0), ((0.2, 0), 0), ((0, 1.25), 0.25)]
 )
 def test_gap(moved, gap):
-    assert polygon_gap(SQUARE, SQUARE + np.array(moved)) == pytest.approx(gap, abs=1e-12)
+    assert polygons.polygon_gap(SQUARE, SQUARE + np.array(moved)) == pytest.approx(gap, abs=1e-12)
 
 
 def test_gap_of_one_inside_another_and_against_samples():
-    assert polygon_gap(SQUARE, SQUARE * 0.2 + 0.4) == 0
-    some = polygons(6, 20, spread=1.0)
+    assert polygons.polygon_gap(SQUARE, SQUARE * 0.2 + 0.4) == 0
+    some = random_hulls(6, 20, spread=1.0)
     shifted = [h + np.random.default_rng(k).uniform(-3, 3, 2) for k, h in enumerate(some)]
     for a, b in zip(some, reversed(shifted), strict=True):
         s = np.linspace(0, 1, 200)[:, None]
         rims = [np.concatenate([p + s * (q - p) for p, q in zip(h, np.roll(h, -1, 0), strict=True)]) for h in (a, b)]
         sampled = np.hypot(*np.moveaxis(rims[0][:, None] - rims[1], -1, 0)).min()
-        overlap = iou_matrix([a], [b])[0, 0] > 0
-        assert polygon_gap(a, b) == pytest.approx(0 if overlap else sampled, abs=0.01)
+        overlap = polygons.iou_matrix([a], [b])[0, 0] > 0
+        assert polygons.polygon_gap(a, b) == pytest.approx(0 if overlap else sampled, abs=0.01)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -139,7 +129,7 @@ def test_hulls_are_those_of_each_set_by_itself(seed: int) -> None:
     sets = [r.integers(0, 6, (int(r.integers(0, 12)), 2)).astype(float) for _ in range(30)]
     for points, found in zip(sets, convex_hulls(sets), strict=True):
         if len(np.unique(points, axis=0)) == len(points):
-            np.testing.assert_array_equal(found, convex_hull(points))
+            np.testing.assert_array_equal(found, polygons.convex_hull(points))
 
 
 def test_points_lines_and_nothing() -> None:

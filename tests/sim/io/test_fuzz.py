@@ -20,15 +20,15 @@ from sim.io.files.tables import json_document
 from sim.io.store.seal import with_hash
 from tests.damaged.mutations import mutate
 from tests.damaged.readers import FILES, READERS
-from tests.damaged.specimens import TEXTS, write_specimens, write_texts
+from tests.damaged.specimens import KINDS, write_specimens, write_texts
 
 EVERY = settings(
     max_examples=100, deadline=None, database=None, suppress_health_check=list(HealthCheck), print_blob=True
 )
 SEALS = {"dataset": "manifest.json", "run": "run.json"}
 LONGEST_LINE = 20_000
-SIMULATED = "simulated scenario"
-QUICK = [pytest.param(kind, marks=pytest.mark.slow if kind == SIMULATED else ()) for kind in TEXTS]
+SIMULATED = "simulated-scenario"
+QUICK = [pytest.param(kind, marks=pytest.mark.slow if kind == SIMULATED else ()) for kind in KINDS]
 
 
 class Overtime(BaseException):

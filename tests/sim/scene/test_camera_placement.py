@@ -85,14 +85,14 @@ def test_from_above() -> None:
     assert placed.position[:2] == pytest.approx([8, 5])
 
 
-@pytest.mark.parametrize(
-    ("keys", "named"),
-    [
-        ({"height": 2.0}, "camera.height"),
-        ({"position": (8.0, 5.0)}, "camera.position"),
-        ({"kind": "top", "px_per_m": 200.0}, "camera.px_per_m"),
-    ],
-)
+OUT_OF_VIEW = [
+    ({"height": 2.0}, "camera.height"),
+    ({"position": (8.0, 5.0)}, "camera.position"),
+    ({"kind": "top", "px_per_m": 200.0}, "camera.px_per_m"),
+]
+
+
+@pytest.mark.parametrize(("keys", "named"), OUT_OF_VIEW)
 def test_people_out_of_view_are_refused(keys: dict[str, object], named: str) -> None:
     motion = crowd(0)
     with pytest.raises(InputError, match="out of view in frame 1 ") as caught:

@@ -69,16 +69,15 @@ def test_paths_that_meet_in_a_point_of_both_cross_at_any_angle(angle):
     assert len(crossed(turned)) == 1
 
 
-@pytest.mark.parametrize(
-    "paths",
-    [
-        pair((0, 5), there_and_back(0.9, 5.2)) + pair((10, 5.2), there_and_back(-0.9, 5.2)),  # bounce back
-        pair((0, 5), straight(1)) + pair((10, 7.0), straight(-1)),  # pass in lanes beside, hulls 0.8 m apart
-        pair((0, 5), straight(1)) + pair((1.5, 5), straight(0.5)),  # too slowly through
-        pair((0, 5), straight(1)) + pair((10, 9), straight(-1)),  # never near
-    ],
-    ids=["bounce", "lanes", "slow", "far"],
-)
+NO_CROSSES = [
+    pair((0, 5), there_and_back(0.9, 5.2)) + pair((10, 5.2), there_and_back(-0.9, 5.2)),  # bounce back
+    pair((0, 5), straight(1)) + pair((10, 7.0), straight(-1)),  # pass in lanes beside, hulls 0.8 m apart
+    pair((0, 5), straight(1)) + pair((1.5, 5), straight(0.5)),  # too slowly through
+    pair((0, 5), straight(1)) + pair((10, 9), straight(-1)),  # never near
+]
+
+
+@pytest.mark.parametrize("paths", NO_CROSSES, ids=["bounce", "lanes", "slow", "far"])
 def test_not_a_cross(paths):
     assert crossed(paths) == []
 

@@ -282,18 +282,18 @@ def _leaves(group):
         yield from [(name, [sub]) for sub in inner] if inner else [(name, [])]
 
 
+USAGE = [
+    ("trak", "no such command 'trak'"), ("track blob", "missing argument 'SOURCE'"),
+    ("track blob x", "missing option '--out'"), ("track blob x --out y --colour red", "no such option: --colour"),
+    ("track blob x --out y --seed one", "invalid value for '--seed'"),
+    ("track blob x --out y --detections magic", "magic"),
+    ("generate merge --seeds 0:2 --out y --workers 0", "invalid value for '--workers'"),
+    ("scenarios --out x.svg", "--out without a scenario to explain"), ("export coc", "no such command 'coc'"),
+]  # fmt: skip
+
+
 @pytest.mark.parametrize("as_json", [False, True], ids=["text", "json"])
-@pytest.mark.parametrize(
-    ("line", "got"),
-    [
-        ("trak", "no such command 'trak'"), ("track blob", "missing argument 'SOURCE'"),
-        ("track blob x", "missing option '--out'"), ("track blob x --out y --colour red", "no such option: --colour"),
-        ("track blob x --out y --seed one", "invalid value for '--seed'"),
-        ("track blob x --out y --detections magic", "magic"),
-        ("generate merge --seeds 0:2 --out y --workers 0", "invalid value for '--workers'"),
-        ("scenarios --out x.svg", "--out without a scenario to explain"), ("export coc", "no such command 'coc'"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("line", "got"), USAGE)
 def test_usage(line, got, as_json, capsys):
     assert run(line.split() + ["--json"] * as_json) == 2
     printed = capsys.readouterr()

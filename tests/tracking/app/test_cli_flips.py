@@ -26,48 +26,8 @@ from tracking.running import tracker_registry
 
 pytestmark = pytest.mark.slow
 
-SCENE = """
-schema = 1
-duration = 12.0
-warmup = 1.0
-world.size = [24, 20]
-world.walls = [[0, 18, 24, 18], [16.5, 6.7, 18.5, 6.7]]
-world.doors = [{ at = [12, 18] }]
-world.pillars = [[8, 2.4, 0.3]]
-world.service = [[20, 3]]
-world.stairs = [{ foot = [14, 14], head = [18, 14] }]
-camera = { fps = 5 }
-sensor = { detect_prob = 0.9, persistence = 0.3, small_px = 40, min_visibility = 0.4, hide = [{ start = 1, end = 3 }] }
-group = [
-  { id = "a", size = 3, start = [4, 4], goal = [12, 4] },
-  { id = "b", size = 2, start = [13, 8], goal = [7, 8] },
-  { id = "s", size = 2, start = [12, 14], goal = [17, 14] },
-  { id = "q", size = 1, start = [{ uniform = [13, 17] }, { uniform = [5, 9] }], goal = [20, 6], repeat = 4 },
-]
-[[event]]
-id = "m"
-type = "merge"
-groups = ["a", "b"]
-into = "ab"
-goal = [10, 9]
-when = { time = 0.5 }
-
-[[event]]
-id = "p"
-type = "split"
-group = "ab"
-when = { time = 7 }
-parts = [{ id = "c", size = 2, goal = [4, 12] }, { id = "d", goal = [16, 11] }]
-
-[[event]]
-id = "l"
-type = "queue"
-groups = ["q-*"]
-at = [20, 6]
-direction_deg = 180
-service = 1.0
-when = { time = 0.5 }
-"""
+SCENE = Path(__file__).with_name("flips.toml").read_text()
+"""A scene in which every key of the table below has an effect."""
 TOP = "camera={ kind = 'top', px_per_m = 20, fps = 5 }"
 FAR = "group.s.goal=[22, 8]"
 LOW = "camera={ height = 3, position = [12, -3] }"

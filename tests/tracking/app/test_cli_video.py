@@ -117,18 +117,18 @@ def test_which_background_is_told(tmp_path, capsys):
         assert words in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("option", "words"),
-    [
-        ("--background last:5", ["--background", "last:5", "first:N"]),
-        ("--background first:61", ["--background", "60 frames", "61"]),
-        ("--background {}/nowhere.png", ["nowhere.png", "--background", "no such file", "check the path"]),
-        ("--background {}/text.png", ["text.png", "--background", "no picture that can be read"]),
-        ("--background {}/small.png", ["small.png", "--background", "64×96 px", "96×64 px", "the same size"]),
-        ("--detections file", ["needs pixels or boxes", "film", "images"]),
-        ("--detections image --set sensor.noise_m=3", ["sensor"]),
-    ],
-)
+OPTIONS = [
+    ("--background last:5", ["--background", "last:5", "first:N"]),
+    ("--background first:61", ["--background", "60 frames", "61"]),
+    ("--background {}/nowhere.png", ["nowhere.png", "--background", "no such file", "check the path"]),
+    ("--background {}/text.png", ["text.png", "--background", "no picture that can be read"]),
+    ("--background {}/small.png", ["small.png", "--background", "64×96 px", "96×64 px", "the same size"]),
+    ("--detections file", ["needs pixels or boxes", "film", "images"]),
+    ("--detections image --set sensor.noise_m=3", ["sensor"]),
+]
+
+
+@pytest.mark.parametrize(("option", "words"), OPTIONS)
 def test_options_that_cannot_work(option, words, tmp_path, capsys, monkeypatch):
     """Before a frame is read."""
     path = film(tmp_path)

@@ -27,18 +27,18 @@ BASE = np.array([0.5, 0.6, 0.7, 0.8, 0.55, 0.65])
 NOISE = np.array([0.02, -0.02, 0.01, -0.01, 0.015, -0.015])
 
 
-@pytest.mark.parametrize(
-    ("change", "verdict", "code"),
-    [
-        (-0.1 + NOISE, "regression", 1),
-        (0.1 + NOISE, "improvement", 0),
-        (NOISE / 10, "no difference", 0),
-        (10 * NOISE, "too noisy", 0),
-        (-0.05 + 10 * NOISE, "too noisy", 0),
-        (0.05 + 10 * NOISE, "too noisy", 0),
-        (-0.005 + NOISE / 100, "no difference", 0),
-    ],
-)
+VERDICTS = [
+    (-0.1 + NOISE, "regression", 1),
+    (0.1 + NOISE, "improvement", 0),
+    (NOISE / 10, "no difference", 0),
+    (10 * NOISE, "too noisy", 0),
+    (-0.05 + 10 * NOISE, "too noisy", 0),
+    (0.05 + 10 * NOISE, "too noisy", 0),
+    (-0.005 + NOISE / 100, "no difference", 0),
+]
+
+
+@pytest.mark.parametrize(("change", "verdict", "code"), VERDICTS)
 def test_verdicts(change, verdict, code, tmp_path, capsys):
     before, now = stored(tmp_path / "a.json", BASE), stored(tmp_path / "b.json", BASE + change)
     assert run(["compare", before, now, "--json"]) == code
@@ -64,17 +64,17 @@ def test_a_saved_baseline_gives_the_same_verdict(tmp_path, capsys):
     assert len(small.read_bytes()) < 1000
 
 
-@pytest.mark.parametrize(
-    ("write", "words"),
-    [
-        (lambda p: stored(p, BASE[:4], truth="a"), "incomplete: got no s4, s5"),
-        (lambda p: stored(p, np.append(BASE, 0.5), truth="a"), "incomplete: got s6, not in"),
-        (lambda p: stored(p, BASE, similarity="image", truth="a"), "s0: similarity: got 'image'"),
-        (lambda p: stored(p, BASE, truth="b"), "s0: truth"),
-        (lambda p: (p.write_text("{}"), str(p))[1], "got no scores of sequences"),
-        (lambda p: (p.write_text('{"sequences": [{"name": "a"}, {"name": "a"}]}'), str(p))[1], "a sequence twice"),
-    ],
-)
+NOT_COMPARED = [
+    (lambda p: stored(p, BASE[:4], truth="a"), "incomplete: got no s4, s5"),
+    (lambda p: stored(p, np.append(BASE, 0.5), truth="a"), "incomplete: got s6, not in"),
+    (lambda p: stored(p, BASE, similarity="image", truth="a"), "s0: similarity: got 'image'"),
+    (lambda p: stored(p, BASE, truth="b"), "s0: truth"),
+    (lambda p: (p.write_text("{}"), str(p))[1], "got no scores of sequences"),
+    (lambda p: (p.write_text('{"sequences": [{"name": "a"}, {"name": "a"}]}'), str(p))[1], "a sequence twice"),
+]
+
+
+@pytest.mark.parametrize(("write", "words"), NOT_COMPARED)
 def test_what_is_not_compared_ends_with_2(write, words, tmp_path, capsys):
     before = stored(tmp_path / "a.json", BASE, truth="a")
     assert run(["compare", before, write(tmp_path / "b.json")]) == 2

@@ -73,14 +73,14 @@ def broken_name(tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        "track blob {0}/data --detections file --out {1}", "score {0}/data {0}/tracks",
-        "score {0}/data {0}/tracks {0}/tracks/. --all", "fit sensor {0}/data --out {1}/sensor.toml",
-        "view {0}/data --video none --out {1}", "sheet {0}/data --out {1}", "validate {0}/tracks",
-    ],
-)  # fmt: skip
+LINES_WITH_NAMES = [
+    "track blob {0}/data --detections file --out {1}", "score {0}/data {0}/tracks",
+    "score {0}/data {0}/tracks {0}/tracks/. --all", "fit sensor {0}/data --out {1}/sensor.toml",
+    "view {0}/data --video none --out {1}", "sheet {0}/data --out {1}", "validate {0}/tracks",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("line", LINES_WITH_NAMES)
 def test_a_line_break_in_a_name_makes_no_row(line, broken_name, tmp_path, capsys):
     capsys.readouterr()
     assert run([word.format(broken_name, tmp_path / "out") for word in line.split()]) == 0
@@ -95,15 +95,14 @@ def _command(*words: str | bytes, text: bool = True, **env: str) -> subprocess.C
     return subprocess.run([*COMMAND, *words], env=environment, capture_output=True, check=False, text=text)
 
 
+TERMINALS = [
+    {"LC_ALL": "C"}, {"LC_ALL": "POSIX", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
+    {"PYTHONIOENCODING": "ascii"}, {"TERM": ""}, {"PYTHONOPTIMIZE": "1"},
+]  # fmt: skip
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "env",
-    [
-        {"LC_ALL": "C"}, {"LC_ALL": "POSIX", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
-        {"PYTHONIOENCODING": "ascii"}, {"TERM": ""}, {"PYTHONOPTIMIZE": "1"},
-    ],
-    ids=lambda env: next(iter(env)) + "=" + next(iter(env.values())),
-)  # fmt: skip
+@pytest.mark.parametrize("env", TERMINALS, ids=lambda env: next(iter(env)) + "=" + next(iter(env.values())))
 def test_any_terminal_and_locale(env):
     """A character that the terminal's encoding lacks is printed as an escape."""
     shown = _command("scenarios", "crossing", **env)

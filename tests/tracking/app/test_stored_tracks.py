@@ -72,13 +72,13 @@ def test_a_deleted_file_is_no_answer_without_it(made, tracks, tmp_path, capsys, 
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(
-    ("option", "words"),
-    [
-        (["--set", "gate=0.8"], "blob (gate = "),
-        (["--grouping", "{folder}/rule.toml"], "blob (near = 0.7"),
-    ],
-)
+CONFIGS = [
+    (["--set", "gate=0.8"], "blob (gate = "),
+    (["--grouping", "{folder}/rule.toml"], "blob (near = 0.7"),
+]
+
+
+@pytest.mark.parametrize(("option", "words"), CONFIGS)
 def test_two_configs_in_one_folder(made, tracks, tmp_path, capsys, option, words):
     (tmp_path / "rule.toml").write_text("[params]\nnear = 0.7\n")
     (one,) = (p for p in (made / "data").rglob("*s40001") if p.is_dir())

@@ -74,15 +74,15 @@ def test_a_found_scene_is_generated_by_its_command(scene: str, capsys) -> None:
     assert json.loads(capsys.readouterr().out)["sequences"][0]["HOTA"] == worst["score"]
 
 
-@pytest.mark.parametrize(
-    ("words", "place"),
-    [
-        ("--vary detection --vary clutter --vary noise", "--vary: got 3 axes"),
-        ("--vary noise --vary noise", "--vary: got noise twice"),
-        ("--vary noise --search 5 --episodes 10", "--episodes: got it beside --search"),
-        ("--detections image", "got a tracker that needs"),
-    ],
-)
+WRONG_OPTIONS = [
+    ("--vary detection --vary clutter --vary noise", "--vary: got 3 axes"),
+    ("--vary noise --vary noise", "--vary: got noise twice"),
+    ("--vary noise --search 5 --episodes 10", "--episodes: got it beside --search"),
+    ("--detections image", "got a tracker that needs"),
+]
+
+
+@pytest.mark.parametrize(("words", "place"), WRONG_OPTIONS)
 def test_wrong_options(words: str, place: str, scene: str, capsys) -> None:
     assert stress(scene, *words.split()) == 2
     assert place in capsys.readouterr().err

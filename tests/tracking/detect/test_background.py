@@ -231,17 +231,16 @@ def test_a_still_picture_can_be_trained_on():
 # --- bad input --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("sample", "words"),
-    [
-        (np.zeros((50, 8, 8), np.uint8), "uint8, BGR"),
-        (np.zeros((50, 8, 8, 3)), "uint8, BGR"),
-        (np.zeros((50, 0, 8, 3), np.uint8), "uint8, BGR"),
-        (np.zeros((9, 8, 8, 3), np.uint8), "at least 10 frames"),
-        (np.random.default_rng(0).integers(0, 255, (50, 8, 8, 3), np.uint8), "no background can be learned"),
-    ],
-    ids=["grey", "floats", "empty", "few", "all pixels change"],
-)
+NO_SAMPLES = [
+    (np.zeros((50, 8, 8), np.uint8), "uint8, BGR"),
+    (np.zeros((50, 8, 8, 3)), "uint8, BGR"),
+    (np.zeros((50, 0, 8, 3), np.uint8), "uint8, BGR"),
+    (np.zeros((9, 8, 8, 3), np.uint8), "at least 10 frames"),
+    (np.random.default_rng(0).integers(0, 255, (50, 8, 8, 3), np.uint8), "no background can be learned"),
+]
+
+
+@pytest.mark.parametrize(("sample", "words"), NO_SAMPLES, ids=["grey", "floats", "empty", "few", "all pixels change"])
 def test_a_sample_that_is_none_is_refused_in_one_line(sample, words):
     with pytest.raises(InputError, match=words):
         Background(sample, FPS)

@@ -142,21 +142,21 @@ class StillToy(Toy):
     config_class = Still
 
 
-@pytest.mark.parametrize(
-    ("tracker", "options", "words"),
-    [
-        (FAKE, {}, "a tracker with parameters"), ("blbo", {}, "did you mean blob"),
-        ("blob", {"decision_every": 0}, "1 or more"), ("blob", {"decision_every": 2.5}, "1 or more"),
-        ("blob", {"observation": "statistic"}, "did you mean statistics"),
-        ("blob", {"params": {"gaet": 0.5}}, "did you mean gate"),
-        ("blob", {"suite": "nothing at all"}, "a scenario, a suite"), ("blob", {"render_mode": "human"}, "rgb_array"),
-        ("blob", {"detections": "boxes"}, "one of None, image, truth, file"),
-        ("blob", {"seeds": 5}, r"write for example range\(5\)"), ("blob", {"seeds": [0, 20_000]}, "seeds of one split"),
-        ("blob", {"cache": -1}, "bytes"),
-        ("blob", {"set": "camera.fps=5"}, r"write \['camera.fps=5'\]"),
-        (StillToy, {"decision_every": 5}, "may change between frames"),
-    ],
-)  # fmt: skip
+WRONG_ARGUMENTS = [
+    (FAKE, {}, "a tracker with parameters"), ("blbo", {}, "did you mean blob"),
+    ("blob", {"decision_every": 0}, "1 or more"), ("blob", {"decision_every": 2.5}, "1 or more"),
+    ("blob", {"observation": "statistic"}, "did you mean statistics"),
+    ("blob", {"params": {"gaet": 0.5}}, "did you mean gate"),
+    ("blob", {"suite": "nothing at all"}, "a scenario, a suite"), ("blob", {"render_mode": "human"}, "rgb_array"),
+    ("blob", {"detections": "boxes"}, "one of None, image, truth, file"),
+    ("blob", {"seeds": 5}, r"write for example range\(5\)"), ("blob", {"seeds": [0, 20_000]}, "seeds of one split"),
+    ("blob", {"cache": -1}, "bytes"),
+    ("blob", {"set": "camera.fps=5"}, r"write \['camera.fps=5'\]"),
+    (StillToy, {"decision_every": 5}, "may change between frames"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("tracker", "options", "words"), WRONG_ARGUMENTS)
 def test_wrong_wishes_are_named(tracker, options, words):
     with pytest.raises(InputError, match=words):
         TuningEnv(tracker, **{"suite": "cross", "set": SHORT, **options})
@@ -195,13 +195,13 @@ def test_vectorised():
 KNOWN = "assert gymnasium.registry['flockscope/Tuning-v0'].entry_point == 'tracking.environment.env:TuningEnv'"
 
 
-@pytest.mark.parametrize(
-    "lines",
-    [
-        ("import tracking", "assert 'gymnasium' not in sys.modules", "import gymnasium", KNOWN),
-        ("import gymnasium", "env = gymnasium.make('tracking:flockscope/Tuning-v0', tracker='blob')", KNOWN),
-    ],
-)
+FIRST_IMPORTS = [
+    ("import tracking", "assert 'gymnasium' not in sys.modules", "import gymnasium", KNOWN),
+    ("import gymnasium", "env = gymnasium.make('tracking:flockscope/Tuning-v0', tracker='blob')", KNOWN),
+]
+
+
+@pytest.mark.parametrize("lines", FIRST_IMPORTS)
 def test_it_is_known(lines):
     done = python("-c", "\n".join(["import sys", *lines]))
     assert done.returncode == 0, done.stderr

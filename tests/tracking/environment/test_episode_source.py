@@ -36,15 +36,15 @@ def test_sequences_in_memory_and_lists():
     assert found[0].open() is sequence
 
 
-@pytest.mark.parametrize(
-    ("what", "options", "words"),
-    [
-        ("crosss", {}, "a scenario, a suite"),
-        ([], {}, "at least one"),
-        ("cross", {"seeds": []}, "at least one"),
-        ("cross", {"set": ["wrold.size=[1,2]"]}, "wrold"),
-    ],
-)
+WRONG_SOURCES = [
+    ("crosss", {}, "a scenario, a suite"),
+    ([], {}, "at least one"),
+    ("cross", {"seeds": []}, "at least one"),
+    ("cross", {"set": ["wrold.size=[1,2]"]}, "wrold"),
+]
+
+
+@pytest.mark.parametrize(("what", "options", "words"), WRONG_SOURCES)
 def test_wrong_sources(what, options, words):
     with pytest.raises(InputError, match=words):
         sources(what, **options)

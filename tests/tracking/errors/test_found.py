@@ -156,16 +156,16 @@ def reported(scenes: list[Scene], start: int, end: int, groups, unit: str) -> li
 TWO, ONE = {1: ([1, 2], None), 2: ([3, 4], None)}, {3: ([1, 2, 3, 4], None)}
 
 
+MERGES_AND_SPLITS = [
+    (20, 29, TWO, ["late merge"]),
+    (20, 39, TWO, ["missed merge"]),
+    (40, 49, ONE, ["late split", "late split"]),
+    (40, 60, ONE, ["missed split", "missed split"]),
+]
+
+
 @pytest.mark.parametrize("unit", ["person", "group"])
-@pytest.mark.parametrize(
-    ("start", "end", "groups", "kinds"),
-    [
-        (20, 29, TWO, ["late merge"]),
-        (20, 39, TWO, ["missed merge"]),
-        (40, 49, ONE, ["late split", "late split"]),
-        (40, 60, ONE, ["missed split", "missed split"]),
-    ],
-)
+@pytest.mark.parametrize(("start", "end", "groups", "kinds"), MERGES_AND_SPLITS)
 def test_merges_and_splits(start: int, end: int, groups, kinds: list[str], unit: str) -> None:
     """Pairs are so far from each other that the hulls of whole groups hold no others."""
     far = [Scene({i: (x, 3 * y) for i, (x, y) in meeting(n).people.items()}, meeting(n).given) for n in range(FRAMES)]
@@ -201,31 +201,30 @@ def test_causes_of_a_ghost(where: tuple[float, float], cause: str) -> None:
     assert one.cause.name == cause
 
 
-@pytest.mark.parametrize(
-    ("spoil", "words"),
-    [
-        (lambda t: t.replace(plane="image"), "place|positions"),
-        (lambda t: t.replace(plane="image", unit="group"), "no scale of the image"),
-    ],
-)
+INCOMPARABLE = [
+    (lambda t: t.replace(plane="image"), "place|positions"),
+    (lambda t: t.replace(plane="image", unit="group"), "no scale of the image"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "words"), INCOMPARABLE)
 def test_what_cannot_be_compared_is_an_error_of_one_line(spoil, words: str) -> None:
     run = TrackingRun(tuple(spoil(t) for t in tracks(SCENES)), {})
     with pytest.raises(InputError, match=words):
         errors_of_run(sequence_of(SCENES, px_per_m=np.nan), run)
 
 
+WHOLE_GROUP_FAULTS = {
+    "missed": ({1: ([1, 2], None)}, ["missed group"]),
+    "engulfed": ({7: ([1, 2, 3, 4], None)}, ["engulfed group"] * 2),
+    "nobody": ({1: ([1, 2], None), 2: ([3, 4], None), 7: ([], (90, 90, 92, 92))}, ["false group"]),
+    "double": ({1: ([1, 2], None), 2: ([3, 4], None), 7: ([1, 2], None)}, ["false group"]),
+    "strangers": ({2: ([3, 4], None), 7: ([1, 2, 5, 6], None)}, ["strangers joined"]),
+}
+
+
 @pytest.mark.parametrize("k", range(12, 42, 6))
-@pytest.mark.parametrize(
-    ("groups", "kinds"),
-    [
-        ({1: ([1, 2], None)}, ["missed group"]),
-        ({7: ([1, 2, 3, 4], None)}, ["engulfed group"] * 2),
-        ({1: ([1, 2], None), 2: ([3, 4], None), 7: ([], (90, 90, 92, 92))}, ["false group"]),
-        ({1: ([1, 2], None), 2: ([3, 4], None), 7: ([1, 2], None)}, ["false group"]),
-        ({2: ([3, 4], None), 7: ([1, 2, 5, 6], None)}, ["strangers joined"]),
-    ],
-    ids=["missed", "engulfed", "nobody", "double", "strangers"],
-)
+@pytest.mark.parametrize(("groups", "kinds"), WHOLE_GROUP_FAULTS.values(), ids=WHOLE_GROUP_FAULTS)
 def test_errors_of_a_tracker_of_whole_groups(groups, kinds: list[str], k: int) -> None:
     scenes = [Scene({**scene(n).people, 5: (SPEED * n, 2.0), 6: (SPEED * n, -1.5)}, scene(n).given) for n in range(60)]
     run, sequence = reported(scenes, k, k + 9, groups, "group"), sequence_of(scenes)

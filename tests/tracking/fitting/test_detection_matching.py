@@ -17,13 +17,7 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth
 from tests.recordings import mot_folder
-from tracking.fitting.detection_matching import (
-    MatchedRecording,
-    box_intersections,
-    box_iou,
-    match_detections,
-    match_sequence,
-)
+from tracking.fitting import detection_matching as matching
 from tracking.fitting.error_correlation import (
     Correlations,
     bivariate_normal_cdf,
@@ -59,13 +53,13 @@ SIZE = (640, 480)
 
 def test_overlaps_by_hand() -> None:
     a, b = np.array([[0.0, 0.0, 10.0, 10.0]]), np.array([[5.0, 5.0, 10.0, 10.0], [20.0, 0.0, 5.0, 5.0], [0, 0, 10, 10]])
-    assert box_intersections(a, b).tolist() == [[25.0, 0.0, 100.0]]
-    assert box_iou(a, b) == pytest.approx(np.array([[25 / 175, 0.0, 1.0]]))
+    assert matching.box_intersections(a, b).tolist() == [[25.0, 0.0, 100.0]]
+    assert matching.box_iou(a, b) == pytest.approx(np.array([[25 / 175, 0.0, 1.0]]))
 
 
 def test_hits_misses_and_false_alarms() -> None:
     truth = truth_of({1: [HERE, HERE, None], 2: [THERE, THERE, THERE]})
-    m = match_detections(truth, found([HERE], [THERE, [500.0, 300.0, 40.0, 100.0]], []), SIZE)
+    m = matching.match_detections(truth, found([HERE], [THERE, [500.0, 300.0, 40.0, 100.0]], []), SIZE)
     assert m.hit.tolist() == [True, False, False, True, False]  # frames 1 (1, 2), 2 (1, 2), 3 (2)
     assert m.owner.tolist() == [0, 3, -1]
     assert miss_runs(m).tolist() == [1, 1, 1]
@@ -76,14 +70,18 @@ def test_what_motchallenge_leaves_out_is_no_false_alarm(tmp_path: Path) -> None:
     person, static, other = "1,1,100,100,40,100,1,1,1", "1,2,300,100,40,100,1,7,1", "1,3,500,100,40,100,0,3,1"
     boxes = [f"1,-1,{x},100,40,100,0.9" for x in (100, 300, 500, 10)]
     ini = "name=x\nframeRate=10\nseqLength=1\nimWidth=640\nimHeight=480\n"
-    m = match_sequence(open_source(mot_folder(tmp_path, "\n".join([person, static, other]), "\n".join(boxes), ini))[0])
+    m = matching.match_sequence(
+        open_source(mot_folder(tmp_path, "\n".join([person, static, other]), "\n".join(boxes), ini))[0]
+    )
     assert m.box[:, 0].tolist() == [100.0, 10.0]
     assert m.false.tolist() == [False, True]
     assert m.match.tolist() == [0]
 
 
-def alarmed(*frames: list[list[float]]) -> MatchedRecording:
-    return match_detections(truth_of({1: [HERE] * len(frames), 2: [THERE] * len(frames)}), found(*frames), SIZE)
+def alarmed(*frames: list[list[float]]) -> matching.MatchedRecording:
+    return matching.match_detections(
+        truth_of({1: [HERE] * len(frames), 2: [THERE] * len(frames)}), found(*frames), SIZE
+    )
 
 
 def test_alarms_are_linked_over_pauses_and_know_whom_they_are_at() -> None:
@@ -115,10 +113,10 @@ def test_detections_in_frames_without_labels_are_no_false_alarms() -> None:
         for name in ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading", "height", "truncation")
     }
     sparse = dense.replace(**rows, visible_box=None, labelled=np.zeros(dense.length, bool))
-    got = match_sequence(replace(scene, load_truth=lambda: sparse))
+    got = matching.match_sequence(replace(scene, load_truth=lambda: sparse))
     anew = sparse.replace(frame=(sparse.frame - 1) // 5 + 1, fps=2.0, length=dense.length // 5)
     told = [d.replace(index=k) for k, d in enumerate(found[::5], 1)]
-    expected = match_detections(anew, told, scene.image_size, scene.camera)
+    expected = matching.match_detections(anew, told, scene.image_size, scene.camera)
     assert (got.truth.fps, got.truth.length) == (2.0, dense.length // 5)
     assert got.match.tolist() == expected.match.tolist()
     assert got.owner.tolist() == expected.owner.tolist()

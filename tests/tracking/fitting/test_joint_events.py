@@ -10,16 +10,7 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from tracking.fitting.joint_events import (
-    MERGE,
-    NONE,
-    SPLIT,
-    EventRows,
-    event_scores,
-    fit_events,
-    log_probabilities,
-    partition_rows,
-)
+from tracking.fitting import joint_events
 from tracking.fitting.relational import LABELS, fit_observed, fit_relational, logistic
 from tracking.papers.relational.config import RelationalConfig
 
@@ -33,15 +24,17 @@ def test_rows_say_what_happened_to_each_group():
     pos = state([[0, 0], [0.7, 0], [2, 0], [9, 0], [9.7, 0]])
 
     def found(before, after):
-        return partition_rows(pos, pos, np.array(before), np.array(after)).event.tolist()
+        return joint_events.partition_rows(pos, pos, np.array(before), np.array(after)).event.tolist()
 
-    assert found([1, 1, -1, 2, 2], [1, 1, -1, 2, 2]) == [NONE, NONE, NONE]
-    assert found([1, 1, -1, 2, 2], [1, 1, 1, 2, 2]) == [MERGE, MERGE, NONE]
-    assert found([1, 1, -1, 2, 2], [1, 1, -1, -1, -1]) == [NONE, NONE, SPLIT]
-    assert found([1, 1, -1, 2, 2], [1, -1, -1, 2, 2]) == [SPLIT, NONE, NONE]
-    rows = partition_rows(pos, pos, np.array([1, 1, -1, 2, 2]), np.array([1, 1, -1, 2, 2]))
+    assert found([1, 1, -1, 2, 2], [1, 1, -1, 2, 2]) == [joint_events.NONE, joint_events.NONE, joint_events.NONE]
+    assert found([1, 1, -1, 2, 2], [1, 1, 1, 2, 2]) == [joint_events.MERGE, joint_events.MERGE, joint_events.NONE]
+    assert found([1, 1, -1, 2, 2], [1, 1, -1, -1, -1]) == [joint_events.NONE, joint_events.NONE, joint_events.SPLIT]
+    assert found([1, 1, -1, 2, 2], [1, -1, -1, 2, 2]) == [joint_events.SPLIT, joint_events.NONE, joint_events.NONE]
+    rows = joint_events.partition_rows(pos, pos, np.array([1, 1, -1, 2, 2]), np.array([1, 1, -1, 2, 2]))
     assert rows.possible.tolist() == [[True, True, True], [True, False, True], [True, True, True]]
-    assert partition_rows(pos[:1], pos[:1], np.array([-1]), np.array([-1])).possible.tolist() == [[False, False, True]]
+    assert joint_events.partition_rows(pos[:1], pos[:1], np.array([-1]), np.array([-1])).possible.tolist() == [
+        [False, False, True]
+    ]
 
 
 def test_the_fit_finds_its_weights():
@@ -49,21 +42,21 @@ def test_the_fit_finds_its_weights():
     features = rng.normal(1, 0.7, (150_000, 6))
     true = {"merge_weights": [-1, 0.5, 0, -1, 1, 0, 0.5], "split_weights": [0.5, 0, -1, 0, 0.5, 1, -1]}
     possible = np.ones((150_000, 3), bool)
-    possible[:50_000, SPLIT] = False
-    rows = EventRows(features, np.zeros(150_000, np.int64), possible)
-    p = np.exp(log_probabilities(rows, true))
+    possible[:50_000, joint_events.SPLIT] = False
+    rows = joint_events.EventRows(features, np.zeros(150_000, np.int64), possible)
+    p = np.exp(joint_events.log_probabilities(rows, true))
     event = (rng.random((150_000, 1)) > np.cumsum(p, axis=1)).sum(axis=1)
-    fitted = fit_events(dataclasses.replace(rows, event=event))
+    fitted = joint_events.fit_events(dataclasses.replace(rows, event=event))
     assert list(fitted) == list(true)
     np.testing.assert_allclose(list(fitted.values()), list(true.values()), atol=0.08)
-    scores = event_scores(dataclasses.replace(rows, event=event), fitted)
+    scores = joint_events.event_scores(dataclasses.replace(rows, event=event), fitted)
     assert scores["log_loss"] < scores["prior_log_loss"]
     assert scores["merge_expected_over_true"] == pytest.approx(1, abs=0.01)
 
 
 def test_without_events_nothing_is_fitted():
     with pytest.raises(InputError, match="0 merges, 0 splits"):
-        fit_events(EventRows.joined([]))
+        joint_events.fit_events(joint_events.EventRows.joined([]))
 
 
 ENDS = RelationalConfig().speed_ends

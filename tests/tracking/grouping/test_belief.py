@@ -115,21 +115,21 @@ def test_the_file_is_read_as_written(tmp_path):
     assert FROZEN.read_text().endswith(belief.toml_text())
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "named"),
-    [
-        ('grouping = "belief"', 'grouping = "rule"', "grouping"),
-        ("bias = [", "bias = [nan, ", "bias"),
-        ("memory = ", "memory = -", "memory"),
-        ("stay", "wait", "wait"),
-        ('name = "sideways, 5 s"', 'name = "sideways, 3 s"', "table 8: name"),
-        ("now = [", "now = [1, ", "table 1: at"),
-        ("at = [", "at = [9, ", "table 1: at"),
-        ("events = [", 'events = ["x", ', "table 1: events"),
-        ("events = [", "change = [", "table 1"),
-        ("[[table]]", "[[row]]", "grouping"),
-    ],
-)
+BAD_FILES = [
+    ('grouping = "belief"', 'grouping = "rule"', "grouping"),
+    ("bias = [", "bias = [nan, ", "bias"),
+    ("memory = ", "memory = -", "memory"),
+    ("stay", "wait", "wait"),
+    ('name = "sideways, 5 s"', 'name = "sideways, 3 s"', "table 8: name"),
+    ("now = [", "now = [1, ", "table 1: at"),
+    ("at = [", "at = [9, ", "table 1: at"),
+    ("events = [", 'events = ["x", ', "table 1: events"),
+    ("events = [", "change = [", "table 1"),
+    ("[[table]]", "[[row]]", "grouping"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "named"), BAD_FILES)
 def test_bad_files_are_refused(tmp_path, old, new, named):
     text = FROZEN.read_text()
     assert old in text

@@ -130,16 +130,16 @@ def test_a_group_waits_for_a_member_who_is_not_seen():
     assert events(made) == [(131, "leave", 120, (1,), (-1,), (1, 2))]
 
 
-@pytest.mark.parametrize(
-    ("people", "changed", "told"),
-    [
-        (joining(), LinkRule(near=1.0), 142),  # 6 - 0.4 t < 1 from frame 127 on
-        (joining(), LinkRule(share=1.0), 133), (joining(), LinkRule(window=1.0), 121),
-        (joining(), LinkRule(alike=0.3), 146),  # not before it stops drifting, in frame 131
-        (leaving(), LinkRule(apart=2.0), 103), (leaving(), LinkRule(patience=1.0), 106),
-        (leaving(), LinkRule(diverge=0.3), 91),
-    ],
-)  # fmt: skip
+RULES = [
+    (joining(), LinkRule(near=1.0), 142),  # 6 - 0.4 t < 1 from frame 127 on
+    (joining(), LinkRule(share=1.0), 133), (joining(), LinkRule(window=1.0), 121),
+    (joining(), LinkRule(alike=0.3), 146),  # not before it stops drifting, in frame 131
+    (leaving(), LinkRule(apart=2.0), 103), (leaving(), LinkRule(patience=1.0), 106),
+    (leaving(), LinkRule(diverge=0.3), 91),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("people", "changed", "told"), RULES)
 def test_parameters_of_the_rule(people, changed, told):
     assert [e[0] for e in events(derive(tracks(people), FPS, rule=changed))] == [told]
 

@@ -11,58 +11,25 @@ from scenarios.errors import InputError
 from tracking.running import tracker_registry
 
 STRANGER = """
-from dataclasses import dataclass
-
-@dataclass
-class Mark:
-    x: int = 0
-
 class Mine:
     needs = ("points",)
     def reset(self, context, seed): ...
     def step(self, frame, detections): ...
 
-class NoNeeds:
-    needs = "points"
-    def reset(self, context, seed): ...
-    def step(self, frame, detections): ...
+class Wrong(Mine):
+    {}
 
 class Nothing: ...
 
-class Number(Mine):
-    needs = 5
-
-class Listed(Mine):
-    needs = (["boxes"],)
-
-class Unknown(Mine):
-    needs = ("boxes", "sound")
-
-class Short(Mine):
-    def step(self, frame): ...
-
-class Blind(Mine):
-    def reset(self): ...
-
-class Demanding(Mine):
-    def __init__(self, x): ...
-
-class Unset(Mine):
-    step = None
-
-class Wild(Mine):
-    config_class = dict
-
-class Static(Mine):
-    @staticmethod
-    def step(frame, detections): ...
-
-class Loose(Mine):
-    def __init__(self, *args): ...
-    def step(self, *args, **more): ...
-
 def function(): ...
 """
+WRONG = {
+    "needs = 'points'": "needs = 'points'", "needs = 5": "needs = 5", "needs = (['boxes'],)": "needs = ",
+    "needs = ('boxes', 'sound')": "sound", "def step(self, frame): ...": r"step\(self, frame\); expected a class",
+    "def reset(self): ...": r"reset\(self\); expected a class", "step = None": "step = None",
+    "def __init__(self, x): ...": r"__init__\(x\), called with nothing", "config_class = dict": "config_class = ",
+}  # fmt: skip
+"""What is wrong in a class, and what is said of it."""
 
 
 def test_registered_and_by_module():
@@ -79,29 +46,28 @@ def test_a_file_is_loaded_anew_where_it_has_changed(tmp_path):
     assert tracker_registry.find(f"{path}:Mine").needs == ("boxes",)
 
 
-@pytest.mark.parametrize(
-    ("spec", "words"),
-    [
-        ("blop", "did you mean blob"), ("{file}:None_", "a class of this module"),
-        ("{file}:NoNeeds", "needs = 'points'"), ("{file}:Nothing", "no needs, reset, step"),
-        ("{file}:Number", "needs = 5"), ("{file}:Listed", "needs = "), ("{file}:Unknown", "sound"),
-        ("{file}:Short", r"step\(self, frame\); expected a class"),
-        ("{file}:Blind", r"reset\(self\); expected a class"),
-        ("{file}:Demanding", r"__init__\(x\), called with nothing"), ("{file}:Unset", "step = None"),
-        ("{file}:Wild", "config_class = "), ("{file}:function", "got a function; expected a class"),
-        ("{file}:", "a class of this module"), ("{leaves}:Mine", "SystemExit: 3"), (":Mine", "Empty module name"),
-        ("{missing}:Mine", "no such file"), ("{broken}:Mine", "ZeroDivisionError"),
-        ("no.such.module:Mine", "ModuleNotFoundError"),
-    ],
-)  # fmt: skip
-def test_wrong_trackers_are_one_line(tmp_path, spec, words):
-    (tmp_path / "mine.py").write_text(STRANGER)
-    (tmp_path / "broken.py").write_text("1 / 0")
-    (tmp_path / "leaves.py").write_text("raise SystemExit(3)")
+SPECS = [
+    ("blop", "did you mean blob"), ("{mine}:None_", "a class of this module"), ("{mine}:", "a class of this module"),
+    ("{mine}:Nothing", "no needs, reset, step"), ("{mine}:function", "got a function; expected a class"),
+    ("{leaves}:Mine", "SystemExit: 3"), (":Mine", "Empty module name"), ("{missing}:Mine", "no such file"),
+    ("{broken}:Mine", "ZeroDivisionError"), ("no.such.module:Mine", "ModuleNotFoundError"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("spec", "words"), SPECS)
+def test_wrong_names_are_one_line(tmp_path, spec, words):
+    for name, text in {"mine": STRANGER.format("..."), "broken": "1 / 0", "leaves": "raise SystemExit(3)"}.items():
+        (tmp_path / f"{name}.py").write_text(text)
     paths = {name: tmp_path / f"{name}.py" for name in ("mine", "missing", "broken", "leaves")}
-    paths["file"] = paths["mine"]
     with pytest.raises(InputError, match=words):
         tracker_registry.find(spec.format(**paths))
+
+
+@pytest.mark.parametrize("body", WRONG)
+def test_wrong_classes_are_one_line(tmp_path, body):
+    (tmp_path / "mine.py").write_text(STRANGER.format(body))
+    with pytest.raises(InputError, match=WRONG[body]):
+        tracker_registry.find(f"{tmp_path}/mine.py:Wrong")
 
 
 NEIGHBOUR = """

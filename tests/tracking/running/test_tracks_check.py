@@ -42,35 +42,35 @@ def refused(made, words, history=None):
     assert str(caught.value).startswith(f"mine.py:Mine: frame {made.index}")
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"id": np.array([5.0])}, "float64"), ({"id": np.array([[5]])}, "groups.id"),
-        ({"id": np.array([-2])}, "group id -2"), ({"pos": np.zeros((1, 3))}, r"groups.pos of shape \(1, 3\)"),
-        ({"pos": np.full((1, 2), np.nan)}, "NaN or infinity in groups.pos"),
-        ({"vel": np.zeros((2, 2))}, "groups.vel of shape"), ({"extent": np.zeros((1, 2))}, "groups.extent of shape"),
-        ({"size": np.zeros(3)}, "groups.size of shape"), ({"hull": (SQUARE, SQUARE)}, "2 groups.hull"),
-        ({"hull": (np.zeros(4),)}, "groups.hull of shape"),
-        ({"hull": (np.full((3, 2), np.nan),)}, "NaN or infinity in groups.hull"),
-        ({"members": (np.array([1]), np.array([2]))}, "2 groups.members"),
-        ({"members": (np.array([1, 7]),)}, "7 in groups.members"), ({"members": (np.array([1.0]),)}, "no ids"),
-        ({"members": [[1]]}, "groups.members list"),
-    ],
-)  # fmt: skip
+WRONG_GROUPS = [
+    ({"id": np.array([5.0])}, "float64"), ({"id": np.array([[5]])}, "groups.id"),
+    ({"id": np.array([-2])}, "group id -2"), ({"pos": np.zeros((1, 3))}, r"groups.pos of shape \(1, 3\)"),
+    ({"pos": np.full((1, 2), np.nan)}, "NaN or infinity in groups.pos"),
+    ({"vel": np.zeros((2, 2))}, "groups.vel of shape"), ({"extent": np.zeros((1, 2))}, "groups.extent of shape"),
+    ({"size": np.zeros(3)}, "groups.size of shape"), ({"hull": (SQUARE, SQUARE)}, "2 groups.hull"),
+    ({"hull": (np.zeros(4),)}, "groups.hull of shape"),
+    ({"hull": (np.full((3, 2), np.nan),)}, "NaN or infinity in groups.hull"),
+    ({"members": (np.array([1]), np.array([2]))}, "2 groups.members"),
+    ({"members": (np.array([1, 7]),)}, "7 in groups.members"), ({"members": (np.array([1.0]),)}, "no ids"),
+    ({"members": [[1]]}, "groups.members list"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "words"), WRONG_GROUPS)
 def test_wrong_groups(changes, words):
     refused(answer(groups=group(**changes)), words)
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"kind": "meet"}, "kind 'meet'; expected one of merge"), ({"emitted": 2}, "emitted 2; expected 3"),
-        ({"emitted": 4}, "emitted 4; expected 3"), ({"start": 4, "end": 5}, "start 4; expected a frame from 1 to 3"),
-        ({"start": 0}, "start 0"), ({"start": 2.0}, "start 2.0; expected a whole number"), ({"end": 1}, "end 1"),
-        ({"members": (1, 7)}, "7 in the members of a merge"), ({"members": [1, 2]}, "members"),
-        ({"before": (-2,)}, "before"), ({"after": 5}, "after 5"), ({"pos": (0.0,)}, "pos"), ({"pos": None}, "pos"),
-    ],
-)  # fmt: skip
+WRONG_EVENTS = [
+    ({"kind": "meet"}, "kind 'meet'; expected one of merge"), ({"emitted": 2}, "emitted 2; expected 3"),
+    ({"emitted": 4}, "emitted 4; expected 3"), ({"start": 4, "end": 5}, "start 4; expected a frame from 1 to 3"),
+    ({"start": 0}, "start 0"), ({"start": 2.0}, "start 2.0; expected a whole number"), ({"end": 1}, "end 1"),
+    ({"members": (1, 7)}, "7 in the members of a merge"), ({"members": [1, 2]}, "members"),
+    ({"before": (-2,)}, "before"), ({"after": 5}, "after 5"), ({"pos": (0.0,)}, "pos"), ({"pos": None}, "pos"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "words"), WRONG_EVENTS)
 def test_wrong_events(changes, words):
     refused(answer(events=(event(**changes),)), words)
 
@@ -117,15 +117,15 @@ def test_trackers_of_groups():
     refused(answer(unit="group", group=own, events=(event(),)), "1 in the members")
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"id": np.array([4, 4])}, "the same id twice"), ({"id": np.array([-1, 4])}, "id -1"),
-        ({"id": np.array([1.0, 2.0])}, "float64"), ({"pos": np.zeros((2, 3))}, r"pos of shape \(2, 3\)"),
-        ({"vel": np.zeros((1, 2))}, "vel of shape"), ({"cov": np.full((2, 4, 4), np.nan)}, "NaN or infinity in cov"),
-        ({"box": np.zeros((2, 3))}, "box of shape"), ({"index": 4}, "index 4"), ({"plane": "floor"}, "floor"),
-    ],
-)  # fmt: skip
+WRONG_ANSWERS = [
+    ({"id": np.array([4, 4])}, "the same id twice"), ({"id": np.array([-1, 4])}, "id -1"),
+    ({"id": np.array([1.0, 2.0])}, "float64"), ({"pos": np.zeros((2, 3))}, r"pos of shape \(2, 3\)"),
+    ({"vel": np.zeros((1, 2))}, "vel of shape"), ({"cov": np.full((2, 4, 4), np.nan)}, "NaN or infinity in cov"),
+    ({"box": np.zeros((2, 3))}, "box of shape"), ({"index": 4}, "index 4"), ({"plane": "floor"}, "floor"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "words"), WRONG_ANSWERS)
 def test_wrong_answers_name_tracker_frame_and_fault(changes, words):
     with pytest.raises(WorkError, match=words) as caught:
         check_tracks(answer(**changes), 3, "mine.py:Mine")

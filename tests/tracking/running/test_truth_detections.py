@@ -68,30 +68,30 @@ def source(**has):
     return Sequence("s", 10.0, 1, lambda: iter(()), **has)
 
 
-@pytest.mark.parametrize(
-    ("needs", "has", "expected"),
-    [
-        (("boxes",), {"has_detections": True, "load_truth": lambda: None}, "file"),
-        (("boxes",), {"has_images": True, "load_truth": lambda: None}, "truth"),
-        (("pixels", "boxes"), {"has_images": True, "has_detections": True}, "image"),
-        (("pixels", "boxes"), {"has_detections": True}, "file"),
-        (("stereo", "points"), {"has_images": True, "load_truth": lambda: None}, "truth"),
-        (("stereo",), {"has_images": True, "has_right": True}, "image"),
-    ],
-)
+DEFAULT_MODES = [
+    (("boxes",), {"has_detections": True, "load_truth": lambda: None}, "file"),
+    (("boxes",), {"has_images": True, "load_truth": lambda: None}, "truth"),
+    (("pixels", "boxes"), {"has_images": True, "has_detections": True}, "image"),
+    (("pixels", "boxes"), {"has_detections": True}, "file"),
+    (("stereo", "points"), {"has_images": True, "load_truth": lambda: None}, "truth"),
+    (("stereo",), {"has_images": True, "has_right": True}, "image"),
+]
+
+
+@pytest.mark.parametrize(("needs", "has", "expected"), DEFAULT_MODES)
 def test_default_mode(needs, has, expected):
     assert choose_mode(needs, source(**has), None) == expected
 
 
-@pytest.mark.parametrize(
-    ("needs", "has", "asked"),
-    [
-        (("boxes",), {"has_images": True}, None),
-        (("boxes",), {"has_detections": True}, "truth"),
-        (("boxes",), {"has_images": True, "has_detections": True}, "image"),
-        (("stereo",), {"has_images": True, "load_truth": lambda: None}, None),
-    ],
-)
+IMPOSSIBLE_MODES = [
+    (("boxes",), {"has_images": True}, None),
+    (("boxes",), {"has_detections": True}, "truth"),
+    (("boxes",), {"has_images": True, "has_detections": True}, "image"),
+    (("stereo",), {"has_images": True, "load_truth": lambda: None}, None),
+]
+
+
+@pytest.mark.parametrize(("needs", "has", "asked"), IMPOSSIBLE_MODES)
 def test_what_cannot_work_names_both_sides(needs, has, asked):
     with pytest.raises(InputError) as caught:
         choose_mode(needs, source(**has), asked)

@@ -37,18 +37,18 @@ def test_one_second_to_either_side(start, hit):
     assert hits("merge", found) == (hit, 1 - hit, 1 - hit)
 
 
-@pytest.mark.parametrize(
-    ("members", "hit"),
-    [
-        ((1, 2, 3), 1),
-        ((1, 2), 1),  # 2/3
-        ((1, 2, 3, 4, 5, 6), 1),  # 3/6, exactly one half
-        ((1, 2, 3, 4, 5, 6, 7), 0),  # 3/7
-        ((1,), 0),  # 1/3
-        ((1, 2, 30), 1),  # 2 of {1, 2, 3, nobody}
-        ((1, 2, 30, 31), 0),  # 2/5: with those who are nobody left out it would be 2/3
-    ],
-)
+MEMBERS = [
+    ((1, 2, 3), 1),
+    ((1, 2), 1),  # 2/3
+    ((1, 2, 3, 4, 5, 6), 1),  # 3/6, exactly one half
+    ((1, 2, 3, 4, 5, 6, 7), 0),  # 3/7
+    ((1,), 0),  # 1/3
+    ((1, 2, 30), 1),  # 2 of {1, 2, 3, nobody}
+    ((1, 2, 30, 31), 0),  # 2/5: with those who are nobody left out it would be 2/3
+]
+
+
+@pytest.mark.parametrize(("members", "hit"), MEMBERS)
 def test_half_of_all_people_concerned(members, hit):
     ghosts = {30: (4.0, 99.0), 31: (8.0, 99.0)}
     found = scores([event("split", 30, (1, 2, 3))], [event("split", 30, members, emitted=31)], CROWD | ghosts)
@@ -112,16 +112,16 @@ def changing(before, after, at):
 AB, CD, EF, ABCD = (1, 2), (3, 4), (5, 6), (1, 2, 3, 4)
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "right"),
-    [
-        ([AB, CD], [ABCD], 1),
-        ([AB], [ABCD], 0),  # 3 and 4 are said to have come alone: three parents
-        ([(1, 2, 3), (4,)], [ABCD], 0),  # two parents, but 4 alone is not {3, 4}: 1/2 is not more than half
-        ([AB, CD], [(1, 2, 3)], 0),  # 4 stayed outside: two children
-        ([ABCD], [ABCD], 0),  # the tracker's groups did not change at all
-    ],
-)
+MERGE_LINEAGES = [
+    ([AB, CD], [ABCD], 1),
+    ([AB], [ABCD], 0),  # 3 and 4 are said to have come alone: three parents
+    ([(1, 2, 3), (4,)], [ABCD], 0),  # two parents, but 4 alone is not {3, 4}: 1/2 is not more than half
+    ([AB, CD], [(1, 2, 3)], 0),  # 4 stayed outside: two children
+    ([ABCD], [ABCD], 0),  # the tracker's groups did not change at all
+]
+
+
+@pytest.mark.parametrize(("before", "after", "right"), MERGE_LINEAGES)
 def test_lineage_of_a_merge(before, after, right):
     true = truth(changing([AB, CD, EF], [ABCD, EF], 30), [event("merge", 30, ABCD)])
     told = tracks(changing(before, after, 35), [event("merge", 31, ABCD, emitted=35)])
@@ -143,17 +143,11 @@ def test_lineage_does_not_mind_ids_nor_a_late_word():
 def test_as_many_hits_as_there_can_be(seed):
     r = np.random.default_rng(seed)
 
-    def some(n):
-        return [
-            (
-                int(r.integers(1, 40)),
-                frozenset(r.choice(5, int(r.integers(2, 5)), replace=False).tolist()),
-                int(r.integers(0, 2)),
-            )
-            for _ in range(n)
-        ]
+    def one(most_wrong):
+        people = frozenset(r.choice(5, int(r.integers(2, 5)), replace=False).tolist())
+        return int(r.integers(1, 40)), people, int(r.integers(0, most_wrong + 1))
 
-    happened, said = [(s, people, 0) for s, people, _ in some(4)], some(4)
+    happened, said = [one(0) for _ in range(4)], [one(1) for _ in range(4)]
     true, told = (
         [ComparableEvent("merge", s, s, EventMembers(people, wrong), (0.0, 0.0)) for s, people, wrong in side]
         for side in (happened, said)
@@ -162,13 +156,19 @@ def test_as_many_hits_as_there_can_be(seed):
     assert found["merge_TP"] == event_hits(happened, said, 10.0)
 
 
+def test_two_hits_by_half_are_more_than_a_whole_one():
+    """The merge of (1, 2) is told exactly; the best pairing gives it to another event, by half, and that one too."""
+    happened = [event("merge", 30, (1, 2)), event("merge", 40, (1, 2, 3, 4))]
+    said = [event("merge", 30, (1, 2), emitted=45), event("merge", 40, (1,), emitted=45)]
+    assert hits("merge", scores(happened, said)) == (2, 0, 0)
+
+
 def test_latency_is_to_the_answer_that_told_whatever_it_claims():
     told = tracks([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2), emitted=45)])
     claimed = [t.replace(events=tuple(replace(e, emitted=30) for e in t.events)) for t in told]
+    true = truth([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2))])
     for said in (told, claimed):
-        assert evaluate(truth([Scene(CROWD)] * FRAMES, [event("merge", 30, (1, 2))]), said)["merge_latency"] == near(
-            1.5
-        )
+        assert evaluate(true, said)["merge_latency"] == near(1.5)
 
 
 def test_crossings_and_queues_of_a_method_without_people_are_unknown_unless_it_tells_some():

@@ -10,14 +10,7 @@ import pytest
 from sim.geometry.polygons import iou_matrix
 from sim.truth.group_hulls import groups_over_time
 from sim.types import Groups, Tracks, Truth
-from tests.reference_social import (
-    group_scores,
-    groups_of,
-    groups_without_people,
-    pairwise_scores,
-    right_group_scores,
-    who_is_who,
-)
+from tests import reference_social as reference
 from tests.reference_trackeval import trackeval_scores
 from tracking.scoring import evaluate
 
@@ -76,12 +69,12 @@ def both_sides(truth: Truth, tracks: list[Tracks]):
     for t in tracks:
         now = truth.at(t.index)
         places = dict(zip(now.id.tolist(), now.pos, strict=True))
-        true.append(groups_of(now.groups, lambda p: p))
+        true.append(reference.groups_of(now.groups, lambda p: p))
         if t.unit == "group":
-            est.append(groups_without_people(t.groups, places))
+            est.append(reference.groups_without_people(t.groups, places))
         else:
-            name = who_is_who(places, dict(zip(t.id.tolist(), t.pos, strict=True)))
-            est.append(groups_of(t.groups, name.get))
+            name = reference.who_is_who(places, dict(zip(t.id.tolist(), t.pos, strict=True)))
+            est.append(reference.groups_of(t.groups, name.get))
     return true, est
 
 
@@ -92,9 +85,11 @@ def test_equal_to_the_oracle(seed: int, unit: str, by: str) -> None:
     truth, tracks = scene(seed, unit)
     true, est = both_sides(truth, tracks)
     found = evaluate(truth, tracks, group_match=by)
-    expected = {f"group_{k}": v for k, v in group_scores(true, est, by).items()} | pairwise_scores(true, est)
-    expected |= right_group_scores(true, est, "right_groups", Fraction(2, 3))
-    expected |= right_group_scores(true, est, "exact_groups", Fraction(1))
+    expected = {f"group_{k}": v for k, v in reference.group_scores(true, est, by).items()} | reference.pairwise_scores(
+        true, est
+    )
+    expected |= reference.right_group_scores(true, est, "right_groups", Fraction(2, 3))
+    expected |= reference.right_group_scores(true, est, "exact_groups", Fraction(1))
     assert found["group_TP"] > 0
     for key, value in expected.items():
         assert found[key] == pytest.approx(value, abs=1e-7, nan_ok=True), key

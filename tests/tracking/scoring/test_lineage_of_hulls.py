@@ -32,18 +32,18 @@ def accuracy(seen: list[Scene], event: GroupEvent, start: int = 30) -> float:
     return evaluate(true, tracks(seen, [event], unit="group"))["lineage_accuracy"]
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "right"),
-    [
-        ((1, 2), (1,), 1),
-        ((2, 1), (1,), 1),
-        ((1, 3), (1,), 0),  # the wrong parent
-        ((2, 3), (1,), 0),
-        ((1, 2), (3,), 0),  # the wrong child
-        ((1, 2, 3), (1,), 0),
-        ((1,), (1,), 0),
-        ((1, 9), (1,), 0),  # nobody's name
-    ],
-)
+PARENTS = [
+    ((1, 2), (1,), 1),
+    ((2, 1), (1,), 1),
+    ((1, 3), (1,), 0),  # the wrong parent
+    ((2, 3), (1,), 0),
+    ((1, 2), (3,), 0),  # the wrong child
+    ((1, 2, 3), (1,), 0),
+    ((1,), (1,), 0),
+    ((1, 9), (1,), 0),  # nobody's name
+]
+
+
+@pytest.mark.parametrize(("before", "after", "right"), PARENTS)
 def test_parents_must_be_the_right_ones(before: tuple[int, ...], after: tuple[int, ...], right: float) -> None:
     assert accuracy(scenes(30), merge(30, 30, before, after)) == right

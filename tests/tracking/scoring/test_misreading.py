@@ -117,13 +117,13 @@ def test_no_warning_for_weak_trackers(share):
     assert likely_misreading(truth_of(rows), tracks_of(rows[:, 0], rows[:, 1], box), size=SIZE) == ""
 
 
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        (lambda p: p * 100, "frame,id,x_cm,y_cm,"), (lambda p: p * 1000, "frame,id,x_mm,y_mm,"),
-        (lambda p: p[:, ::-1], "read as y,x"), (lambda p: p * 40, "give the positions of the tracks in m"),
-    ],
-)  # fmt: skip
+WRONG_POSITIONS = [
+    (lambda p: p * 100, "frame,id,x_cm,y_cm,"), (lambda p: p * 1000, "frame,id,x_mm,y_mm,"),
+    (lambda p: p[:, ::-1], "read as y,x"), (lambda p: p * 40, "give the positions of the tracks in m"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("wrong", "words"), WRONG_POSITIONS)
 def test_positions(wrong, words):
     rows = walk()
     pos = np.c_[rows[:, 2] / 50, rows[:, 3] / 30]

@@ -46,21 +46,19 @@ def test_equal_to_trackeval_in_a_crowd(seed: int) -> None:
     assert_equal_to_trackeval(*random_case(seed, crowd=60))
 
 
-@pytest.mark.parametrize(
-    "case",
-    [
-        ([[]], [[]], [np.zeros((0, 0))]), ([[1, 2], [2]], [[], []], [np.zeros((2, 0)), np.zeros((1, 0))]),
-        ([[], []], [[4], [4, 5]], [np.zeros((0, 1)), np.zeros((0, 2))]),
-        ([[1], [], [1]], [[4], [4], [5]], [np.ones((1, 1)), np.zeros((0, 1)), np.ones((1, 1))]),
-        ([[1], [1], [1]], [[4], [], [4]], [np.ones((1, 1)), np.zeros((1, 0)), np.ones((1, 1))]),
-        ([[1], [1], [1]], [[4], [5], [4]], [np.ones((1, 1)), np.zeros((1, 1)), np.ones((1, 1))]),
-        ([[1, 2]], [[4, 5]], [np.zeros((2, 2))]), ([[1, 2]], [[4, 5]], [np.full((2, 2), 0.5)]),
-        ([[1]], [[4]], [np.full((1, 1), 0.5 - 1e-16)]),
-    ],
-    ids=[
-        "nothing", "no tracks", "no truth", "nobody true", "nobody said", "a miss", "far", "all equal",
-        "rounded half",
-    ],
-)  # fmt: skip
+EDGES = {
+    "nothing": ([[]], [[]], [np.zeros((0, 0))]),
+    "no tracks": ([[1, 2], [2]], [[], []], [np.zeros((2, 0)), np.zeros((1, 0))]),
+    "no truth": ([[], []], [[4], [4, 5]], [np.zeros((0, 1)), np.zeros((0, 2))]),
+    "nobody true": ([[1], [], [1]], [[4], [4], [5]], [np.ones((1, 1)), np.zeros((0, 1)), np.ones((1, 1))]),
+    "nobody said": ([[1], [1], [1]], [[4], [], [4]], [np.ones((1, 1)), np.zeros((1, 0)), np.ones((1, 1))]),
+    "a miss": ([[1], [1], [1]], [[4], [5], [4]], [np.ones((1, 1)), np.zeros((1, 1)), np.ones((1, 1))]),
+    "far": ([[1, 2]], [[4, 5]], [np.zeros((2, 2))]),
+    "all equal": ([[1, 2]], [[4, 5]], [np.full((2, 2), 0.5)]),
+    "rounded half": ([[1]], [[4]], [np.full((1, 1), 0.5 - 1e-16)]),
+}
+
+
+@pytest.mark.parametrize("case", EDGES.values(), ids=EDGES)
 def test_equal_to_trackeval_at_the_edges(case) -> None:
     assert_equal_to_trackeval(*case)

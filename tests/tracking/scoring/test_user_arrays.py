@@ -69,25 +69,25 @@ def test_empty_sides_are_no_error() -> None:
     assert score_arrays(none, none, fps=10)["FP"] == 0
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"grp": [1, 1, 1, 1]}, "'grp'"), ({"pos": None}, "frame, id, and pos or box"),
-        ({"pos": [0, 1, 0, 1]}, r"pos of shape \(4,\)"), ({"id": [1, 2, 1]}, "3 rows of id"),
-        ({"frame": [0, 0, 1, 1]}, "got 0 in frame, expected numbers from 1 on"),
-        ({"frame": [1, 1, 2, 10**7]}, "got 10000000.* in frame, expected numbers from 1 on, to 1,000,000"),
-        ({"frame": [1, 1, 2, 1e300]}, "1e.300 in frame"),
-        ({"id": [1, -2, 1, 2]}, "-2 in id, expected numbers from 0"), ({"group": [7, -2, 7, 7]}, "-2 in group"),
-        ({"id": ["a", "b", "a", "b"]}, "'a' in id, expected whole numbers: number them"),
-        ({"id": [None, 1, 2, 3]}, "None"), ({"pos": [["x", "y"]] * 4}, "'x' in pos, expected numbers"),
-        ({"pos": [[0, 0], [1e200, 0], [0, 0], [1, 0]]}, "1e.200 in pos, expected numbers from -1e.06 to 1,000,000"),
-        ({"pos": None, "box": [[0, 0, 1, 0]] * 4}, "box without area"),
-        ({"frame": np.ones(5001), "id": np.arange(5001), "pos": np.zeros((5001, 2)), "group": None}, "5001 rows"),
-        ({"id": [1, 2.5, 1, 2]}, "not whole"), ({"pos": [[0, 0], [np.nan, 0], [0, 0], [1, 0]]}, "not finite"),
-        ({"frame": [1, 1, 1, 1]}, "id 1 is twice in frame 1"),
-        ({"pos": None, "box": [[0, 0, 1, 1]] * 4}, "one of them on both"),
-    ],
-)  # fmt: skip
+WRONG_COLUMNS = [
+    ({"grp": [1, 1, 1, 1]}, "'grp'"), ({"pos": None}, "frame, id, and pos or box"),
+    ({"pos": [0, 1, 0, 1]}, r"pos of shape \(4,\)"), ({"id": [1, 2, 1]}, "3 rows of id"),
+    ({"frame": [0, 0, 1, 1]}, "got 0 in frame, expected numbers from 1 on"),
+    ({"frame": [1, 1, 2, 10**7]}, "got 10000000.* in frame, expected numbers from 1 on, to 1,000,000"),
+    ({"frame": [1, 1, 2, 1e300]}, "1e.300 in frame"),
+    ({"id": [1, -2, 1, 2]}, "-2 in id, expected numbers from 0"), ({"group": [7, -2, 7, 7]}, "-2 in group"),
+    ({"id": ["a", "b", "a", "b"]}, "'a' in id, expected whole numbers: number them"),
+    ({"id": [None, 1, 2, 3]}, "None"), ({"pos": [["x", "y"]] * 4}, "'x' in pos, expected numbers"),
+    ({"pos": [[0, 0], [1e200, 0], [0, 0], [1, 0]]}, "1e.200 in pos, expected numbers from -1e.06 to 1,000,000"),
+    ({"pos": None, "box": [[0, 0, 1, 0]] * 4}, "box without area"),
+    ({"frame": np.ones(5001), "id": np.arange(5001), "pos": np.zeros((5001, 2)), "group": None}, "5001 rows"),
+    ({"id": [1, 2.5, 1, 2]}, "not whole"), ({"pos": [[0, 0], [np.nan, 0], [0, 0], [1, 0]]}, "not finite"),
+    ({"frame": [1, 1, 1, 1]}, "id 1 is twice in frame 1"),
+    ({"pos": None, "box": [[0, 0, 1, 1]] * 4}, "one of them on both"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "said"), WRONG_COLUMNS)
 def test_wrong_columns(change: dict, said: str) -> None:
     wrong = {name: values for name, values in (ROWS | change).items() if values is not None}
     with pytest.raises(ValueError, match=said):

@@ -14,6 +14,7 @@ from scenarios.loading.resolve import load
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario, group_names
 from scenarios.schema.values import bounds
+from tests.processes import FAKE
 from tracking.app.cli import run
 from tracking.errors import groups
 from tracking.errors.people import PersonKind
@@ -190,14 +191,14 @@ def test_a_scene_without_the_failure_is_refused_with_its_score() -> None:
         search(lambda scenario, seed: False).run(HARD)
 
 
-@pytest.mark.parametrize(
-    ("text", "got"),
-    [
-        ("HOTA", "choose one of switch"), ("HOTTA<0.7", "did you mean HOTA"), ("HOTA=0.7", "SCORE<NUMBER"),
-        ("HOTA<0..7", "correct the number"),
-        ("swich", "'switch'"), ("switch:hiden", "'hidden'"), ("switch:", "a cause"),
-    ],
-)  # fmt: skip
+WRONG_CONDITIONS = [
+    ("HOTA", "choose one of switch"), ("HOTTA<0.7", "did you mean HOTA"), ("HOTA=0.7", "SCORE<NUMBER"),
+    ("HOTA<0..7", "correct the number"),
+    ("swich", "'switch'"), ("switch:hiden", "'hidden'"), ("switch:", "a cause"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "got"), WRONG_CONDITIONS)
 def test_wrong_conditions(text: str, got: str) -> None:
     with pytest.raises(InputError, match=got):
         parse_failure(text)
@@ -252,22 +253,11 @@ def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
     assert Path("scene.toml").read_text() == SCENE
 
 
-ONE_GROUP = """
-from tests.fake_tracker import Nearest
-
-class OneGroup(Nearest):
-    def step(self, frame, detections):
-        found = super().step(frame, detections)
-        return found.replace(group=0 * found.id)
-"""
-
-
 @pytest.mark.parametrize("groups", [True, False])
 def test_a_score_counts_only_where_the_oracle_has_it(tmp_path: Path, groups: bool) -> None:
-    (tmp_path / "one.py").write_text(ONE_GROUP)
     (tmp_path / "scene.toml").write_text(SCENE if groups else SCENE.replace("size = 2", "size = 1"))
     failure = parse_failure("pairwise_F1<1")
-    subject = Subject(f"{tmp_path}/one.py:OneGroup", "one", detections="truth")
+    subject = Subject(FAKE.replace("Nearest", "OneGroup"), "one", detections="truth")
     outcome = play_episode(EpisodeOf(subject, failure, load(str(tmp_path / "scene.toml")), 4))
     assert outcome.problem is None
     assert failure.holds(outcome) == groups
@@ -295,21 +285,10 @@ def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, c
     assert "recordings cannot be made smaller" in json.loads(capsys.readouterr().out)["error"]["remedy"]
 
 
-CRASHES = """
-from tests.fake_tracker import Nearest
-
-class Crashes(Nearest):
-    def step(self, frame, detections):
-        raise ValueError("no")
-"""
-
-
 @pytest.mark.parametrize("condition", ["crash", "IDSW>=0"])
-def test_a_tracker_that_raises_fails_if_that_is_the_condition(condition: str, tmp_path: Path) -> None:
-    (tmp_path / "crashes.py").write_text(CRASHES)
-    subject = Subject(f"{tmp_path / 'crashes.py'}:Crashes", "c")
+def test_a_tracker_that_raises_fails_if_that_is_the_condition(condition: str) -> None:
+    subject = Subject(FAKE.replace("Nearest", "Crashes"), "c")
     failure = parse_failure(condition)
-    outcome = play_episode(
-        EpisodeOf(subject, failure, load("merge", set=("duration=4", "camera.fps=4", "event=[]")), 0)
-    )
+    scene = load("merge", set=("duration=4", "camera.fps=4", "event=[]"))
+    outcome = play_episode(EpisodeOf(subject, failure, scene, 0))
     assert (outcome.problem is None) == failure.holds(outcome) == (condition == "crash")

@@ -11,15 +11,8 @@ from tracking.environment.episodes import SourceCache, sources
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.link_rule import LinkRule
 from tracking.scoring import evaluate
+from tracking.tuning import grouping_episodes as episodes
 from tracking.tuning import tune
-from tracking.tuning.grouping_episodes import (
-    FILMED,
-    SURVEYED,
-    LabelErrors,
-    people_as_tracks,
-    play_rule,
-    with_label_errors,
-)
 
 
 @pytest.fixture
@@ -29,7 +22,7 @@ def source(tmp_path):
 
 def test_the_people_are_perfect_and_their_groups_unknown(source):
     truth = source.open().truth
-    answers = people_as_tracks(truth)
+    answers = episodes.people_as_tracks(truth)
     assert len(answers) == truth.length
     assert all((t.group == -1).all() and t.groups is None and t.events == () for t in answers)
     assert evaluate(truth, answers)["HOTA"] == 1.0
@@ -39,12 +32,12 @@ def test_the_people_are_perfect_and_their_groups_unknown(source):
 def test_an_episode_is_what_evaluate_says(tmp_path, seed):
     (source,) = sources(write_scenes(tmp_path)[0], (seed,))
     truth, rule = source.open().truth, LinkRule(near=1.0)
-    found = play_rule(source, rule, SourceCache())
-    labels = FILMED if seed % 2 else SURVEYED
-    people = people_as_tracks(with_label_errors(truth, labels, seed))
+    found = episodes.play_rule(source, rule, SourceCache())
+    labels = episodes.FILMED if seed % 2 else episodes.SURVEYED
+    people = episodes.people_as_tracks(episodes.with_label_errors(truth, labels, seed))
     factor = labels.scale ** rng(seed, "label").uniform(-1, 1)
     assert (factor == 1) == (seed == 4)
-    similarity = "image" if labels is FILMED else "ground"
+    similarity = "image" if labels is episodes.FILMED else "ground"
     scores = evaluate(truth, derive(people, truth.fps, truth.px_per_m * factor, rule), similarity=similarity)
     assert found.objective == scores["objective"]
     assert found.scores == {key: value for key, value in scores.items() if value == value}
@@ -54,8 +47,8 @@ def test_an_episode_is_what_evaluate_says(tmp_path, seed):
 def test_labels_err_for_a_while_and_do_not_change_who_is_there():
     source = sources("crossing", (0,))[0]
     truth = source.open().truth
-    for labels in (LabelErrors(0.06, 0.3, filmed=True), SURVEYED):
-        found = with_label_errors(truth, labels, 7)
+    for labels in (episodes.LabelErrors(0.06, 0.3, filmed=True), episodes.SURVEYED):
+        found = episodes.with_label_errors(truth, labels, 7)
         assert (found.vel is None) == (found.pos is None) == labels.filmed
         assert found.frame.tobytes() + found.id.tobytes() == truth.frame.tobytes() + truth.id.tobytes()
         error = (found.box - truth.box)[:, :2] / truth.px_per_m if labels.filmed else found.pos - truth.pos
@@ -64,7 +57,7 @@ def test_labels_err_for_a_while_and_do_not_change_who_is_there():
         own = error[truth.id == truth.id[0]]
         stay = np.exp(-1 / (truth.fps * labels.time))
         assert np.corrcoef(own[1:, 0], own[:-1, 0])[0, 1] == pytest.approx(stay, abs=0.2)
-        again = [with_label_errors(truth, labels, seed) for seed in (7, 8)]
+        again = [episodes.with_label_errors(truth, labels, seed) for seed in (7, 8)]
         same, other = (told.box if labels.filmed else told.pos for told in again)
         here = found.box if labels.filmed else found.pos
         assert same.tobytes() == here.tobytes()
@@ -74,7 +67,7 @@ def test_labels_err_for_a_while_and_do_not_change_who_is_there():
 def test_filmed_people_are_grouped_in_the_image():
     """Boxes alone, at one scale: those who walk behind each other look nearer than they are."""
     truth = sources("crossing", (0,))[0].open().truth
-    answers = people_as_tracks(with_label_errors(truth, FILMED, 1))
+    answers = episodes.people_as_tracks(episodes.with_label_errors(truth, episodes.FILMED, 1))
     assert {t.plane for t in answers} == {"image"}
     assert all(np.isnan(t.vel).all() for t in answers)
     assert evaluate(truth, derive(answers, truth.fps, truth.px_per_m), similarity="image").surface == "image"

@@ -8,26 +8,25 @@ from scenarios.errors import InputError
 from tests.tuning_toys import toy_plan, write_scenes
 from tracking.tuning import search_plan
 
+DEFAULT_SEEDS = [
+    ("train", 1, range(16)), ("train", 4, range(4)), ("train", 32, range(2)), ("val", 4, range(10_000, 10_012)),
+    ("test", 4, range(20_000, 20_025)), ("test", 28, range(20_000, 20_004)),
+]  # fmt: skip
 
-@pytest.mark.parametrize(
-    ("split", "count", "expected"),
-    [
-        ("train", 1, range(16)), ("train", 4, range(4)), ("train", 32, range(2)), ("val", 4, range(10_000, 10_012)),
-        ("test", 4, range(20_000, 20_025)), ("test", 28, range(20_000, 20_004)),
-    ],
-)  # fmt: skip
+
+@pytest.mark.parametrize(("split", "count", "expected"), DEFAULT_SEEDS)
 def test_default_seeds_make_enough_episodes(split, count, expected):
     assert search_plan.chosen_seeds(None, split, count) == expected
 
 
-@pytest.mark.parametrize(
-    ("option", "seeds"),
-    [
-        ("seeds", range(9_998, 10_002)), ("seeds", range(20_000, 20_002)), ("seeds", range(0)),
-        ("validation", range(5)), ("validation", range(20_000, 20_005)), ("test", range(5)),
-        ("test", range(29_999, 30_001)),
-    ],
-)  # fmt: skip
+WRONG_SEEDS = [
+    ("seeds", range(9_998, 10_002)), ("seeds", range(20_000, 20_002)), ("seeds", range(0)),
+    ("validation", range(5)), ("validation", range(20_000, 20_005)), ("test", range(5)),
+    ("test", range(29_999, 30_001)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("option", "seeds"), WRONG_SEEDS)
 def test_seeds_of_another_range_are_refused(tmp_path, option, seeds):
     with pytest.raises(InputError, match=f"--{option}.*kept apart"):
         toy_plan(tmp_path, **{option: seeds})
@@ -50,15 +49,15 @@ def test_a_recording_is_never_tuned_on(tmp_path):
         assert f"--{option}" in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("names", "expected"),
-    [
-        (["crossing"], "friends-meet"),
-        (["standard"], "friends-meet"),
-        (["friends-meet"], "crossing"),
-        (["suite:friends-meet", "cross"], None),
-    ],
-)
+USUAL_CHECKS = [
+    (["crossing"], "friends-meet"),
+    (["standard"], "friends-meet"),
+    (["friends-meet"], "crossing"),
+    (["suite:friends-meet", "cross"], None),
+]
+
+
+@pytest.mark.parametrize(("names", "expected"), USUAL_CHECKS)
 def test_the_usual_check_shares_nothing(names, expected):
     assert search_plan.default_check_suite(names) == expected
 
@@ -83,21 +82,21 @@ def test_settings_reach_the_scenes(tmp_path):
     assert "skip" not in made.defaults
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"trials": 0}, "--trials: got 0"), ({"prune": 1.0}, "--prune: got 1.0"), ({"finalists": 0}, "--finalists"),
-        ({"seed": -1}, "--seed"), ({"only": ["reech"]}, "did you mean reach"),
-        ({"only": ["reach"], "set": ["reach=1"]}, "reach, which is set"), ({"only": ["steps"]}, "about pixels alone"),
-        ({"set": ["reach=99"]}, "from 0.05 to 5"), ({"detections": "image"}, "--detections"),
-        ({"tracker": "tests/fake_tracker.py:Nearest"}, "a tracker with parameters"),
-        ({"tracker": "blobb"}, "did you mean blob"), ({"suite": "crosing"}, "--suite.*crossing"),
-        ({"seeds": 5}, r"--seeds: got 5; expected a range of seeds; .* range\(0, 4\)"),
-        ({"set": ["sensor.detect_prob=0.5"], "detections": "truth"}, "remove the sensor"),
-        ({"tracker": "grouping", "detections": "file"}, "whose identity is known"),
-        ({"set": [f"{name}=0.1" for name in ("reach", "skip", "colour", "forbidden")]}, "skip|colour"),
-    ],
-)  # fmt: skip
+WRONG_OPTIONS = [
+    ({"trials": 0}, "--trials: got 0"), ({"prune": 1.0}, "--prune: got 1.0"), ({"finalists": 0}, "--finalists"),
+    ({"seed": -1}, "--seed"), ({"only": ["reech"]}, "did you mean reach"),
+    ({"only": ["reach"], "set": ["reach=1"]}, "reach, which is set"), ({"only": ["steps"]}, "about pixels alone"),
+    ({"set": ["reach=99"]}, "from 0.05 to 5"), ({"detections": "image"}, "--detections"),
+    ({"tracker": "tests/fake_tracker.py:Nearest"}, "a tracker with parameters"),
+    ({"tracker": "blobb"}, "did you mean blob"), ({"suite": "crosing"}, "--suite.*crossing"),
+    ({"seeds": 5}, r"--seeds: got 5; expected a range of seeds; .* range\(0, 4\)"),
+    ({"set": ["sensor.detect_prob=0.5"], "detections": "truth"}, "remove the sensor"),
+    ({"tracker": "grouping", "detections": "file"}, "whose identity is known"),
+    ({"set": [f"{name}=0.1" for name in ("reach", "skip", "colour", "forbidden")]}, "skip|colour"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "words"), WRONG_OPTIONS)
 def test_wrong_options_are_one_line(tmp_path, change, words):
     with pytest.raises(InputError, match=words):
         toy_plan(tmp_path, **change)

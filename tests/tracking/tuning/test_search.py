@@ -140,13 +140,13 @@ def test_two_processes_share_a_journal(tmp_path):
     assert (tmp_path / "toy.toml").is_file()
 
 
-@pytest.mark.parametrize(
-    ("change", "word"),
-    [
-        ({"seeds": range(6)}, "seeds"), ({"objective": "MOTA"}, "objective"), ({"set": ["skip=1"]}, "searched"),
-        ({"set": ["scenario.duration=5"]}, "motions"), ({"seed": 3}, "seed"), ({"prune": 0.2}, "prune"),
-    ],
-)  # fmt: skip
+OTHER_STUDIES = [
+    ({"seeds": range(6)}, "seeds"), ({"objective": "MOTA"}, "objective"), ({"set": ["skip=1"]}, "searched"),
+    ({"set": ["scenario.duration=5"]}, "motions"), ({"seed": 3}, "seed"), ({"prune": 0.2}, "prune"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "word"), OTHER_STUDIES)
 def test_a_study_about_something_else_is_refused(found, change, word):
     folder = found[1]
     with pytest.raises(InputError, match=f"{word}.* differ"):

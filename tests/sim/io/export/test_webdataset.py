@@ -208,14 +208,14 @@ def link_out_of_the_sequence(manifest: dict[str, Any], folder: Path) -> None:
     (folder / "scenario.toml").symlink_to(secret)
 
 
+CHANGED_MANIFESTS = [
+    (name_no_files, r"files: got no scenario.toml and \d+ more"),
+    (link_out_of_the_sequence, r"scenario.toml: got a link that leads out of the sequence"),
+]
+
+
 @pytest.mark.parametrize("samples", ["sequence", "frame"])
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (name_no_files, r"files: got no scenario.toml and \d+ more"),
-        (link_out_of_the_sequence, r"scenario.toml: got a link that leads out of the sequence"),
-    ],
-)
+@pytest.mark.parametrize(("change", "words"), CHANGED_MANIFESTS)
 def test_what_a_changed_manifest_vouches_for_is_not_exported(data, tmp_path: Path, change, words, samples: str) -> None:
     folder = copied(data, tmp_path, change)
     with pytest.raises(InputError, match=words):

@@ -12,16 +12,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from scenarios.errors import InputError
+from sim.io.files import own_files
 from sim.io.files.atomic import PARTIAL
-from sim.io.files.own_files import (
-    GENERATOR,
-    file_name,
-    is_ours,
-    marked_png,
-    output_path,
-    output_paths,
-    refuse_foreign_file,
-)
 from sim.io.files.tables import Column, table_bytes
 from sim.io.pictures.video_files import write_video
 
@@ -34,7 +26,7 @@ labels = st.one_of(st.text(max_size=300), st.text("./\\\0 aé\n:", max_size=20),
 
 
 def check(folder: Path, label: str, ending: str) -> None:
-    path = output_path(folder, label, ending)
+    path = own_files.output_path(folder, label, ending)
     assert path.parent == folder
     assert path.name not in ("", ".", "..")
     assert not path.name.startswith(".")
@@ -53,7 +45,7 @@ def test_no_label_leaves_the_folder(label: str, ending: str) -> None:
 @given(st.lists(labels, max_size=5))
 def test_no_two_labels_share_a_path(names: list[str]) -> None:
     try:
-        paths = output_paths(Path("out"), names, ".png")
+        paths = own_files.output_paths(Path("out"), names, ".png")
     except InputError:
         return
     assert len({str(path).casefold() for path in paths}) == len(names)
@@ -62,11 +54,11 @@ def test_no_two_labels_share_a_path(names: list[str]) -> None:
 @pytest.mark.parametrize(("a", "b"), [("x", "x"), ("a/b", "a_b"), ("A", "a"), ("é", "e\u0301"), ("", "_")])
 def test_two_labels_of_one_file_are_refused(a: str, b: str) -> None:
     with pytest.raises(InputError, match="unique names"):
-        output_paths(Path("out"), [a, b])
+        own_files.output_paths(Path("out"), [a, b])
 
 
 def test_long_labels_with_one_beginning_stay_apart() -> None:
-    assert file_name("x" * 300) != file_name("x" * 301)
+    assert own_files.file_name("x" * 300) != own_files.file_name("x" * 301)
 
 
 META = '<meta name="generator" content="flockscope">'
@@ -79,34 +71,36 @@ def png() -> bytes:
 
 
 def test_a_marked_picture_shows_the_same():
-    shown = (cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_COLOR) for body in (png(), marked_png(png())))
+    shown = (
+        cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_COLOR) for body in (png(), own_files.marked_png(png()))
+    )
     assert np.array_equal(*shown)
 
 
-@pytest.mark.parametrize(
-    ("name", "body", "expected"),
-    [
-        ("x.json", b'{"a": "t", "b": {}, "c": 1}', True), ("x.json", b'{"a": "t", "b": []}', False),
-        ("x.json", b'["a", "b"]', None), ("x.json", b'{"a": "t", "b": {}', None),
-        ("x.parquet", table_bytes([Column("a", np.arange(3))], {}), True), ("x.parquet", b"PAR1", None),
-        ("x.html", PAGE, True), ("x.html", b"", False),
-        ("x.png", marked_png(png()), True), ("x.png", png(), False), ("x.png", b"", False),
-        ("x.mp4", b"flockscope", False), ("x.mp4", b"", False), ("x.txt", PAGE, False),
-    ],
-)  # fmt: skip
+FILES = [
+    ("x.json", b'{"a": "t", "b": {}, "c": 1}', True), ("x.json", b'{"a": "t", "b": []}', False),
+    ("x.json", b'["a", "b"]', None), ("x.json", b'{"a": "t", "b": {}', None),
+    ("x.parquet", table_bytes([Column("a", np.arange(3))], {}), True), ("x.parquet", b"PAR1", None),
+    ("x.html", PAGE, True), ("x.html", b"", False),
+    ("x.png", own_files.marked_png(png()), True), ("x.png", png(), False), ("x.png", b"", False),
+    ("x.mp4", b"flockscope", False), ("x.mp4", b"", False), ("x.txt", PAGE, False),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "body", "expected"), FILES)
 def test_files(tmp_path, name, body, expected):
     path = tmp_path / name
-    assert is_ours(path, MARKS) is None
-    refuse_foreign_file(path, MARKS)
+    assert own_files.is_ours(path, MARKS) is None
+    own_files.refuse_foreign_file(path, MARKS)
     path.write_bytes(body)
-    assert is_ours(path, MARKS) is expected
+    assert own_files.is_ours(path, MARKS) is expected
     if not expected:
         with pytest.raises(InputError, match="did not write"):
-            refuse_foreign_file(path, MARKS)
+            own_files.refuse_foreign_file(path, MARKS)
 
 
-@pytest.mark.parametrize("comment", [GENERATOR, "another", ""])
+@pytest.mark.parametrize("comment", [own_files.GENERATOR, "another", ""])
 def test_videos(tmp_path, comment):
     with write_video(tmp_path / "x.mp4", (32, 32), 10.0, comment=comment) as video:
         video.add(np.zeros((32, 32, 3), np.uint8))
-    assert is_ours(tmp_path / "x.mp4") is (comment == GENERATOR)
+    assert own_files.is_ours(tmp_path / "x.mp4") is (comment == own_files.GENERATOR)

@@ -71,14 +71,14 @@ def test_labels_are_not_scaled(tmp_path):
         open_source(tmp_path, fps=10, box_scale="2")
 
 
+OTHER_SIZES = [
+    (0.5, "all 160 boxes lie in the upper left 500 × 500 px of the pictures of 1000 × 1000"),
+    (2, "[67].% of the boxes lie beyond the pictures of 1000 × 1000"), (1, ""),
+]  # fmt: skip
+
+
 @pytest.mark.filterwarnings("always")
-@pytest.mark.parametrize(
-    ("factor", "words"),
-    [
-        (0.5, "all 160 boxes lie in the upper left 500 × 500 px of the pictures of 1000 × 1000"),
-        (2, "[67].% of the boxes lie beyond the pictures of 1000 × 1000"), (1, ""),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("factor", "words"), OTHER_SIZES)
 def test_boxes_of_pictures_of_another_size(tmp_path, recwarn, factor, words):
     """The warning is gone with the right --box-scale."""
     (tmp_path / "det").mkdir()
@@ -107,13 +107,13 @@ def test_corners(tmp_path, ids):
             _ = open_source(tmp_path, fps=10)[0].truth
 
 
-@pytest.mark.parametrize(
-    ("column", "value", "remedy"),
-    [
-        (5, -5, "check the columns, which are frame,id,left,top,width,height"),
-        (0, 5000, "check that this text belongs to this recording"),
-    ],
-)
+FAULTS_OF_ALL_LINES = [
+    (5, -5, "check the columns, which are frame,id,left,top,width,height"),
+    (0, 5000, "check that this text belongs to this recording"),
+]
+
+
+@pytest.mark.parametrize(("column", "value", "remedy"), FAULTS_OF_ALL_LINES)
 def test_a_fault_of_every_line_is_no_fault_of_a_line(tmp_path, column, value, remedy):
     rows = people()
     rows[:, column] = value

@@ -65,14 +65,14 @@ def test_a_calibration_is_scaled_to_the_recording(tmp_path):
         scaled_to_image(camera, (640, 360), tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "place"),
-    [
-        ("<Camera", "Camera", "no XML"), ("Geometry", "Geometrie", "Geometry width"),
-        ('kappa1="5.1e-03"', "", "Intrinsic kappa1"), ('focal="5.5"', 'focal="0"', "Intrinsic focal"),
-        ('rx="2.04"', 'rx="nan"', "Extrinsic rx"), ('rx="2.04"', 'rx="two"', "Extrinsic rx"),
-    ],
-)  # fmt: skip
+BROKEN = [
+    ("<Camera", "Camera", "no XML"), ("Geometry", "Geometrie", "Geometry width"),
+    ('kappa1="5.1e-03"', "", "Intrinsic kappa1"), ('focal="5.5"', 'focal="0"', "Intrinsic focal"),
+    ('rx="2.04"', 'rx="nan"', "Extrinsic rx"), ('rx="2.04"', 'rx="two"', "Extrinsic rx"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "place"), BROKEN)
 def test_a_broken_calibration_is_one_line(tmp_path, old, new, place):
     (tmp_path / "c.xml").write_text(XML.replace(old, new))
     with pytest.raises(InputError, match=place):

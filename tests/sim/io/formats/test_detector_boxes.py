@@ -103,16 +103,16 @@ def test_frames_are_used_if_there_are_times_too(tmp_path, video):
     assert [len(frame.detections.box) for frame in found] == [0, 0, 1, *[0] * 9]
 
 
-@pytest.mark.parametrize(
-    ("rows", "got"),
-    [
-        ([(13, *ROWS[0][1:])], "frame 13"),
-        ([(k, 400.0, y, w, h, s) for k, _, y, w, h, s in ROWS], "boxes that end at"),
-        ([(0, *ROWS[0][1:])], '"image_id": 0'),
-        ([(1, 10.0, 20.0, 0.0, 30.0, 0.9)], '"bbox": \\[10.0, 20.0, 0.0'),
-        ([], "no result"),
-    ],
-)
+MISFITS = [
+    ([(13, *ROWS[0][1:])], "frame 13"),
+    ([(k, 400.0, y, w, h, s) for k, _, y, w, h, s in ROWS], "boxes that end at"),
+    ([(0, *ROWS[0][1:])], '"image_id": 0'),
+    ([(1, 10.0, 20.0, 0.0, 30.0, 0.9)], '"bbox": \\[10.0, 20.0, 0.0'),
+    ([], "no result"),
+]
+
+
+@pytest.mark.parametrize(("rows", "got"), MISFITS)
 def test_what_does_not_fit_is_refused(tmp_path, video, rows, got):
     (plain,) = open_source(video)
     with pytest.raises(InputError, match=got):

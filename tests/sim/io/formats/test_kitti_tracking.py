@@ -32,15 +32,15 @@ def test_people_with_boxes(tmp_path):
     assert truth.pos is None
 
 
-@pytest.mark.parametrize(
-    ("wrong", "place"),
-    [
-        (LINES.replace("1 0 Pedestrian 0 1 -0.3 103.0", "1 0 Pedestrian 0 1 -0.3 x"), "line 3"),
-        (LINES.replace("133.0", "103.0"), "line 3"),
-        (LINES.replace("2 5 Person_sitting", "-1 5 Person_sitting"), "line 5"),
-        (LINES.replace("Pedestrian", "Van").replace("Person_sitting", "Tram"), "Car, DontCare, Tram, Van"),
-    ],
-)
+WRONG_LINES = [
+    (LINES.replace("1 0 Pedestrian 0 1 -0.3 103.0", "1 0 Pedestrian 0 1 -0.3 x"), "line 3"),
+    (LINES.replace("133.0", "103.0"), "line 3"),
+    (LINES.replace("2 5 Person_sitting", "-1 5 Person_sitting"), "line 5"),
+    (LINES.replace("Pedestrian", "Van").replace("Person_sitting", "Tram"), "Car, DontCare, Tram, Van"),
+]
+
+
+@pytest.mark.parametrize(("wrong", "place"), WRONG_LINES)
 def test_wrong_lines_are_named(tmp_path, wrong, place):
     with pytest.raises(InputError, match=place):
         opened(tmp_path, wrong)

@@ -87,19 +87,19 @@ def test_detections_with_points_are_on_the_ground(tmp_path):
 GOOD = "1,1,0,0,5,5,1,1,1\n"
 
 
-@pytest.mark.parametrize(
-    ("gt", "line", "word"),
-    [
-        (GOOD + "2,1,0,0,nan,5,1,1,1\n", 2, "finite"), (GOOD + "\n2,1,0,0,5,0,1,1,1\n", 3, "above 0"),
-        (GOOD + "1,1,0,0,5,5,1,1,1\n", 2, "once"), (GOOD + "4,1,0,0,5,5,1,1,1\n", 2, "1 to 3"),
-        (GOOD + "0,1,0,0,5,5,1,1,1\n", 2, "1 to 3"), (GOOD + "1.5,1,0,0,5,5,1,1,1\n", 2, "whole"),
-        (GOOD + "2,1,0,0,5,x,1,1,1\n", 2, "'x'"), (GOOD + "2,1,0,0,5\n", 2, "9 columns"),
-        (GOOD + "2,1,0,0,5,5,1,1,1.5\n", 2, "visibility"), ("1,2,3\n", 1, "columns"),
-        (GOOD + "1,2,1e200,0,5,5,1,1,1\n", 2, "within 1e"), (GOOD + "1,1.5,0,0,5,5,1,1,1\n", 2, "whole number"),
-        (GOOD + "1,9007199254740993,0,0,5,5,1,1,1\n", 2, "whole number"),
-        (GOOD + "1,1_0,0,0,5,5,1,1,1\n", 2, "'1_0'"), (GOOD + "1,²,0,0,5,5,1,1,1\n", 2, "'²'"),
-    ],
-)  # fmt: skip
+BAD_ROWS = [
+    (GOOD + "2,1,0,0,nan,5,1,1,1\n", 2, "finite"), (GOOD + "\n2,1,0,0,5,0,1,1,1\n", 3, "above 0"),
+    (GOOD + "1,1,0,0,5,5,1,1,1\n", 2, "once"), (GOOD + "4,1,0,0,5,5,1,1,1\n", 2, "1 to 3"),
+    (GOOD + "0,1,0,0,5,5,1,1,1\n", 2, "1 to 3"), (GOOD + "1.5,1,0,0,5,5,1,1,1\n", 2, "whole"),
+    (GOOD + "2,1,0,0,5,x,1,1,1\n", 2, "'x'"), (GOOD + "2,1,0,0,5\n", 2, "9 columns"),
+    (GOOD + "2,1,0,0,5,5,1,1,1.5\n", 2, "visibility"), ("1,2,3\n", 1, "columns"),
+    (GOOD + "1,2,1e200,0,5,5,1,1,1\n", 2, "within 1e"), (GOOD + "1,1.5,0,0,5,5,1,1,1\n", 2, "whole number"),
+    (GOOD + "1,9007199254740993,0,0,5,5,1,1,1\n", 2, "whole number"),
+    (GOOD + "1,1_0,0,0,5,5,1,1,1\n", 2, "'1_0'"), (GOOD + "1,²,0,0,5,5,1,1,1\n", 2, "'²'"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("gt", "line", "word"), BAD_ROWS)
 def test_bad_rows_are_one_line(tmp_path, gt, line, word):
     with pytest.raises(InputError, match=word) as error:
         open_source(mot_folder(tmp_path, gt, ini=INI))[0].truth  # noqa: B018
@@ -189,14 +189,14 @@ def test_a_row_that_does_not_count_hides_no_duplicate(tmp_path):
     assert error.value.place == "line 3"
 
 
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("seqLength", "9999999"), ("seqLength", "4.5"), ("seqLength", "²"), ("frameRate", "1e9"),
-        ("seqLength", "-3"), ("frameRate", "fast"), ("frameRate", "0"), ("frameRate", "nan"),
-        ("frameRate", "0.001"), ("imWidth", "60000"), ("imHeight", "480.5"), ("imWidth", "-1"),
-    ],
-)  # fmt: skip
+SEQINFOS = [
+    ("seqLength", "9999999"), ("seqLength", "4.5"), ("seqLength", "²"), ("frameRate", "1e9"),
+    ("seqLength", "-3"), ("frameRate", "fast"), ("frameRate", "0"), ("frameRate", "nan"),
+    ("frameRate", "0.001"), ("imWidth", "60000"), ("imHeight", "480.5"), ("imWidth", "-1"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("key", "value"), SEQINFOS)
 def test_seqinfo(tmp_path, key, value):
     given = {"frameRate": "10", "seqLength": "4", "imWidth": "64", "imHeight": "48"} | {key: value}
     (tmp_path / "seqinfo.ini").write_text("[Sequence]\n" + "".join(f"{k}={v}\n" for k, v in given.items()))

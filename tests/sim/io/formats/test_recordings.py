@@ -62,15 +62,15 @@ def test_biwi_without_groups_is_not_labelled(tmp_path):
     assert (s.truth.group == -1).all()
 
 
-@pytest.mark.parametrize(
-    ("groups", "rows", "word"),
-    [
-        ("1 x\n", None, "ids of people"),
-        ("", [(1, 1, 0, 0), (1, 1, 0, 0)], "once"),
-        ("", [(1, 1, "nan", 0)], "finite"),
-        ("", [(1, 1.5, 0, 0)], "whole"),
-    ],
-)
+BAD_BIWI = [
+    ("1 x\n", None, "ids of people"),
+    ("", [(1, 1, 0, 0), (1, 1, 0, 0)], "once"),
+    ("", [(1, 1, "nan", 0)], "finite"),
+    ("", [(1, 1.5, 0, 0)], "whole"),
+]
+
+
+@pytest.mark.parametrize(("groups", "rows", "word"), BAD_BIWI)
 def test_bad_biwi_is_one_line(tmp_path, groups, rows, word):
     with pytest.raises(InputError, match=word) as error:
         open_source(biwi_folder(tmp_path, groups, rows))[0].truth  # noqa: B018
@@ -117,14 +117,14 @@ def test_caviar_traps(tmp_path):
     assert found.label.tolist() == [4, 4, 5]
 
 
-@pytest.mark.parametrize(
-    ("objects", "what"),
-    [
-        ([OBJECT.format(1, 10).replace(DOES, "")], "no hypotheses"),
-        ([OBJECT.format(1, 10), OBJECT.format(2, 700)], "a larger picture"),
-        ([], "nobody"),
-    ],
-)
+CVML = [
+    ([OBJECT.format(1, 10).replace(DOES, "")], "no hypotheses"),
+    ([OBJECT.format(1, 10), OBJECT.format(2, 700)], "a larger picture"),
+    ([], "nobody"),
+]
+
+
+@pytest.mark.parametrize(("objects", "what"), CVML)
 def test_cvml_of_others_needs_a_frame_rate(tmp_path, objects, what):
     """Neither CAVIAR's 25 fps nor its 384×288 px are assumed."""
     path = xml(tmp_path, (objects, []))
@@ -162,22 +162,22 @@ def test_cvml_of_every_fifth_frame(tmp_path):
     assert annotated_frames(fifth).step == 5
 
 
-@pytest.mark.parametrize(
-    ("frames", "tag", "word"),
-    [
-        ((([OBJECT.format(1, "nan")], []),), "dataset", "a number"),
-        ((([OBJECT.format("a", 1)], []),), "dataset", "a whole number"),
-        ((([OBJECT.format("²", 1)], []),), "dataset", "a whole number"),
-        ((([OBJECT.format(1, 1), OBJECT.format(2, 5)], [GROUP.format(1, "1,²")]),), "dataset", "ids of people"),
-        ((([OBJECT.format(1, "1e200")], []),), "dataset", "within 1e\\+06"),
-        ((([OBJECT.format(1, 1).replace('"8"', '"0"')], []),), "dataset", "above 0"),
-        ((([OBJECT.format(1, 1)] * 2, []),), "dataset", "once"),
-        ((([], [GROUP.format(1, "a,b")]),), "dataset", "ids of people"),
-        (((['<object id="1"/>'], []),), "dataset", "without box"),
-        (((["<object>"], []),), "dataset", "broken XML"),
-        ((([], []),), "Camera", "<dataset>"),
-    ],
-)
+BAD_CAVIAR = [
+    ((([OBJECT.format(1, "nan")], []),), "dataset", "a number"),
+    ((([OBJECT.format("a", 1)], []),), "dataset", "a whole number"),
+    ((([OBJECT.format("²", 1)], []),), "dataset", "a whole number"),
+    ((([OBJECT.format(1, 1), OBJECT.format(2, 5)], [GROUP.format(1, "1,²")]),), "dataset", "ids of people"),
+    ((([OBJECT.format(1, "1e200")], []),), "dataset", "within 1e\\+06"),
+    ((([OBJECT.format(1, 1).replace('"8"', '"0"')], []),), "dataset", "above 0"),
+    ((([OBJECT.format(1, 1)] * 2, []),), "dataset", "once"),
+    ((([], [GROUP.format(1, "a,b")]),), "dataset", "ids of people"),
+    (((['<object id="1"/>'], []),), "dataset", "without box"),
+    (((["<object>"], []),), "dataset", "broken XML"),
+    ((([], []),), "Camera", "<dataset>"),
+]
+
+
+@pytest.mark.parametrize(("frames", "tag", "word"), BAD_CAVIAR)
 def test_bad_caviar_is_one_line(tmp_path, frames, tag, word):
     with pytest.raises(InputError, match=word):
         open_source(xml(tmp_path, *frames, tag=tag))

@@ -56,15 +56,15 @@ def test_rotation_is_undone(tmp_path):
         assert np.abs(next(iter(sequence)).image[::-1, ::-1].astype(int) - other).mean() > 5
 
 
-@pytest.mark.parametrize(
-    ("name", "more", "rate", "said"),
-    [
-        ("a.mkv", {"stamps": [100 * k for k in range(20)], "rate": 1000}, 10.0, "10 by its time stamps"),
-        ("b.mp4", {"stamps": [40 * k for k in range(20)], "rate": 1000}, 25.0, "25 by its time stamps"),
-        ("c.mkv", {"stamps": [round(k * 1000 / 29.97) for k in range(20)], "rate": 90}, 29.97, "by its time stamps"),
-        ("d.avi", {"codec": "mjpeg", "pix_fmt": "yuvj420p", "rate": 1000}, 25.0, "25 .the container says 1000"),
-    ],
-)
+WRONG_RATES = [
+    ("a.mkv", {"stamps": [100 * k for k in range(20)], "rate": 1000}, 10.0, "10 by its time stamps"),
+    ("b.mp4", {"stamps": [40 * k for k in range(20)], "rate": 1000}, 25.0, "25 by its time stamps"),
+    ("c.mkv", {"stamps": [round(k * 1000 / 29.97) for k in range(20)], "rate": 90}, 29.97, "by its time stamps"),
+    ("d.avi", {"codec": "mjpeg", "pix_fmt": "yuvj420p", "rate": 1000}, 25.0, "25 .the container says 1000"),
+]
+
+
+@pytest.mark.parametrize(("name", "more", "rate", "said"), WRONG_RATES)
 def test_a_container_that_lies_about_its_rate(tmp_path, name, more, rate, said):
     path = write_video(tmp_path / name, [picture(k) for k in range(20)], **more)
     with pytest.warns(UserWarning, match=said):
@@ -122,14 +122,14 @@ def test_times_without_frames_are_told(tmp_path, name):
     assert [frame.index for frame in sequence] == list(range(1, 21))
 
 
-@pytest.mark.parametrize(
-    ("name", "steps", "rate"),
-    [
-        ("phone.mp4", [33] * 25 + [67] * 9 + [100] * 25, 1000 * 59 / (33 * 25 + 67 * 9 + 100 * 25)),
-        ("dark.mkv", [33] * 30 + [67] * 29, 1000 * 59 / (33 * 30 + 67 * 29)),
-        ("pause.mkv", [40] * 29 + [9000] + [80] * 29, 1000 * 58 / (40 * 29 + 80 * 29)),
-    ],
-)
+VARYING_RATES = [
+    ("phone.mp4", [33] * 25 + [67] * 9 + [100] * 25, 1000 * 59 / (33 * 25 + 67 * 9 + 100 * 25)),
+    ("dark.mkv", [33] * 30 + [67] * 29, 1000 * 59 / (33 * 30 + 67 * 29)),
+    ("pause.mkv", [40] * 29 + [9000] + [80] * 29, 1000 * 58 / (40 * 29 + 80 * 29)),
+]
+
+
+@pytest.mark.parametrize(("name", "steps", "rate"), VARYING_RATES)
 def test_a_rate_that_varies_is_frames_over_time(tmp_path, name, steps, rate):
     """Each frame has the time that the file states; --fps replaces it. A reported gap counts for the times only."""
     stamps = [0, *np.cumsum(steps).tolist()]
@@ -207,15 +207,15 @@ def without_index(path):
     path.write_bytes(whole[whole.index(b"mdat") - 4 :])
 
 
-@pytest.mark.parametrize(
-    ("make", "got"),
-    [
-        (empty, "an empty file"),
-        (text, "no readable video"),
-        (sound_alone, "no video stream"),
-        (without_index, "no readable video"),
-    ],
-)
+NO_VIDEOS = [
+    (empty, "an empty file"),
+    (text, "no readable video"),
+    (sound_alone, "no video stream"),
+    (without_index, "no readable video"),
+]
+
+
+@pytest.mark.parametrize(("make", "got"), NO_VIDEOS)
 def test_no_video_is_one_line(tmp_path, make, got):
     path = tmp_path / "a.mp4"
     make(path)
@@ -233,15 +233,15 @@ def test_pictures_of_another_size_are_one_line(tmp_path):
         list(sequence)
 
 
+SAMPLES = [
+    (None, [int((k + 0.5) * 60 / 50) + 1 for k in range(50)], "50 frames spread over the recording (not causal)"),
+    ("spread:3", [11, 31, 51], "3 frames spread over the recording (not causal)"),
+    ("first:4", [1, 2, 3, 4], "first 4 frames (causal from frame 4)"),
+]
+
+
 @pytest.mark.parametrize("name", ["long-groups.mp4", "mpeg2.mpg"])
-@pytest.mark.parametrize(
-    ("asked", "wanted", "words"),
-    [
-        (None, [int((k + 0.5) * 60 / 50) + 1 for k in range(50)], "50 frames spread over the recording (not causal)"),
-        ("spread:3", [11, 31, 51], "3 frames spread over the recording (not causal)"),
-        ("first:4", [1, 2, 3, 4], "first 4 frames (causal from frame 4)"),
-    ],
-)
+@pytest.mark.parametrize(("asked", "wanted", "words"), SAMPLES)
 def test_the_background_sample(tmp_path, name, asked, wanted, words):
     path = write_video(tmp_path / name, [picture(k) for k in range(60)], **KINDS[name])
     sequence = one(path, background=asked)

@@ -77,23 +77,23 @@ def shown(path, **options):
     return [None if p is None else min(every, key=lambda k: np.abs(every[k].astype(int) - p).mean()) for p in pictures]
 
 
-@pytest.mark.parametrize(
-    ("names", "more", "right"),
-    [
-        (["000001.jpg", "000002.jpg", "000003.jpg"], {}, [0, 1, 2]),
-        (["000001.png", "000002.jpg", "000004.png"], {"gt": ROWS}, [0, 1, None, 2, None, None, None, None, None]),
-        (["000001.jpg", "000003.jpg"], {"ini": "seqLength=4\n"}, [0, None, 1, None]),
-        (["000000.jpg", "000001.jpg", "000003.jpg"], {}, [0, 1, None, 2]),
-        (["000000.jpg", "000001.jpg", "000002.jpg"], {"ini": "seqLength=3\n"}, [0, 1, 2]),
-        (["in000470.jpg", "in000471.jpg", "in000473.jpg"], {}, [0, 1, None, 2]),
-        (["000500.jpg", "000501.jpg", "000502.jpg"], {"ini": "seqLength=3\n"}, [0, 1, 2]),
-        (["000003.jpg", "000004.jpg"], {"det": ROWS.replace(",1,", ",-1,", 1)}, [None, None, 0, 1, *[None] * 5]),
-        (["9.jpg", "10.jpg", "11.jpg"], {}, [0, 1, 2]),
-        (["a.jpg", "b.jpg", "c.jpg"], {}, [0, 1, 2]),
-        (["a1.jpg", "b1.jpg", "c7.jpg"], {}, [0, 1, 2]),
-        (["1600000000100.jpg", "1600000000200.jpg", "1600000000900.jpg"], {}, [0, 1, 2]),
-    ],
-)
+NUMBERED = [
+    (["000001.jpg", "000002.jpg", "000003.jpg"], {}, [0, 1, 2]),
+    (["000001.png", "000002.jpg", "000004.png"], {"gt": ROWS}, [0, 1, None, 2, None, None, None, None, None]),
+    (["000001.jpg", "000003.jpg"], {"ini": "seqLength=4\n"}, [0, None, 1, None]),
+    (["000000.jpg", "000001.jpg", "000003.jpg"], {}, [0, 1, None, 2]),
+    (["000000.jpg", "000001.jpg", "000002.jpg"], {"ini": "seqLength=3\n"}, [0, 1, 2]),
+    (["in000470.jpg", "in000471.jpg", "in000473.jpg"], {}, [0, 1, None, 2]),
+    (["000500.jpg", "000501.jpg", "000502.jpg"], {"ini": "seqLength=3\n"}, [0, 1, 2]),
+    (["000003.jpg", "000004.jpg"], {"det": ROWS.replace(",1,", ",-1,", 1)}, [None, None, 0, 1, *[None] * 5]),
+    (["9.jpg", "10.jpg", "11.jpg"], {}, [0, 1, 2]),
+    (["a.jpg", "b.jpg", "c.jpg"], {}, [0, 1, 2]),
+    (["a1.jpg", "b1.jpg", "c7.jpg"], {}, [0, 1, 2]),
+    (["1600000000100.jpg", "1600000000200.jpg", "1600000000900.jpg"], {}, [0, 1, 2]),
+]
+
+
+@pytest.mark.parametrize(("names", "more", "right"), NUMBERED)
 def test_pictures_are_frames_by_their_numbers(tmp_path, names, more, right):
     assert shown(folder(tmp_path / "a", names, **more)) == right
 
@@ -111,22 +111,22 @@ def names(numbers):
     return [f"{k:06d}.jpg" for k in numbers]
 
 
-@pytest.mark.parametrize(
-    ("files", "frames", "ini", "right", "said"),
-    [
-        (names(range(4)), range(1, 5), "", [0, 1, 2, 3], "0 to 3 are taken as frames 1 to 4"),
-        (names(range(7, 10)), range(1, 4), "", [0, 1, 2], "7 to 9 are taken as frames 1 to 3"),
-        (names(range(7, 10)), range(1, 3), "seqLength=3\n", [0, 1, 2], "7 to 9 are taken as frames 1 to 3"),
-        (names(range(0, 40, 10)), range(1, 5), "", [0, 1, 2, 3], "0 to 30 in steps of 10"),
-        (names(range(2, 5)), (2, 4), "", [None, 0, 1, 2], ""),
-        (names(range(2, 9, 2)), (2, 6), "", [None, 0, None, 1, None, 2, None, 3], ""),
-        (names(range(1, 5)), (2,), "", [0, 1, 2, 3], ""),
-        (["b.jpg", "a.jpg"], (1, 2), "", [1, 0], "in the order of their names"),
-        (["1_left.jpg", "2_left.jpg", "10_left.jpg"], (1, 10), "", [0, 1, *[None] * 7, 2], ""),
-        (["cam2_0001_rgb.jpg", "cam2_0002_rgb.jpg"], (1, 2), "", [0, 1], ""),
-        (names(range(0, 40, 10)), (), "seqLength=4\n", [0, 1, 2, 3], ""),
-    ],
-)
+LABELLED = [
+    (names(range(4)), range(1, 5), "", [0, 1, 2, 3], "0 to 3 are taken as frames 1 to 4"),
+    (names(range(7, 10)), range(1, 4), "", [0, 1, 2], "7 to 9 are taken as frames 1 to 3"),
+    (names(range(7, 10)), range(1, 3), "seqLength=3\n", [0, 1, 2], "7 to 9 are taken as frames 1 to 3"),
+    (names(range(0, 40, 10)), range(1, 5), "", [0, 1, 2, 3], "0 to 30 in steps of 10"),
+    (names(range(2, 5)), (2, 4), "", [None, 0, 1, 2], ""),
+    (names(range(2, 9, 2)), (2, 6), "", [None, 0, None, 1, None, 2, None, 3], ""),
+    (names(range(1, 5)), (2,), "", [0, 1, 2, 3], ""),
+    (["b.jpg", "a.jpg"], (1, 2), "", [1, 0], "in the order of their names"),
+    (["1_left.jpg", "2_left.jpg", "10_left.jpg"], (1, 10), "", [0, 1, *[None] * 7, 2], ""),
+    (["cam2_0001_rgb.jpg", "cam2_0002_rgb.jpg"], (1, 2), "", [0, 1], ""),
+    (names(range(0, 40, 10)), (), "seqLength=4\n", [0, 1, 2, 3], ""),
+]
+
+
+@pytest.mark.parametrize(("files", "frames", "ini", "right", "said"), LABELLED)
 def test_labelled_frames_decide_which_frame_a_picture_is(tmp_path, files, frames, ini, right, said):
     path = folder(tmp_path / "a", files, gt=rows(*frames), ini=ini)
     with warnings.catch_warnings(record=True) as found:
@@ -138,19 +138,19 @@ def test_labelled_frames_decide_which_frame_a_picture_is(tmp_path, files, frames
         assert shown(path) == right
 
 
-@pytest.mark.parametrize(
-    ("files", "frames", "ini", "got"),
-    [
-        (names(range(5)), range(1, 5), "", "5 pictures numbered 0 to 4, and labels of frames 1 to 4"),
-        (names(range(5)), range(1, 5), "seqLength=5\n", "5 pictures numbered 0 to 4"),
-        (names(range(5, 20)), range(1, 9), "", "15 pictures numbered 5 to 19, and labels of frames 1 to 8"),
-        (names(range(50, 60)), range(1, 30), "", "10 pictures numbered 50 to 59"),
-        (names((1, 2, 4, 7)), range(1, 5), "", "4 pictures numbered 1 to 7, and labels of frames 1 to 4"),
-        (names((1, 2, 9)), (), "seqLength=4\n", "000009.jpg among 3 pictures"),
-        ([*names((1, 2)), "000001 (1).jpg"], (1, 2), "", r"000001 \(1\).jpg beside 000001.jpg"),
-        ([*names((1, 2)), "000001 copy.jpg", "x.jpg"], (), "", "000001 copy.jpg and 1 more beside 000001.jpg"),
-    ],
-)
+SHIFTED = [
+    (names(range(5)), range(1, 5), "", "5 pictures numbered 0 to 4, and labels of frames 1 to 4"),
+    (names(range(5)), range(1, 5), "seqLength=5\n", "5 pictures numbered 0 to 4"),
+    (names(range(5, 20)), range(1, 9), "", "15 pictures numbered 5 to 19, and labels of frames 1 to 8"),
+    (names(range(50, 60)), range(1, 30), "", "10 pictures numbered 50 to 59"),
+    (names((1, 2, 4, 7)), range(1, 5), "", "4 pictures numbered 1 to 7, and labels of frames 1 to 4"),
+    (names((1, 2, 9)), (), "seqLength=4\n", "000009.jpg among 3 pictures"),
+    ([*names((1, 2)), "000001 (1).jpg"], (1, 2), "", r"000001 \(1\).jpg beside 000001.jpg"),
+    ([*names((1, 2)), "000001 copy.jpg", "x.jpg"], (), "", "000001 copy.jpg and 1 more beside 000001.jpg"),
+]
+
+
+@pytest.mark.parametrize(("files", "frames", "ini", "got"), SHIFTED)
 def test_pictures_that_may_be_shifted_against_labels_are_refused(tmp_path, files, frames, ini, got):
     with pytest.raises(InputError, match=got):
         open_source(folder(tmp_path / "a", files, gt=rows(*frames), ini=ini))

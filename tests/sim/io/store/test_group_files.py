@@ -19,14 +19,14 @@ SCENE = {"format": 1, "size": [16, 10], "walls": [], "pillars": [], "doors": [],
          "wall_height": 2.5, "pillar_height": 2.5}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"pos": [1.5]}, {"pos": ["1", 2]}, {"pos": [1e300, 0]}, {"pos": None}, {"start": 0}, {"start": 1.0},
-        {"end": 80_000_000}, {"emitted": -1}, {"before": [-2]}, {"members": [-1]}, {"members": 3}, {"after": "ab"},
-        {"kind": []}, {"members": [2**63]}, {"frame": 0}, {"frame": "2"},
-    ],
-)  # fmt: skip
+EVENT_CHANGES = [
+    {"pos": [1.5]}, {"pos": ["1", 2]}, {"pos": [1e300, 0]}, {"pos": None}, {"start": 0}, {"start": 1.0},
+    {"end": 80_000_000}, {"emitted": -1}, {"before": [-2]}, {"members": [-1]}, {"members": 3}, {"after": "ab"},
+    {"kind": []}, {"members": [2**63]}, {"frame": 0}, {"frame": "2"},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("change", EVENT_CHANGES)
 def test_events(change, tmp_path):
     path = tmp_path / "events.json"
     path.write_text(json.dumps({"format": 1, "events": [EVENT]}))
@@ -69,13 +69,13 @@ def test_stairs(stairs, tmp_path):
         read_scene(path)
 
 
-@pytest.mark.parametrize(
-    "row",
-    [
-        "1,1,1 -2,,,,2", "1,1,9223372036854775808,,,,", "1,1,1_0,,,,", "²,1,1,,,,", "1,1,1,1e200,0,,", "1,1,1,0,inf,,",
-        '1,1,1,0,0,"POLYGON ((1e200 0, 1 1, 0 1))",', "1,1,1,0,0,,-2", "1,1,1,0,0,,inf", '1,1,"1' + "x" * 200_000 + '"',
-    ],
-)  # fmt: skip
+GROUP_ROWS = [
+    "1,1,1 -2,,,,2", "1,1,9223372036854775808,,,,", "1,1,1_0,,,,", "²,1,1,,,,", "1,1,1,1e200,0,,", "1,1,1,0,inf,,",
+    '1,1,1,0,0,"POLYGON ((1e200 0, 1 1, 0 1))",', "1,1,1,0,0,,-2", "1,1,1,0,0,,inf", '1,1,"1' + "x" * 200_000 + '"',
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("row", GROUP_ROWS)
 def test_groups(row, tmp_path):
     path = tmp_path / "groups.csv"
     path.write_text(f"frame,group,members,x,y,hull,size\n2,1,1 2,,,,2\n{row}\n")

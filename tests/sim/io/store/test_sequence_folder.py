@@ -107,15 +107,15 @@ def swap(path, old, new):
     (folder / "manifest.json").write_text(json.dumps(with_hash(manifest)))
 
 
-@pytest.mark.parametrize(
-    ("name", "old", "new"),
-    [
-        ("gt/events.json", '"members": [1', '"members": [99'), ("gt/events.json", '"end": 12', '"end": 99'),
-        ("gt/script.json", '"event": null', '"event": 9'),
-        ("gt/near.csv", "start,end,a,b\n", "start,end,a,b\n1,2,1,2\n"),
-        ("scenario.toml", "fake", "fakes"),
-    ],
-)  # fmt: skip
+DISAGREEMENTS = [
+    ("gt/events.json", '"members": [1', '"members": [99'), ("gt/events.json", '"end": 12', '"end": 99'),
+    ("gt/script.json", '"event": null', '"event": 9'),
+    ("gt/near.csv", "start,end,a,b\n", "start,end,a,b\n1,2,1,2\n"),
+    ("scenario.toml", "fake", "fakes"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "old", "new"), DISAGREEMENTS)
 def test_validate_sees_what_disagrees(tmp_path, name, old, new):
     folder = tmp_path / "a"
     sequence_folder.write_sequence(folder, make_sequence(5), scenario=SCENARIO, seed=5)

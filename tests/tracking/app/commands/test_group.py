@@ -200,14 +200,14 @@ def test_boxes(tmp_path, capsys):
     assert [g["members"] for g in row["groups"]] == [[1, 2, 3], [4, 6]]
 
 
-@pytest.mark.parametrize(
-    ("rows", "options", "expected"),
-    [
-        (text, ["--fps", "100"], "Check --fps, here 100, and that positions are in metres"),
-        (boxes, ["--fps", "10", "--px-per-m", "4"], "--px-per-m, here 4"),
-        (boxes, ["--fps", "10"], ""),
-    ],
-)
+SPEEDS = [
+    (text, ["--fps", "100"], "Check --fps, here 100, and that positions are in metres"),
+    (boxes, ["--fps", "10", "--px-per-m", "4"], "--px-per-m, here 4"),
+    (boxes, ["--fps", "10"], ""),
+]
+
+
+@pytest.mark.parametrize(("rows", "options", "expected"), SPEEDS)
 def test_speeds_that_nobody_has(tmp_path, capsys, rows, options, expected):
     (tmp_path / "walk.txt").write_text(rows())
     assert run(["group", str(tmp_path / "walk.txt"), *options, "--out", str(tmp_path / "g")]) == 0

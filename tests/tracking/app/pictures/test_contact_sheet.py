@@ -13,15 +13,7 @@ from hypothesis import strategies as st
 from scenarios.errors import InputError
 from sim.types import GroupEvent, Sequence, Truth
 from tests.coded_pictures import SIZE, number, sequence
-from tracking.app.pictures.contact_sheet import (
-    HEAD,
-    TITLE,
-    WIDTH,
-    PanelPictures,
-    choose_frames,
-    empty_truth,
-    write_sheet,
-)
+from tracking.app.pictures import contact_sheet
 from tracking.drawing.canvas import FLOOR, colour
 
 
@@ -32,7 +24,7 @@ def bare(length: int, starts: dict[int, str]) -> Truth:
 
 
 def test_onsets_come_first_and_gaps_are_filled() -> None:
-    chosen = choose_frames(bare(200, {50: "merge", 120: "split", 60: "enter"}), 8)
+    chosen = contact_sheet.choose_frames(bare(200, {50: "merge", 120: "split", 60: "enter"}), 8)
     assert {50, 120} <= set(chosen)
     assert len(set(chosen)) == 8
     assert max(np.diff([1, *chosen, 200])) < 45
@@ -46,23 +38,23 @@ def test_onsets_come_first_and_gaps_are_filled() -> None:
     starts=st.dictionaries(st.integers(1, 300), st.sampled_from(["merge", "split", "cross", "enter"])),
 )
 def test_frames_are_distinct_and_inside(length: int, frames: int, starts: dict[int, str]) -> None:
-    chosen = choose_frames(bare(length, starts), frames)
+    chosen = contact_sheet.choose_frames(bare(length, starts), frames)
     assert len(chosen) == len(set(chosen)) == min(frames, length)
     assert chosen[0] >= 1
     assert chosen[-1] <= length
 
 
 def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
-    from tracking.app.pictures.contact_sheet import HEAD, TITLE, WIDTH, sheet_area
+    from tracking.app.pictures.contact_sheet import sheet_area
 
-    index = choose_frames(truth, 1)[0]
-    path = write_sheet(sequence, tmp_path / "new" / "sheet.png", frames=1)
+    index = contact_sheet.choose_frames(truth, 1)[0]
+    path = contact_sheet.write_sheet(sequence, tmp_path / "new" / "sheet.png", frames=1)
     picture = cv2.imread(str(path))
     low, high = sheet_area(sequence, truth)
-    scale = WIDTH / 2 / (high - low)[0]
+    scale = contact_sheet.WIDTH / 2 / (high - low)[0]
     row = truth.rows(index).start + int(np.flatnonzero(truth.at(index).id == 7)[0])
     x, y = truth.pos[row] if truth.pos is not None else (0, 0)
-    u, v = 10 + (x - low[0]) * scale, (HEAD + TITLE) / 2 + (high[1] - y) * scale
+    u, v = 10 + (x - low[0]) * scale, (contact_sheet.HEAD + contact_sheet.TITLE) / 2 + (high[1] - y) * scale
     np.testing.assert_allclose(picture[round(v), round(u)], colour(7), atol=12)
     np.testing.assert_allclose(picture[round(v) + 30, round(u) + 30], FLOOR, atol=12)
 
@@ -70,23 +62,23 @@ def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_p
 def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) -> None:
     for load in (None, lambda: bare(10, {})):
         with pytest.raises(InputError, match="no labelled people"):
-            write_sheet(Sequence("none", 10.0, 10, sequence.frames, load), tmp_path / "none.png")
+            contact_sheet.write_sheet(Sequence("none", 10.0, 10, sequence.frames, load), tmp_path / "none.png")
     assert not (tmp_path / "none.png").exists()
 
 
 def test_each_panel_shows_its_frame(tmp_path: Path) -> None:
     """Without labels too: frames spread over the recording."""
     bare = sequence(60)
-    truth = empty_truth(bare)
-    chosen = choose_frames(truth, 4)
-    pictures = PanelPictures(bare, truth, chosen)
+    truth = contact_sheet.empty_truth(bare)
+    chosen = contact_sheet.choose_frames(truth, 4)
+    pictures = contact_sheet.PanelPictures(bare, truth, chosen)
     assert pictures.kinds() == ()
     for index in chosen:
         area = np.zeros((SIZE[1] * 4, SIZE[0] * 4, 3), np.uint8)
         pictures.draw_large(area, index)
         assert number(area, 0, 4) == index
-    read = cv2.imread(str(write_sheet(bare, tmp_path / "s.png", 4)))
-    shrunk = WIDTH / 2 / SIZE[0]
-    top = (HEAD + TITLE) // 2
-    first = cv2.resize(read[top : top + round(SIZE[1] * shrunk), 10 : 10 + WIDTH // 2], SIZE)
+    read = cv2.imread(str(contact_sheet.write_sheet(bare, tmp_path / "s.png", 4)))
+    shrunk = contact_sheet.WIDTH / 2 / SIZE[0]
+    top = (contact_sheet.HEAD + contact_sheet.TITLE) // 2
+    first = cv2.resize(read[top : top + round(SIZE[1] * shrunk), 10 : 10 + contact_sheet.WIDTH // 2], SIZE)
     assert number(first) == chosen[0]

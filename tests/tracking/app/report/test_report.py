@@ -9,39 +9,31 @@ from dataclasses import replace
 
 import pytest
 
-from tracking.app.report import moments
-from tracking.app.report.content import (
-    CauseBar,
-    Curve,
-    Curves,
-    Failure,
-    HeatCell,
-    HeatMap,
-    Moment,
-    RankedRow,
-    Report,
-    Speed,
-)
+from tracking.app.report import content, moments
 from tracking.app.report.moments import Candidate, chosen
 from tracking.app.report.page import report_html
 
 EVIL = "<img src=x onerror=alert(1)></script><script>alert(2)</script>"
-EMPTY = Report("Two trackers", "about", "HOTA", [])
+EMPTY = content.Report("Two trackers", "about", "HOTA", [])
 
 
-def full(name: str) -> Report:
+def full(name: str) -> content.Report:
     """A report with all parts, in which trackers, scenes and errors have this name."""
-    cells = [HeatCell(0.5, 0.8), HeatCell(math.nan, math.nan, f"no scene, {name}")]
+    cells = [content.HeatCell(0.5, 0.8), content.HeatCell(math.nan, math.nan, f"no scene, {name}")]
     ends = [0.8, math.nan, 0.2], [1, math.nan, 0.4]
-    curve = Curve(name, [0.9, math.nan, 0.3], *ends, {"at": 0.6, "low": 0.5, "high": 1.0})
-    rows = [RankedRow("oracle", "", 0.9, math.nan, math.nan, {}), RankedRow(name, "1", 0.8, 0.7, 0.9, {"MOTA": 0.5})]
-    return Report(
-        name, name, "HOTA", rows, [name], HeatMap(name, (name, "b"), {name: cells}),
-        [Curves(name, name, [1, 0.8, 0.4], [curve], [name])], [HeatMap(name, ("1", "2"), {name: cells})],
-        [CauseBar(name, name, name, 2, 1.5, {"HOTA": 0.1, "group_F1": 0.2})], name,
-        [Speed(name, 100.0, 0.8, 0.7, 0.9)],
-        [Moment(name, name, name, 0.5, 0.9, 1.0, name, name, json.dumps({"name": "x"}))],
-        [Failure(name, name, name, name)], [(name, "page.html", 0.5)],
+    curve = content.Curve(name, [0.9, math.nan, 0.3], *ends, {"at": 0.6, "low": 0.5, "high": 1.0})
+    rows = [
+        content.RankedRow("oracle", "", 0.9, math.nan, math.nan, {}),
+        content.RankedRow(name, "1", 0.8, 0.7, 0.9, {"MOTA": 0.5}),
+    ]
+    maps = [content.HeatMap(name, columns, {name: cells}) for columns in ((name, "b"), ("1", "2"))]
+    return content.Report(
+        name, name, "HOTA", rows, [name], maps[0],
+        [content.Curves(name, name, [1, 0.8, 0.4], [curve], [name])], maps[1:],
+        [content.CauseBar(name, name, name, 2, 1.5, {"HOTA": 0.1, "group_F1": 0.2})], name,
+        [content.Speed(name, 100.0, 0.8, 0.7, 0.9)],
+        [content.Moment(name, name, name, 0.5, 0.9, 1.0, name, name, json.dumps({"name": "x"}))],
+        [content.Failure(name, name, name, name)], [(name, "page.html", 0.5)],
     )  # fmt: skip
 
 
@@ -88,7 +80,7 @@ def test_moments_are_shared_among_trackers_and_scenarios() -> None:
 
 
 def test_a_report_stays_small(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = Moment("a", "merge", "merge-s0", 0.5, 0.9, 0.0, "switch", "words", "x" * 3_000_000)
+    made = content.Moment("a", "merge", "merge-s0", 0.5, 0.9, 0.0, "switch", "words", "x" * 3_000_000)
     monkeypatch.setattr(moments, "_moment", lambda *_: made)
     chosen_ones = [candidate("a", "merge", k / 10) for k in range(4)]
     found = moments.moments(chosen_ones, lambda one: ())  # type: ignore[return-value, arg-type]

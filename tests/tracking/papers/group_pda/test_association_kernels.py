@@ -231,17 +231,17 @@ def settled(gate, correct, frames=200, start=1.0, count=1_000):
     return np.sqrt(np.linalg.det(extent[0])), size[0] / count
 
 
-@pytest.mark.parametrize(
-    ("gate", "correct", "extent", "inside", "start"),
-    [
-        (5.99, False, 0.715, 1 - np.exp(-0.715 * 5.99 / 2), 0.8),
-        (5.99, False, 0.715, 1 - np.exp(-0.715 * 5.99 / 2), 2.0),
-        (9.21, False, 0.943, 1 - np.exp(-0.943 * 9.21 / 2), 2.0),
-        (13.8, False, 0.993, 1.0, 0.8),
-        (9.21, True, 1.0, 0.99, 0.8),
-        (9.21, True, 1.0, 0.99, 2.0),
-    ],
-)
+GATES = [
+    (5.99, False, 0.715, 1 - np.exp(-0.715 * 5.99 / 2), 0.8),
+    (5.99, False, 0.715, 1 - np.exp(-0.715 * 5.99 / 2), 2.0),
+    (9.21, False, 0.943, 1 - np.exp(-0.943 * 9.21 / 2), 2.0),
+    (13.8, False, 0.993, 1.0, 0.8),
+    (9.21, True, 1.0, 0.99, 0.8),
+    (9.21, True, 1.0, 0.99, 2.0),
+]
+
+
+@pytest.mark.parametrize(("gate", "correct", "extent", "inside", "start"), GATES)
 def test_what_the_gate_cuts_off(gate: float, correct: bool, extent: float, inside: float, start: float) -> None:
     """E3: the fixed point of s = c(gate s), or of s = c(gate s) / c(gate), which is 1."""
     found = settled(gate, correct, start=start)

@@ -9,20 +9,9 @@ from filterpy.kalman import KalmanFilter
 from sim.scene.camera import back_project, point_covariances, project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
+from tracking.papers.stereo import space_group
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.space_group import (
-    POS,
-    VEL,
-    PairMeasurement,
-    PlaceMeasurement,
-    measure,
-    measured_state,
-    motion_model,
-    newborn,
-    predict,
-    spread_of,
-    state_jacobian,
-)
+from tracking.papers.stereo.space_group import POS, VEL, PairMeasurement, PlaceMeasurement
 
 DT = 1 / 30
 FIT = {"tilt": 20.0, "focal": 1000.0, "baseline": 0.5, "height": 3.0}
@@ -43,25 +32,28 @@ def test_the_state_jacobian_is_that_of_central_differences() -> None:
     measurement, step = PairMeasurement(rig(40.0)), 1e-5
     x = np.array([[1.5, 0.7, 6.0, -0.3, 1.1, 0.1]]).T
     numeric = [
-        (measured_state(x + step * e[:, None], measurement) - measured_state(x - step * e[:, None], measurement))[:, 0]
+        (
+            space_group.measured_state(x + step * e[:, None], measurement)
+            - space_group.measured_state(x - step * e[:, None], measurement)
+        )[:, 0]
         for e in np.eye(6)
     ]
-    assert np.abs(state_jacobian(x, measurement) - np.stack(numeric, 1) / (2 * step)).max() < 1e-6
+    assert np.abs(space_group.state_jacobian(x, measurement) - np.stack(numeric, 1) / (2 * step)).max() < 1e-6
 
 
 def test_a_linear_measurement_makes_it_a_kalman_filter() -> None:
     config = StereoConfig()
-    motion, r = motion_model(config, DT), np.random.default_rng(0)
+    motion, r = space_group.motion_model(config, DT), np.random.default_rng(0)
     points = at_places(cloud(1, 8, [1, 2, 1]), np.repeat(0.01 * np.eye(3)[None], 8, 0))
-    group = newborn(points, PlaceMeasurement(), motion, 0.0)
+    group = space_group.newborn(points, PlaceMeasurement(), motion, 0.0)
     kf = KalmanFilter(dim_x=6, dim_z=3)
     kf.x, kf.P, kf.F, kf.Q = group.ekf.x.copy(), group.ekf.P.copy(), motion.Phi, motion.Q
     kf.H = np.eye(6)[POS]
     for k in range(1, 40):
-        predict(group, motion)
+        space_group.predict(group, motion)
         kf.predict()
         pos = points.pos + DT * k * np.array([1.0, 0.3, 0.0]) + 0.1 * r.standard_normal((8, 3))
-        measure(group, at_places(pos, points.cov), PlaceMeasurement(), motion, DT * k)
+        space_group.measure(group, at_places(pos, points.cov), PlaceMeasurement(), motion, DT * k)
         kf.update(pos.mean(0)[:, None], R=(0.01 / 8 + config.centroid_noise**2) * np.eye(3))
         assert np.abs(group.ekf.x - kf.x).max() < 1e-12
         assert np.abs(group.ekf.P - kf.P).max() < 1e-12
@@ -73,7 +65,7 @@ def test_errors_have_the_stated_covariance(depth: float) -> None:
     """NEES of the state over 60 runs of 2 s: 6 in the mean, within 99 % of chi-square."""
     camera = rig(**FIT)
     config = StereoConfig(centroid_noise=0.05, accel_noise=0.5, density_width=20.0)
-    measurement, motion, n, runs = PairMeasurement(camera), motion_model(config, DT), 12, 60
+    measurement, motion, n, runs = PairMeasurement(camera), space_group.motion_model(config, DT), 12, 60
     deviations, nees = np.array([0.3, 0.3, 0.25]), []
     for run in range(runs):
         r = np.random.default_rng([run, int(depth)])
@@ -91,12 +83,12 @@ def test_errors_have_the_stated_covariance(depth: float) -> None:
             pos = back_project(camera, uvd)
             points = at_places(pos, point_covariances(camera, pos, deviations**2))
             if group is None:
-                group = newborn(points, measurement, motion, 0.0)
+                group = space_group.newborn(points, measurement, motion, 0.0)
                 group.ekf.x[VEL, 0] = x[VEL] + 0.2 * r.standard_normal(3)
                 group.ekf.P[np.ix_(VEL, VEL)] = 0.04 * np.eye(3)
             else:
-                predict(group, motion)
-                measure(group, points, measurement, motion, k * DT)
+                space_group.predict(group, motion)
+                space_group.measure(group, points, measurement, motion, k * DT)
         e = group.ekf.x[:, 0] - x
         nees.append(e @ np.linalg.solve(group.ekf.P, e))
     sd = np.sqrt(2 * 6 / runs)
@@ -113,12 +105,12 @@ def test_depth_has_no_bias_where_members_stand_at_many_depths() -> None:
     d = project_pair(camera, pos)[:, 2]
     assert 246 * 0.12 / d.mean() - 8.0 < -0.1
     config, measurement = StereoConfig(density_width=20.0), PairMeasurement(camera)
-    motion = motion_model(config, DT)
+    motion = space_group.motion_model(config, DT)
     points = at_places(pos, point_covariances(camera, pos, np.square([0.3, 0.3, 0.15])))
-    group = newborn(points, measurement, motion, 0.0)
+    group = space_group.newborn(points, measurement, motion, 0.0)
     for k in range(1, 30):
-        predict(group, motion)
-        measure(group, points, measurement, motion, k * DT)
+        space_group.predict(group, motion)
+        space_group.measure(group, points, measurement, motion, k * DT)
     assert abs((group.pos - camera.position) @ camera.rotation[2] - 8.0) < 0.02
 
 
@@ -128,8 +120,8 @@ def test_the_spread_is_that_of_the_members_without_their_errors() -> None:
     cov = np.repeat(np.diag([0.01, 0.1, 0.02])[None], n, 0)
     pos = place + np.sqrt([0.01, 0.1, 0.02]) * r.standard_normal((n, 3))
     points = at_places(pos, cov, vel=0.1 * r.standard_normal((n, 3)), vel_cov=1e-9)
-    found = np.sqrt(np.diag(spread_of(points, StereoConfig())))
+    found = np.sqrt(np.diag(space_group.spread_of(points, StereoConfig())))
     assert found[POS] == pytest.approx([0.5, 0.3, 0.4], abs=0.03)
     assert found[VEL] == pytest.approx([0.1, 0.1, 0.1], abs=0.03)
-    raw = np.sqrt(np.diag(spread_of(points, StereoConfig(point_covariance=False))))
+    raw = np.sqrt(np.diag(space_group.spread_of(points, StereoConfig(point_covariance=False))))
     assert raw[POS[1]] == pytest.approx(np.sqrt(0.09 + 0.1), abs=0.03)

@@ -14,18 +14,11 @@ from sim.scene.camera import project
 from sim.types import Context, Frame, Groups, Tracks
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
+from tracking.papers.stereo import space_group
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.group_life import merge, overlap, pooled, separation, sphere_groups
 from tracking.papers.stereo.points import stereo_camera
-from tracking.papers.stereo.space_group import (
-    VEL,
-    PairMeasurement,
-    PlaceMeasurement,
-    SpaceGroup,
-    associated,
-    motion_model,
-    newborn,
-)
+from tracking.papers.stereo.space_group import VEL, PairMeasurement, PlaceMeasurement
 from tracking.papers.stereo.tracker import Stereo
 
 FPS = 30.0
@@ -131,13 +124,18 @@ def test_a_point_in_no_region_belongs_to_nobody(away: float, owner: int) -> None
     """Its sphere overlaps those of the group's points, and its velocity is the group's (eq. 8)."""
     (step,) = together(walkers(0, 12, [1, 5, 1], [1, 0, 0], 1))
     config = StereoConfig()
-    group = newborn(step, PLACE, motion_model(config, 1 / FPS), 0.0)
+    group = space_group.newborn(step, PLACE, space_group.motion_model(config, 1 / FPS), 0.0)
     cov = 4e-4 * np.eye(3)[None]
     point = SpacePoints(
-        np.array([99]), group.pos[None] + [away, 0, 0], cov, group.ekf.x[None, VEL, 0], 25 * cov, np.zeros(1)
+        np.array([99]),
+        group.pos[None] + [away, 0, 0],
+        cov,
+        group.ekf.x[None, VEL, 0],
+        25 * cov,
+        np.zeros(1),
     )
     assert sphere_groups(np.concatenate([step.pos, point.pos]), config.radius, 1).tolist() == [0] * 13
-    assert associated([group], point, config).tolist() == [owner]
+    assert space_group.associated([group], point, config).tolist() == [owner]
 
 
 def crossing(seed: int, **params: object) -> bool:
@@ -174,12 +172,12 @@ def test_groups_of_one_velocity_merge_and_opposite_ones_never() -> None:
         assert "merge" not in kinds(scripted(together(a, b))[1])
 
 
-def people(*groups: tuple[int, int, float, float]) -> list[SpaceGroup]:
+def people(*groups: tuple[int, int, float, float]) -> list[space_group.SpaceGroup]:
     """Groups that walk alike: id, number of points, place, first time."""
-    model, made = motion_model(StereoConfig(), 1 / FPS), []
+    model, made = space_group.motion_model(StereoConfig(), 1 / FPS), []
     for id, count, start, first_seen in groups:
         (step,) = together(walkers(count, count, [start, 5, 1], [1, 0, 0], 1))
-        made.append(newborn(step, PLACE, model, first_seen))
+        made.append(space_group.newborn(step, PLACE, model, first_seen))
         made[-1].id = id
     return made
 
@@ -196,13 +194,15 @@ def test_the_larger_group_keeps_its_id_when_two_merge() -> None:
 def test_regions_of_opposite_groups_overlap_at_no_distance(distance: float, direction: float) -> None:
     """Walkers in space at 0.9 m/s, by eq. 13; of the same velocity they overlap when they are near."""
     config, r = StereoConfig(), np.random.default_rng(3)
-    along, motion = np.array([np.cos(direction), np.sin(direction), 0.0]), motion_model(config, 1 / FPS)
+    along, motion = np.array([np.cos(direction), np.sin(direction), 0.0]), space_group.motion_model(config, 1 / FPS)
 
     def group(at: float, speed: float):
         pos = np.array([at, 5.0, 1.0]) + 0.25 * r.standard_normal((15, 3))
         vel = speed * along + 0.1 * r.standard_normal((15, 3))
         cov = np.repeat(4e-4 * np.eye(3)[None], 15, 0)
-        return newborn(SpacePoints(np.arange(15), pos, cov, vel, 25 * cov, np.zeros(15)), PLACE, motion, 0.0)
+        return space_group.newborn(
+            SpacePoints(np.arange(15), pos, cov, vel, 25 * cov, np.zeros(15)), PLACE, motion, 0.0
+        )
 
     assert not overlap(group(0.0, 0.9), group(distance, -0.9), config.merge_gate)
     assert overlap(group(0.0, 0.9), group(distance, 0.9), config.merge_gate) == (distance < 1.5)
@@ -292,13 +292,8 @@ def test_a_hull_in_the_image_covers_bodies_from_their_feet_to_their_heads() -> N
     )
     assert made.plane == "image"
     (hull,) = made.groups.hull
-    for height, inside in (
-        (1.4 - HALF, True),
-        (1.4 + HALF, True),
-        (1.4 - HALF - 0.8, False),
-        (1.4 + HALF + 0.8, False),
-    ):
-        uv = project(camera, np.array([[1.0, 6.0, height]]))[0]
+    for height, inside in ((-HALF, True), (HALF, True), (-HALF - 0.8, False), (HALF + 0.8, False)):
+        uv = project(camera, np.array([[1.0, 6.0, 1.4 + height]]))[0]
         assert contains(hull, uv).tolist() == [inside], height
     corners = np.column_stack([square, np.full(4, 1.4)])
     assert contains(hull, project(camera, corners)[0], 0.01).all()
