@@ -2,23 +2,22 @@
 
     python -m benchmarks.tuning search [blob] [group-pda] [grouping] --out FOLDER [--trials N] …
     python -m benchmarks.tuning real [blob] [group-pda] [grouping] --out FOLDER [--data FOLDER]       after `search`
-    python -m benchmarks.tuning workers|overhead [--trials N]
+    python -m benchmarks.tuning overhead [--trials N]
 
 search: on the suites of benchmarks/tuning_suites (or --suite), training seeds. Printed: defaults and tuned parameters
 on test seeds, and on friends-meet or crossing, which share no scenario with the suites. An interrupted search continues
-when it is started again. --sensor: detections err as this profile says (`flockscope fit sensor`), with --half in every
-second scene; for trackers of boxes.
+when it is started again. --sensor: detections err as this profile says (`flockscope fit sensor`), for trackers of
+boxes.
 real: present defaults and the parameters that `search` found, on recordings: `blob`
 on PETS09-S2L1 (200 frames) and TUD-Campus from their det/det.txt; `group-pda` and the baseline grouping rule on
 seq_hotel and CAVIAR Meet_WalkTogether1 from labelled people. With several objectives the whole front is compared.
 Intervals are by moving blocks, of the differences from the present defaults.
-workers: wall seconds of one search by 1 and 2 processes. overhead: CPU ms of a trial beside its episodes.
+overhead: CPU ms of a trial beside its episodes.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -31,8 +30,6 @@ import numpy as np
 
 from benchmarks.support.options import CAMPUS, HOTEL, PETS, WALK_TOGETHER, add_data, new_parser
 from scenarios import sensor_settings
-from scenarios.loading.resolve import read_suite
-from sim.io.files.atomic import write_file
 from sim.io.source import open_source
 from sim.types import Array, Sequence, Tracks
 from tracking.config import Config
@@ -95,32 +92,18 @@ def search(given: argparse.Namespace) -> None:
     for name in given.names or SEARCHES:
         wanted = SEARCHES[name]
         begun, suite = time.perf_counter(), given.suite or SUITES / wanted.suite
-        if given.half:
-            suite = half_with_sensor(suite, given.sensor, given.out)
         found = tune(
             wanted.tracker, suite, given.trials or 60, objective=given.objective or wanted.objective,
             detections=wanted.detections, workers=given.workers, out=given.out / f"{name}.toml", only=given.only,
             finalists=given.finalists,
             seeds=range(wanted.seeds), validation=range(10_000, 10_000 + (given.validation or wanted.validation)),
             test=range(20_000, 20_013), progress=progress_printer(),
-            set=sensor_settings(given.sensor) if given.sensor and not given.half else (),
+            set=sensor_settings(given.sensor) if given.sensor else (),
         )  # fmt: skip
         print(found)
         for key, (old, new) in found.changed.items():
             print(f"  {key}: {old} → {new}")
         print(f"  {time.perf_counter() - begun:.0f} s\n", flush=True)
-
-
-def half_with_sensor(suite: Path, sensor: Path, out: Path) -> Path:
-    """Writes and returns the suite with this detector in every second scene, beginning with the first."""
-    rows = []
-    for k, line in enumerate(read_suite(suite).entry):
-        settings = (*line.settings, *(sensor_settings(sensor) if k % 2 == 0 else ()))
-        name, scenario, more = map(json.dumps, (line.name, line.scenario, settings))
-        rows.append(f"  {{ name = {name}, scenario = {scenario}, set = {more} }},")
-    path = out / f"{suite.stem}-half-{sensor.stem}.toml"
-    write_file(path, "\n".join(["entry = [", *rows, "]", ""]).encode())
-    return path
 
 
 def progress_printer() -> Callable[[int, int | None, str], None]:
@@ -200,25 +183,9 @@ def overhead(given: argparse.Namespace) -> None:
             print(f"{kind}: {1000 * (time.process_time() - begun) / made.options.trials:.1f} ms")
 
 
-def workers(given: argparse.Namespace) -> None:
-    """Prints seconds of one search by one process and by two, in turn, and a hash of what each found."""
-    best: dict[int, float] = {}
-    for _ in range(2):
-        for count in (1, 2):
-            with tempfile.TemporaryDirectory() as folder:
-                out, begun = Path(folder) / "blob.toml", time.perf_counter()
-                tune(
-                    "blob", "crossing", given.trials or 20, seeds=range(4), validation=range(10_000, 10_004),
-                    test=range(20_000, 20_004), check=None, workers=count, out=out,
-                )  # fmt: skip
-                best[count] = min(best.get(count, np.inf), time.perf_counter() - begun)
-                print(f"{count} workers: {best[count]:.1f} s, {hash(out.read_bytes())}", flush=True)
-    print(f"two are {best[1] / best[2]:.2f} times as fast as one")
-
-
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["search", "real", "workers", "overhead"])
+    parser.add_argument("mode", choices=["search", "real", "overhead"])
     parser.add_argument("names", nargs="*", choices=[*SEARCHES, []])
     parser.add_argument("--out", type=Path, default=Path("tuned"))
     parser.add_argument("--trials", type=int)
@@ -228,13 +195,10 @@ def main() -> None:
     parser.add_argument("--only", action="append", default=[], help="search: only this parameter; may be repeated")
     parser.add_argument("--finalists", type=int, default=5, help="search: trials that are played on validation scenes")
     parser.add_argument("--sensor", type=Path)
-    parser.add_argument("--half", action="store_true", help="--sensor in every second scene only")
     parser.add_argument("--workers", type=int, default=1, help="search: processes; the result does not depend on it")
     add_data(parser)
     given = parser.parse_intermixed_args()
-    if given.half and given.sensor is None:
-        parser.error("--half needs --sensor")
-    {"search": search, "real": real, "workers": workers, "overhead": overhead}[given.mode](given)
+    {"search": search, "real": real, "overhead": overhead}[given.mode](given)
 
 
 if __name__ == "__main__":
