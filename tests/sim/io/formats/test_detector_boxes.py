@@ -86,12 +86,18 @@ def test_times_of_no_frame_are_left_out(tmp_path, video):
     step = 1 / plain.fps
     # before and after the video, and a second picture of frame 5
     times = [-step, *(k * step for k in range(1, 10)), 4.3 * step, 20 * step]
-    with pytest.warns(UserWarning, match="3 of 12 boxes have times of no frame, and are left out"):
+    with pytest.warns(UserWarning, match="3 of 12 boxes have times of no frame, or of one that has nearer"):
         found = with_boxes(plain, timed(tmp_path / "det.csv", times))
     assert [len(frame.detections.box) for frame in found] == [0, *[1] * 9, 0, 0]
-    for wrong in (np.arange(12) / 4 * step, np.arange(12) * 1000 * step):  # another frame rate, milliseconds
-        with pytest.raises(InputError, match=r"\d+ of 12 boxes have times of no frame.* expected times of 12 frames"):
-            with_boxes(plain, timed(tmp_path / "det.csv", wrong))
+    with pytest.raises(InputError, match=r"\d+ of 12 boxes have times of no frame.* expected times of 12 frames"):
+        with_boxes(plain, timed(tmp_path / "det.csv", np.arange(12) * 1000 * step))  # milliseconds
+
+
+def test_of_more_pictures_than_frames_the_nearest_count(tmp_path, video):
+    (plain,) = open_source(video)
+    with pytest.warns(UserWarning, match="8 of 12 boxes have times of no frame, or of one that has nearer"):
+        found = with_boxes(plain, timed(tmp_path / "det.csv", np.arange(12) / 4 / plain.fps))
+    assert sum(len(frame.detections.box) for frame in found) == 4
 
 
 def test_frames_are_used_if_there_are_times_too(tmp_path, video):
