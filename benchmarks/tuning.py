@@ -2,7 +2,6 @@
 
     python -m benchmarks.tuning search [blob] [group-pda] [grouping] --out FOLDER [--trials N] …
     python -m benchmarks.tuning real [blob] [group-pda] [grouping] --out FOLDER [--data FOLDER]       after `search`
-    python -m benchmarks.tuning overhead [--trials N]
 
 search: on the suites of benchmarks/tuning_suites (or --suite), training seeds. Printed: defaults and tuned parameters
 on test seeds, and on friends-meet or crossing, which share no scenario with the suites. An interrupted search continues
@@ -12,19 +11,16 @@ real: present defaults and the parameters that `search` found, on recordings: `b
 on PETS09-S2L1 (200 frames) and TUD-Campus from their det/det.txt; `group-pda` and the baseline grouping rule on
 seq_hotel and CAVIAR Meet_WalkTogether1 from labelled people. With several objectives the whole front is compared.
 Intervals are by moving blocks, of the differences from the present defaults.
-overhead: CPU ms of a trial beside its episodes.
 """
 
 from __future__ import annotations
 
 import argparse
-import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -33,7 +29,6 @@ from scenarios import sensor_settings
 from sim.io.source import open_source
 from sim.types import Array, Sequence, Tracks
 from tracking.config import Config
-from tracking.environment.episodes import Episode, Source
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
@@ -44,9 +39,6 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import weighted_scorers
 from tracking.stats import block_intervals
 from tracking.tuning import tune
-from tracking.tuning.options import TuneOptions
-from tracking.tuning.search_plan import search_plan
-from tracking.tuning.study import open_study, run_trials
 
 SUITES = Path(__file__).parent / "tuning_suites"
 DRAWS = 200
@@ -165,27 +157,9 @@ def tracks_of(name: str, sequence: Sequence, mode: str, config: Config) -> list[
     return list(track(name, sequence, params=config, detections=mode))
 
 
-def overhead(given: argparse.Namespace) -> None:
-    """Prints CPU ms of a trial of 16 episodes that cost nothing: proposing, testing, storing."""
-    made = search_plan(TuneOptions(tracker="blob", suite="crossing", trials=given.trials or 200, check=None))
-    r = np.random.default_rng(0)
-
-    def play(sources: list[Source], values: dict[str, Any], every: bool) -> Iterator[Episode]:
-        for s in sources:
-            value = 0.5 + 0.04 * (s.seed % 10) - 0.1 * r.random()
-            yield Episode(s.name, s.seed, value, {"objective": value}, 1, 1.0, 0.0)
-
-    for kind in ("memory", "journal"):
-        with tempfile.TemporaryDirectory() as folder:
-            begun = time.process_time()
-            with open_study(made, None if kind == "memory" else Path(folder) / "journal", "x") as study:
-                run_trials(study, play, lambda done, total, what: None)
-            print(f"{kind}: {1000 * (time.process_time() - begun) / made.options.trials:.1f} ms")
-
-
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["search", "real", "overhead"])
+    parser.add_argument("mode", choices=["search", "real"])
     parser.add_argument("names", nargs="*", choices=[*SEARCHES, []])
     parser.add_argument("--out", type=Path, default=Path("tuned"))
     parser.add_argument("--trials", type=int)
@@ -198,7 +172,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=1, help="search: processes; the result does not depend on it")
     add_data(parser)
     given = parser.parse_intermixed_args()
-    {"search": search, "real": real, "overhead": overhead}[given.mode](given)
+    {"search": search, "real": real}[given.mode](given)
 
 
 if __name__ == "__main__":
