@@ -187,7 +187,7 @@ def recordings(rows: list[Row]) -> None:
     head(["score", *(f"{m} min: {what}" for m in MINUTES for what in ("held", "width", "none"))])
     for key in (*KEYS, *MORE):
         row([key, *(cell for m in MINUTES for cell in cells(rows, key, m))])
-    print("\nby scene and tracker, share held\n")
+    print("\nby scene and tracker, share held")
     parts = sorted({(r["scene"], r["tracker"]) for r in rows})
     head(["score", *(f"{scene}, {tracker}, {m} min" for scene, tracker in parts for m in MINUTES)])
     for key in KEYS:

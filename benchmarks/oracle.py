@@ -94,7 +94,7 @@ def cells(mean: np.ndarray) -> list[str]:
 
 def synthetic(wanted: Sequence[str], seeds: range, every: bool) -> None:
     """Prints one row for each scenario and each suite; every: and one for each entry of the suites."""
-    print(f"\nOracle, seeds {seeds_text(seeds)}\n")
+    print(f"\nOracle, seeds {seeds_text(seeds)}")
     head(["scenario or suite", *COLUMNS, "lowest entry, boxes, box errors"])
     known: dict[str, np.ndarray] = {}
     for name in wanted:
@@ -109,7 +109,7 @@ def synthetic(wanted: Sequence[str], seeds: range, every: bool) -> None:
 
 def recordings(data: Path) -> None:
     """Prints one row for each recording that is there, and why a row is missing for each other one."""
-    print("\nReal recordings, det.txt\n")
+    print("\nReal recordings, det.txt")
     head(["recording", "oracle, boxes", "blob, boxes", "blob's share", "height", "5 %"])
     for path in REAL:
         if not (data / path).is_dir():

@@ -190,7 +190,7 @@ def measured(weakness: Weakness, folder: Path) -> float:
 
 def breaks(runs: int, episodes: int, folder: Path) -> None:
     """Prints a row for each weakness, of sweeps and of grids."""
-    print(f"\nBreaking points, {runs} runs of about {episodes} episodes\n")
+    print(f"\nBreaking points, {runs} runs of about {episodes} episodes")
     head(["tracker", "true", "episodes", "inside", "width, %", "inside, grid", "width, %, grid"])
     for weakness in WEAKNESSES:
         axis = weakness.axis
@@ -285,7 +285,7 @@ def searched(kind: str, number: int, scenes: int, random: bool, folder: Path) ->
 
 def searches(kinds: Iterable[str], count: int, scenes: int, folder: Path) -> list[Failure]:
     """Prints a row for each weakness and sampler; returns the worst failure of each search by TPE, if there is one."""
-    print(f"\nSearch, {count} searches of {scenes} scenes\n")
+    print(f"\nSearch, {count} searches of {scenes} scenes")
     head(["weakness", "sampler", "first, median", "with a failure", "failures, mean", "scenarios, mean"])
     worst_ones = []
     for kind in kinds:
@@ -308,7 +308,7 @@ def searches(kinds: Iterable[str], count: int, scenes: int, folder: Path) -> lis
 def story(count: int, scenes: int, folder: Path) -> None:
     """Prints how the weakness in changing light is found, made small and confirmed."""
     found = searches(["light"], count, scenes, folder)[:MINIMISED]
-    print(f"\nThe worst failures of the first {len(found)} searches by TPE, minimised\n")
+    print(f"\nThe worst failures of the first {len(found)} searches by TPE, minimised")
     head(["scenario", "seed", "people", "s", "difficulties", "episodes", "fails at first", "fails on fresh seeds"])
     for one in found:
         source = one.scene.source
@@ -352,7 +352,7 @@ def cost(folder: Path) -> None:
     given = ["--suite", SUITE, "--seeds", f"{seeds.start}:{seeds.stop}", "--out", str(folder / "cost")]
     assert run(["stress", *names, *given]) == 0
     whole = time.process_time() - begun
-    print(f"\nstress {' '.join([*names, *given[:-2]])}\n")
+    print(f"\nstress {' '.join([*names, *given[:-2]])}")
     head(["episodes alone, CPU s", "all, CPU s", "beyond them", "MB"])
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
     row([f"{plain:.0f}", f"{whole:.0f}", f"{whole / plain - 1:.1%}", f"{most:.0f}"])

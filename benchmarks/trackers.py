@@ -29,7 +29,7 @@ def print_ranking(title: str, options: ScoreOptions) -> None:
     found = ranking(options, source, source.open()).data
     by, rows = found["by"], found["ranking"]
     keys = shown_columns([one["scores"] for one in rows], by)
-    print(f"\n{title}, mean of {len(found['sequences'])} sequences\n")
+    print(f"\n{title}, mean of {len(found['sequences'])} sequences")
     head(["rank", "tracker", by, *keys])
     for one in rows:
         mean, low, high = (number(by, one[end], mean=True) for end in ("mean", "low", "high"))

@@ -160,7 +160,7 @@ def peers(parts: Sequence[str], run: PeerRun) -> None:
 
 def occluded(run: PeerRun) -> None:
     scenes = synthetic_scenes(range(20_000, 20_000 + run.scenes))
-    print(f"\nScenes with occlusion, test seeds, mean of {len(scenes)}\n")
+    print(f"\nScenes with occlusion, test seeds, mean of {len(scenes)}")
     head(["tracker", *SHOWN, "HOTA of `blob` minus this"])
     found = all_scores(run.python, scenes)
     own = np.array([s["HOTA"] for s in found["`blob`"]])
@@ -171,7 +171,7 @@ def occluded(run: PeerRun) -> None:
 
 
 def rates(run: PeerRun) -> None:
-    print(f"\nHOTA, mean of {', '.join(RATED)}, seed 20000\n")
+    print(f"\nHOTA, mean of {', '.join(RATED)}, seed 20000")
     head(["detected", "frames/s", *VARIANTS, *PEERS])
     panels = []
     for detected in DETECTED:
@@ -190,7 +190,7 @@ def rates(run: PeerRun) -> None:
 
 
 def real(run: PeerRun) -> None:
-    print("\nRecordings, det.txt\n")
+    print("\nRecordings, det.txt")
     head(["recording", "tracker", *SHOWN])
     for path in (TOWN_CENTRE, PETS, CAMPUS):
         for name, (found,) in all_scores(
@@ -200,7 +200,7 @@ def real(run: PeerRun) -> None:
 
 
 def speed(run: PeerRun) -> None:
-    print(f"\nFrames per CPU second, best of {run.rounds} rounds, and times SORT\n")
+    print(f"\nFrames per CPU second, best of {run.rounds} rounds, and times SORT")
     head(["squares, detected, false boxes", "`blob`", "`blob`, step only", *PEERS])
     for n, p_detect, clutter in FIELDS:
         scene = of_boxes(synthetic.plain(n, p_detect=p_detect, clutter=clutter))

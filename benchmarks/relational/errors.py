@@ -79,7 +79,7 @@ def particles(given: argparse.Namespace) -> None:
     for entry in (e for e in resolve("suite:occlusion", LABELS) if not given.entry or e.name in given.entry.split(",")):
         scenes = [simulate(entry.scenario, seed, 0, ()) for seed in given.seeds]
         print(f"\n{entry.name}: error per person and frame, m; seeds {given.seeds.start}:{given.seeds.stop}, "
-              f"filter seeds {given.filter_seeds.start}:{given.filter_seeds.stop}\n")  # fmt: skip
+              f"filter seeds {given.filter_seeds.start}:{given.filter_seeds.stop}")  # fmt: skip
         tables.head(["particles", *(f"{name}, {preset}" for preset in PRESETS for name in (*FILTERS, DIFFERENCE))])
         curves: dict[str, list[Array]] = {}
         for count in given.counts:
@@ -141,7 +141,7 @@ def pair(seed: int, length: float) -> tuple[Array, Iterator[Frame]]:
 
 def hidden(given: argparse.Namespace) -> None:
     """Prints a table: rows are lengths of the occlusion, columns the error of the hidden person in its last frame."""
-    print("\nerror of the hidden one of two people in the last frame of the occlusion, m, at most 2\n")
+    print("\nerror of the hidden one of two people in the last frame of the occlusion, m, at most 2")
     tables.head(["occlusion, s", *FILTERS, DIFFERENCE])
     curves: dict[str, list[Array]] = {name: [] for name in FILTERS}
     for length in LENGTHS:

@@ -91,7 +91,7 @@ def _pooled(scored: list[dict[str, float]], kind: str) -> str:
 def title(given: argparse.Namespace, count: int) -> None:
     """Prints what a table of scores is of; count: of its sequences."""
     print(f"\nsuite {given.suite}, {count} sequences, {given.counts[0]} particles, "
-          f"filter seeds {given.filter_seeds.start}:{given.filter_seeds.stop}\n")  # fmt: skip
+          f"filter seeds {given.filter_seeds.start}:{given.filter_seeds.stop}")  # fmt: skip
 
 
 def differences(before: Array, after: Array) -> list[str]:

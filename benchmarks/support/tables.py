@@ -27,7 +27,8 @@ def wilson(hits: int, count: int) -> tuple[float, float, float]:
 
 
 def head(columns: Sequence[str]) -> None:
-    """Prints the names of the columns and the rule under them."""
+    """Prints an empty line, the names of the columns and the rule under them."""
+    print()
     row(columns)
     print("|" + "---|" * len(columns))
 
@@ -39,7 +40,7 @@ def row(cells: Iterable[str]) -> None:
 
 def table(title: str, first: str, columns: Sequence[str], rows: Mapping[str, Sequence[str]]) -> None:
     """Prints a whole table; first: name of the first column, which holds the keys of `rows`."""
-    print(f"\n{title}\n")
+    print(f"\n{title}")
     head([first, *columns])
     for name, cells in rows.items():
         row([name, *cells])

@@ -48,7 +48,7 @@ def _filled(tracks: Tracks) -> Tracks:
     if not np.size(tracks.score) and np.ndim(tracks.id) == 1:
         tracks = tracks.replace(score=np.ones(len(tracks.id)))
     if not np.size(tracks.seen) and np.ndim(tracks.id) == 1:
-        tracks = tracks.replace(seen=np.ones(len(tracks.id), bool))
+        tracks = tracks.replace(seen=tracks.measured)
     if isinstance(tracks.events, tuple) and any(map(_has_open_frames, tracks.events)):
         tracks = tracks.replace(events=tuple(_with_frames(e, tracks.index) for e in tracks.events))
     return tracks
