@@ -264,7 +264,8 @@ class Particle(PointTracker):
         if self.plane == "image":
             pos, vel, cov = pos * self.unit, vel * self.unit, cov * self.unit**2
         box = boxes_at(pos, self.slots.size[rows]) if self.plane == "image" else None
-        return Tracks(frame.index, frame.t, self.plane, "person", id, np.full(len(id), -1), pos, vel, cov, box, score)
+        alone, seen = np.full(len(id), -1), self.slots.missed[rows] == 0
+        return Tracks(frame.index, frame.t, self.plane, "person", id, alone, pos, vel, cov, box, score, seen=seen)
 
     def _follow(self, state: Array) -> None: ...
 
