@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from scenarios.errors import InputError
 from scenarios.limits import PICTURE_SIDE
@@ -15,6 +16,19 @@ BoxScale = tuple[float, float]  # factors of x and y that make the boxes of a te
 
 
 @dataclass(frozen=True)
+class BoxOptions:
+    """How the boxes of a MOTChallenge text are read; None: not given."""
+
+    person_class: int | None = None  # the class of people
+    box_scale: BoxScale | None = None  # factors of x and y
+    min_score: float | None = None  # least score of detections, as it stands there
+
+    def given(self) -> dict[str, Any]:
+        """Returns the values of the options that are given, by their names on the command line."""
+        return {key.removeprefix("person_"): value for key, value in vars(self).items() if value is not None}
+
+
+@dataclass(frozen=True)
 class RecordingOptions:
     """The options of `open_source`, parsed; None: not given."""
 
@@ -23,9 +37,7 @@ class RecordingOptions:
     camera: Camera | None = None  # its calibration
     images: bool = True  # False leaves out the pictures of MOTChallenge folders
     background: BackgroundChoice | None = None  # which frames are the sample for background models
-    person_class: int | None = None  # the class of people in MOTChallenge texts
-    box_scale: BoxScale | None = None  # factors of x and y of the boxes of these
-    min_score: float | None = None  # least score of their detections, as it stands there
+    boxes: BoxOptions = BoxOptions()  # of MOTChallenge texts
 
     @property
     def scale(self) -> float:
@@ -33,9 +45,14 @@ class RecordingOptions:
         return float("nan") if self.px_per_m is None else self.px_per_m
 
     def reject(self, path: Path, kind: str, why: str, names: str) -> None:
-        """Raises InputError if any of the options `names` ("camera fps") is given: `why` says why it has no effect."""
-        found = [name for name in names.split() if getattr(self, name) is not None]
-        given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
+        """Raises InputError if any of the options `names` ("camera fps") is given: `why` says why it has no effect.
+
+        The name "boxes" stands for all options of boxes.
+        """
+        values = {name: value for name, value in vars(self).items() if name != "boxes" and value is not None}
+        boxes = self.boxes.given()
+        found = [key for name in names.split() for key in (boxes if name == "boxes" else [name])]
+        given = [f"--{name.replace('_', '-')}" for name in found if name in {**values, **boxes}]
         if given:
             remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
             raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
