@@ -8,6 +8,7 @@ frame rate and the names of the columns.
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Literal
 
@@ -16,13 +17,22 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.export.tidy_tables import TidyTables
 from sim.io.files.atomic import write_file
+from sim.io.files.own_files import refuse_foreign_file
 
 TextForm = Literal["trajnet", "pedpy"]
 NAMES = {"trajnet": "people.ndjson", "pedpy": "people.txt"}
+# of the texts written here; a text without people may be empty
+BEGINNINGS = {
+    "trajnet": re.compile(rb'\{"scene": \{"id": 0, "p": \d+, "s": \d+, "e": \d+, "fps": [^}]*\}\}\n|\Z'),
+    "pedpy": re.compile(rb"# framerate: \S+\n# id\tframe\tx/m\ty/m\n"),
+}
 
 
 def write_text(tables: TidyTables, folder: Path, form: TextForm, fps: float) -> list[Path]:
-    """Writes the people of tables into the folder and returns the path. Raises InputError if they are in the image."""
+    """Writes the people of tables into the folder and returns the path.
+
+    Raises InputError if they are in the image, or a file of another program is in the way.
+    """
     columns = tables.people.columns
     if "x_m" not in columns:
         raise InputError(
@@ -31,8 +41,15 @@ def write_text(tables: TidyTables, folder: Path, form: TextForm, fps: float) -> 
         )  # fmt: skip
     rows = list(zip(*(columns[name].tolist() for name in ("frame", "id", "x_m", "y_m")), strict=True))
     path = folder / NAMES[form]
+    if path.exists() and not (path.is_file() and _is_own(path, form)):
+        refuse_foreign_file(path)
     write_file(path, (_trajnet(tables, rows, fps) if form == "trajnet" else _pedpy(rows, fps)).encode())
     return [path]
+
+
+def _is_own(path: Path, form: TextForm) -> bool:
+    with path.open("rb") as file:
+        return BEGINNINGS[form].match(file.read(1000)) is not None
 
 
 def _trajnet(tables: TidyTables, rows: list[tuple[int, int, float, float]], fps: float) -> str:

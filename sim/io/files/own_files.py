@@ -38,7 +38,7 @@ def is_hidden(path: PurePath) -> bool:
 
 GENERATOR = "flockscope"  # the name in the element <meta name="generator"> of a page, and in the comment of a video
 
-HEAD = 1 << 16  # bytes of a page in which its generator stands
+HEAD = 1 << 16  # bytes of a file in which our name stands
 
 IHDR_END = 33  # bytes of a PNG file up to the end of its first chunk
 
@@ -62,7 +62,7 @@ Marks = Mapping[str, type]
 def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
     """Returns True if flockscope wrote the file, False if not, None if it is missing or cannot be parsed.
 
-    marks: of a .json file.
+    marks: of a .json file; without them it must be a COCO file.
     """
     if not path.is_file():
         return None
@@ -70,7 +70,9 @@ def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
         if path.suffix == ".json" and marks:
             found = tables.read_json(path)
             return all(isinstance(found.get(key), kind) for key, kind in marks.items())
-        kinds = {".parquet": tables.is_own_table, ".html": _page, ".png": _picture, ".mp4": _video}
+        kinds = {
+            ".parquet": tables.is_own_table, ".html": _page, ".png": _picture, ".mp4": _video, ".json": _coco
+        }  # fmt: skip
         return path.suffix in kinds and kinds[path.suffix](path)
     except (InputError, OSError, ValueError):
         return None
@@ -86,8 +88,16 @@ def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
 
 
 def _page(path: Path) -> bool:
+    return _begins_with(path, f'<meta name="generator" content="{GENERATOR}">')
+
+
+def _coco(path: Path) -> bool:
+    return _begins_with(path, f'"description": "{GENERATOR}"')
+
+
+def _begins_with(path: Path, text: str) -> bool:
     with path.open("rb") as file:
-        return f'<meta name="generator" content="{GENERATOR}">'.encode() in file.read(HEAD)
+        return text.encode() in file.read(HEAD)
 
 
 def _picture(path: Path) -> bool:

@@ -41,14 +41,17 @@ class SeqInfo:
 
 
 def read_seqinfo(path: Path) -> SeqInfo:
-    """Reads the section [Sequence] of a seqinfo.ini; without it every key counts as missing."""
+    """Reads the section [Sequence] of a seqinfo.ini; in an empty file every key counts as missing."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read_string(read_text(path))
     except configparser.Error as error:
         reason = (error.message.splitlines() or ["no ini file"])[0]
         raise InputError(file=path, got=reason, expected="key=value lines", remedy="correct the file") from None
-    section = dict(parser["Sequence"]) if parser.has_section("Sequence") else {}
+    if parser.sections() and not parser.has_section("Sequence"):
+        got = ", ".join(f"[{name}]" for name in parser.sections())
+        raise InputError(file=path, got=got, expected="[Sequence]", remedy="correct the name of the section")
+    section = dict(parser["Sequence"]) if parser.sections() else {}
 
     def number(key: str, low: float, high: float, whole: bool = True) -> float | None:
         text = section.get(key.lower())
