@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,17 +46,18 @@ class RecordingOptions:
         return float("nan") if self.px_per_m is None else self.px_per_m
 
     def reject(self, path: Path, kind: str, why: str, names: str) -> None:
-        """Raises InputError if any of the options `names` ("camera fps") is given: `why` says why it has no effect.
+        """Refuses the options `names`; "boxes" stands for all options of boxes. See `refuse_options`."""
+        values = {**vars(self), **vars(self.boxes)}
+        refuse_options(values, names.replace("boxes", " ".join(vars(self.boxes))), path, kind, why)
 
-        The name "boxes" stands for all options of boxes.
-        """
-        values = {name: value for name, value in vars(self).items() if name != "boxes" and value is not None}
-        boxes = self.boxes.given()
-        found = [key for name in names.split() for key in (boxes if name == "boxes" else [name])]
-        given = [f"--{name.replace('_', '-')}" for name in found if name in {**values, **boxes}]
-        if given:
-            remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
-            raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
+
+def refuse_options(values: Mapping[str, Any], names: str, path: Path, kind: str, why: str) -> None:
+    """Raises InputError if any of the options `names` ("camera fps") has a value: `why` says why it has no effect."""
+    found = [name for name in names.split() if values[name] is not None]
+    given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
+    if given:
+        remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
+        raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
 
 
 NO_OPTIONS = RecordingOptions()

@@ -30,7 +30,7 @@ from sim.io.formats.labels import labelled_sequence, require_size
 from sim.io.formats.mot_table import table_of_rows
 from sim.io.formats.mot_text import truth_of_table
 from sim.io.formats.options import RecordingOptions
-from sim.types import Ints, Sequence
+from sim.types import Ints, Sequence, Truth
 
 NDJSON = ".ndjson"
 ETH_FPS = 2.5
@@ -75,10 +75,11 @@ def open_text(path: Path, layout: str, options: RecordingOptions) -> Sequence:
     rows.reject(table.id < 0, "ids from 0", "correct the id")
     length = int(table.frame.max())
     require_size(path, length, table.id)
-    return labelled_sequence(
-        layout, path, path.stem, rate, length, lambda: truth_of_table(table, path.stem, rate, length, options.scale),
-        options.scale,
-    )  # fmt: skip
+
+    def truth() -> Truth:
+        return truth_of_table(table, path.stem, rate, length, options.scale)
+
+    return labelled_sequence("people text", path, path.stem, rate, length, truth, options.scale)
 
 
 def _with_frames(rows: NumericTable, frame: Ints) -> NumericTable:

@@ -12,7 +12,7 @@ from sim.io.export.places import Places, parse_places
 from sim.io.export.tidy_tables import NOWHERE, Form, TidyTables, run_tables, truth_tables, write_tables
 from sim.io.files.own_files import output_paths
 from sim.io.formats.mot_folder import frame_rate
-from sim.io.formats.options import RecordingOptions
+from sim.io.formats.options import refuse_options
 from sim.io.source import holds_sequences, open_source
 from sim.io.store.seal import WHOLE, is_run, is_sequence, run_folder
 from sim.io.store.track_files import read_checked_tracks
@@ -85,7 +85,7 @@ def _of_runs(options: TrajnetOptions, own: bool) -> list[Job]:
                 remedy="give the text itself",
             )  # fmt: skip
         if "fps" in stored.info:
-            RecordingOptions(fps=options.fps).reject(folder, "a run", "run.json states it", "fps")
+            refuse_options(vars(options), "fps", folder, "a run", "run.json states it")
         fps = frame_rate(options.fps, stored.info.get("fps"))
         facts = {"sequence": stored.info.get("sequence", folder.name), "fps": fps}
         jobs.append((target, facts, partial(_run, stored, fps)))

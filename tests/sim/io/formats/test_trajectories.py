@@ -10,6 +10,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.types import Sequence
+from tracking.grouping.known_people import known_people
 
 PLACES = [(780, 1, 8.46, 3.59), (790, 1, 9.57, 3.79), (790, 2, 9.57, 4.79), (810, 2, 10.57, 4.79)]
 TRAJNET = '{"scene": {"id": 0, "p": 1, "s": 780, "e": 810, "fps": 2.5, "tag": [1, []]}}\n' + "".join(
@@ -50,6 +51,15 @@ def test_the_rate_of_eth_is_assumed_with_a_warning(tmp_path):
         opened(tmp_path, "walk.txt", ETH)
     assert opened(tmp_path, "walk.txt", ETH, fps=5).fps == 5
     assert opened(tmp_path, "walk.txt", ETH.replace("\t", " "), fps=5).truth.frame.tolist() == [1, 2, 2, 4]
+
+
+@pytest.mark.filterwarnings("ignore:trajectories without a frame rate")
+@pytest.mark.parametrize("name", TEXTS)
+def test_groups_are_found_without_a_look_ahead(tmp_path, name):
+    """Velocities of the labels are differences over a centred window."""
+    sequence = opened(tmp_path, name, TEXTS[name])
+    assert np.isfinite(sequence.truth.vel).all()
+    assert all(np.isnan(tracks.vel).all() for tracks in known_people(sequence))
 
 
 def test_a_folder_of_ndjson_is_a_dataset(tmp_path):
