@@ -22,7 +22,7 @@ NAME_THEM = "name the columns in the first line, as frame,id,x,y or frame,id,lef
 # More than 18 digits may not fit into 64 bits.
 WHOLE = re.compile("[-+]?[0-9]{1,18}")
 LARGEST = 2**52  # whole numbers pass through float64
-CORRECT = "remove or correct the line"
+CORRECT = "remove or correct it"
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ def _frames_at(path: Path, sequence: Sequence, seconds: Array) -> Ints:
     near = away <= HALF / sequence.fps
     fits = near & (np.abs(seconds - nearest) <= SAME)
     out = f"{(~fits).sum()} of {len(fits)} boxes have times of no frame, or of one that has nearer ones"
-    if near.mean() < 0.5:
+    if len(near) and near.mean() < 0.5:
         raise InputError(
             file=path, place="times", got=f"{seconds.min():g} to {seconds.max():g} s: {out}",
             expected=f"times of {len(times)} frames, {times[0]:g} to {times[-1]:g} s",

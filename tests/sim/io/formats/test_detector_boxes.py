@@ -159,8 +159,10 @@ def test_results_are_regular_files_perhaps_with_a_byte_order_mark(tmp_path, vide
 
 def test_a_text_without_boxes_is_refused(tmp_path, video):
     (plain,) = open_source(video)
-    with pytest.raises(InputError, match="no box"):
-        with_boxes(plain, mot(tmp_path / "det.txt", []))
+    (tmp_path / "det.csv").write_text("t,left,top,width,height\n")
+    for path in (mot(tmp_path / "det.txt", []), tmp_path / "det.csv"):
+        with pytest.raises(InputError, match="no box"):
+            with_boxes(plain, path)
 
 
 def test_boxes_of_another_picture_size(tmp_path, video):
