@@ -62,11 +62,6 @@ def ground_positions(table: MotTable) -> Array | None:
     return None if known is None else np.where(known[:, None], table.rest[:, 1:4], np.nan)
 
 
-def has_ground(table: MotTable) -> bool:
-    """Returns True if `ground_positions` gives positions, without its warning."""
-    return _known(table)[0] is not None
-
-
 def _known(table: MotTable) -> tuple[Bools | None, str]:
     if table.rest.shape[1] < 4:
         return None, ""
@@ -254,7 +249,8 @@ def classes_of(table: MotTable, named: bool) -> Array | None:
 
 
 def _one_for_each(table: MotTable, column: Array) -> bool:
-    if (table.id < 0).any() or column.max(initial=0) < 2 or column.max(initial=0) > LAST_CLASS or has_ground(table):
+    highest = column.max(initial=0)
+    if (table.id < 0).any() or not 2 <= highest <= LAST_CLASS or _known(table)[0] is not None:
         return False
     order = np.lexsort((column, table.id))
     same = np.diff(table.id[order]) == 0
