@@ -22,7 +22,7 @@ from scenarios.limits import JSON_BYTES, is_number
 from scenarios.reading import parse_json
 from sim.io.files.numeric_text import NumericTable, read_text
 from sim.io.formats import mot_text
-from sim.io.formats.mot_table import table_of_rows
+from sim.io.formats.mot_table import read_table, table_of_rows
 from sim.io.formats.options import NO_OPTIONS, BoxOptions
 from sim.types import Array, Frame, Ints, Sequence
 
@@ -39,9 +39,11 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     """
     if path.suffix.lower() == ".json":
         table = table_of_rows(_coco_results(path), box_scale=options.box_scale)
-        found = mot_text.detections_of_table(table, options)
     else:
-        found = mot_text.read_detections(path, options, frames_at=partial(_frames_at, path, sequence))
+        frames_at = partial(_frames_at, path, sequence)
+        table = read_table(path, boxless=True, box_scale=options.box_scale, frames_at=frames_at)
+    mot_text.require_classes(table, options.person_class)
+    found = mot_text.detections_of_table(table, options)
     if not len(found.frame):
         raise InputError(file=path, got="no box", expected="the boxes of a detector", remedy="check the file")
     if found.plane != "image" or found.box is None:

@@ -226,6 +226,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     if not (table.id == -1).all():
         options.reject(path, "a text of people with ids", "it is for detections", "min_score")
         return sequence
+    mot_text.require_classes(table, of_boxes.person_class)
     found = mot_text.detections_of_table(table, of_boxes)
 
     def frames() -> Iterator[Frame]:

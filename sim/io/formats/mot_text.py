@@ -27,7 +27,7 @@ from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.biwi import labels_of
 from sim.io.formats.labels import CHORD, differentiate, labelled_truth_fields, require_size
-from sim.io.formats.mot_table import GROUND_COLUMNS, FramesAt, MotTable, corner_doubt, read_table, require_pixels
+from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable, corner_doubt, read_table, require_pixels
 from sim.io.formats.options import BoxOptions
 from sim.scene.visibility import scale_of_all_boxes
 from sim.truth.group_hulls import box_groups
@@ -205,12 +205,17 @@ def labelled_people(table: MotTable, person_class: int | None) -> Bools:
     elif (flag == 0).all() and len(keep):
         text = f"{file}: column 7 is 0 in all {len(keep)} rows; it is taken as a confidence, and all rows count"
         warnings.warn(text, stacklevel=2)
+    require_classes(table, person_class)
+    return of_class(table, keep, person_class)
+
+
+def require_classes(table: MotTable, person_class: int | None) -> None:
+    """Raises InputError if the user named the class of people, and the text has no classes."""
     if person_class is not None and classes_of(table, True) is None:
         raise InputError(
-            file=file, place="--class", got=f"{table.rows.values.shape[1]} columns without classes",
+            file=table.rows.file, place="--class", got=f"{table.rows.values.shape[1]} columns without classes",
             expected="a class in column 8", remedy="leave --class out",
         )  # fmt: skip
-    return of_class(table, keep, person_class)
 
 
 def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
@@ -324,11 +329,9 @@ class DetectionTable:
         return Detections(index, (index - 1) / fps, self.plane, self.pos[low:high], None, box, self.score[low:high])
 
 
-def read_detections(
-    path: Path, options: BoxOptions, length: int | None = None, frames_at: FramesAt | None = None
-) -> DetectionTable:
-    """Reads a det.txt as `detections_of_table`. frames_at: as `read_named` takes it."""
-    table = read_table(path, length=length, boxless=True, box_scale=options.box_scale, frames_at=frames_at)
+def read_detections(path: Path, options: BoxOptions, length: int | None = None) -> DetectionTable:
+    """Reads a det.txt as `detections_of_table`. length: the last frame allowed."""
+    table = read_table(path, length=length, boxless=True, box_scale=options.box_scale)
     return detections_of_table(table, options)
 
 

@@ -165,6 +165,14 @@ def test_a_text_without_boxes_is_refused(tmp_path, video):
             with_boxes(plain, path)
 
 
+def test_a_class_of_a_text_without_classes_is_refused(tmp_path, video):
+    (plain,) = open_source(video)
+    with pytest.raises(InputError, match="--class: got 7 columns without classes"):
+        with_boxes(plain, mot(tmp_path / "det.txt"), BoxOptions(person_class=1))
+    with pytest.raises(InputError, match="--class: got 7 columns without classes"):
+        open_source(mot(tmp_path / "det.txt"), fps=10, person_class=1)
+
+
 def test_boxes_of_another_picture_size(tmp_path, video):
     (plain,) = open_source(video)
     large = [(k, 4 * x, 4 * y, 4 * w, 4 * h, s) for k, x, y, w, h, s in ROWS]
