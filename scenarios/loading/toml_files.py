@@ -88,7 +88,7 @@ def parse(path: Path) -> Table:
     """Returns the content of a TOML file, without applying `extends`."""
     body = read_regular(path, TOML_BYTES, "check the path and its permissions")
     try:
-        return parse_toml(body.decode(), path)
+        return parse_toml(body.decode("utf-8-sig"), path)
     except UnicodeDecodeError as error:
         place, got = f"byte {error.start}", "bytes that are not UTF-8"
         raise InputError(file=path, place=place, got=got, expected="TOML", remedy="save the file as UTF-8") from None

@@ -16,9 +16,10 @@ from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.reading import is_present, require_regular
 from sim.io.files.own_files import is_hidden
-from sim.io.formats import biwi, caviar, kitti_tracking, mot_folder, trajectories, video
+from sim.io.formats import biwi, caviar, mot_folder, people_texts, video
 from sim.io.formats.calibration import read_calibration
-from sim.io.formats.options import RecordingOptions, parse_box_scale
+from sim.io.formats.detector_boxes import with_boxes
+from sim.io.formats.options import BoxOptions, RecordingOptions, parse_box_scale
 from sim.io.pictures.background_sample import parse_choice
 from sim.io.store import sequence_folder
 from sim.io.store.seal import is_sequence
@@ -42,6 +43,7 @@ def open_source(
     person_class: int | None = None,
     box_scale: str | None = None,
     min_score: float | None = None,
+    boxes: str | Path | None = None,
 ) -> list[Sequence]:
     """Opens a path that holds sequences or recordings, in any known format.
 
@@ -58,6 +60,8 @@ def open_source(
         person_class: Class of people in MOTChallenge texts that have classes; None: 1, with a warning about others.
         box_scale: Factor of the boxes of MOTChallenge texts that are not in pixels of the pictures, "X" or "X,Y".
         min_score: Detections of MOTChallenge texts with a lower score, as it stands there, are left out.
+        boxes: File with the detections of one sequence, which the three options above then belong to: MOTChallenge
+            text, table with named columns, or COCO results.
 
     Returns:
         The Sequences: of a folder sorted by path, subfolders first. Truth and pictures are read later.
@@ -72,10 +76,21 @@ def open_source(
             raise InputError(place=option, got=value, expected=expected, remedy=f"correct {option}")
     if isinstance(camera, str | Path):
         camera = read_calibration(Path(camera))
+    of_boxes = BoxOptions(person_class, None if box_scale is None else parse_box_scale(box_scale), min_score)
     options = RecordingOptions(
-        fps, px_per_m, camera, images, None if background is None else parse_choice(background), person_class,
-        None if box_scale is None else parse_box_scale(box_scale), min_score,
+        fps, px_per_m, camera, images, None if background is None else parse_choice(background),
+        of_boxes if boxes is None else BoxOptions(),
     )  # fmt: skip
+    sequences = _open(path, options)
+    if boxes is None:
+        return sequences
+    if len(sequences) > 1:
+        got, remedy = f"{len(sequences)} sequences", "give one of them"
+        raise InputError(place="--boxes", got=got, expected="one sequence", remedy=remedy)
+    return [with_boxes(sequences[0], Path(boxes), of_boxes)]
+
+
+def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
     if not os.path.exists(path):
         raise InputError(file=path, got="nothing there", expected=KINDS, remedy="check the path")
     if not os.path.isdir(path):
@@ -133,26 +148,28 @@ def split_and_name(folder: Path) -> str:
 def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     suffix = path.suffix.lower()
     if suffix == ".xml":
-        no = "camera background person_class box_scale min_score"
-        options.reject(path, "a CAVIAR recording", "its truth is in the image, without pictures", no)
+        options.reject(
+            path, "a CAVIAR recording", "its truth is in the image, without pictures", "camera background boxes"
+        )
         return caviar.open_file(path, options)
     if path.name == "obsmat.txt":
         return _open_folder(path.parent, options)
     if suffix in video.SUFFIXES:
-        options.reject(path, "a video", "it has no text", "person_class box_scale min_score")
+        options.reject(path, "a video", "it has no text", "boxes")
         return video.open_video(path, options)
-    if suffix in (".txt", ".csv", trajectories.NDJSON) and trajectories.is_trajectories(path):
-        no = "px_per_m camera background person_class box_scale min_score"
-        options.reject(path, "a text of trajectories", "it is in metres, without pictures", no)
-        return trajectories.open_text(path, options)
-    if suffix == ".txt" and kitti_tracking.is_kitti_tracking(path):
-        no = "camera background person_class box_scale min_score"
-        options.reject(path, "a text of KITTI", "its camera drives, and it has labels of people only", no)
-        return kitti_tracking.open_text(path, options)
-    if suffix in (".txt", ".csv"):
+    if suffix not in (".txt", ".csv", people_texts.NDJSON):
+        raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy="check the path")
+    layout = people_texts.layout_of(path)
+    if layout is None:
         options.reject(path, "a text", "it has no pictures", "background")
         return mot_folder.open_text(path, options)
-    raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy="check the path")
+    if layout == "kitti":
+        why = "its camera drives, and it has labels of people only"
+        options.reject(path, "a text of KITTI", why, "camera background boxes")
+    else:
+        why = "it is in metres, without pictures"
+        options.reject(path, "a text of trajectories", why, "px_per_m camera background boxes")
+    return people_texts.open_text(path, layout, options)
 
 
 def _kind(folder: Path) -> str | None:
@@ -176,7 +193,7 @@ def _find(folder: Path, depth: int) -> list[Path]:
 
 def _is_recording(path: Path) -> bool:
     suffix = path.suffix.lower()
-    return suffix in (*video.SUFFIXES, trajectories.NDJSON) or (suffix == ".xml" and caviar.is_caviar(path))
+    return suffix in (*video.SUFFIXES, people_texts.NDJSON) or (suffix == ".xml" and caviar.is_caviar(path))
 
 
 def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
@@ -184,12 +201,11 @@ def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
         return _open_file(path, options)
     match _kind(path):
         case "generated":
-            no = "fps px_per_m camera person_class box_scale min_score"
-            options.reject(path, "a generated sequence", "it knows its own", no)
+            options.reject(path, "a generated sequence", "it knows its own", "fps px_per_m camera boxes")
             return sequence_folder.open_sequence(path, background=options.background)
         case "biwi":
-            no = "px_per_m camera background person_class box_scale min_score"
-            options.reject(path, "a BIWI recording", "it is in metres, without pictures", no)
+            why = "it is in metres, without pictures"
+            options.reject(path, "a BIWI recording", why, "px_per_m camera background boxes")
             return biwi.open_folder(path, options)
         case _:
             return mot_folder.open_folder(path, options)

@@ -61,9 +61,9 @@ def _camera(name: str) -> Callable[[Path], None]:
     return read
 
 
-def _source(name: str = "") -> Callable[[Path], None]:
+def _source(name: str = "", boxes: str | None = None) -> Callable[[Path], None]:
     def read(folder: Path) -> None:
-        for sequence in open_source(folder / name):
+        for sequence in open_source(folder / name, boxes=None if boxes is None else folder / boxes):
             list(islice(sequence.frames(), SHOWN))
             list(islice(sequence.without_pictures(), SHOWN))
             _ = sequence.truth
@@ -101,7 +101,9 @@ READERS: dict[str, Callable[[Path], object]] = {
     "mot": _source(),
     "mot-text": _source("people.txt"),
     "trajnet": _source("walk.ndjson"),
+    "coco-results": _source("walk.ndjson", "walk.json"),
     "eth": _source("walk.txt"),
+    "kitti": _source("0012.txt"),
     "pedpy": _source("walk.txt"),
     "labelled-text": _source("people.csv"),
     "tracks-text": read_tracks,

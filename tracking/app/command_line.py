@@ -71,6 +71,8 @@ class StrictCommand(TyperCommand):
         rest = super().parse_args(ctx, args)
         for param in params:
             text = given.get(param.name)
+            if text == "":  # as of an unset variable of a shell
+                raise InputError(place=param.opts[0], got="''", expected="a value", remedy="give one, or leave it out")
             if isinstance(text, str) and isinstance(ctx.params.get(param.name), int | float):
                 _check_number(param.opts[0], text)
         return rest

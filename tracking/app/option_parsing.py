@@ -99,13 +99,13 @@ def toml_values(texts: Iterable[str]) -> dict[str, Any]:
     return {".".join(steps): value for steps, value in map(parse_setting, texts)}
 
 
-def output_file(out: Path, suffix: str) -> Path:
+def output_file(out: Path, suffix: str, option: str = "--out") -> Path:
     """Returns `out` if it is a file name with this suffix; else raises InputError."""
     is_folder = out.is_dir()
     if is_folder or out.suffix.lower() != suffix:
         got, better = (f"{out}, a folder", out / "page") if is_folder else (str(out), out.with_suffix(""))
         remedy = f"write {better}{suffix}"
-        raise InputError(place="--out", got=got, expected=f"a file that ends in {suffix}", remedy=remedy)
+        raise InputError(place=option, got=got, expected=f"a file that ends in {suffix}", remedy=remedy)
     return out
 
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from scenarios.errors import FlockscopeError, InputError, WorkError
-from sim.io.formats.detector_boxes import with_boxes
-from sim.io.formats.options import parse_box_scale
+from scenarios.errors import FlockscopeError, WorkError
 from sim.io.source import open_source
 from sim.types import Sequence
 from tracking.app.progress import ProgressMeter
@@ -37,20 +35,8 @@ class OpenedAs:
     boxes: Path | None = None
 
     def open(self) -> list[Sequence]:
-        """Returns the sequences of the source, of `boxes` with these. Raises InputError as `open_source`."""
-        if self.boxes is None:
-            return self._opened()
-        sequences = replace(self, boxes=None, person_class=None, box_scale=None, min_score=None)._opened()
-        if len(sequences) > 1:
-            got, remedy = f"{len(sequences)} sequences", "give one of them"
-            raise InputError(place="--boxes", got=got, expected="one sequence", remedy=remedy)
-        scale = None if self.box_scale is None else parse_box_scale(self.box_scale)
-        return [with_boxes(sequences[0], self.boxes, self.person_class, scale, self.min_score)]
-
-    def _opened(self) -> list[Sequence]:
-        options = asdict(self)
-        del options["boxes"]
-        return open_source(**options)
+        """Returns the sequences of the source. Raises InputError as `open_source`."""
+        return open_source(**asdict(self))
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,8 @@ from scenarios.errors import InputError
 from sim.dataset.replay import on_ground
 from sim.types import FrameTruth, Plane, Sequence, Tracks, Truth
 
-LOOK_AHEAD = ("mot", "mot text")  # Kinds of sources whose velocities are computed from earlier and later positions.
+# Kinds of sources whose velocities are computed from earlier and later positions.
+LOOK_AHEAD = ("mot", "mot text", "people text")
 
 
 def known_people(sequence: Sequence) -> list[Tracks]:

@@ -20,7 +20,7 @@ from scenarios.limits import is_number
 from sim import hashing
 from sim.dataset.splits import split_of
 from sim.io.files.atomic import write_file
-from sim.io.files.own_files import output_paths
+from sim.io.files.own_files import GENERATOR, output_paths, refuse_foreign_file
 from sim.io.files.tables import json_text
 from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
@@ -53,7 +53,8 @@ def coco(
         The paths of the files. The same dataset gives the same bytes.
 
     Raises:
-        InputError: No sequence has labelled boxes, two have one name, or an argument is wrong.
+        InputError: No sequence has labelled boxes, two have one name, an argument is wrong, or a split's file is of
+            another program.
     """
     if not is_number(min_visibility, 0, 1):
         raise InputError(
@@ -74,6 +75,9 @@ def coco(
     paths = [out if len(splits) == 1 else out.with_name(f"{out.stem}-{split}{out.suffix}") for split in splits]
     for some in splits.values():
         output_paths("", [s.name for s in some], source=source)
+    for path in paths:
+        if path != out:
+            refuse_foreign_file(path)
     for path, some in zip(paths, splits.values(), strict=True):
         write_file(path, _document(some, root, path, min_visibility).encode())
     return paths
@@ -88,7 +92,7 @@ def _split(sequence: Sequence, root: Path) -> str:
 
 
 def _document(sequences: list[Sequence], root: Path, path: Path, min_visibility: float) -> str:
-    info: dict[str, Any] = {"description": "flockscope", "version": "1"}
+    info: dict[str, Any] = {"description": GENERATOR, "version": "1"}
     if all(s.source.get("kind") == "generated" for s in sequences):
         folders = [Path(s.source["path"]) for s in sequences]
         hashes = {split_and_name(folder): read_whole_manifest(folder)["content_hash"] for folder in folders}

@@ -32,7 +32,7 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
         name, _, cells = text.partition("=")
         values = [float(cell) if is_number_text(cell) else np.inf for cell in cells.split(",")]
         count = len(values) == 4 if option == "--line" else len(values) >= 6 and len(values) % 2 == 0
-        if not name.isidentifier() or name in found or not count or np.max(np.abs(values)) > COORDINATE:
+        if not name.isidentifier() or name in found or not count or not np.max(np.abs(values)) <= COORDINATE:
             raise InputError(
                 place=option, got=repr(text), expected=f"{expected[option]}, each name once",
                 remedy="write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image",

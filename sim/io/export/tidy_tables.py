@@ -1,13 +1,19 @@
-"""Tidy tables of a run or a truth: people, people_summary, groups, members, events and counts, as CSV or Parquet.
+"""Tidy tables of a run or a truth: people, people_summary, groups, members, events and counts, and their files.
 
 A tidy table has one observation a row. The names of its columns end with their unit: `x_m`, `speed_m_s`, `t_s`; what is
 in the image is in px. Unknown values are empty cells. Groups and members are those that the run or truth states in each
 frame; nothing is derived anew, so the tables agree with it.
+
+All tables are written as CSV or Parquet; the people also as texts of positions on the ground in m. TrajNet++: a JSON
+object a line, for each person a scene that spans the frames of the person, then a track for each person and frame.
+PedPy and JuPedSim: lines `id frame x y`, apart by tabs, below comments with the frame rate and the names of columns.
 """
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from collections.abc import Mapping
 from collections.abc import Sequence as Series
 from dataclasses import dataclass, fields
@@ -29,7 +35,12 @@ from sim.types import Array, GroupEvent, Groups, Ints, Tracks, Truth
 if TYPE_CHECKING:
     import pyarrow
 
-Form = Literal["csv", "parquet"]
+Form = Literal["csv", "parquet", "trajnet", "pedpy"]
+# name and beginning of the texts of people; of nobody, one is empty
+TEXTS = {
+    "trajnet": ("people.ndjson", rb'\{"scene": \{"id": 0, "p": \d+, "s": \d+, "e": \d+, "fps": [^}]*\}\}\n|\Z'),
+    "pedpy": ("people.txt", rb"# framerate: \S+\n# id\tframe\tx/m\ty/m\n"),
+}
 MINUTE = 60.0  # s
 LINE = 2  # corners of a line
 NOWHERE: Places = {}
@@ -166,23 +177,62 @@ def truth_tables(truth: Truth, places: Places = NOWHERE) -> TidyTables:
 
 
 def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[str, Any]) -> list[Path]:
-    """Writes each table as folder/NAME.csv or .parquet and returns the paths; `facts` is metadata of Parquet files.
+    """Writes each table as folder/NAME.csv or .parquet, or the people as a text, and returns the paths.
 
-    Raises InputError if a file of another program is in the way.
+    facts: "fps" and others, the metadata of Parquet files. Raises InputError if a file of another program is in the
+    way, or a text is wanted of people in the image.
     """
+    if form in TEXTS:
+        name, beginning = TEXTS[form]
+        text = _trajnet if form == "trajnet" else _pedpy
+        body = text(tables, _places_in_metres(tables, folder), facts["fps"])
+        _refuse_foreign(folder / name, beginning)
+        write_file(folder / name, body.encode())
+        return [folder / name]
     found = {folder / f"{f.name}.{form}": getattr(tables, f.name).to_arrow() for f in fields(tables)}
     for path, table in found.items():
-        if not (form == "csv" and path.is_file() and _is_own_csv(path, table)):
-            refuse_foreign_file(path)
+        # The first columns have the same names for runs and truths, in m and in px.
+        _refuse_foreign(path, re.escape(",".join(table.column_names[:2]) + ",").encode() if form == "csv" else None)
     for path, table in found.items():
         write_file(path, _csv(table) if form == "csv" else _parquet(table, facts))
     return list(found)
 
 
-def _is_own_csv(path: Path, table: pyarrow.Table) -> bool:
-    # The first columns have the same names for runs and truths, in m and in px.
-    with path.open("rb") as file:
-        return file.read(1000).startswith(",".join(table.column_names[:2]).encode() + b",")
+def _refuse_foreign(path: Path, beginning: bytes | None) -> None:
+    """Raises InputError if there is a file of another program; of a text of ours the beginning (a pattern) is known."""
+    if beginning is not None and path.is_file():
+        with path.open("rb") as file:
+            if re.match(beginning, file.read(1000)):
+                return
+    refuse_foreign_file(path)
+
+
+Rows = list[tuple[int, int, float, float]]  # frame, id, x, y
+
+
+def _places_in_metres(tables: TidyTables, folder: Path) -> Rows:
+    columns = tables.people.columns
+    if "x_m" not in columns:
+        raise InputError(
+            file=folder, got="people in the image, px", expected="positions on the ground, m",
+            remedy="track with --camera, or from points",
+        )  # fmt: skip
+    return list(zip(*(columns[name].tolist() for name in ("frame", "id", "x_m", "y_m")), strict=True))
+
+
+def _trajnet(tables: TidyTables, rows: Rows, fps: float) -> str:
+    stays = tables.people_summary.columns
+    spans = zip(*(np.asarray(stays[name]).tolist() for name in ("id", "start_frame", "end_frame")), strict=True)
+    scenes = [
+        {"scene": {"id": k, "p": p, "s": first, "e": last, "fps": fps}} for k, (p, first, last) in enumerate(spans)
+    ]
+    tracks = [{"track": {"f": f, "p": p, "x": round(x, 4), "y": round(y, 4)}} for f, p, x, y in rows]
+    return "".join(json.dumps(line) + "\n" for line in [*scenes, *tracks])
+
+
+def _pedpy(tables: TidyTables, rows: Rows, fps: float) -> str:
+    head = f"# framerate: {fps:g}\n# id\tframe\tx/m\ty/m\n"
+    return head + "".join(f"{p}\t{f}\t{x:.4f}\t{y:.4f}\n" for f, p, x, y in rows)
 
 
 def _csv(table: pyarrow.Table) -> bytes:

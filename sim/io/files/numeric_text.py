@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import DETECTIONS, TEXT_BYTES
+from scenarios.limits import COORDINATE, DETECTIONS, FRAMES, TEXT_BYTES
 from scenarios.reading import read_regular
 from sim.types import Array, Bools, Ints
 
@@ -21,6 +21,8 @@ NAME_THEM = "name the columns in the first line, as frame,id,x,y or frame,id,lef
 
 # More than 18 digits may not fit into 64 bits.
 WHOLE = re.compile("[-+]?[0-9]{1,18}")
+LARGEST = 2**52  # whole numbers pass through float64
+CORRECT = "remove or correct it"
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,7 @@ class NumericTable:
     values: Array  # (N, C) the numbers, float64
     line: Ints  # (N,) line number of each row in the file, from 1
     layout: str = ""  # what the columns must be, for the remedy of errors that most rows have
+    unit: str = "line"  # what a row is in the file, for errors
 
     def reject(self, wrong: Bools | np.bool_, expected: str, remedy: str, most: str | None = None) -> None:
         """Raises InputError about the first row where `wrong` (N,) is True; `most` is the remedy if most rows are."""
@@ -39,15 +42,31 @@ class NumericTable:
             got = ",".join(f"{v:g}" for v in self.values[k])
             # If most rows are wrong, the columns are, and not these lines.
             if total > 1 and 2 * count > total:
-                got += f" (like {count} of {total} lines)"
+                got += f" (like {count} of {total} {self.unit}s)"
                 remedy = most or f"check the columns, which are {self.layout or 'the same in each line'}"
-            raise InputError(file=self.file, place=f"line {self.line[k]}", got=got, expected=expected, remedy=remedy)
+            place = f"{self.unit} {self.line[k]}"
+            raise InputError(file=self.file, place=place, got=got, expected=expected, remedy=remedy)
 
     def integers(self, column: int, name: str) -> Ints:
         """Returns column number `column` (from 0) as integers (N,)."""
         v = self.values[:, column]
-        self.reject((v != np.round(v)) | (np.abs(v) > 2**52), f"a whole number as {name}", f"correct the {name}")
+        self.reject(v != np.round(v), f"a whole number as {name}", f"correct the {name}")
+        self.reject(np.abs(v) > LARGEST, f"a whole number within {LARGEST} as {name}", f"correct the {name}")
         return v.astype(np.int64)
+
+    def require_bounds(self, frame: Ints, length: int | None = None) -> None:
+        """Raises InputError for frames (N,) beyond 1 to `length`, with too many rows, or with numbers too large."""
+        span, remedy, most = f"frames from 1 to {length or FRAMES}", "correct the frame", None
+        if length is not None:
+            remedy = "correct the frame, or seqLength"
+            most = "check that this text belongs to this recording, and its seqLength"
+        self.reject(frame == 0, span, "add 1 to all frames, if the file counts them from 0")
+        self.reject((frame < 1) | (frame > (length or FRAMES)), span, remedy, most)
+        # Memory in proportion to the highest frame: frames are checked before.
+        crowded = np.bincount(frame, minlength=1)[frame] > DETECTIONS
+        self.reject(crowded, f"at most {DETECTIONS} {self.unit}s of one frame", "check that this is the right file")
+        far = ~(np.abs(self.values[:, 2:]) <= COORDINATE).all(axis=1)  # also nan
+        self.reject(far, f"numbers within {COORDINATE:g}", CORRECT)
 
 
 def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
@@ -59,12 +78,6 @@ def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
             file=path, place=f"byte {error.start}", got="no UTF-8 text", expected="a text file", remedy="check the path"
         ) from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def crowded(frame: Ints) -> Bools:
-    """Returns flags (N,): True for rows of frames (from 0) with more than 5000 rows."""
-    # Memory in proportion to the highest frame: frames are checked before.
-    return np.asarray(np.bincount(frame, minlength=1)[frame] > DETECTIONS)
 
 
 def whole_number(text: str) -> int:
@@ -104,7 +117,7 @@ def read_numbers(
         span = (str(low) if low == high else f"{low} to {high}") + ("" if also is None else f" or {also}")
         remedy = layout and f"the columns are {layout}"
         rows.reject(np.ones(len(lines), bool), f"{span} columns", remedy, remedy)
-    rows.reject(~np.isfinite(values).all(axis=1), "finite numbers", "remove or correct the line")
+    rows.reject(~np.isfinite(values).all(axis=1), "finite numbers", CORRECT)
     return rows
 
 
@@ -119,7 +132,7 @@ def _first_bad_line(
         if bad is not None or len(cells) != width:
             got = repr(bad.strip()) if bad is not None else f"{len(cells)} columns"
             expected = "a number" if bad is not None else f"{width} columns, as in the first line"
-            remedy = "remove or correct the line"
+            remedy = CORRECT
             if line.startswith("#"):
                 remedy = f"remove the lines that begin with #, and {NAME_THEM}"
             return InputError(file=path, place=f"line {k}", got=got, expected=expected, remedy=remedy)

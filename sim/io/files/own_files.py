@@ -38,7 +38,11 @@ def is_hidden(path: PurePath) -> bool:
 
 GENERATOR = "flockscope"  # the name in the element <meta name="generator"> of a page, and in the comment of a video
 
-HEAD = 1 << 16  # bytes of a page in which its generator stands
+HEAD = 1 << 16  # bytes of a file in which our name stands, so:
+HEADS = {
+    ".html": f'<meta name="generator" content="{GENERATOR}">',
+    ".json": f'"description": "{GENERATOR}"',  # of COCO
+}
 
 IHDR_END = 33  # bytes of a PNG file up to the end of its first chunk
 
@@ -62,7 +66,7 @@ Marks = Mapping[str, type]
 def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
     """Returns True if flockscope wrote the file, False if not, None if it is missing or cannot be parsed.
 
-    marks: of a .json file.
+    marks: of a .json file; without them it must be a COCO file.
     """
     if not path.is_file():
         return None
@@ -70,7 +74,10 @@ def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
         if path.suffix == ".json" and marks:
             found = tables.read_json(path)
             return all(isinstance(found.get(key), kind) for key, kind in marks.items())
-        kinds = {".parquet": tables.is_own_table, ".html": _page, ".png": _picture, ".mp4": _video}
+        if path.suffix in HEADS:
+            with path.open("rb") as file:
+                return HEADS[path.suffix].encode() in file.read(HEAD)
+        kinds = {".parquet": tables.is_own_table, ".png": _picture, ".mp4": _video}
         return path.suffix in kinds and kinds[path.suffix](path)
     except (InputError, OSError, ValueError):
         return None
@@ -83,11 +90,6 @@ def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
             file=path, got="a file that flockscope did not write", expected="its own file, or none",
             remedy="move it away, or choose another --out",
         )  # fmt: skip
-
-
-def _page(path: Path) -> bool:
-    with path.open("rb") as file:
-        return f'<meta name="generator" content="{GENERATOR}">'.encode() in file.read(HEAD)
 
 
 def _picture(path: Path) -> bool:

@@ -9,24 +9,20 @@ whose frames count the annotated ones from 1.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import NumericTable, crowded, read_number, read_numbers, read_text
-from sim.io.formats.labels import labelled_truth_fields, require_size
+from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, read_number, read_numbers, read_text
+from sim.io.formats.labels import labelled_sequence, labelled_truth_fields, require_size
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
-from sim.types import Frame, Ints, Sequence, Truth
+from sim.types import Ints, Sequence, Truth
 
 FPS = 2.5
-LAST_ID = 2**52
-CORRECT = "correct or remove the line"
 
 
 def frame_numbers(raw: Ints, id: Ints | None = None) -> Ints:
@@ -81,10 +77,19 @@ def read_groups(path: Path) -> dict[int, int]:
     return label
 
 
+def labels_of(path: Path, id: Ints) -> Ints:
+    """Returns the group labels (N,) of people by the file of groups `path`, -1 for alone; warns if it groups nobody."""
+    names = read_groups(path)
+    known = [names[person] for person in set(id.tolist()) if person in names]
+    if names and len(id) and len(known) == len(set(known)):
+        warnings.warn(f"{path}: no two people of this recording are in one of its groups: check the ids", stacklevel=3)
+    return np.array([names.get(i, -1) for i in id.tolist()], np.int64)
+
+
 def _ids(path: Path, number: int, line: str) -> list[int]:
     try:
         values = [read_number(word) for word in line.replace(",", " ").split()]
-        if all(0 <= v <= LAST_ID and v == round(v) for v in values):
+        if all(0 <= v <= LARGEST and v == round(v) for v in values):
             return [int(v) for v in values]
     except (ValueError, OverflowError):
         pass
@@ -102,10 +107,8 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
         raise InputError(file=path, got="no line", expected="people: frame id x z y vx vz vy", remedy="restore it")
     raw, id = rows.integers(0, "frame"), rows.integers(1, "id")
     rows.reject(id < 0, "ids from 0", "correct the id")
-    rows.reject((np.abs(rows.values[:, 2:]) > COORDINATE).any(axis=1), f"numbers within {COORDINATE:g}", CORRECT)
     frame = frame_numbers(raw, id)
-    rows.reject(frame > FRAMES, f"at most {FRAMES} frames", "correct the frame")
-    rows.reject(crowded(frame), f"at most {DETECTIONS} people in a frame", CORRECT)
+    rows.require_bounds(frame)
     require_size(path, int(frame.max()), id)
     expected = "each id once in a frame, also where two frames are nearer than a step"
     rows.reject(repeated_ids(frame, id), expected, CORRECT)
@@ -128,8 +131,7 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
     )  # fmt: skip
     if not is_present(folder / "groups.txt"):
         return truth
-    names = read_groups(folder / "groups.txt")
-    label = np.array([names.get(int(i), -1) for i in id], np.int64)
+    label = labels_of(folder / "groups.txt", id)
     return truth.replace(group=label, **labelled_truth_fields(frame, id, label, pos, vel, fps=fps, length=length))
 
 
@@ -138,10 +140,4 @@ def open_folder(folder: Path, options: RecordingOptions = NO_OPTIONS) -> Sequenc
     rate = options.fps or FPS
     length = int(_table(folder)[1].max(initial=0))
 
-    def frames() -> Iterator[Frame]:
-        return (Frame(index, (index - 1) / rate) for index in range(1, length + 1))
-
-    return Sequence(
-        name=folder.name, fps=rate, length=length, frames=frames, load_truth=lambda: read_truth(folder, rate),
-        source={"kind": "biwi", "path": str(folder)},
-    )  # fmt: skip
+    return labelled_sequence("biwi", folder, folder.name, rate, length, lambda: read_truth(folder, rate))

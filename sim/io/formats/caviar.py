@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 import warnings
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,11 +22,11 @@ from scenarios.limits import COORDINATE, FRAMES, XML_BYTES
 from scenarios.reading import read_regular
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import read_number, whole_number
-from sim.io.formats.labels import CHORD, differentiate, labelled_truth_fields, require_size
+from sim.io.formats.labels import CHORD, differentiate, labelled_sequence, labelled_truth_fields, require_size
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.scene.visibility import scale_of_all_boxes, scale_of_first_boxes
 from sim.truth.group_hulls import box_groups
-from sim.types import Array, Frame, Ints, Sequence, Truth
+from sim.types import Array, Ints, Sequence, Truth
 
 FPS = 25.0
 LAST_ID = 10**15 - 1  # ids pass through float64
@@ -200,15 +199,11 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     rate = options.fps or _frame_rate(path, found)
     scale, learned = scale_of_first_boxes(found.frame, found.size.max(axis=1)) if px_per_m is None else (px_per_m, 0)
 
-    def frames() -> Iterator[Frame]:
-        return (Frame(index, (index - 1) / rate) for index in range(1, found.length + 1))
-
-    return Sequence(
-        name=found.name, fps=rate, length=found.length, frames=frames,
-        load_truth=lambda: read_truth(path, rate, px_per_m), px_per_m=scale,
-        image_size=IMAGE_SIZE if found.caviar else None,
-        source={"kind": "caviar", "path": str(path), **({"px_per_m_frames": learned} if learned else {})},
+    sequence = labelled_sequence(
+        "caviar", path, found.name, rate, found.length, lambda: read_truth(path, rate, px_per_m), scale,
+        **({"px_per_m_frames": learned} if learned else {}),
     )  # fmt: skip
+    return replace(sequence, image_size=IMAGE_SIZE if found.caviar else None)
 
 
 def _frame_rate(path: Path, found: CaviarRecording) -> float:

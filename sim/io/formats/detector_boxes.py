@@ -18,30 +18,34 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import is_number
+from scenarios.limits import JSON_BYTES, is_number
+from scenarios.reading import parse_json
+from sim.io.files.numeric_text import NumericTable, read_text
 from sim.io.formats import mot_text
-from sim.io.formats.options import BoxScale
+from sim.io.formats.mot_table import read_table, table_of_rows
+from sim.io.formats.options import NO_OPTIONS, BoxOptions
 from sim.types import Array, Frame, Ints, Sequence
 
-PERSON = 1  # COCO's category of people.
+COLUMNS = "frame (image_id), -1, left, top, width, height, score, class (category_id)"
 SAME = 1e-3  # s: boxes of one picture have times that differ by at most this.
 HALF = 0.5 + 1e-6  # frames: a time belongs to a frame that is so near; times may be rounded.
 OUTSIDE = 1.1  # Boxes that end farther right or lower than this share of the picture are of another picture size.
 
 
-def with_boxes(
-    sequence: Sequence, path: Path, person_class: int | None = None, box_scale: BoxScale | None = None,
-    min_score: float | None = None,
-) -> Sequence:  # fmt: skip
+def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.boxes) -> Sequence:
     """Returns the sequence with the boxes of a file as its detections.
 
     Raises InputError if the file cannot be read, has no boxes, or does not fit the sequence's frames and pictures.
     """
     if path.suffix.lower() == ".json":
-        found = _coco_results(path, person_class, box_scale, min_score)
+        table = table_of_rows(_coco_results(path), box_scale=options.box_scale)
     else:
         frames_at = partial(_frames_at, path, sequence)
-        found = mot_text.read_detections(path, None, person_class, box_scale, min_score, frames_at)
+        table = read_table(path, boxless=True, box_scale=options.box_scale, frames_at=frames_at)
+    mot_text.require_classes(table, options.person_class)
+    found = mot_text.detections_of_table(table, options)
+    if not len(found.frame):
+        raise InputError(file=path, got="no box", expected="the boxes of a detector", remedy="check the file")
     if found.plane != "image" or found.box is None:
         raise InputError(file=path, got="points", expected="boxes, px", remedy="give the detector's boxes")
     last = int(found.frame.max(initial=0))
@@ -50,7 +54,7 @@ def with_boxes(
             file=path, got=f"frame {last}", expected=f"at most {sequence.length}, the frames of {sequence.name}",
             remedy="give the boxes of this recording; frames count from 1",
         )  # fmt: skip
-    if sequence.image_size is not None and len(found.box):
+    if sequence.image_size is not None:
         _check_size(path, found.box, sequence.image_size)
 
     def joined(frames: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
@@ -76,7 +80,7 @@ def _frames_at(path: Path, sequence: Sequence, seconds: Array) -> Ints:
     near = away <= HALF / sequence.fps
     fits = near & (np.abs(seconds - nearest) <= SAME)
     out = f"{(~fits).sum()} of {len(fits)} boxes have times of no frame, or of one that has nearer ones"
-    if near.mean() < 0.5:
+    if len(near) and near.mean() < 0.5:
         raise InputError(
             file=path, place="times", got=f"{seconds.min():g} to {seconds.max():g} s: {out}",
             expected=f"times of {len(times)} frames, {times[0]:g} to {times[-1]:g} s",
@@ -96,43 +100,27 @@ def _check_size(path: Path, box: Array, size: tuple[int, int]) -> None:
         raise InputError(file=path, got=got, expected=expected, remedy=remedy)
 
 
-def _coco_results(
-    path: Path, person_class: int | None, box_scale: BoxScale | None, min_score: float | None
-) -> mot_text.DetectionTable:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(file=path, got=str(error), expected="JSON", remedy="check the file") from None
-    if not isinstance(content, list) or not content:
+def _coco_results(path: Path) -> NumericTable:
+    """Returns frame, -1, left, top, width, height, score and category of each result."""
+    results = parse_json(read_text(path, JSON_BYTES), path, "check the file")
+    if not isinstance(results, list):
         raise InputError(
-            file=path, got=type(content).__name__ if content != [] else "no result", expected="a list of COCO results",
+            file=path, got="no list", expected="a list of COCO results",
             remedy="give the detector's results, with image_id, category_id, bbox and score",
         )  # fmt: skip
-    wanted = PERSON if person_class is None else person_class
-    rows = [_row(path, k, each) for k, each in enumerate(content, 1)]
-    table = np.array([row[1:] for row in rows if row[0] == wanted], float).reshape(-1, 6)
-    if not len(table):
-        expected, remedy = f"people, of category {wanted}", "name the category of people with --class N"
-        raise InputError(file=path, got="other categories", expected=expected, remedy=remedy)
-    good = mot_text.good_scores(path, table[:, 5], min_score)
-    table[:, 5] = mot_text.told_scores(path, table[:, 5])
-    table = table[good][np.argsort(table[good, 0], kind="stable")]
-    box = table[:, 1:5] * np.tile(box_scale or (1.0, 1.0), 2)
-    frame = table[:, 0].astype(np.int64)
-    return mot_text.DetectionTable(frame, np.full(len(box), -1), "image", box[:, :2] + box[:, 2:] / 2, box, table[:, 5])
+    rows = [_row(path, k, each) for k, each in enumerate(results, 1)]
+    values = np.array(rows, np.float64).reshape(-1, 8)
+    return NumericTable(path, values, np.arange(1, len(rows) + 1), COLUMNS, unit="result")
 
 
 def _row(path: Path, number: int, result: Any) -> tuple[float, ...]:
-    """Returns category, frame, left, top, width, height and score of a result."""
-    result = result if isinstance(result, dict) else {}
-    frame, category, box, score = (result.get(key) for key in ("image_id", "category_id", "bbox", "score"))
-    box = box if isinstance(box, list) and len(box) == 4 else [None] * 4
-    values = (category, frame, *box, score)
-    good = all(is_number(value, -np.inf, np.inf) for value in values)
-    if not good or frame < 1 or frame != int(frame) or box[2] <= 0 or box[3] <= 0:
-        raise InputError(
-            file=path, place=f"result {number}", got=json.dumps(result)[:80],
-            expected="image_id (a frame, from 1), category_id, bbox [left, top, width, height] and score",
-            remedy="correct the result, or number the pictures from 1",
-        )  # fmt: skip
-    return values
+    match result:
+        case {"image_id": frame, "category_id": category, "bbox": [x, y, w, h], "score": score}:
+            row = (frame, -1, x, y, w, h, score, category)
+            if all(map(is_number, row)):
+                return row
+    raise InputError(
+        file=path, place=f"result {number}", got=json.dumps(result)[:80],
+        expected="image_id (a frame, from 1), category_id, bbox [left, top, width, height] and score, numbers",
+        remedy="correct the result",
+    )  # fmt: skip

@@ -11,6 +11,7 @@ that of the positions per second.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import CELLS
 from sim.truth.merge_split_rules import frames_of
-from sim.types import Array, GroupEvent, Groups, Ints
+from sim.types import Array, Frame, GroupEvent, Groups, Ints, Sequence, Truth
 
 
 def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
@@ -41,6 +42,21 @@ def require_size(path: Path, length: int, id: Ints) -> None:
         got = f"{length:,} frames with {people:,} people"
         expected = f"at most {CELLS:,} frames times people"
         raise InputError(file=path, got=got, expected=expected, remedy="correct the last frame, or cut the recording")
+
+
+def labelled_sequence(
+    kind: str, path: Path, name: str, fps: float, length: int, load_truth: Callable[[], Truth],
+    px_per_m: float = float("nan"), **more: Any,
+) -> Sequence:  # fmt: skip
+    """Returns a recording of labels alone, without pictures and detections. more: further entries of its source."""
+
+    def frames() -> Iterator[Frame]:
+        return (Frame(index, (index - 1) / fps) for index in range(1, length + 1))
+
+    return Sequence(
+        name=name, fps=fps, length=length, frames=frames, load_truth=load_truth, px_per_m=px_per_m,
+        source={"kind": kind, "path": str(path), **more},
+    )  # fmt: skip
 
 
 def labelled_truth_fields(

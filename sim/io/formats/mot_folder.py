@@ -5,10 +5,9 @@ from __future__ import annotations
 import configparser
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from sim.io.files.numeric_text import read_number, read_text
 from sim.io.files.own_files import is_hidden
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
+from sim.io.formats.labels import labelled_sequence
 from sim.io.formats.mot_table import read_table, size_doubt
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
@@ -41,14 +41,17 @@ class SeqInfo:
 
 
 def read_seqinfo(path: Path) -> SeqInfo:
-    """Reads the section [Sequence] of a seqinfo.ini; without it every key counts as missing."""
+    """Reads the section [Sequence] of a seqinfo.ini; in an empty file every key counts as missing."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read_string(read_text(path))
     except configparser.Error as error:
         reason = (error.message.splitlines() or ["no ini file"])[0]
         raise InputError(file=path, got=reason, expected="key=value lines", remedy="correct the file") from None
-    section = dict(parser["Sequence"]) if parser.has_section("Sequence") else {}
+    if parser.sections() and not parser.has_section("Sequence"):
+        got = ", ".join(f"[{name}]" for name in parser.sections())
+        raise InputError(file=path, got=got, expected="[Sequence]", remedy="correct the name of the section")
+    section = dict(parser["Sequence"]) if parser.sections() else {}
 
     def number(key: str, low: float, high: float, whole: bool = True) -> float | None:
         text = section.get(key.lower())
@@ -114,13 +117,11 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     last frame of texts and pictures. The truth is read, and checked, when asked for.
     """
     info, images, background = _info(path), options.images, options.background
-    person_class, box_scale = options.person_class, options.box_scale
     rate = frame_rate(options.fps, info.fps, path)
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
-    least = options.min_score
-    found = mot_text.read_detections(det, info.length, person_class, box_scale, least) if is_present(det) else None
+    found = mot_text.read_detections(det, options.boxes, info.length) if is_present(det) else None
     if found is None:
-        options.reject(path, "a recording without det/det.txt", "labels are not scaled", "box_scale min_score")
+        options.reject(path, "a recording without det/det.txt", "they are for detections", "box_scale min_score")
     pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
     length = info.length or max(_labelled_frames(path).max(initial=0).item(), pictures.last)
@@ -154,7 +155,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         return pictures.read(wanted, seen if images else pictures.first_size())
 
     def truth() -> Truth:
-        return mot_text.read_truth(gt, info.name, rate, length, options.scale, person_class)
+        return mot_text.read_truth(gt, info.name, rate, length, options.scale, options.boxes.person_class)
 
     shown = {} if choice is None else {"background": str(choice)}
     return Sequence(
@@ -164,7 +165,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         px_per_m=options.scale, has_images=images and bool(pictures.files),
         has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
-        source={"kind": "mot", "path": str(path), **_named(options), **shown},
+        source={"kind": "mot", "path": str(path), **options.boxes.given(), **shown},
     )  # fmt: skip
 
 
@@ -209,36 +210,32 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     The camera is not scaled.
     """
-    rate, person_class, box_scale = frame_rate(options.fps, None, path), options.person_class, options.box_scale
-    table = read_table(path, boxless=True)
+    rate, of_boxes = frame_rate(options.fps, None, path), options.boxes
+    table = read_table(path, boxless=True, box_scale=of_boxes.box_scale)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
-    found = mot_text.read_detections(path, None, person_class, box_scale, options.min_score)
-    length = int(table.frame.max(initial=0))
-    only_detections = bool((table.id == -1).all())
-
-    def frames() -> Iterator[Frame]:
-        for index in range(1, length + 1):
-            here = found.at(index, rate) if only_detections else None
-            yield Frame(index, (index - 1) / rate, detections=here)
+    length = int(table.frame.max())
 
     def truth() -> Truth:
-        return mot_text.read_truth(path, path.stem, rate, length, options.scale, person_class, box_scale)
+        return mot_text.truth_of_table(table, path.stem, rate, length, options.scale, of_boxes.person_class)
 
-    return Sequence(
-        name=path.stem, fps=rate, length=length, frames=frames,
-        load_truth=None if only_detections else truth,
-        camera=options.camera, px_per_m=options.scale, has_detections=only_detections,
-        source={"kind": "mot text", "path": str(path), **_named(options)},
-    )  # fmt: skip
+    sequence = replace(
+        labelled_sequence("mot text", path, path.stem, rate, length, truth, options.scale, **of_boxes.given()),
+        camera=options.camera,
+    )
+    if not (table.id == -1).all():
+        options.reject(path, "a text of people with ids", "it is for detections", "min_score")
+        return sequence
+    mot_text.require_classes(table, of_boxes.person_class)
+    found = mot_text.detections_of_table(table, of_boxes)
+
+    def frames() -> Iterator[Frame]:
+        return (Frame(k, (k - 1) / rate, detections=found.at(k, rate)) for k in range(1, length + 1))
+
+    return replace(sequence, frames=frames, load_truth=None, has_detections=True)
 
 
 def _labelled_frames(path: Path) -> Ints:
     texts = [text for text in (path / "det" / "det.txt", path / "gt" / "gt.txt") if text.is_file()]
     frames = [read_table(text, boxless=True).frame for text in texts]
     return np.unique(np.concatenate([np.zeros(0, np.int64), *frames]))
-
-
-def _named(options: RecordingOptions) -> dict[str, Any]:
-    given = {"class": options.person_class, "box_scale": options.box_scale, "min_score": options.min_score}
-    return {key: value for key, value in given.items() if value is not None}

@@ -20,8 +20,7 @@ from typing import NoReturn
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, DETECTIONS, FRAMES
-from sim.io.files.numeric_text import NumericTable, crowded, is_number_text, read_numbers, read_text
+from sim.io.files.numeric_text import CORRECT, NumericTable, is_number_text, read_numbers, read_text
 from sim.io.formats.options import BoxScale
 from sim.types import Array, Bools, Ints
 
@@ -42,9 +41,10 @@ MANY, PART = 100, 0.7  # so many boxes reach further than this part of both side
 NO_ID = "frame,left,top,width,height,score"
 
 
-def reject_missing_ids(rows: NumericTable, frame: Ints, id: Ints) -> None:
+def reject_missing_ids(rows: NumericTable) -> None:
     """Raises InputError if column 2 is no id but the left edge of a box, and the ids are missing."""
     values = rows.values
+    frame, id = values[:, 0], values[:, 1]
     if not len(values) or values.shape[1] < 6 or (id == -1).all():
         return
     # Column 6 then holds scores: at most 1, which is no height. Scores up to 100 show in other ways: the six columns
@@ -64,7 +64,7 @@ def _aspect(box: Array) -> bool:
     return bool(low <= np.median(box[:, 3] / np.maximum(box[:, 2], 1e-9)) <= high)
 
 
-def _lasts(frame: Ints, id: Ints) -> bool:
+def _lasts(frame: Array, id: Array) -> bool:
     if len(np.unique(frame)) < 2 or (np.diff(id) > 0).all():
         return True
     number = np.unique(frame, return_inverse=True)[1]
@@ -148,8 +148,13 @@ EXPECTED = (
 def column_names(path: Path) -> list[str] | None:
     """Returns the names in the first line of a text, in lower case; None if a cell of it is a number."""
     line = next((line for line in read_text(path).splitlines() if line.strip()), "")
+    if ";" in line:
+        raise InputError(
+            file=path, place="line 1", got=line[:80], expected="columns apart by commas, blanks or tabs",
+            remedy="replace the semicolons, and write decimals with a point",
+        )  # fmt: skip
     cells = [cell.strip().strip('"').lower() for cell in line.split("," if "," in line else None)]
-    return cells if cells and not line.startswith("#") and not any(map(is_number_text, cells)) and cells[0] else None
+    return cells if any(cells) and not line.startswith("#") and not any(map(is_number_text, cells)) else None
 
 
 def read_named(path: Path, names: list[str], frames_at: FramesAt | None = None) -> tuple[NumericTable, Ints | None]:
@@ -169,8 +174,6 @@ def read_named(path: Path, names: list[str], frames_at: FramesAt | None = None) 
             found[meaning] = k
     use, count = list(found.values()), len(names)
     rows = read_numbers(path, (count, count), header=True, layout="those that line 1 names", use=use)
-    if not len(rows.line):
-        return replace(rows, values=np.zeros((0, 6))), None
     if "time" in found and frames_at is not None:
         found["frame"] = found.pop("time")
         k = use.index(found["frame"])
@@ -195,10 +198,10 @@ def read_named(path: Path, names: list[str], frames_at: FramesAt | None = None) 
     else:
         left, top, w, h = _box(column, have) or _refuse(path, names)
         columns = [frame, id, left, top, w, h, column("score", 1.0), column("class")]
-    unused = [name for k, name in enumerate(names) if k not in found.values()]
+    unused = [name for k, name in enumerate(names) if name and k not in found.values()]
     if unused:
         warnings.warn(f"{path}: line 1: columns that are not used: {', '.join(unused)}", stacklevel=4)
-    if frame.min() == 0:
+    if frame.min(initial=1) == 0:
         columns[0] = frame + 1
         warnings.warn(f"{path}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
     group = replace(rows, values=column("group")[:, None]).integers(0, "group") if "group" in have else None
@@ -259,28 +262,28 @@ def read_table(
     boxes pixels. frames_at: as `read_named` takes it. Rows stay in the order of the file.
     """
     named = column_names(path)
-    rows, group = (
-        (read_numbers(path, (6, 10), also=GROUND_COLUMNS, layout=LAYOUT), None)
-        if named is None
-        else read_named(path, named, frames_at)
-    )
+    if named is not None:
+        rows, group = read_named(path, named, frames_at)
+        return table_of_rows(rows, length, boxless, box_scale, group)
+    rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS, layout=LAYOUT)
+    reject_missing_ids(rows)
+    return table_of_rows(rows, length, boxless, box_scale)
+
+
+def table_of_rows(
+    rows: NumericTable, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None,
+    group: Ints | None = None,
+) -> MotTable:  # fmt: skip
+    """Returns rows with the columns of a MOTChallenge text as its table. See `read_table`."""
     frame, id, count = rows.integers(0, "frame"), rows.integers(1, "id"), len(rows.line)
     box, rest = rows.values[:, 2:6], rows.values[:, 6:]
     if rows.values.shape[1] == GROUND_COLUMNS:
         # A text of positions: no box, confidence 1, z = 0.
         box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
     table = MotTable(rows, frame, id, box, rest, group)
-    last = FRAMES if length is None else length
-    rows.reject(frame == 0, f"frames from 1 to {last}", "add 1 to all frames, if the file counts them from 0")
-    remedy = "check that this text belongs to this recording, and its seqLength"
-    rows.reject((frame < 1) | (frame > last), f"frames from 1 to {last}", "correct the frame, or seqLength", remedy)
-    rows.reject(crowded(frame), f"at most {DETECTIONS} lines of one frame", "check that this is the right file")
-    far = (np.abs(rows.values[:, 2:]) > COORDINATE).any(axis=1)
-    rows.reject(far, f"numbers within {COORDINATE:g}", "remove or correct the line")
-    if named is None:
-        reject_missing_ids(rows, frame, id)
+    rows.require_bounds(frame, length)
     flat, boxed = (table.box[:, 2:] <= 0).any(axis=1), ~table.without_box()
-    rows.reject(flat & boxed if boxless else flat, "boxes with width and height above 0", "remove or correct the line")
+    rows.reject(flat & boxed if boxless else flat, "boxes with width and height above 0", CORRECT)
     if box_scale is not None:
         table = replace(table, box=np.where(boxed[:, None], box * np.tile(box_scale, 2), box))
     return table

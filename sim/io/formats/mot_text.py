@@ -17,7 +17,6 @@ people; other programs write categories, occlusion flags, zeros or pixels there.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,13 +25,13 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
-from sim.io.formats.biwi import read_groups
+from sim.io.formats.biwi import labels_of
 from sim.io.formats.labels import CHORD, differentiate, labelled_truth_fields, require_size
-from sim.io.formats.mot_table import GROUND_COLUMNS, FramesAt, MotTable, corner_doubt, read_table, require_pixels
-from sim.io.formats.options import BoxScale
+from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable, corner_doubt, read_table, require_pixels
+from sim.io.formats.options import BoxOptions
 from sim.scene.visibility import scale_of_all_boxes
 from sim.truth.group_hulls import box_groups
-from sim.types import Array, Bools, Detections, Frame, Ints, Plane, Sequence, Truth, Unscored
+from sim.types import Array, Bools, Detections, Ints, Plane, Truth, Unscored
 
 # step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
 LONGEST = 12.0
@@ -61,11 +60,6 @@ def ground_positions(table: MotTable) -> Array | None:
         text = f"{table.rows.file}: columns 8 to 10 are not taken as metres: {doubt}; the boxes are used"
         warnings.warn(text, stacklevel=3)
     return None if known is None else np.where(known[:, None], table.rest[:, 1:4], np.nan)
-
-
-def has_ground(table: MotTable) -> bool:
-    """Returns True if `ground_positions` gives positions, without its warning."""
-    return _known(table)[0] is not None
 
 
 def _known(table: MotTable) -> tuple[Bools | None, str]:
@@ -211,28 +205,32 @@ def labelled_people(table: MotTable, person_class: int | None) -> Bools:
     elif (flag == 0).all() and len(keep):
         text = f"{file}: column 7 is 0 in all {len(keep)} rows; it is taken as a confidence, and all rows count"
         warnings.warn(text, stacklevel=2)
+    require_classes(table, person_class)
+    return of_class(table, keep, person_class)
+
+
+def require_classes(table: MotTable, person_class: int | None) -> None:
+    """Raises InputError if the user named the class of people, and the text has no classes."""
     if person_class is not None and classes_of(table, True) is None:
         raise InputError(
-            file=file, place="--class", got=f"{table.rows.values.shape[1]} columns without classes",
+            file=table.rows.file, place="--class", got=f"{table.rows.values.shape[1]} columns without classes",
             expected="a class in column 8", remedy="leave --class out",
         )  # fmt: skip
-    return of_class(table, keep, person_class)
 
 
 def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
     """Returns `keep` (N,) without the rows of other classes than that of people."""
-    found = classes_of(table, person_class is not None)
+    found, file = classes_of(table, person_class is not None), table.rows.file
     if found is None or not keep.any():
         return keep
     wanted = PEDESTRIAN if person_class is None else person_class
     people: Bools = np.asarray(keep & (found == wanted))
-    file = table.rows.file
     values, counts = np.unique(found[keep & ~people], return_counts=True)
     words = ", ".join(f"{n} rows of class {v:g}" for v, n in zip(values[:SHOWN], counts[:SHOWN], strict=True))
     words += ", …" if len(values) > SHOWN else ""
     if not people.any():
         raise InputError(
-            file=file, place="column 8", got=words, expected=f"people, of class {wanted}",
+            file=file, place="classes", got=words, expected=f"people, of class {wanted}",
             remedy="name the class of people with --class N",
         )  # fmt: skip
     if len(values) and person_class is None:
@@ -256,7 +254,8 @@ def classes_of(table: MotTable, named: bool) -> Array | None:
 
 
 def _one_for_each(table: MotTable, column: Array) -> bool:
-    if (table.id < 0).any() or column.max(initial=0) < 2 or column.max(initial=0) > LAST_CLASS or has_ground(table):
+    highest = column.max(initial=0)
+    if (table.id < 0).any() or not 2 <= highest <= LAST_CLASS or _known(table)[0] is not None:
         return False
     order = np.lexsort((column, table.id))
     same = np.diff(table.id[order]) == 0
@@ -289,15 +288,7 @@ def unit_scores(score: Array) -> tuple[Array, str]:
     return mapped, f"{span} are mapped into 0 to 1 by 1 / (1 + exp(-(score - {c:g}) / {d:g}))"
 
 
-def told_scores(path: Path, score: Array) -> Array:
-    """Returns `unit_scores` of a file's scores (N,), with a warning if they were mapped."""
-    found, told = unit_scores(score)
-    if told:
-        warnings.warn(f"{path}: {told}", stacklevel=3)
-    return found
-
-
-def good_scores(path: Path, score: Array, least: float | None) -> Bools:
+def _good_scores(path: Path, score: Array, least: float | None) -> Bools:
     """Returns flags (N,) of scores that are not below the least one. Raises InputError if none is left."""
     good = np.asarray(score >= (-np.inf if least is None else least))
     if len(score) and not good.any():
@@ -338,24 +329,26 @@ class DetectionTable:
         return Detections(index, (index - 1) / fps, self.plane, self.pos[low:high], None, box, self.score[low:high])
 
 
-def read_detections(
-    path: Path, length: int | None, person_class: int | None = None, box_scale: BoxScale | None = None,
-    min_score: float | None = None, frames_at: FramesAt | None = None,
-) -> DetectionTable:  # fmt: skip
-    """Reads a det.txt: points on the ground (m) if every row has one, else the boxes' centres (px).
+def read_detections(path: Path, options: BoxOptions, length: int | None = None) -> DetectionTable:
+    """Reads a det.txt as `detections_of_table`. length: the last frame allowed."""
+    table = read_table(path, length=length, boxless=True, box_scale=options.box_scale)
+    return detections_of_table(table, options)
 
-    min_score: rows with a lower score in the file are left out. frames_at: as `read_named` takes it.
-    """
-    table = read_table(path, length=length, boxless=True, box_scale=box_scale, frames_at=frames_at)
+
+def detections_of_table(table: MotTable, options: BoxOptions) -> DetectionTable:
+    """Returns a text's table as detections: points on the ground (m) if every row has one, else the boxes' centres."""
     _check_boxes(table)
     ground = ground_positions(table)
     boxless = _reject_placeless(table, ground)
-    raw = table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame))
-    score, good = told_scores(path, raw), good_scores(path, raw, min_score)
+    raw, path = table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)), table.rows.file
+    good = _good_scores(path, raw, options.min_score)
+    score, mapped = unit_scores(raw)
+    if mapped:
+        warnings.warn(f"{path}: {mapped}", stacklevel=3)
     plane: Plane = "image" if ground is None or np.isnan(ground).any() else "ground"
     pos = ground[:, :2] if plane == "ground" and ground is not None else table.box[:, :2] + table.box[:, 2:] / 2
     order = np.argsort(table.frame, kind="stable")
-    order = order[of_class(table, good, person_class)[order]]
+    order = order[of_class(table, good, options.person_class)[order]]
     box = None if boxless.any() else table.box[order]
     return DetectionTable(table.frame[order], table.id[order], plane, pos[order], box, score[order])
 
@@ -376,7 +369,7 @@ def _reject_placeless(table: MotTable, ground: Array | None) -> Bools:
 
 def read_truth(
     path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan"),
-    person_class: int | None = None, box_scale: BoxScale | None = None,
+    person_class: int | None = None,
 ) -> Truth:  # fmt: skip
     """Reads a gt.txt as truth of people without group labels, as MOTChallenge's own scoring counts them.
 
@@ -384,24 +377,8 @@ def read_truth(
     has none, positions (nan in rows without) and velocities if no row has one. Groups are those of a column `group`, or
     of the file that `group_file` names.
     """
-    table = read_table(path, length=length, boxless=True, box_scale=box_scale)
+    table = read_table(path, length=length, boxless=True)
     return truth_of_table(table, name, fps, length, px_per_m, person_class)
-
-
-def sequence_of_table(table: MotTable, path: Path, fps: float, kind: str, px_per_m: float = float("nan")) -> Sequence:
-    """Returns a text's table as Sequence with truth, without pictures and detections."""
-    length = int(table.frame.max())
-
-    def frames() -> Iterator[Frame]:
-        return (Frame(index, (index - 1) / fps) for index in range(1, length + 1))
-
-    def truth() -> Truth:
-        return truth_of_table(table, path.stem, fps, length, px_per_m)
-
-    return Sequence(
-        name=path.stem, fps=fps, length=length, frames=frames, load_truth=truth, px_per_m=px_per_m,
-        source={"kind": kind, "path": str(path)},
-    )  # fmt: skip
 
 
 def truth_of_table(
@@ -454,8 +431,7 @@ def _labels(table: MotTable, order: Ints) -> Ints | None:
     path = group_file(table.rows.file)
     if not is_present(path):
         return None
-    names = read_groups(path)
-    return np.array([names.get(int(i), -1) for i in table.id[order]], np.int64)
+    return labels_of(path, table.id[order])
 
 
 def _labelled(truth: Truth, label: Ints, file: Path) -> Truth:

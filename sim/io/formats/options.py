@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from scenarios.errors import InputError
 from scenarios.limits import PICTURE_SIDE
@@ -15,6 +17,19 @@ BoxScale = tuple[float, float]  # factors of x and y that make the boxes of a te
 
 
 @dataclass(frozen=True)
+class BoxOptions:
+    """How the boxes of a MOTChallenge text are read; None: not given."""
+
+    person_class: int | None = None  # the class of people
+    box_scale: BoxScale | None = None  # factors of x and y
+    min_score: float | None = None  # least score of detections, as it stands there
+
+    def given(self) -> dict[str, Any]:
+        """Returns the values of the options that are given, by their names on the command line."""
+        return {key.removeprefix("person_"): value for key, value in vars(self).items() if value is not None}
+
+
+@dataclass(frozen=True)
 class RecordingOptions:
     """The options of `open_source`, parsed; None: not given."""
 
@@ -23,9 +38,7 @@ class RecordingOptions:
     camera: Camera | None = None  # its calibration
     images: bool = True  # False leaves out the pictures of MOTChallenge folders
     background: BackgroundChoice | None = None  # which frames are the sample for background models
-    person_class: int | None = None  # the class of people in MOTChallenge texts
-    box_scale: BoxScale | None = None  # factors of x and y of the boxes of these
-    min_score: float | None = None  # least score of their detections, as it stands there
+    boxes: BoxOptions = BoxOptions()  # of MOTChallenge texts
 
     @property
     def scale(self) -> float:
@@ -33,12 +46,18 @@ class RecordingOptions:
         return float("nan") if self.px_per_m is None else self.px_per_m
 
     def reject(self, path: Path, kind: str, why: str, names: str) -> None:
-        """Raises InputError if any of the options `names` ("camera fps") is given: `why` says why it has no effect."""
-        found = [name for name in names.split() if getattr(self, name) is not None]
-        given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
-        if given:
-            remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
-            raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
+        """Refuses the options `names`; "boxes" stands for all options of boxes. See `refuse_options`."""
+        values = {**vars(self), **vars(self.boxes)}
+        refuse_options(values, names.replace("boxes", " ".join(vars(self.boxes))), path, kind, why)
+
+
+def refuse_options(values: Mapping[str, Any], names: str, path: Path, kind: str, why: str) -> None:
+    """Raises InputError if any of the options `names` ("camera fps") has a value: `why` says why it has no effect."""
+    found = [name for name in names.split() if values[name] is not None]
+    given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
+    if given:
+        remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
+        raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
 
 
 NO_OPTIONS = RecordingOptions()

@@ -25,7 +25,7 @@ from sim.io.files.tables import Column, StoredTable, read_table, table_bytes
 from sim.io.pictures import video_files
 from sim.io.pictures.picture_folder import require_size
 from sim.io.pictures.video_files import VideoWriter, write_video
-from sim.io.store.seal import REDO, damaged_files, file_facts
+from sim.io.store.seal import REDO, file_facts, whole_file
 from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
 
 JPG_QUALITY = 95
@@ -200,19 +200,13 @@ class StoredPictures:
         """File type of the pictures; "png" without pictures or with 16-bit streams only."""
         return self.manifest.get("images") or "png"
 
-    def checked(self, name: str) -> Path:
-        """Returns the path of a file; raises InputError if its content is not that which the manifest names."""
+    def body(self, name: str) -> bytes:
+        """Returns the bytes of a file; raises InputError if they are not those that the manifest names."""
         path, facts = self.folder / name, self.manifest["files"].get(name)
         if facts is None:
             got, expected = "a manifest that does not name it", "a file that manifest.json names"
             raise InputError(file=path, got=got, expected=expected, remedy=REDO)
-        for error in damaged_files(self.folder, {name: facts}):
-            raise error
-        return path
-
-    def body(self, name: str) -> bytes:
-        """Returns the bytes of a file, checked as by `checked`."""
-        return self.checked(name).read_bytes()
+        return whole_file(path, facts)
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
         """Returns picture `index` (from 1) of a stream of picture files: BGR, or codes of ids and disparity."""
@@ -237,7 +231,8 @@ class StoredPictures:
         if streams.suffix(stream, self.images) != "mp4":
             yield from (self.one(stream, k) for k in wanted or range(1, count + 1))
             return
-        path, found = self.checked(streams.file_name(stream, self.images, 1)), 0
+        path, found = self.folder / streams.file_name(stream, self.images, 1), 0
+        self.body(path.name)
         for found, (_, picture) in enumerate(
             video_files.decode_frames(path, video_files.index_packets(path), wanted), 1
         ):

@@ -48,7 +48,7 @@ class _Camera(BaseModel):
 
 def read_camera(path: Path) -> Camera:
     """Reads a camera.json; missing baseline and radial are 0, a missing px_per_m is nan."""
-    found = validated(path, tables.read_document(path), _Camera, "correct it")
+    found = validated(path, tables.read_document(path, "give a camera.json"), _Camera, "correct it")
     if found.px_per_m is None and found.kind == "top":
         raise InputError(file=path, place="px_per_m", got="null", expected="a scale for kind top", remedy="add it")
     camera = Camera(

@@ -22,7 +22,7 @@ from pydantic import BaseModel, Field, model_validator
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, INTEGER
 from sim.io.files import tables
-from sim.io.files.numeric_text import read_text, whole_number
+from sim.io.files.numeric_text import read_numbers, read_text, whole_number
 from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, StoredTable, none_to_nan, validated
 from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
 
@@ -88,24 +88,17 @@ def near_bytes(near: Near) -> bytes:
 
 def read_near(path: Path) -> Near:
     """Reads a near.csv."""
-    header, *lines = read_text(path).splitlines() or [""]
+    header = read_text(path).partition("\n")[0]
     if header != NEAR_COLUMNS:
         raise InputError(
             file=path, place="line 1", got=repr(header), expected=NEAR_COLUMNS, remedy="restore the header"
         )
-    rows = [_near_row(path, k, line) for k, line in enumerate(lines, 2)]
-    return Near(*np.array(rows, np.int64).reshape(-1, 4).T.copy()) if rows else Near.none()
-
-
-def _near_row(path: Path, number: int, line: str) -> tuple[int, int, int, int]:
-    try:
-        start, end, a, b = (whole_number(cell) for cell in line.split(","))
-    except ValueError:
-        start, end, a, b = 0, 0, -1, -1
-    if not 1 <= start <= end <= FRAMES or min(a, b) < 0:
-        expected = f"frames from 1 to {FRAMES}, start not after end, and two ids from 0 on"
-        raise InputError(file=path, place=f"line {number}", got=repr(line), expected=expected, remedy="restore it")
-    return start, end, a, b
+    rows = read_numbers(path, (4, 4), header=True, layout=NEAR_COLUMNS)
+    start, end, a, b = (rows.integers(k, name) for k, name in enumerate(NEAR_COLUMNS.split(",")))
+    wrong = (start < 1) | (end < start) | (end > FRAMES) | (np.minimum(a, b) < 0)
+    expected = f"frames from 1 to {FRAMES}, start not after end, and two ids from 0 on"
+    rows.reject(wrong, expected, "restore it", "restore them")
+    return Near(start, end, a, b)
 
 
 def script_bytes(orders: Iterable[Order]) -> bytes:

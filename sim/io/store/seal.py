@@ -138,19 +138,29 @@ def damaged_files(
     compared.
     """
     for name, facts in files.items():
-        path = folder / name
         try:
-            size = path.stat().st_size if path.is_file() else None  # a FIFO would block its reader
-            whole = size == facts["bytes"] and (
-                name in size_only or hashing.file_hash(path.read_bytes()) == facts["sha256"]
-            )
-        except OSError:
-            size, whole = None, False
-        if not whole:
-            kind = "truncated" if size is not None and size < facts["bytes"] else "altered"
-            got = "missing" if size is None else f"{kind}: {size} bytes"
-            expected = f"the file of {facts['bytes']} bytes that {seal} names"
-            yield InputError(file=path, got=got, expected=expected, remedy=remedy)
+            whole_file(folder / name, facts, seal, remedy, name in size_only)
+        except InputError as error:
+            yield error
+
+
+def whole_file(
+    path: Path, facts: Mapping[str, Any], seal: str = MANIFEST, remedy: str = REDO, size_only: bool = False
+) -> bytes:
+    """Returns the bytes of a file, none if only its size is compared; InputError if it is not as a seal states."""
+    body, size = b"", None
+    try:
+        if path.is_file():  # a FIFO would block its reader
+            size = path.stat().st_size
+            body = path.read_bytes() if size == facts["bytes"] and not size_only else b""
+    except OSError:
+        size = None
+    if size == facts["bytes"] and (size_only or hashing.file_hash(body) == facts["sha256"]):
+        return body
+    kind = "truncated" if size is not None and size < facts["bytes"] else "altered"
+    got = "missing" if size is None else f"{kind}: {size} bytes"
+    expected = f"the file of {facts['bytes']} bytes that {seal} names"
+    raise InputError(file=path, got=got, expected=expected, remedy=remedy)
 
 
 def is_sequence(folder: Path) -> bool:

@@ -81,7 +81,7 @@ def _left_behind(root: Path) -> Iterator[InputError]:
 
 
 def _seqmaps(root: Path) -> Iterator[InputError]:
-    base = root if (root / "seqmaps").is_dir() else root.parent
+    base = root if (root / "seqmaps").is_dir() or any(root.glob("flockscope-*")) else root.parent
     for split in sorted(root.glob("flockscope-*")) if base == root else [root]:
         path = base / "seqmaps" / f"{split.name}.txt"
         if not path.is_file():

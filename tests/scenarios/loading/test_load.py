@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import scenarios
 from scenarios.errors import InputError
 from scenarios.loading.resolve import dump, dump_sensor, load, names, resolve, sensor_settings
+from scenarios.loading.toml_files import CATALOGUE
 from scenarios.schema.sensor import BoxNoise, FalseAlarms, Hide, Memory, Sensor
 
 
@@ -152,6 +153,11 @@ def test_syntax_error_has_its_line(tmp_path: Path) -> None:
     assert "no such file" in error_of(tmp_path / "none.toml").got
     (tmp_path / "folder.toml").mkdir()
     error_of(tmp_path / "folder.toml")
+
+
+def test_a_byte_order_mark_is_no_content(tmp_path: Path) -> None:
+    (tmp_path / "mark.toml").write_bytes(b"\xef\xbb\xbf" + (CATALOGUE / "merge.toml").read_bytes())
+    assert load(tmp_path / "mark.toml").duration == load("merge").duration
 
 
 def test_unknown_names_are_answered_with_near_ones() -> None:

@@ -64,6 +64,14 @@ def test_a_saved_baseline_gives_the_same_verdict(tmp_path, capsys):
     assert len(small.read_bytes()) < 1000
 
 
+def test_scores_are_saved_as_json_only(tmp_path, capsys):
+    (tmp_path / "mine.txt").write_text("mine")
+    before = stored(tmp_path / "a.json", BASE)
+    assert run(["compare", before, before, "--save", str(tmp_path / "mine.txt")]) == 2
+    assert "ends in .json" in capsys.readouterr().err
+    assert (tmp_path / "mine.txt").read_text() == "mine"
+
+
 NOT_COMPARED = [
     (lambda p: stored(p, BASE[:4], truth="a"), "incomplete: got no s4, s5"),
     (lambda p: stored(p, np.append(BASE, 0.5), truth="a"), "incomplete: got s6, not in"),

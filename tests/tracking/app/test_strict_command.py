@@ -83,6 +83,12 @@ def test_a_number_is_written_in_digits_0_to_9(line: str, text: str, tmp_path: Pa
     assert shown.count("\n") == 1
 
 
+def test_an_empty_value_is_refused(capsys) -> None:
+    """`--out "$OUT"` without that variable would write into the working folder."""
+    assert run(["export", "csv", "x", "--out", ""]) == 2
+    assert "--out: got ''; expected a value" in capsys.readouterr().err
+
+
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A scene, a dataset of it with two sequences and without pictures, and a run on it."""
@@ -110,6 +116,12 @@ MISTAKES = {
     "generate crossing --seeds 0": ("flockscope generate: got missing option '--out'; expected --out DIR: ",),
     "score {0}/data {0}/run {0}/run": ("TRACKS: got", "twice; expected each run once",),
     "score {0}/data {0}/run {0}/run/scene-s00000 --by HOTAA": ("--by: got HOTAA", "such as HOTA"),
+    "score {0}/data {0}/run --by HOTA": ("--by: got one run; expected several",),
+    "score {0}/data {0}/run --csv {0}/x.csv": ("--csv: got one run; expected several",),
+    "score {0}/data {0}/run {0}/run/scene-s00000 --csv {0}/x.toml": ("--csv: got", "ends in .csv"),
+    "export coco {0}/data --out {0}/scene.toml": ("--out: got", "ends in .json"),
+    "replay {0}/data --out {0}/x --duration nan": ("--duration: got nan; expected seconds above 0",),
+    "export csv {0}/data --out {0}/x --line a=nan,2,3,4": ("--line: got 'a=nan,2,3,4'",),
 }  # fmt: skip
 
 

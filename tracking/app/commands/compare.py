@@ -23,6 +23,7 @@ from sim.io.files.tables import json_document, read_json
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import checked_key, new_table, with_title
+from tracking.app.option_parsing import output_file
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import paired
 
@@ -41,7 +42,7 @@ def compare(options: CompareOptions) -> CommandResult:
     rows = [_row(key, before, now, options.tolerance) for key in keys]
     if options.save is not None:
         kept = [{"name": name, **{k: row[k] for k in (*HOW, *keys) if k in row}} for name, row in now.items()]
-        write_file(options.save, json_document({"sequences": kept}))
+        write_file(output_file(options.save, ".json", "--save"), json_document({"sequences": kept}))
     worse = [row["score"] for row in rows if row["verdict"] == "regression"]
     data = {"sequences": len(before), "tolerance": options.tolerance, "scores": rows}
     return CommandResult(data, _table(rows, len(before)), int(bool(worse)))
@@ -51,7 +52,7 @@ def _read(path: Path) -> Stored:
     document = read_json(path)
     rows = document.get("sequences") if isinstance(document, dict) else None
     if not isinstance(rows, list) or not rows or not all(map(_is_named, rows)):
-        raise InputError(file=path, got="no scores of sequences", expected=EXPECTED, remedy="make it again")
+        raise InputError(file=path, got="no scores of sequences", expected=EXPECTED, remedy="give another file")
     found = {row["name"]: row for row in rows}
     if len(found) < len(rows):
         raise InputError(
@@ -95,7 +96,8 @@ def _row(key: str, before: Stored, now: Stored, tolerance: float) -> dict[str, A
         both = [k for k in CATALOGUE if all(np.isfinite(_value(s[name], k)) for s in (before, now) for name in before)]
         raise InputError(
             place=key, got=f"known in {counted(int(known.sum()), 'sequence')} on both sides",
-            expected=f"at least {FEWEST}", remedy=f"choose another score with --by, such as {' or '.join(both[:2])}",
+            expected=f"at least {FEWEST}",
+            remedy="choose another score with --by" + (f", such as {' or '.join(both[:2])}" if both else ""),
         )  # fmt: skip
     first, second = pairs[known].T
     mean, low, high = (float(end[0]) for end in paired(first[:, None], second[:, None]))

@@ -58,7 +58,8 @@ def export_coco(options: CocoOptions) -> CommandResult:
     """Writes COCO files, one per split, of all sequences with labelled boxes at the path of the options."""
     from sim.io.export.coco import coco
 
-    paths = coco(options.folder, options.out, options.min_visibility, person_class=options.person_class)
+    out = option_parsing.output_file(options.out, ".json")
+    paths = coco(options.folder, out, options.min_visibility, person_class=options.person_class)
     root = options.folder if options.folder.is_dir() else options.folder.parent
     text = "\n".join([*map(str, paths), f"file names are relative to {root}"])
     return CommandResult({"file": paths[0] if len(paths) == 1 else None, "files": paths, "root": root}, text)
@@ -98,7 +99,7 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
     option_parsing.output_folder(options.out)
     seeds = option_parsing.seeds(options.seeds)
     streams, images = option_parsing.pictures(options.streams, options.images)
-    if options.duration is not None and options.duration <= 0:
+    if options.duration is not None and not options.duration > 0:
         raise InputError(place="--duration", got=options.duration, expected="seconds above 0", remedy="correct it")
     settings = option_parsing.scenario_settings(options.settings)
     view = load_observation(options.camera, [*option_parsing.sensor_settings(options.sensor), *settings])

@@ -17,7 +17,7 @@ import numpy as np
 
 from scenarios.errors import InputError, counted, printable, shortened
 from sim.io.formats.mot_folder import frame_rate
-from sim.io.formats.options import RecordingOptions
+from sim.io.formats.options import refuse_options
 from sim.io.source import holds_sequences, open_source
 from sim.io.store.seal import WHOLE, reject_foreign, run_folder
 from sim.types import EVENT_KINDS, Sequence
@@ -128,6 +128,7 @@ def _place(row: Row) -> str:
 
 # Kind of a source whose rows are anybody's tracks: the run may be scored with the labels of any sequence.
 TEXT = "mot text"
+STATED = "run.json states it"
 
 
 def group(options: GroupOptions) -> CommandResult:
@@ -184,10 +185,8 @@ def _open(path: Path, options: GroupOptions) -> list[Sequence]:
 def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
     tracks.check()
     info, folder = tracks.info, tracks.path if tracks.path.is_dir() else tracks.path.parent
-    o = options
-    given = RecordingOptions(o.fps, o.px_per_m, o.camera, True, None, o.person_class, o.box_scale)  # type: ignore[arg-type]
     stated = [name for name, known in (("fps", "fps" in info), ("px_per_m", info.get("plane") != "image")) if known]
-    given.reject(folder, "a run", "run.json states it", " ".join(("camera person_class box_scale", *stated)))
+    refuse_options(vars(options), " ".join(("camera person_class box_scale", *stated)), folder, "a run", STATED)
     scale, frames = info.get("px_per_m"), int(info.get("px_per_m_frames") or 0)
     if options.px_per_m is not None:
         scale, frames = options.px_per_m, 0

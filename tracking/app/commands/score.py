@@ -33,6 +33,9 @@ def score(options: ScoreOptions) -> CommandResult:
     check_blocks(options.blocks, len(sequences))
     if len(options.tracks) > 1 or is_class(options.tracks[0]):
         return ranking(options, source, sequences)
+    for flag, value in (("--by", options.by), ("--csv", options.csv), ("--all", options.all or None)):
+        if value is not None:
+            raise InputError(place=flag, got="one run", expected="several, which are ranked", remedy="leave it out")
     scored = _score_all(options, source, sequences)
     rows = [
         SequenceScores(sequence.name, one.scores[0], one.given[0])

@@ -35,6 +35,7 @@ from tracking.app.commands.score_tables import (
     with_title,
 )
 from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequence
+from tracking.app.option_parsing import output_file
 from tracking.app.sequence_workers import OpenedAs, results_over_sequences
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.comparison import ComparedRuns, joined
@@ -136,6 +137,8 @@ def ranking(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) 
         )
     if options.by is not None:
         checked_key(options.by)
+    if options.csv is not None:
+        output_file(options.csv, ".csv", "--csv")
     names = run_names(options.tracks)
     runs = stored_runs(names, sequences)
     how = (options.similarity, options.group_match, options.blocks)

@@ -9,11 +9,10 @@ from typing import Any
 
 from scenarios.errors import InputError
 from sim.io.export.places import Places, parse_places
-from sim.io.export.tidy_tables import Form, TidyTables, run_tables, truth_tables, write_tables
-from sim.io.export.trajectory_texts import TextForm, write_text
+from sim.io.export.tidy_tables import NOWHERE, Form, TidyTables, run_tables, truth_tables, write_tables
 from sim.io.files.own_files import output_paths
 from sim.io.formats.mot_folder import frame_rate
-from sim.io.formats.options import RecordingOptions
+from sim.io.formats.options import refuse_options
 from sim.io.source import holds_sequences, open_source
 from sim.io.store.seal import WHOLE, is_run, is_sequence, run_folder
 from sim.io.store.track_files import read_checked_tracks
@@ -27,37 +26,25 @@ from tracking.app.stored_tracks import StoredTracks, find_tracks, run_folders
 
 def export_csv(options: CsvOptions) -> CommandResult:
     """Writes the tables of every run or sequence as CSV."""
-    return _export_tables(options, "csv")
+    return _export(options, "csv", parse_places(options.line, options.zone))
 
 
 def export_parquet(options: ParquetOptions) -> CommandResult:
     """Writes the tables of every run or sequence as Parquet."""
-    return _export_tables(options, "parquet")
+    return _export(options, "parquet", parse_places(options.line, options.zone))
 
 
 def export_trajnet(options: TrajnetOptions) -> CommandResult:
     """Writes the people of every run or sequence as TrajNet++."""
-    return _export_text(options, "trajnet")
+    return _export(options, "trajnet")
 
 
 def export_pedpy(options: PedpyOptions) -> CommandResult:
     """Writes the people of every run or sequence as a text of PedPy and JuPedSim."""
-    return _export_text(options, "pedpy")
+    return _export(options, "pedpy")
 
 
-def _export_tables(options: CsvOptions, form: Form) -> CommandResult:
-    places = parse_places(options.line, options.zone)
-    return _export(options, places, lambda tables, folder, facts: write_tables(tables, folder, form, facts))
-
-
-def _export_text(options: TrajnetOptions, form: TextForm) -> CommandResult:
-    return _export(options, {}, lambda tables, folder, facts: write_text(tables, folder, form, facts["fps"]))
-
-
-Write = Callable[[TidyTables, Path, dict[str, Any]], list[Path]]
-
-
-def _export(options: TrajnetOptions, places: Places, write: Write) -> CommandResult:
+def _export(options: TrajnetOptions, form: Form, places: Places = NOWHERE) -> CommandResult:
     option_parsing.output_folder(options.out)
     path = options.source
     own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)
@@ -73,7 +60,7 @@ def _export(options: TrajnetOptions, places: Places, write: Write) -> CommandRes
     with ProgressMeter("export", len(jobs)) as meter:
         for folder, facts, make in jobs:
             tables = make(places)
-            files = write(tables, folder, facts)
+            files = write_tables(tables, folder, form, facts)
             sizes = {name: len(table.to_arrow()) for name, table in vars(tables).items()}
             rows.append({**facts, "folder": folder, "files": files, "rows": sizes})
             people, groups, events = (sizes[name] for name in ("people_summary", "groups", "events"))
@@ -98,7 +85,7 @@ def _of_runs(options: TrajnetOptions, own: bool) -> list[Job]:
                 remedy="give the text itself",
             )  # fmt: skip
         if "fps" in stored.info:
-            RecordingOptions(fps=options.fps).reject(folder, "a run", "run.json states it", "fps")
+            refuse_options(vars(options), "fps", folder, "a run", "run.json states it")
         fps = frame_rate(options.fps, stored.info.get("fps"))
         facts = {"sequence": stored.info.get("sequence", folder.name), "fps": fps}
         jobs.append((target, facts, partial(_run, stored, fps)))

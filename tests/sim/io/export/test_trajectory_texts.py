@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.export.tidy_tables import run_tables
-from sim.io.export.trajectory_texts import write_text
+from sim.io.export.tidy_tables import run_tables, write_tables
 from sim.io.source import open_source
 from tests.sim.io.export.test_tidy_tables import frame, walk
 
@@ -17,7 +16,7 @@ from tests.sim.io.export.test_tidy_tables import frame, walk
 @pytest.mark.parametrize("form", ["trajnet", "pedpy"])
 def test_round_trip(tmp_path, form):
     tables = run_tables(walk(), 2.0)
-    (path,) = write_text(tables, tmp_path, form, 2.0)
+    (path,) = write_tables(tables, tmp_path, form, {"fps": 2.0})
     (back,) = open_source(path)
     people, truth = tables.people.columns, back.truth
     assert back.fps == 2.0
@@ -27,14 +26,14 @@ def test_round_trip(tmp_path, form):
 
 
 def test_lines(tmp_path):
-    (path,) = write_text(run_tables(walk(), 2.0), tmp_path, "trajnet", 2.0)
+    (path,) = write_tables(run_tables(walk(), 2.0), tmp_path, "trajnet", {"fps": 2.0})
     scene, *_, last = map(json.loads, path.read_text().splitlines())
     assert scene == {"scene": {"id": 0, "p": 1, "s": 1, "e": 5, "fps": 2.0}}
     assert last == {"track": {"f": 121, "p": 3, "x": 9.0, "y": 9.0}}
-    (path,) = write_text(run_tables(walk(), 2.0), tmp_path, "pedpy", 2.0)
+    (path,) = write_tables(run_tables(walk(), 2.0), tmp_path, "pedpy", {"fps": 2.0})
     assert path.read_text().splitlines()[:3] == ["# framerate: 2", "# id\tframe\tx/m\ty/m", "1\t1\t1.0000\t0.0000"]
 
 
 def test_people_in_the_image_are_refused(tmp_path):
     with pytest.raises(InputError, match="people in the image"):
-        write_text(run_tables([frame(1, {1: (3, 4, -1)}, plane="image")], 2.0), tmp_path, "pedpy", 2.0)
+        write_tables(run_tables([frame(1, {1: (3, 4, -1)}, plane="image")], 2.0), tmp_path, "pedpy", {"fps": 2.0})

@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.formats.mot_text import read_detections
-from sim.io.formats.options import parse_box_scale
+from sim.io.formats.options import BoxOptions, parse_box_scale
 from sim.io.source import open_source
 from sim.io.store.track_files import read_track_text
 
@@ -47,7 +47,7 @@ def test_shares_of_the_picture_are_refused_and_scaled(tmp_path):
     scaled = written(tmp_path, np.c_[rows[:, :2], rows[:, 2:] / (1920, 1080, 1920, 1080)])
     with pytest.raises(InputError, match=r"numbers up to .* expected pixels; .*--box-scale WIDTH,HEIGHT"):
         open_source(scaled, fps=10)
-    box = read_detections(scaled, None, None, parse_box_scale("1920,1080")).box
+    box = read_detections(scaled, BoxOptions(box_scale=parse_box_scale("1920,1080"))).box
     assert box == pytest.approx(rows[:, 2:], rel=1e-5)
 
 
@@ -99,7 +99,7 @@ def test_corners(tmp_path, ids):
     rows = people(ids)
     rows[:, 4:] += rows[:, 2:4]
     with pytest.warns(UserWarning, match="all 48 boxes look like x1,y1,x2,y2, but are read as left,top,width,height"):
-        open_source(written(tmp_path, rows), fps=10)
+        _ = open_source(written(tmp_path, rows), fps=10)[0].truth
     if ids:
         (tmp_path / "gt").mkdir()
         written(tmp_path / "gt", rows, "gt.txt")

@@ -1,6 +1,7 @@
 """Boxes of a detector beside a video: both forms give the same tracks, and what does not fit is refused."""
 
 import json
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.formats.detector_boxes import with_boxes
+from sim.io.formats.options import BoxOptions
 from sim.io.source import open_source
 from sim.types import Frame
 from tests.small_videos import picture, write_video
@@ -112,9 +114,13 @@ def test_frames_are_used_if_there_are_times_too(tmp_path, video):
 MISFITS = [
     ([(13, *ROWS[0][1:])], "frame 13"),
     ([(k, 400.0, y, w, h, s) for k, _, y, w, h, s in ROWS], "boxes that end at"),
-    ([(0, *ROWS[0][1:])], '"image_id": 0'),
-    ([(1, 10.0, 20.0, 0.0, 30.0, 0.9)], '"bbox": \\[10.0, 20.0, 0.0'),
-    ([], "no result"),
+    ([(0, *ROWS[0][1:])], "result 1: got 0,.* expected frames from 1"),
+    ([(1, 10.0, 20.0, 0.0, 30.0, 0.9)], "result 1: .* width and height above 0"),
+    ([ROWS[0], (1, 1e12, 20.0, 9.0, 30.0, 0.9)], r"result 2: .* numbers within 1e\+06"),
+    ([(1e300, *ROWS[0][1:])], "result 1: .* a whole number"),
+    ([("1.jpg", *ROWS[0][1:])], 'result 1: got {"image_id": "1.jpg"'),
+    ([(k, x / 320, y / 240, w / 320, h / 240, s) for k, x, y, w, h, s in ROWS], "expected pixels"),
+    ([], "no box"),
 ]
 
 
@@ -125,10 +131,52 @@ def test_what_does_not_fit_is_refused(tmp_path, video, rows, got):
         with_boxes(plain, coco(tmp_path / "det.json", rows))
 
 
+UNREADABLE = [
+    ("[" * 100_000, "deeper nesting"),
+    ('[{"image_id": NaN}]', "NaN, which is no number of JSON"),
+    ("{}", "no list"),
+    ('[{"image_id": 1', "line 1: got no JSON"),
+]
+
+
+@pytest.mark.parametrize(("text", "got"), UNREADABLE)
+def test_unreadable_results_are_one_line(tmp_path, video, text, got):
+    (plain,) = open_source(video)
+    (tmp_path / "det.json").write_text(text)
+    with pytest.raises(InputError, match=got):
+        with_boxes(plain, tmp_path / "det.json")
+
+
+def test_results_are_regular_files_perhaps_with_a_byte_order_mark(tmp_path, video):
+    (plain,) = open_source(video)
+    path = coco(tmp_path / "det.json")
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert with_boxes(plain, path).has_detections
+    os.mkfifo(tmp_path / "fifo.json")
+    with pytest.raises(InputError, match="a FIFO"):
+        with_boxes(plain, tmp_path / "fifo.json")
+
+
+def test_a_text_without_boxes_is_refused(tmp_path, video):
+    (plain,) = open_source(video)
+    (tmp_path / "det.csv").write_text("t,left,top,width,height\n")
+    for path in (mot(tmp_path / "det.txt", []), tmp_path / "det.csv"):
+        with pytest.raises(InputError, match="no box"):
+            with_boxes(plain, path)
+
+
+def test_a_class_of_a_text_without_classes_is_refused(tmp_path, video):
+    (plain,) = open_source(video)
+    with pytest.raises(InputError, match="--class: got 7 columns without classes"):
+        with_boxes(plain, mot(tmp_path / "det.txt"), BoxOptions(person_class=1))
+    with pytest.raises(InputError, match="--class: got 7 columns without classes"):
+        open_source(mot(tmp_path / "det.txt"), fps=10, person_class=1)
+
+
 def test_boxes_of_another_picture_size(tmp_path, video):
     (plain,) = open_source(video)
     large = [(k, 4 * x, 4 * y, 4 * w, 4 * h, s) for k, x, y, w, h, s in ROWS]
-    found = with_boxes(plain, coco(tmp_path / "det.json", large), box_scale=(0.25, 0.25))
+    found = with_boxes(plain, coco(tmp_path / "det.json", large), BoxOptions(box_scale=(0.25, 0.25)))
     assert next(iter(found)).detections.box.tolist() == [list(ROWS[0][1:5])]
 
 
@@ -137,11 +185,11 @@ def test_least_score_is_that_of_the_file(tmp_path, video):
     (plain,) = open_source(video)
     rows = [(*row[:5], score) for row in ROWS for score in (-2.0, 4.0, 9.0)]  # which are mapped into 0 to 1
     for path in (mot(tmp_path / "det.txt", rows), coco(tmp_path / "det.json", rows)):
-        every, some = (with_boxes(plain, path, min_score=least) for least in (None, 4.0))
+        every, some = (with_boxes(plain, path, BoxOptions(min_score=least)) for least in (None, 4.0))
         for all_of, kept in zip(every, some, strict=True):
             np.testing.assert_array_equal(kept.detections.score, all_of.detections.score[1:])
         with pytest.raises(InputError, match="at most 9, the greatest score"):
-            with_boxes(plain, path, min_score=10.0)
+            with_boxes(plain, path, BoxOptions(min_score=10.0))
 
 
 def test_least_score_of_a_recording(tmp_path):

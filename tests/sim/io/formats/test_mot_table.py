@@ -49,6 +49,33 @@ def test_frames_from_zero(tmp_path):
     assert truth.pos.tolist() == [[0.5, 1], [0.6, 1]]
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("header", "row"), [(",frame,id,x,y,w,h", "0,{row}"), ("frame,id,x,y,w,h,", "{row},")])
+def test_columns_without_a_name_are_not_used(tmp_path, header, row):
+    """As pandas writes the index of a table, or as of lines that end with a comma."""
+    path = tmp_path / "a.csv"
+    path.write_text(f"{header}\n{row.format(row='1,7,10,20,30,40')}\n")
+    assert open_source(path, fps=25)[0].truth.box.tolist() == [[10, 20, 30, 40]]
+
+
+UNCLEAR = {
+    "frame;id;x;y;w;h\n1;7;10;20;30;40\n": "line 1: .* apart by commas.* semicolons",
+    "1;7;10,5;20,5;30,5;40,5\n": "line 1: .* apart by commas.* decimals with a point",
+    "<html>\n": "line 1: got columns <html>",
+    "frame,id,u,v\n": "line 1: got columns frame,id,u,v",
+    "frame,id,x,y,w,h\n": "no row",
+    "1,9007199254740993,10,20,30,40\n": "a whole number within 4503599627370496 as id",
+}
+
+
+@pytest.mark.parametrize("text", UNCLEAR)
+def test_what_is_wrong_with_a_text_is_said(tmp_path, text):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=UNCLEAR[text]):
+        open_source(path, fps=25)
+
+
 def test_named_boxes_without_ids_are_detections(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("frame,x,y,w,h,score\n1,10,20,30,40,0.5\n")

@@ -205,6 +205,12 @@ def test_seqinfo(tmp_path, key, value):
     assert error.value.place == key
 
 
+def test_another_section_of_seqinfo_is_an_error(tmp_path):
+    (tmp_path / "seqinfo.ini").write_text("[sequence]\nframeRate=10\n")
+    with pytest.raises(InputError, match=r"got \[sequence\]; expected \[Sequence\]"):
+        open_source(tmp_path)
+
+
 def test_chords_look_back_only():
     frame, id = np.array([0, 1, 2, 5, 0]), np.array([7, 7, 7, 7, 3])
     pos = np.array([[0.0, 0], [1, 0], [2, 0], [5, 5], [0, 0]])

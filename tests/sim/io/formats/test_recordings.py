@@ -202,7 +202,7 @@ def test_biwi_with_a_person_thrice_in_a_step_is_refused(tmp_path):
 
 def test_biwi_bounds(tmp_path):
     for rows, word in (
-        ([(1, 1, 0, 0), (11, 1, 0, 0), (80_000_000, 1, 0, 0)], "1000000 frames"),
+        ([(1, 1, 0, 0), (11, 1, 0, 0), (80_000_000, 1, 0, 0)], "frames from 1 to 1000000"),
         ([(1, 1, 1e200, 0)], "within 1e"),
         ([(1, -1, 0, 0)], "ids from 0"),
         ([(k * 10, p, 0, 0) for k in (1, 2, 3, 900_000) for p in range(30)], "frames times people"),

@@ -10,6 +10,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.types import Sequence
+from tracking.grouping.known_people import known_people
 
 PLACES = [(780, 1, 8.46, 3.59), (790, 1, 9.57, 3.79), (790, 2, 9.57, 4.79), (810, 2, 10.57, 4.79)]
 TRAJNET = '{"scene": {"id": 0, "p": 1, "s": 780, "e": 810, "fps": 2.5, "tag": [1, []]}}\n' + "".join(
@@ -52,6 +53,15 @@ def test_the_rate_of_eth_is_assumed_with_a_warning(tmp_path):
     assert opened(tmp_path, "walk.txt", ETH.replace("\t", " "), fps=5).truth.frame.tolist() == [1, 2, 2, 4]
 
 
+@pytest.mark.filterwarnings("ignore:trajectories without a frame rate")
+@pytest.mark.parametrize("name", TEXTS)
+def test_groups_are_found_without_a_look_ahead(tmp_path, name):
+    """Velocities of the labels are differences over a centred window."""
+    sequence = opened(tmp_path, name, TEXTS[name])
+    assert np.isfinite(sequence.truth.vel).all()
+    assert all(np.isnan(tracks.vel).all() for tracks in known_people(sequence))
+
+
 def test_a_folder_of_ndjson_is_a_dataset(tmp_path):
     for name in ("a.ndjson", "b.ndjson"):
         (tmp_path / name).write_text(TRAJNET)
@@ -72,6 +82,9 @@ BAD = {
     "far away": ("a.txt", ETH + "820 1 1e9 1\n", "line 5: .*numbers within"),
     "no rate": ("a.txt", PETRACK.replace("16.00 fps", ""), "# framerate: got none"),
     "rate 0": ("a.txt", PETRACK.replace("16.00", "0"), "# framerate: got 0"),
+    "decimal comma": ("a.txt", PETRACK.replace("16.00", "16,5"), "# framerate: got 16,5"),
+    "negative rate": ("a.txt", PETRACK.replace("16.00", "-16"), "# framerate: got -16"),
+    "rates": ("a.txt", "# framerate: 8.00\n" + PETRACK, "# framerate: got 16.00 and 8.00"),
     "NaN": ("a.txt", PETRACK + "3 1 nan 1 1\n", "line 8: .*finite"),
     "twice": ("a.txt", PETRACK + "1 1 2 2 2\n", "line 8: .*each id once in a frame"),
 }
@@ -84,6 +97,12 @@ def test_bad_input_is_one_line(tmp_path, case):
     with pytest.raises(InputError, match=words) as error:
         opened(tmp_path, name, text).truth  # noqa: B018
     assert str(tmp_path / name) in str(error.value)
+
+
+@pytest.mark.parametrize("words", ["X[cm] Y[cm]", "x(cm) y(cm)", "x/cm y/cm", "x y, in cm"])
+def test_comments_state_centimetres(tmp_path, words):
+    truth = opened(tmp_path, "hall.txt", PETRACK.replace("x/cm y/cm", words)).truth
+    assert truth.pos == pytest.approx(np.array([p[2:] for p in PLACES]))
 
 
 def test_options_without_effect_are_refused(tmp_path):
@@ -122,6 +141,9 @@ def test_a_file_of_group_labels(tmp_path):
         assert pairs(truth) == {(1, 1), (2, 1), (3, -1)}
         assert truth.groups is None
         assert all(some.members[0].tolist() == [1, 2] for some in truth.groups_px)
+    (tmp_path / "walk.groups.txt").write_text("1 9\n8 7\n")
+    with pytest.warns(UserWarning, match="no two people of this recording are in one of its groups"):
+        assert pairs(open_source(tmp_path / "walk.txt", fps=5)[0].truth) == {(1, 1), (2, -1), (3, -1)}
     (tmp_path / "walk.groups.txt").write_text("1 two\n")
     with pytest.raises(InputError, match=r"walk\.groups\.txt: line 1: got 1 two; expected ids of people"):
         open_source(tmp_path / "walk.txt", fps=5)[0].truth  # noqa: B018

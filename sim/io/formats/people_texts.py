@@ -1,0 +1,170 @@
+"""Reader for texts of people that are not MOTChallenge's: TrajNet++, ETH and UCY, PedPy and JuPedSim, KITTI's tracking.
+
+TrajNet++ (*.ndjson) has a JSON object a line: {"scene": {…, "fps": 2.5}} or {"track": {"f", "p", "x", "y"}}. ETH and
+UCY texts, as Social GAN and others distribute them, have `frame id x y`, separated by tabs or blanks, at 2.5 per s. In
+both, frames are numbers of video frames in steps, and are counted from 1 as in BIWI. PedPy and JuPedSim texts have
+lines `id frame x y z …` below comments: one states the rate, `# framerate: 8.00`, and one may state cm, as `x/cm`.
+These are positions on the ground in m.
+
+KITTI's labels, or results of a tracker, have 17 cells apart by blanks: frame (from 0), id, type, truncated, occluded,
+alpha, left, top, right, bottom in px, and the size, place and rotation of a body before a camera that drives; results
+have a score as the 18th. People are of the types in PEOPLE, and are read with their boxes; other types are left out.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from scenarios.errors import InputError
+from scenarios.limits import FRAME_RATES, is_number
+from scenarios.reading import parse_json
+from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, is_number_text, read_numbers, read_text
+from sim.io.formats.biwi import frame_numbers
+from sim.io.formats.labels import labelled_sequence, require_size
+from sim.io.formats.mot_table import table_of_rows
+from sim.io.formats.mot_text import truth_of_table
+from sim.io.formats.options import RecordingOptions
+from sim.types import Ints, Sequence, Truth
+
+NDJSON = ".ndjson"
+ETH_FPS = 2.5
+FRAMERATE = re.compile(r"framerate[\s:=]*([-+0-9.,]+)", re.IGNORECASE)
+CENTIMETRES = re.compile(r"\bx\W?cm\b|\bin cm\b", re.IGNORECASE)
+PEDPY = re.compile(r"#.*framerate|#\s*(id|persid)\s+(frame|fr)\b", re.IGNORECASE)
+
+KITTI_FPS = 10.0
+KITTI_CELLS = (17, 18)
+KITTI_LAYOUT = "frame id type truncated occluded alpha left top right bottom …"
+PEOPLE = ("Pedestrian", "Person", "Person_sitting")
+
+# rows with the columns of a MOTChallenge text, and the frames per second that the text states
+People = tuple[NumericTable, float | None]
+
+
+def layout_of(path: Path) -> str | None:
+    """Returns which of LAYOUTS a text has, by its ending, comments, or the cells of its first line; None: none."""
+    if path.suffix.lower() == NDJSON:
+        return "trajnet"
+    lines = [line for line in islice(read_text(path).splitlines(), 1000) if line.strip()]
+    comments = [line for line in lines if line.startswith("#")]
+    if comments:
+        return "pedpy" if any(PEDPY.match(line) for line in comments) else None
+    cells = lines[0].split() if lines else []
+    numbers = [is_number_text(cell) for cell in cells[:4]]
+    if len(cells) == 4 and all(numbers):
+        return "eth"
+    return "kitti" if len(cells) in KITTI_CELLS and numbers == [True, True, False, True] else None
+
+
+def open_text(path: Path, layout: str, options: RecordingOptions) -> Sequence:
+    """Returns a text of a layout as Sequence with truth, without pictures and detections."""
+    rows, stated = LAYOUTS[layout](path, options.fps)
+    if not len(rows.line):
+        raise InputError(file=path, got="no row", expected="people with frame, id, x and y", remedy="restore it")
+    rate = options.fps or stated or ETH_FPS
+    if options.fps is None and stated is None:
+        text = f"trajectories without a frame rate are taken at {ETH_FPS:g} fps, as ETH and UCY (--fps says otherwise)"
+        warnings.warn(text, stacklevel=4)
+    table = table_of_rows(rows, boxless=True)
+    rows.reject(table.id < 0, "ids from 0", "correct the id")
+    length = int(table.frame.max())
+    require_size(path, length, table.id)
+
+    def truth() -> Truth:
+        return truth_of_table(table, path.stem, rate, length, options.scale)
+
+    return labelled_sequence("people text", path, path.stem, rate, length, truth, options.scale)
+
+
+def _with_frames(rows: NumericTable, frame: Ints) -> NumericTable:
+    return replace(rows, values=np.column_stack([frame, rows.values[:, 1:]]))
+
+
+def _counted(rows: NumericTable) -> NumericTable:
+    """Returns rows `frame, id, x, y` with the frames of a video counted from 1."""
+    return _with_frames(rows, frame_numbers(rows.integers(0, "frame"), rows.integers(1, "id")))
+
+
+def _read_eth(path: Path, fps: float | None) -> People:
+    return _counted(read_numbers(path, (4, 4), layout="frame id x y")), None
+
+
+def _read_pedpy(path: Path, fps: float | None) -> People:
+    comments = [line for line in read_text(path).splitlines() if line.startswith("#")]
+    rates = {found[1] for line in comments if (found := FRAMERATE.search(line))}
+    stated = float(*rates) if len(rates) == 1 and all(map(is_number_text, rates)) else None
+    if not is_number(fps or stated, *FRAME_RATES):
+        expected = "frames per second from {:g} to {:g}".format(*FRAME_RATES)
+        got = " and ".join(sorted(rates)) or "none"
+        raise InputError(file=path, place="# framerate", got=got, expected=expected, remedy="correct it, or give --fps")
+    rows = read_numbers(path, (4, 12), layout="id frame x y z", comments=True)
+    raw = rows.integers(1, "frame")
+    scale = 0.01 if any(map(CENTIMETRES.search, comments)) else 1.0
+    values = np.column_stack([raw - raw.min(initial=LARGEST) + 1, rows.values[:, 0], scale * rows.values[:, 2:4]])
+    return replace(rows, values=values), stated
+
+
+def _read_ndjson(path: Path, fps: float | None) -> People:
+    rows, lines, rates = [], [], set[float]()
+    for number, line in enumerate(read_text(path).splitlines(), 1):
+        if not line.strip():
+            continue
+        track, rate = _json_row(path, number, line)
+        if track is not None:
+            rows.append(track)
+            lines.append(number)
+        elif rate is not None:
+            rates.add(rate)
+            if len(rates) > 1:
+                raise _bad(path, number, f"fps {rate:g}", f"{min(rates - {rate}):g}, as in earlier scenes")
+    values = np.array(rows, np.float64).reshape(-1, 4)
+    rows_of_file = NumericTable(path, values, np.array(lines, np.int64), "f, p, x, y")
+    return _counted(rows_of_file), next(iter(rates), None)
+
+
+def _json_row(path: Path, number: int, line: str) -> tuple[list[float] | None, float | None]:
+    """Returns (frame, person, x, y) of a line with a track, or the frame rate of one with a scene."""
+    try:
+        value = parse_json(line, path)
+    except InputError as error:
+        raise _bad(path, number, error.got, "a JSON object") from None
+    match value:
+        case {"track": {"f": f, "p": p, "x": x, "y": y}} if all(_finite(v) for v in (f, p, x, y)):
+            return [float(v) for v in (f, p, x, y)], None
+        case {"scene": {"fps": fps}} if is_number(fps, *FRAME_RATES):
+            return None, float(fps)
+        case {"scene": dict() as scene} if "fps" not in scene:
+            return None, None
+    raise _bad(path, number, line.strip()[:80], '{"track": {"f", "p", "x", "y"}} of numbers, or {"scene": {…, "fps"}}')
+
+
+def _finite(value: object) -> bool:
+    return is_number(value, -LARGEST, LARGEST)
+
+
+def _bad(path: Path, number: int, got: object, expected: str) -> InputError:
+    return InputError(file=path, place=f"line {number}", got=got, expected=expected, remedy=CORRECT)
+
+
+def _read_kitti(path: Path, fps: float | None) -> People:
+    numbered = [(k, line.split()) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
+    for number, cells in numbered:
+        if len(cells) not in KITTI_CELLS or not all(map(is_number_text, [*cells[:2], *cells[6:10]])):
+            raise _bad(path, number, " ".join(cells)[:80], f"{KITTI_CELLS[0]} cells, {KITTI_LAYOUT}")
+    people = [(k, cells) for k, cells in numbered if cells[2] in PEOPLE]
+    if not people:
+        got = ", ".join(sorted({cells[2] for _, cells in numbered}))
+        raise InputError(file=path, got=got, expected=" or ".join(PEOPLE), remedy="give labels of people")
+    values = np.array([[*cells[:2], *cells[6:10]] for _, cells in people], float)
+    values[:, 0] += 1
+    values[:, 4:] -= values[:, 2:4]
+    return NumericTable(path, values, np.array([k for k, _ in people]), "frame + 1, id and box"), KITTI_FPS
+
+
+LAYOUTS = {"trajnet": _read_ndjson, "eth": _read_eth, "pedpy": _read_pedpy, "kitti": _read_kitti}
