@@ -20,6 +20,7 @@ from sim.io.formats import biwi, caviar, kitti_tracking, mot_folder, trajectorie
 from sim.io.formats.calibration import read_calibration
 from sim.io.formats.options import RecordingOptions, parse_box_scale
 from sim.io.pictures.background_sample import parse_choice
+from sim.io.pictures.picture_folder import SUFFIXES as PICTURES
 from sim.io.store import sequence_folder
 from sim.io.store.seal import is_sequence
 from sim.types import Camera, Sequence
@@ -88,7 +89,10 @@ def open_source(
                 file=path, got="tracks, what `flockscope track` wrote", expected=KINDS,
                 remedy="give the sequence or dataset first, then the tracks: swap the arguments",
             )  # fmt: skip
-        raise InputError(file=path, got="a folder without sequences", expected=KINDS, remedy="check the path")
+        loose = any(p.suffix.lower() in PICTURES for p in path.iterdir() if not is_hidden(p))
+        got = "a folder of pictures, without img1" if loose else "a folder without sequences"
+        remedy = f"move the pictures to {path / 'img1'}" if loose else "check the path"
+        raise InputError(file=path, got=got, expected=KINDS, remedy=remedy)
     return _distinct([_open_folder(p, options) for p in found])
 
 
@@ -139,7 +143,7 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     if path.name == "obsmat.txt":
         return _open_folder(path.parent, options)
     if suffix in video.SUFFIXES:
-        options.reject(path, "a video", "it has no text", "person_class box_scale min_score")
+        options.reject(path, "a video without --boxes", "it has no boxes", "person_class box_scale min_score")
         return video.open_video(path, options)
     if suffix in (".txt", ".csv", trajectories.NDJSON) and trajectories.is_trajectories(path):
         no = "px_per_m camera background person_class box_scale min_score"
@@ -152,7 +156,8 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     if suffix in (".txt", ".csv"):
         options.reject(path, "a text", "it has no pictures", "background")
         return mot_folder.open_text(path, options)
-    raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy="check the path")
+    remedy = "give boxes with --boxes, their video or folder as SOURCE" if suffix == ".json" else "check the path"
+    raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy=remedy)
 
 
 def _kind(folder: Path) -> str | None:

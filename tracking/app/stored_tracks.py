@@ -131,6 +131,8 @@ def _named(sequence: Sequence, by_name: dict[str, StoredTracks], stored: list[St
         remedy = (
             f"name={sequence.name} in {folder / 'seqinfo.ini'} is another than its folder's, {folder.name}: correct it"
         )
+    elif len(stored) == 1 and (text := stored[0].path / "tracks.txt").is_file():
+        remedy += f"; for the same frames in another source give {text}"
     raise InputError(
         file=stored[0].path.parent if len(stored) > 1 else stored[0].path,
         got="tracks of " + ", ".join(sorted(by_name)[:5]), expected=f"tracks of {sequence.name}", remedy=remedy,
