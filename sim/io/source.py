@@ -21,6 +21,7 @@ from sim.io.formats.calibration import read_calibration
 from sim.io.formats.detector_boxes import with_boxes
 from sim.io.formats.options import BoxOptions, RecordingOptions, parse_box_scale
 from sim.io.pictures.background_sample import parse_choice
+from sim.io.pictures.picture_folder import SUFFIXES as PICTURES
 from sim.io.store import sequence_folder
 from sim.io.store.seal import is_sequence
 from sim.types import Camera, Sequence
@@ -103,7 +104,10 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
                 file=path, got="tracks, what `flockscope track` wrote", expected=KINDS,
                 remedy="give the sequence or dataset first, then the tracks: swap the arguments",
             )  # fmt: skip
-        raise InputError(file=path, got="a folder without sequences", expected=KINDS, remedy="check the path")
+        loose = any(p.suffix.lower() in PICTURES for p in path.iterdir() if not is_hidden(p))
+        got = "a folder of pictures, without img1" if loose else "a folder without sequences"
+        remedy = f"move the pictures to {path / 'img1'}" if loose else "check the path"
+        raise InputError(file=path, got=got, expected=KINDS, remedy=remedy)
     return _distinct([_open_folder(p, options) for p in found])
 
 
@@ -155,10 +159,11 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     if path.name == "obsmat.txt":
         return _open_folder(path.parent, options)
     if suffix in video.SUFFIXES:
-        options.reject(path, "a video", "it has no text", "boxes")
+        options.reject(path, "a video without --boxes", "it has no boxes", "boxes")
         return video.open_video(path, options)
     if suffix not in (".txt", ".csv", people_texts.NDJSON):
-        raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy="check the path")
+        remedy = "give boxes with --boxes, their video or folder as SOURCE" if suffix == ".json" else "check the path"
+        raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy=remedy)
     layout = people_texts.layout_of(path)
     if layout is None:
         options.reject(path, "a text", "it has no pictures", "background")

@@ -26,7 +26,7 @@ SHOWN = 3  # Most parameters that the error on two configs names.
 
 
 # Endings of files that hold no tracks.
-OTHER_FILES = (".toml", ".py", ".json", ".ini", ".html", ".svg", ".jpg", ".png", ".mp4", ".xml")
+OTHER_FILES = (".toml", ".py", ".json", ".ini", ".html", ".svg", ".jpg", ".png", ".mp4", ".xml", ".ndjson")
 
 DATASET = ("", "*", "*/*")  # Where a stored sequence lies below a sequence folder, a split of a dataset, or a dataset.
 
@@ -131,6 +131,12 @@ def _named(sequence: Sequence, by_name: dict[str, StoredTracks], stored: list[St
         remedy = (
             f"name={sequence.name} in {folder / 'seqinfo.ini'} is another than its folder's, {folder.name}: correct it"
         )
+    elif (
+        len(stored) == 1
+        and stored[0].info.get("truth_hash") is None
+        and (text := stored[0].path / "tracks.txt").is_file()
+    ):
+        remedy += f"; if they are of the same frames, give {text}"
     raise InputError(
         file=stored[0].path.parent if len(stored) > 1 else stored[0].path,
         got="tracks of " + ", ".join(sorted(by_name)[:5]), expected=f"tracks of {sequence.name}", remedy=remedy,

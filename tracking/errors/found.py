@@ -114,7 +114,8 @@ def errors_of_run(
     sequence: Sequence, run: TrackingRun, similarity: Similarity | None = None, costs: int = EVERY, causes: bool = True
 ) -> RunErrors:
     """Returns the errors of a run, with the detections of the input that it names; raises as `find_errors`."""
-    known = run.info.get("detections") is not None and not any(t.unit == "group" for t in run)
+    named = sequence.truth is not None and run.info.get("detections") is not None
+    known = named and not any(t.unit == "group" for t in run)
     return find_errors(
         sequence, run, named_detections(sequence, run.info, similarity) if known else None, similarity, costs, causes
     )

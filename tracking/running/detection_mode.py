@@ -34,7 +34,10 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
     able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
     if requested in able or (requested is None and able):
         return requested or able[0]  # type: ignore[return-value]
-    remedy = f"try --detections {able[0]}" if able else "take another tracker or source"
+    other = "take another tracker or source"
+    if sequence.has_images and {"boxes", "points"} & set(needs):
+        other = "give a detector's boxes with --boxes FILE"
+    remedy = f"try --detections {able[0]}" if able else other
     got = f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {_contents(sequence)}"
     expected = "what detections of some kind need"
     if requested:

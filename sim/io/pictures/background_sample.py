@@ -122,6 +122,10 @@ class BackgroundSample:
                 file=self.path, got="no readable picture in the background sample", expected="at least one",
                 remedy="choose other frames: --background first:N or spread:N",
             )  # fmt: skip
+        if 2 * count < len(wanted):
+            words = f"only {count} of the {len(wanted)} frames of the background sample have a readable picture"
+            remedy = "number the pictures 1, 2, 3, …, or choose other frames with --background"
+            warnings.warn(f"{self.path}: {words}; {remedy}", stacklevel=2)
         if self.length < BACKGROUNDS and not self.choice.asked:
             words = f"shorter than a background sample of {BACKGROUNDS} frames; all {self.length} are taken"
             warnings.warn(f"{self.path.name}: {words}", stacklevel=2)

@@ -125,6 +125,7 @@ OPTIONS = [
     ("--background {}/small.png", ["small.png", "--background", "64×96 px", "96×64 px", "the same size"]),
     ("--detections file", ["needs pixels or boxes", "film", "images"]),
     ("--detections image --set sensor.noise_m=3", ["sensor"]),
+    ("--min-score 0.5", ["--min-score", "without --boxes", "it has no boxes"]),
 ]
 
 
@@ -148,3 +149,47 @@ def test_a_background_for_a_tracker_that_needs_none(tmp_path, capsys):
     line = ["track", "blob", str(folder), "--fps", "10", "--out", str(tmp_path / "out")]
     assert run([*line, "--detections", "truth", "--background", "first:10"]) == 2
     assert "leave --background out" in capsys.readouterr().err
+
+
+BOXES_ONLY = (
+    "class Mine:\n    needs = ('boxes',)\n    def reset(self, context, seed): ...\n    def step(self, f, d): ...\n"
+)
+
+# commands whose input lacks what they need: what the error must say
+WITHOUT = {
+    "track {0}/mine.py:Mine {0}/film.mp4 --out {0}/x": "give a detector's boxes with --boxes FILE",
+    "track blob {0}/loose --out {0}/x": "move the pictures to {0}/loose/img1",
+    "track blob {0}/boxes.json --out {0}/x": "give boxes with --boxes",
+    "errors {0}/film.mp4 {0}/run": "{0}/film.mp4: got no labels",
+    "overlay {0}/film.mp4 {0}/other --out {0}/x.mp4": "give {0}/other/tracks.txt",
+}
+
+
+@pytest.fixture(scope="module")
+def street(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A video without labels, tracks of it and of its boxes alone, and what a user may take for a recording."""
+    folder = tmp_path_factory.mktemp("street")
+    film(folder)
+    (folder / "mine.py").write_text(BOXES_ONLY)
+    (folder / "boxes.json").write_text("[]")
+    jpegs(folder, [picture(0)]).joinpath("img1").rename(folder / "loose")
+    (folder / "other.txt").write_text("".join(f"{k},-1,{10 + k},20,16,40,0.9\n" for k in range(1, 20)))
+    for source, out in (("film.mp4", "run"), ("other.txt", "other")):
+        assert run(["track", "blob", str(folder / source), "--px-per-m", "20", "--out", str(folder / out)]) == 0
+    return folder
+
+
+@pytest.mark.parametrize("line", WITHOUT)
+def test_the_remedy_says_what_is_missing(line, street, capsys):
+    assert run(line.format(street).split()) == 2
+    assert WITHOUT[line].format(street) in capsys.readouterr().err
+
+
+def test_a_sample_mostly_without_pictures_is_a_warning(tmp_path, capsys):
+    folder = jpegs(tmp_path / "mot", [picture(k) for k in range(121)])
+    for k in range(1, 122):
+        if k % 4 != 1:
+            (folder / "img1" / f"{k:06d}.jpg").unlink()
+    line = ["track", "blob", str(folder), "--fps", "10", "--px-per-m", "20", "--out", str(tmp_path / "out")]
+    run(line)
+    assert "of the 50 frames of the background sample have a readable picture; number the" in capsys.readouterr().err

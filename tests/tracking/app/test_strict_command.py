@@ -95,6 +95,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("mistakes")
     write_short_scene(folder, "0:2")
     assert run(["track", "blob", str(folder / "data"), "--out", str(folder / "run")]) == 0
+    (folder / "people.ndjson").write_text('{"track": {"f": 1, "p": 1, "x": 8.46, "y": 3.59}}\n')
     return folder
 
 
@@ -106,6 +107,7 @@ MISTAKES = {
     "score {0}/run {0}/data": ("{0}/run: got tracks, what `flockscope track` wrote;", "swap the arguments"),
     "view {0}/run {0}/data --out {0}/x": ("{0}/run: got tracks, what", "swap the arguments"),
     "score {0}/data {0}/scene.toml": ("{0}/scene.toml: got a .toml file, no tracks;", "made by `flockscope track`"),
+    "score {0}/data {0}/people.ndjson": ("{0}/people.ndjson: got a .ndjson file, no tracks;", "or MOTChallenge text"),
     "track blob {0}/data --detections image --out {0}/x": (
         "and scene-s00000 with detections, truth, without pictures; expected a sequence with pictures;",
         "try --detections file",
