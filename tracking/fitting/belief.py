@@ -1,7 +1,7 @@
 """`fit_belief`: fits the belief of who belongs together to simulated scenes, by penalised maximum likelihood.
 
-Every scene weighs the same, and every pair of a scene. The penalty is on the squared log-odds and on the curvature of
-the tables.
+Every scene weighs as often as it is named, and every pair of a scene the same. The penalty is on the squared log-odds
+and on the curvature of the tables.
 
 Also here: how well beliefs tell who belongs together: log loss, calibration error and F1 of rows of pairs.
 """
@@ -29,8 +29,8 @@ STEPS = 200  # Most iterations.
 
 @dataclass(frozen=True)
 class PairSample:
-    """Rows of scenes: values (R, len(NAMES)); together (R,); weight (R,), of sum 1, equal for all scenes,
-    and for all pairs of a scene."""
+    """Rows of scenes: values (R, len(NAMES)); together (R,); weight (R,), of sum 1, equal for all pairs of a
+    scene, and in proportion to the weights of scenes."""
 
     values: np.ndarray
     together: Bools
@@ -43,7 +43,7 @@ def sample_of(scenes: Sequence[PairScene]) -> PairSample:
     if not scenes:
         remedy = "name scenarios with people who meet"
         raise InputError(place="fit grouping", got="no two people within 4 m", expected="pairs", remedy=remedy)
-    weight = np.concatenate([_weights(s.pair) / len(scenes) for s in scenes])
+    weight = np.concatenate([_weights(s.pair) * s.weight for s in scenes]) / sum(s.weight for s in scenes)
     values, together = (np.concatenate([getattr(s, name) for s in scenes]) for name in ("values", "together"))
     return PairSample(values, together, weight, sum(len(np.unique(s.pair)) for s in scenes))
 

@@ -6,8 +6,9 @@ detector and misses. Some scenes begin late, as if the recording had begun there
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +34,7 @@ class PairScene:
     pair: Ints
     values: np.ndarray  # (R, len(NAMES)), float32
     together: Bools  # (R,): True if the two are in one true group in the step's last frame
+    weight: int = 1  # number of times that the scene is named
 
 
 @dataclass(frozen=True)
@@ -47,15 +49,18 @@ class Walkers:
 
 
 def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScene]:
-    """Yields two scenes for each entry of the named scenarios, suites or *.toml files and each seed."""
-    for entry in [entry for name in names for entry in resolve(name)]:
+    """Yields two scenes for each entry of the named scenarios, suites or *.toml files and each seed.
+
+    The scenes of what is named several times come once, with that weight.
+    """
+    for entry, weight in [(entry, count) for name, count in Counter(names).items() for entry in resolve(name)]:
         for seed in seeds:
             truth = simulated(entry, seed)
             begin = BEGINS[seed % len(BEGINS)] if truth.length / truth.fps >= LEAST + max(BEGINS) else 0.0
             for rough in (False, True):
                 found = pair_scene(walkers(truth, seed, entry.repeat, rough, begin))
                 if found is not None:
-                    yield found
+                    yield replace(found, weight=weight)
 
 
 def simulated(entry: Entry, seed: int) -> Truth:
