@@ -269,5 +269,5 @@ class GroupPda:
     def _split(self, claims: PointClaims, mine: Bools, scaled: ScaledParameters, t: float) -> None:
         bank = self.bank
         due = np.flatnonzero((bank.null_time >= self.config.split_time - 1e-9) & (bank.null_time > 0))
-        for row in due.tolist()[::-1]:  # from the last row on, as children are appended
+        for row in due.tolist()[::-1]:  # from the last row on, as parts are appended
             fall_apart(bank, row, claims.points[mine[row]], claims.weights[mine[row]], scaled, t, self.ids)
