@@ -142,10 +142,11 @@ class GroupChanges:
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
         """Split groups, and merge parts and groups; yield the events of groups. t: s."""
+        # First: an id that a part has from its lost group must not bring that group's past.
+        self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= PATIENCE + 1e-9}
         yield from self._split(bank, scaled, t)
         self._join_parts(bank, scaled, t)
         yield from self._merge(bank, scaled, t)
-        self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= PATIENCE}
 
     def _split(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
         for group in np.unique(bank.group[bank.confirmed & (bank.parent != NO_ID)]).tolist():
