@@ -162,17 +162,17 @@ def masses(sets, mine, shared, points, weights, age, region, x, P, extent, size,
 
 
 def update(g, points, weights, d2, own, hits, share, age, region, x, P, extent, size, hold, rules):
-    """One group after its points: state, rows chosen, innovation, its S, mass of the miss, x, P, extent, size."""
+    """One group after its points: state, rows chosen, mass of the miss, x, P, extent, size."""
     mine, shared = claims(d2, own, hits, share, g, rules)
     same = x, P, extent, size
     if not mine + shared:
-        return "nothing", [], None, None, 0.0, *same
+        return "nothing", [], 0.0, *same
     sets = associations(mine, shared, points, weights, rules)
     if not sets:
         some = mine + shared
         if reference_components.partition(points[some], weights[some], rules.constraint).max() < 0:
-            return "nothing", [], None, None, 0.0, *same  # noise
-        return "null", some, None, None, 0.0, *same
+            return "nothing", [], 0.0, *same  # noise
+        return "null", some, 0.0, *same
     beta, miss, R = masses(sets, mine, shared, points, weights, age, region, x, P, extent, size, rules)
     states, covariances = [x], [P]
     for s, r in zip(sets, R, strict=True):
@@ -184,16 +184,13 @@ def update(g, points, weights, d2, own, hits, share, age, region, x, P, extent, 
     new_x = mass @ np.array(states)
     new_P = sum(b * (C + np.outer(y - new_x, y - new_x)) for b, y, C in zip(mass, states, covariances, strict=True))
     best = int(np.argmax(beta))
-    middle, now = moments(points[sets[best]], weights[sets[best]])[1], measures(sets[best], weights, age)
     new_extent, new_size = extent, size
     others = weights[mine + shared] @ (1 - share[g][mine + shared]) > rules.freeze * size
     if not hold and not others:
         new_extent, new_size = adapted(sets, mass, points, weights, extent, size, rules)
     found = beta.sum() > miss
-    return (
-        "measured" if found else "nothing", sets[best] if found else [],
-        middle - x[:2], now @ P @ now.T + R[best], miss, new_x, new_P, new_extent, new_size,
-    )  # fmt: skip
+    chosen = ("measured", sets[best]) if found else ("nothing", [])
+    return *chosen, miss, new_x, new_P, new_extent, new_size
 
 
 def adapted(sets, share, points, weights, extent, size, rules):

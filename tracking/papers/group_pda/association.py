@@ -81,7 +81,7 @@ def associate(
     have, (G, M); a point is one group's at most."""
     weighted = scaled.config.appearance * log_ratio
     log_density = point_log_density(bank.size, region, claims, weighted)
-    state, chosen, _ = kernels.associate(
+    state, chosen = kernels.associate(
         claims.points, claims.weights, claims.d2, weighted, claims.owner, claims.claimants,
         shares(log_density, np.isfinite(log_density)), t - claims.last_seen, region,
         bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,

@@ -43,9 +43,6 @@ from tracking.papers.group_pda.association_mass_kernels import (
 NOTHING, NULL, MEASURED = range(3)
 """State of a group after `associate`: no point is the group's; no association is feasible; it was measured."""
 
-INNOVATION_X, INNOVATION_Y, S_XX, S_XY, S_YY, MISS_MASS = range(6)
-"""Columns of the report (G, 6) of `associate`: innovation and its covariance, normalised mass of the miss."""
-
 
 @njit(cache=True)
 def search(points: Array, x: Array, region: Array, gate: float) -> Array:
@@ -105,7 +102,7 @@ def any_within(place: Array, points: Array, reach: float) -> Bools:
 def associate(
     points: Array, weights: Array, d2: Array, log_ratio: Array, owner: Ints, claimants: Ints,
     share: Array, age: Array, region: Array, x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
-) -> tuple[Ints, Bools, Array]:  # fmt: skip
+) -> tuple[Ints, Bools]:  # fmt: skip
     """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (sec. 4.1 to 4.3).
 
     x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M) and
@@ -115,8 +112,7 @@ def associate(
     (M,): time, s, since a missed member that stands in was measured, 0 for a point of this frame.
     rest (G,): True for groups whose extent and size must not change. rules: see association_mass_kernels.
 
-    Returns the state (G,) of each group, the points (G, M) bool of its likeliest association, and the report (G, 6):
-    innovation x, y, its covariance xx, xy, yy, normalised mass (weight) of the miss; 0 without a feasible association.
+    Returns the state (G,) of each group and the points (G, M) bool of its likeliest association:
     - NOTHING = 0: the group has no points, only noise, or the miss has at least the mass of all associations. No points
       are chosen. The group is updated by the mixture if it has a feasible association.
     - NULL = 1: it has points, more than noise, but no feasible association (points that form one group). All its points
@@ -125,7 +121,6 @@ def associate(
     """
     groups, m = d2.shape
     state, chosen = np.zeros(groups, np.int64), np.zeros((groups, m), np.bool_)
-    report = np.zeros((groups, 6))
     for g in range(groups):
         order, start = _ordered_points(d2[g], log_ratio[g], owner, claimants, share, g, rules[ASSOCIATION])
         n = len(order)
@@ -157,7 +152,7 @@ def associate(
         if some:
             best = _estimate(
                 mine, people, ages, colour, start, feasible, region[g], x[g], P[g], extent[g], size[g : g + 1],
-                rest[g] or others > rules[FREEZE_SHARE] * size[g], rules, report[g],
+                rest[g] or others > rules[FREEZE_SHARE] * size[g], rules,
             )  # fmt: skip
             if best >= 0:
                 state[g], taken = MEASURED, start + best
@@ -168,7 +163,7 @@ def associate(
                     state[g], taken = NULL, n
         for k in range(taken):
             chosen[g, order[k]] = True
-    return state, chosen, report
+    return state, chosen
 
 
 @njit(cache=True)
@@ -200,7 +195,7 @@ def _ordered_points(
 @njit(cache=True)
 def _estimate(
     points: Array, weights: Array, age: Array, colour: Array, start: int, feasible: Bools, region: Array,
-    x: Array, P: Array, extent: Array, size: Array, rest: bool, rules: Array, report: Array,
+    x: Array, P: Array, extent: Array, size: Array, rest: bool, rules: Array,
 ) -> int:  # fmt: skip
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
     seen, mean_age = running_ages(weights, age, start)
@@ -239,14 +234,10 @@ def _estimate(
         matched += beta[j]
         if beta[j] > beta[best]:
             best = j
-    report[INNOVATION_X], report[INNOVATION_Y] = mean[best, 0], mean[best, 1]
-    report[MISS_MASS] = miss
     measured = np.zeros(len(beta))
     for j in range(len(beta)):
         if seen[j] > 0:
             measured[j] = beta[j]
-    for k in range(3):
-        report[S_XX + k] = S[best, k]
     _mix(measured, mean, mean_age, S, x, P)
     if not rest:
         _adapt(beta, matched, people, cov, extent, size, rules)

@@ -18,7 +18,7 @@ from tracking.filters.components import partition
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.association import walking_reach
 from tracking.papers.group_pda.group_bank import GroupBank, newborn
-from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
+from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 ExpectedMembers = tuple[Array, Array, Ints]
 
@@ -56,9 +56,7 @@ def add_newborns(
 
 def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
     born.parent[k], born.first_seen[k] = bank.group[row], bank.first_seen[row]
-    if scaled.config.corrections:
-        born.x[k, 2:] = bank.x[row, 2:]
-        born.P[k, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * SPLIT_SPEED) ** 2 * np.eye(2)
+    born.move_with(k, bank, row, scaled)
 
 
 def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[WholeGroupEvent]:

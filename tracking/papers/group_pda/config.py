@@ -53,7 +53,7 @@ class GroupPdaConfig(BackgroundSettings):
     report_coast: float = param(0.5, (0.0, 5.0), "s",
         "time after the last measurement for which a group is reported (ours)")
     carry_time: float = param(0.9, (0.0, 3.0), "s",
-        "from points: time for which a missed member stands in at its predicted place (ours)", sees="points")
+        "time for which a member is expected at its predicted place; from points a missed one stands in there (ours)")
     carry_reach: float = param(0.37, (0.05, 2.0), "m",
         "from points: a member is measured if a point is so near to its predicted place (ours)", sees="points")
     pixel_radius: float = param(0.55, (0.05, 2.0), "m",

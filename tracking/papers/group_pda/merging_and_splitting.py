@@ -42,7 +42,7 @@ from tracking.grouping.link_rule import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
-from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
+from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 # s before and after a moment over which the difference of two groups' velocities is averaged: the time of one step, so
 # that the sway of people has no part in it.
@@ -142,10 +142,11 @@ class GroupChanges:
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
         """Split groups, and merge parts and groups; yield the events of groups. t: s."""
+        # First: an id that a part has from its lost group must not bring that group's past.
+        self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= PATIENCE + 1e-9}
         yield from self._split(bank, scaled, t)
         self._join_parts(bank, scaled, t)
         yield from self._merge(bank, scaled, t)
-        self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= PATIENCE}
 
     def _split(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
         for group in np.unique(bank.group[bank.confirmed & (bank.parent != NO_ID)]).tolist():
@@ -334,9 +335,7 @@ def fall_apart(
         parts.parent[:] = bank.group[row]
         parts.parent[largest] = bank.parent[row]
         parts.id[:] = [bank.id[row] if k == largest else ids.new() for k in range(len(parts))]
-    if scaled.config.corrections:
-        parts.x[:, 2:] = bank.x[row, 2:]
-        parts.P[:, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * SPLIT_SPEED) ** 2 * np.eye(2)
+    parts.move_with(np.arange(len(parts)), bank, row, scaled)
     bank.remove(row)
     bank.add(parts)
 

@@ -162,8 +162,8 @@ class GroupPda:
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
-        Order: predict; gate, associate, update, fall apart (Fig. 1), births; duplicates; split, merge; confirm; remove
-        lost groups.
+        Order: predict; remove lost groups; gate, associate, update, fall apart (Fig. 1), births; duplicates; split,
+        merge; confirm.
         From points `detections.pos` is used (x, y), from pixels `frame.image`. A frame without them (None), and from
         pixels one with too much foreground, is predicted only; before the first detections the Tracks are empty. A
         config that has replaced `config` since the last frame holds from this frame on; the groups stay.
@@ -181,13 +181,12 @@ class GroupPda:
         if bank.colour_hist.shape[1] != scaled.colour_bins:
             bank.colour_hist = np.zeros((len(bank), scaled.colour_bins))
         bank.predict(scaled)
-        events: list[WholeGroupEvent] = []
+        events: list[WholeGroupEvent] = [*remove_lost(bank, scaled, t)]
         if points is not None:
             self._measure(points, weights, scaled, t)
         self.duplicates.step(bank, scaled, t)
         events += self.changes.step(bank, scaled, t)
         events += confirm(bank, scaled, t, self.ids)
-        events += remove_lost(bank, scaled, t)
         return self._report(frame, events, scaled, self._outline(detections))
 
     def _report(self, frame: Frame, events: list[WholeGroupEvent], scaled: ScaledParameters, outline: Array) -> Tracks:
@@ -269,5 +268,5 @@ class GroupPda:
     def _split(self, claims: PointClaims, mine: Bools, scaled: ScaledParameters, t: float) -> None:
         bank = self.bank
         due = np.flatnonzero((bank.null_time >= self.config.split_time - 1e-9) & (bank.null_time > 0))
-        for row in due.tolist()[::-1]:  # from the last row on, as children are appended
+        for row in due.tolist()[::-1]:  # from the last row on, as parts are appended
             fall_apart(bank, row, claims.points[mine[row]], claims.weights[mine[row]], scaled, t, self.ids)

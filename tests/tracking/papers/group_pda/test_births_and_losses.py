@@ -59,6 +59,11 @@ def test_a_leave_tells_where_and_when_it_was_seen_last() -> None:
     assert not len(made[-1].id)
 
 
+@pytest.mark.parametrize(("hidden", "known"), [(range(40, 54), {1}), (range(40, 55), {1, 2})])
+def test_a_group_comes_back_until_coast_time_and_not_a_frame_later(hidden: range, known: set[int]) -> None:
+    assert ids(track(walk((0.0, 0.0), hidden))) == known
+
+
 def joining(seed: int, ranks: tuple[int, int]) -> list[Array]:
     """A group comes to another's side, 1 m between the nearest from frame 31 on, and walks with it."""
     r, made = np.random.default_rng(seed), []
