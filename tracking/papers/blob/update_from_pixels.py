@@ -7,6 +7,7 @@ Order of a frame, with the paper's sections:
     other foreground: split among the tracks expected there, by templates     ours (person_template)
     foreground that no track explains, as large as a person: new tracks       ours (new_people)
     axes return towards those of a person at the track's place                ours (track_management)
+    looks: the colours of people who are hardly hidden are learned            ours (person_look_kernels)
     rho: confirm, delete, start tracks                                        secs. 4.5, 5 (track_management)
     adapt the background, except where confirmed tracks are                   ours
 
