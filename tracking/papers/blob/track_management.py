@@ -223,7 +223,7 @@ class TrackedPeople:
         earlier = np.tri(len(z), k=-1) * np.where(free, person, 0.0)
         owned = np.concatenate([np.tile(self.existence() * self.measured, (len(z), 1)), earlier], 1)
         place, scale = np.concatenate([self.bank[kalman.PLACE], z]), np.concatenate([self.scale, self._scale_of(z)])
-        d2 = kalman.distances(np.stack([place, *[0 * place] * 4]), z, DOUBLE_SPREAD**2, scale).T
+        d2 = np.square((z[:, None] - place) / (DOUBLE_SPREAD * scale[:, None])).sum(2)
         density = np.exp(-0.5 * d2) / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self._false_density(scale)
         double = c.clutter_rate * DOUBLES * (density * owned).sum(1)
         if len(z) or len(self.id):
