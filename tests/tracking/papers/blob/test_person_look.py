@@ -75,7 +75,14 @@ def test_people_without_a_look_are_placed_by_the_foreground_alone():
     plain = ExplainedForeground(foreground).fit_places(expected, spread, 10.0)
     unknown = looks.unknown(len(expected))
     assert np.array_equal(ExplainedForeground(foreground).fit_places(expected, spread, 10.0, image, unknown), plain)
-    apart = np.array([[20.0, 80.0, 40.0, 16.0], [90.0, 80.0, 40.0, 16.0]])
-    other = learned((apart[0], RED), (apart[1], BLUE))
-    plain = ExplainedForeground(foreground).fit_places(apart, spread[:2], 10.0)
-    assert np.array_equal(ExplainedForeground(foreground).fit_places(apart, spread[:2], 10.0, image, other), plain)
+
+
+def test_people_who_touch_nobody_are_placed_by_the_foreground_alone():
+    apart, spread = np.array([[20.0, 80.0, 40.0, 16.0], [90.0, 80.0, 40.0, 16.0]]), np.full((2, 2), 4.0)
+    aside = apart + [4.0, 0, 0, 0]
+    image, mask = (
+        picture((aside[0], RED), (aside[1], BLUE)),
+        (picture((apart[0], RED), (apart[1], BLUE)) != GREY).any(2),
+    )
+    known = learned((apart[0], RED), (apart[1], BLUE))
+    assert np.array_equal(ExplainedForeground(mask).fit_places(apart, spread, 10.0, image, known), apart)
