@@ -79,7 +79,7 @@ def test_people_without_a_look_are_placed_by_the_foreground_alone():
 
 def test_people_who_touch_nobody_are_placed_by_the_foreground_alone():
     apart, spread = np.array([[20.0, 80.0, 40.0, 16.0], [90.0, 80.0, 40.0, 16.0]]), np.full((2, 2), 4.0)
-    aside = apart + [4.0, 0, 0, 0]
+    aside = apart + np.array([4.0, 0, 0, 0])
     image, mask = (
         picture((aside[0], RED), (aside[1], BLUE)),
         (picture((apart[0], RED), (apart[1], BLUE)) != GREY).any(2),
