@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.papers.blob import new_people
+from tracking.papers.blob import person_look_kernels as looks
 from tracking.papers.blob.person_template_kernels import BARE, ELLIPSE, EXPLAINED, LEAST_INSIDE
 from tracking.papers.blob.person_template_search_kernels import FINE_STEPS, MOST_STEPS, STEPS_PER_HEIGHT, SWEEPS
 
@@ -133,3 +134,36 @@ def guesses(region, most, size):
         foot = np.array([[columns[p].mean() + 0.5, np.quantile(rows[p], 0.98) + 1] for p in parts])
         found.append(np.column_stack([foot, size.at(foot)]))
     return found
+
+
+def points(template):
+    """(POINTS, 2) x, y of the points of a template: rows from the top, each as wide as the ellipse."""
+    x, foot, h, w = template
+    down = (np.arange(looks.ROWS) + 0.5) / looks.ROWS
+    aside = (2 * np.arange(looks.COLUMNS) + 1) / looks.COLUMNS - 1
+    half = w / 2 * np.sqrt(1 - (2 * down - 1) ** 2)
+    u = x + half[:, None] * aside
+    return np.column_stack([u.ravel(), np.repeat(foot - h + down * h, looks.COLUMNS)])
+
+
+def seen_at(cover, templates, k, template):
+    """Row and column, -1 if the point is outside or hidden, of template k's points when it is at `template`."""
+    front = [t for t in templates if t[1] > templates[k][1]]
+    hidden = (cover >= EXPLAINED) | (painted(cover.shape, front) > 0)
+    column, row = np.floor(points(template)).astype(int).T
+    inside = (row >= 0) & (row < cover.shape[0]) & (column >= 0) & (column < cover.shape[1])
+    inside[inside] = ~hidden[row[inside], column[inside]]
+    return np.where(inside, row, -1), np.where(inside, column, -1)
+
+
+def fits(image, cover, templates, k, look, steps, step):
+    """The fit of a look at each place of a grid round template k, rows down, columns right."""
+    offset, found = step * np.arange(-steps, steps + 1), []
+    var = np.maximum(look[:, 3], looks.LEAST_VAR)
+    for b in offset:
+        for a in offset:
+            row, column = seen_at(cover, templates, k, np.add(templates[k], (a, b, 0, 0)))
+            away = np.square(image[row, column].astype(float) - look[:, :3]).sum(1)
+            ratio = np.maximum(-away / (2 * var) - 1.5 * np.log(var / looks.ANY_VAR), looks.WORST_FIT)
+            found.append(ratio[(row >= 0) & (look[:, 4] >= looks.LEAST_SEEN)].sum() / looks.POINTS)
+    return np.reshape(found, (len(offset), len(offset)))

@@ -23,6 +23,7 @@ import numpy as np
 
 import tracking
 from benchmarks.support.in_memory import people_in_view, truth_in_view
+from benchmarks.support.replaced_code import replaced_code
 from benchmarks.support.tables import head, row
 from scenarios.loading.resolve import load
 from sim.io.pictures.background_sample import BackgroundChoice, with_copies
@@ -30,6 +31,7 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Frame, Image
 from sim.types import Sequence as Recording
+from tracking.papers.blob import update_from_pixels
 from tracking.papers.blob.config import BlobConfig
 from tracking.running.run import track
 
@@ -40,6 +42,7 @@ ABLATIONS: dict[str, dict[str, object]] = {
     "managed by rho": {"management": "rho"},
     "preset `paper`": dict(BlobConfig.preset("paper").as_dict()),
 }
+NO_LOOKS = (update_from_pixels, "LEARN_SHOWN", np.inf)
 SCENES = (("street", 15), ("street", 20), ("cross", 15), ("mixed", 15), ("pillar", 20), ("split", 15), ("crowd", 20))
 VIEW = ("image=[480,360]", "fps=7", "focal_px=600", "crop=true", "baseline=0")
 ABOVE = {
@@ -88,8 +91,7 @@ def pets(folder: Path) -> None:
     for background, ablations in (("spread:50", ABLATIONS), ("first:50", {"blob": {}})):
         head([f"PETS, background {background}", *KEYS, "frames/s"])
         sequence = open_source(folder, images=True, background=background)[0]
-        for title, params in ablations.items():
-            row([title, *scores_and_speed([sequence], params)])
+        ablation_rows([sequence], ablations)
     head(["PETS with View_001.xml, background spread:50", *KEYS, "frames/s"])
     sequence = open_source(folder, images=True, camera=folder / "View_001.xml")[0]
     for similarity in ("boxes", "ground"):
@@ -100,8 +102,15 @@ def rendered(seeds: range) -> None:
     for bare in (False, True):
         made = [rendered_scene(name, tilt, seed, bare) for name, tilt in SCENES for seed in seeds]
         head(["rendered, " + ("bare video" if bare else "camera and empty background"), *KEYS, "frames/s"])
-        for title, params in ABLATIONS.items():
-            row([title, *scores_and_speed(made, params)])
+        ablation_rows(made, ABLATIONS)
+
+
+def ablation_rows(made: Sequence[Recording], ablations: dict[str, dict[str, object]]) -> None:
+    """Prints a row for each set of parameters, and one of the defaults if no look is ever learned."""
+    for title, params in ablations.items():
+        row([title, *scores_and_speed(made, params)])
+    with replaced_code([NO_LOOKS]):
+        row(["no looks", *scores_and_speed(made, {})])
 
 
 def rendered_scene(name: str, tilt: int, seed: int, bare: bool) -> Recording:
@@ -120,7 +129,7 @@ def people_who_stand(name: str, clips: dict[str, list[str]], seeds: range) -> No
     head([f"{name}, bare video", *KEYS, "frames/s"])
     for title, settings in clips.items():
         made = [encoded(simulate(load(HERE / f"{name}.toml", set=settings), seed)) for seed in seeds]
-        row([title, *scores_and_speed([video for video, _ in made], {})])
+        ablation_rows([video for video, _ in made], {title: {}})
     row([f"{title}, picture of the empty place", *scores_and_speed([with_picture(*each) for each in made], {})])
 
 

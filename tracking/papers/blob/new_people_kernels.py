@@ -14,6 +14,7 @@ from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
 from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob import person_template_search_kernels as search
+from tracking.papers.blob.person_look_kernels import POINTS
 from tracking.papers.blob.person_template_kernels import Cover, kernel
 
 LOWEST = 0.98  # quantile of the rows of a part's pixels at which its foot is guessed
@@ -97,13 +98,14 @@ def fit_new_people(
     its own. Numbers that cannot be better than the best so far are not tried.
     """
     best, worth = np.zeros((0, 4)), 0.0
+    no_image, no_looks = np.zeros((0, 0, 3), np.uint8), np.zeros((0, POINTS, 5))
     first, bound = 0, unexplained_within_reach(foreground, cover, guesses) / person + ROUNDING
     for count in range(1, most + 1):
         if bound - count * support <= worth:
             break
         one, far = guesses[first : first + count], spread[first : first + count]
         first += count
-        at = search.fit_places(foreground, cover, one, far, nats)
+        at = search.fit_places(foreground, cover, one, far, nats, no_image, no_looks)
         alone = kernels.supports(foreground, cover, at, 1)
         kernels.paint_all(cover, at, -1)
         value = joint_support(foreground, cover, at) / person - count * support

@@ -6,7 +6,8 @@ partly hidden person is measured by the visible part, and a gap in the mask (a l
 colour) costs less than a second person.
     support       of a template: the sum over the pixels that it alone covers, divided by its area; at most 1
     fit_places    each template in turn moves to the place of largest evidence * support - d^2 / 2, d^2 the squared
-                  distance from its expected place in standard deviations
+                  distance from its expected place in standard deviations; templates that touch others also by how
+                  well the person's look fits the picture there (person_look_kernels)
 While one template moves and the others stay, only sums over its own rows are needed (person_template_search_kernels).
 """
 
@@ -14,10 +15,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Bools, Ints
+from sim.types import Array, Bools, Image, Ints
 from tracking.detect.blobs import Labels
 from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob import person_template_search_kernels as search
+from tracking.papers.blob.person_look_kernels import POINTS
+
+NO_IMAGE, NO_LOOKS = np.zeros((0, 0, 3), np.uint8), np.zeros((0, POINTS, 5))
 
 
 class ExplainedForeground:
@@ -44,10 +48,14 @@ class ExplainedForeground:
         """Returns a mask (H, W): foreground that no painted template covers and no blob explains."""
         return np.asarray(self.foreground & (self.cover == 0))
 
-    def fit_places(self, templates: Array, spread: Array, evidence: float) -> Array:
-        """Returns the templates (K, 4) x, foot, h, w, px, at the places where they explain most together; paints
-        them."""
-        return search.fit_places(self.foreground, self.cover, templates, spread, evidence)
+    def fit_places(
+        self, templates: Array, spread: Array, evidence: float, image: Image = NO_IMAGE, looks: Array = NO_LOOKS
+    ) -> Array:
+        """Returns the templates (K, 4) x, foot, h, w, px, at the places where they explain most together; paints them.
+
+        With the picture and the looks (K, POINTS, 5) of the people, places are better where these are seen.
+        """
+        return search.fit_places(self.foreground, self.cover, templates, spread, evidence, image, looks)
 
     def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
         """Returns the rows, ascending, of painted templates (K, 4) x, foot, h, w, px, that have enough support; erases

@@ -59,6 +59,16 @@ def row_range(foot: float, h: float, high: int) -> tuple[int, int]:
 
 
 @kernel
+def window(template: Array, reach: float, shape: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Returns first row, last row + 1, first column, last column + 1, cut to an image of `shape` (H, W), that a
+    template (4,) x, foot, h, w can cover while it moves by at most `reach` px in both directions."""
+    x, foot, h, w = template
+    low, high = max(int(foot - h - reach) - 1, 0), min(int(foot + reach) + 2, shape[0])
+    left, right = max(int(x - w / 2 - reach) - 1, 0), min(int(x + w / 2 + reach) + 2, shape[1])
+    return low, max(high, low), left, max(right, left)
+
+
+@kernel
 def area(template: Array, high: int, wide: int) -> float:
     """Returns the area, px^2, of a template (4,) x, foot, h, w (px; upright ellipse, lower edge at row foot) inside an
     image of high x wide px.

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.types import Array, Bools
+from sim.types import Array, Bools, Image
+from tracking.papers.blob.person_look_kernels import look_fits
 from tracking.papers.blob.person_template_kernels import (
     EMPTY,
     FOOT,
@@ -20,18 +21,21 @@ from tracking.papers.blob.person_template_kernels import (
     Cover,
     X,
     area,
+    boxes_touch,
     half_width,
     kernel,
     near_first,
     paint,
     paint_all,
     row_range,
+    window,
 )
 
 Whole = NDArray[np.int32]
 STEPS_PER_HEIGHT = 24  # a coarse step is the template's height over this, but at least 1 px; a fine step is half of it
 MOST_STEPS = 8  # most steps in each direction of the coarse grid, which reaches up to 2.5 standard deviations
 FINE_STEPS = 2  # steps in each direction of the fine grid, and fewest of the coarse grid
+LOOK_EVIDENCE = 3.0  # nats: weight of the mean log-likelihood ratio of a look's points, which are not independent
 SWEEPS = 3  # most sweeps over all templates: the first on the coarse grid, the others on the fine grid
 
 
@@ -57,9 +61,7 @@ def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: in
     (4,): x, foot, h, w, px, not painted. Pixels outside the image count 0.
     """
     x, foot, h, w = template
-    reach = steps * step
-    low, high = max(int(foot - h - reach) - 1, 0), min(int(foot + reach) + 2, cover.shape[0])
-    left, right = max(int(x - w / 2 - reach) - 1, 0), min(int(x + w / 2 + reach) + 2, cover.shape[1])
+    low, high, left, right = window(template, steps * step, cover.shape)
     n = 2 * steps + 1
     found = np.zeros((n, n), np.int32)
     if high <= low or right <= left:
@@ -100,30 +102,32 @@ def row_sums(foreground: Bools, cover: Cover) -> Whole:
 
 
 @kernel
-def best_place(
-    foreground: Bools, cover: Cover, at: Array, expected: Array, spread: Array, evidence: float, fine: bool
-) -> tuple[float, float]:
-    """Returns x and foot, px, on the grid round template `at` (4,) x, foot, h, w with the largest evidence * support -
-    d^2 / 2.
+def grid(h: float, spread: Array, fine: bool) -> tuple[int, float]:
+    """Returns the steps in each direction and the step, px, of the grid round a template of height h.
 
-    d is the distance from the expected place in standard deviations. Support: the pixels that nothing covers, 1 for
-    foreground, -1/2 for background, over the template's area. foreground, cover (H, W). at: not painted. expected (4,):
-    template at its expected place; spread (2,): standard deviation of its x and foot, px. evidence: log-likelihood of
-    full support. fine: use the fine grid. Returns the place of `at` unless another one is better.
+    spread (2,): standard deviation of its x and foot, px.
     """
-    step, steps = max(at[HEIGHT] / STEPS_PER_HEIGHT, 1.0), FINE_STEPS
+    step = max(h / STEPS_PER_HEIGHT, 1.0)
     if fine:
-        step /= 2
-    else:
-        steps = int(min(max(np.ceil(2.5 * max(spread[0], spread[1]) / step), FINE_STEPS), MOST_STEPS))
-    halves = worth_when_moved(foreground, cover, at, steps, step)
-    whole = area(at, cover.shape[0], cover.shape[1])
+        return FINE_STEPS, step / 2
+    return int(min(max(np.ceil(2.5 * max(spread[0], spread[1]) / step), FINE_STEPS), MOST_STEPS)), step
+
+
+@kernel
+def best_place(worth: Array, step: float, at: Array, expected: Array, spread: Array) -> tuple[float, float]:
+    """Returns x and foot, px, on the grid round template `at` (4,) x, foot, h, w with the largest worth - d^2 / 2.
+
+    worth: log-likelihood at each place of the grid, whose steps are `step` px. d is the distance from the expected
+    place in standard deviations. expected (4,): template at its expected place; spread (2,): standard deviation of its
+    x and foot, px. Returns the place of `at` unless another one is better.
+    """
+    steps = len(worth) // 2
     best, right, down = -np.inf, 0.0, 0.0
     for i in range(2 * steps + 1):
         v = (at[FOOT] - expected[FOOT] + (i - steps) * step) / spread[1]
         for j in range(2 * steps + 1):
             u = (at[X] - expected[X] + (j - steps) * step) / spread[0]
-            value = evidence * (halves[i, j] / HALVES) / whole - (u * u + v * v) / 2
+            value = worth[i, j] - (u * u + v * v) / 2
             if value > best:
                 best, right, down = value, (j - steps) * step, (i - steps) * step
             if i == steps and j == steps:
@@ -132,14 +136,27 @@ def best_place(
 
 
 @kernel
-def fit_places(foreground: Bools, cover: Cover, templates: Array, spread: Array, evidence: float) -> Array:
+def touches_another(templates: Array, k: int) -> bool:
+    """Returns True if the box of template k touches that of another of the templates (K, 4)."""
+    found = False
+    for other in range(len(templates)):
+        found |= other != k and boxes_touch(templates[k], templates[other])
+    return found
+
+
+@kernel
+def fit_places(
+    foreground: Bools, cover: Cover, templates: Array, spread: Array, evidence: float, image: Image, looks: Array
+) -> Array:
     """Returns the templates (K, 4) x, foot, h, w, px, at the places where they explain most, and paints them into
     `cover`.
 
     templates: at their expected places, not painted, not changed; sizes stay. Each in turn moves to the largest
-    evidence * support - d^2 / 2 (see `best_place`) while the others stay, those with low feet first, in at most SWEEPS
-    = 3 sweeps; a sweep without a move is the last. foreground, cover (H, W). spread (K, 2): standard deviation, px, of
-    the expected x and foot. evidence: log-likelihood of full support.
+    evidence * support + LOOK_EVIDENCE * fit - d^2 / 2 while the others stay, those with low feet first, in at most
+    SWEEPS = 3 sweeps; a sweep without a move is the last. Support: the pixels that nothing covers, 1 for foreground,
+    -1/2 for background, over the template's area. Fit: of its look, if it touches another template. d: as in
+    `best_place`. foreground, cover (H, W). spread (K, 2): standard deviation, px, of the expected x and foot. evidence:
+    log-likelihood of full support. image (H, W, 3) BGR; looks (K, POINTS, 5), or (0, POINTS, 5) to ignore looks.
     """
     found, order = templates.copy(), near_first(templates)
     paint_all(cover, found, 1)
@@ -147,7 +164,12 @@ def fit_places(foreground: Bools, cover: Cover, templates: Array, spread: Array,
         any_moved = False
         for k in order:
             paint(cover, found[k], -1)
-            x, foot = best_place(foreground, cover, found[k], templates[k], spread[k], evidence, sweep > 0)
+            steps, step = grid(found[k, HEIGHT], spread[k], sweep > 0)
+            halves = worth_when_moved(foreground, cover, found[k], steps, step)
+            worth = evidence * (halves / HALVES) / area(found[k], cover.shape[0], cover.shape[1])
+            if len(looks) and touches_another(found, k):
+                worth += LOOK_EVIDENCE * look_fits(image, cover, found, k, looks[k], steps, step)
+            x, foot = best_place(worth, step, found[k], templates[k], spread[k])
             any_moved |= x != found[k, X] or foot != found[k, FOOT]
             found[k, X], found[k, FOOT] = x, foot
             paint(cover, found[k], 1)

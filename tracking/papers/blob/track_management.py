@@ -27,7 +27,7 @@ from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Context, Ints
 from tracking.detect.person_size import upright
 from tracking.filters import assignment, kalman, track_uncertainty
-from tracking.papers.blob import box_geometry, existence
+from tracking.papers.blob import box_geometry, existence, person_look_kernels
 from tracking.papers.blob.config import BlobConfig
 
 # Relative margin of rho, with which deletion comes earlier, so that filters near their steady state count as in it.
@@ -223,7 +223,7 @@ class TrackedPeople:
         earlier = np.tri(len(z), k=-1) * np.where(free, person, 0.0)
         owned = np.concatenate([np.tile(self.existence() * self.measured, (len(z), 1)), earlier], 1)
         place, scale = np.concatenate([self.bank[kalman.PLACE], z]), np.concatenate([self.scale, self._scale_of(z)])
-        d2 = kalman.distances(np.stack([place, *[0 * place] * 4]), z, DOUBLE_SPREAD**2, scale).T
+        d2 = np.square((z[:, None] - place) / (DOUBLE_SPREAD * scale[:, None])).sum(2)
         density = np.exp(-0.5 * d2) / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self._false_density(scale)
         double = c.clutter_rate * DOUBLES * (density * owned).sum(1)
         if len(z) or len(self.id):
@@ -302,12 +302,12 @@ class TrackedEllipses(TrackedPeople):
     Made from config, its nominal filter and context, as TrackedPeople. State, beside that of TrackedPeople: angle (2,
     N), rows: direction of the first axis h (rad, from the abscissa, v down) and its variance (rad^2);
     nominal (5, N, 4), a bank of filters as `bank`, updated with the nominal noise, from which the uncertainty rho
-    follows; angle_var_per_step, growth of the direction's variance in a frame. In `bank` the coordinates are x, y, h,
-    w: centre and full axes of the ellipse.
+    follows; look (N, POINTS, 5), the colours of each person (person_look_kernels); angle_var_per_step, growth of the
+    direction's variance in a frame. In `bank` the coordinates are x, y, h, w: centre and full axes of the ellipse.
     """
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
-        self.angle, self.nominal = np.zeros((2, 0)), np.zeros((5, 0, 4))
+        self.angle, self.nominal, self.look = np.zeros((2, 0)), np.zeros((5, 0, 4)), person_look_kernels.unknown(0)
         super().__init__(config, dynamics, context)
 
     def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
@@ -336,6 +336,7 @@ class TrackedEllipses(TrackedPeople):
     def keep_only(self, rows: Ints) -> None:
         """Delete all tracks except those at table positions `rows` (K,); they are in the order of `rows` afterwards."""
         self.angle, self.nominal = self.angle.take(rows, 1), self.nominal.take(rows, 1)
+        self.look = self.look.take(rows, 0)
         super().keep_only(rows)
 
     def start_tracks(self, z: Array, score: Array, t: float, person: Array) -> None:
@@ -343,6 +344,7 @@ class TrackedEllipses(TrackedPeople):
         super().start_tracks(z[:, :4], score, t, person)
         new = np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)])
         self.angle = np.concatenate([self.angle, new], 1)
+        self.look = np.concatenate([self.look, person_look_kernels.unknown(len(z))])
         self.nominal = np.concatenate([self.nominal, self.bank[:, self.bank.shape[1] - len(z) :]], 1)
 
     def direction_distances(self, z: Array, angle_var: Array) -> Array:

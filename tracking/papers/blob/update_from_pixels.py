@@ -7,6 +7,7 @@ Order of a frame, with the paper's sections:
     other foreground: split among the tracks expected there, by templates     ours (person_template)
     foreground that no track explains, as large as a person: new tracks       ours (new_people)
     axes return towards those of a person at the track's place                ours (track_management)
+    looks: the colours of people who are hardly hidden are learned            ours (person_look_kernels)
     rho: confirm, delete, start tracks                                        secs. 4.5, 5 (track_management)
     adapt the background, except where confirmed tracks are                   ours
 
@@ -22,13 +23,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.types import Array, Bools, Context, Detections, Frame, Ints
+from sim.types import Array, Bools, Context, Detections, Frame, Image, Ints
 from tracking.detect import blobs
 from tracking.detect.blobs import Blobs
-from tracking.detect.foreground import Foreground
+from tracking.detect.foreground import Foreground, Segmented
 from tracking.detect.person_size import KEPT, PersonSize
 from tracking.filters import kalman
-from tracking.papers.blob import box_geometry, new_people
+from tracking.papers.blob import box_geometry, new_people, person_look_kernels
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 from tracking.papers.blob.track_management import TrackedEllipses
@@ -75,6 +76,8 @@ SHARED = 0.35  # share of a predicted box that a blob's box must cover for the t
 UPRIGHT = 25.0  # deg, standard deviation of the direction of a person measured by an upright template
 EXTENT = 0.75, 1.3  # least and largest height and width of a template relative to the expected person
 BLIND = 25.0  # a template's variance of height and width relative to a lone blob's: they are predicted, not measured
+LEARN_SHOWN = 0.7  # least visible share of a person whose look is learned
+LOOK_TIME = 2.0  # s: time constant with which looks follow people who turn
 LEAST_SHOWN = 0.2  # a person of whom a smaller share is visible is measured as if this share were
 
 
@@ -145,7 +148,7 @@ class PixelUpdater:
             people.delete_tracks(frame.t)
             return
         found = foreground.person_blobs(seen.mask)
-        self._measure(frame.t, seen.mask, found)
+        self._measure(frame.t, seen, found)
         foreground.adapt(seen, self._protected())
         if len(found) and (frame.t >= self.learn_at or len(self.size.lone) < KEPT):
             self.learn_at = frame.t + SIZE_TIME
@@ -164,7 +167,7 @@ class PixelUpdater:
         height, width, px."""
         return self._person_boxes(self.people.upright_boxes()[rows])
 
-    def _measure(self, t: float, mask: Bools, found: Blobs) -> None:
+    def _measure(self, t: float, seen: Segmented, found: Blobs) -> None:
         people = self.people
         expected = people.upright_boxes()
         split = self.config.split and self.size.reliable
@@ -178,10 +181,10 @@ class PixelUpdater:
             made, used = self._with_pieces(made, taken, found, d2)
             unexplained = z[~used & ~gated]
         else:
-            scene = ExplainedForeground(mask)
+            scene = ExplainedForeground(seen.mask)
             scene.mark_explained(found.label, columns)
             for confirmed in (True, False):
-                made = made.joined(self._measure_by_templates(scene, expected, made.rows, confirmed))
+                made = made.joined(self._measure_by_templates(scene, seen.image, expected, made.rows, confirmed))
             entered = box_geometry.centred(new_people.find_new_people(scene, self.size, ENTRY_SUPPORT))
             unexplained = np.concatenate([unexplained, self._person_ellipses(entered)])
         d2, log_det = people.directed_innovations(made.z, made.angle_var)
@@ -190,6 +193,7 @@ class PixelUpdater:
         away = people.update(made.rows, made.z, made.noise, made.angle_var)
         if split:
             self._relax_sizes()
+            self._learn_looks(seen.image, made.rows)
         near = away <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
         people.record_measured(made.rows, near, made.support, evidence)
         person = people.new_people(unexplained[:, :4], np.ones(len(unexplained), bool))
@@ -201,6 +205,12 @@ class PixelUpdater:
         axes = self.size.axes(at[:, :2])
         rows = np.flatnonzero(np.isfinite(axes).all(1))
         self.people.relax_axes(rows, -np.sort(-axes[rows]), PERSON_NOISE**2)
+
+    def _learn_looks(self, image: Image, rows: Ints) -> None:
+        people = self.people
+        at = box_geometry.standing(self._person_boxes(people.upright_boxes()))
+        shown = rows[people.visible_shares()[rows] >= LEARN_SHOWN]
+        person_look_kernels.learn(image, at, people.look, shown, people.dynamics.dt / LOOK_TIME)
 
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
         one = self.size.one_person(found.box, found.ellipse)
@@ -251,7 +261,7 @@ class PixelUpdater:
         return made, used
 
     def _measure_by_templates(
-        self, scene: ExplainedForeground, expected: Array, rows: Ints, confirmed: bool
+        self, scene: ExplainedForeground, image: Image, expected: Array, rows: Ints, confirmed: bool
     ) -> Measured:
         people = self.people
         open_rows = np.setdiff1d(np.flatnonzero(people.confirmed == confirmed), rows)
@@ -261,7 +271,7 @@ class PixelUpdater:
         at[:, 2:] = np.clip(at[:, 2:], EXTENT[0] * size, EXTENT[1] * size)
         var = (people.bank[kalman.VAR, open_rows] + people.noise)[:, :2]
         spread = np.sqrt(var) * people.scale[open_rows, None]
-        at = scene.fit_places(at, spread, EVIDENCE)
+        at = scene.fit_places(at, spread, EVIDENCE, image, people.look[open_rows])
         keep = scene.prune(at, TRACK_SUPPORT if confirmed else ENTRY_SUPPORT, pieces=confirmed)
         at = at[keep]
         support, visible = scene.support(at), scene.visible_share(at)

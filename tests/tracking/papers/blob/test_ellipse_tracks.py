@@ -38,6 +38,14 @@ def test_a_direction_far_off_is_a_distance_and_one_that_is_none_is_not():
     assert again.angle[0, 0] == UP
 
 
+def test_looks_stay_with_their_people():
+    one = people([100, 100, 68, 24, UP], [150, 100, 68, 24, UP], [200, 100, 68, 24, UP])
+    one.look[:, 0, 0] = 1, 2, 3
+    one.keep_only(np.array([2, 0]))
+    one.start_tracks(np.array([[50.0, 100, 68, 24, UP]]), np.ones(1), 0.0, np.ones(1))
+    assert one.look[:, 0, 0].tolist() == [3, 1, 0]
+
+
 @pytest.mark.parametrize(("x", "wide", "share"), [(123, 34, 40 / 68), (100, 16, 52 / 68)])
 def test_who_lies_behind_somebody_is_hidden_by_the_boxes_round_the_ellipses(x, wide, share):
     """Of 68 px of his length 28 are behind a wide person beside him, 16 behind a slim one in front."""
