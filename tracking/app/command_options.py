@@ -54,7 +54,7 @@ Similarity = Literal["boxes", "ground", "image"] | None
 class DemoOptions:
     """Generate scenes, track them, score the tracks and write a page with the results."""
 
-    quick: bool = option("Only the short scenes of the suite quick, with one seed, and two trackers.", False)
+    quick: bool = option("Only the short scenes of the suite quick, one seed and two trackers, of pixels one.", False)
     out: Path = OUT(default=Path("flockscope-demo"))
 
 

@@ -1,7 +1,7 @@
 """`fit_belief`: fits the belief of who belongs together to simulated scenes, by penalised maximum likelihood.
 
-Every scene weighs as often as it is named, and every pair of a scene the same. The penalty is on the squared log-odds
-and on the curvature of the tables.
+The weight of a scene is the number of times that it is named; all pairs of a scene have equal weight. The penalty is on
+the squared log-odds and on the curvature of the tables.
 
 Also here: how well beliefs tell who belongs together: log loss, calibration error and F1 of rows of pairs.
 """

@@ -51,7 +51,7 @@ class Walkers:
 def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScene]:
     """Yields two scenes for each entry of the named scenarios, suites or *.toml files and each seed.
 
-    The scenes of what is named several times come once, with that weight.
+    The scenes of a name that is given several times come once, with that weight.
     """
     for entry, weight in [(entry, count) for name, count in Counter(names).items() for entry in resolve(name)]:
         for seed in seeds:

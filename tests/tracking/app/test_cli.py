@@ -152,7 +152,6 @@ COMMANDS = {
     "demo": ("demo --quick --out {out}", "demo --quick --out {scene}/x"),
 }  # fmt: skip
 WRITING = [name for name, (good, _) in COMMANDS.items() if "--out {out}" in good]
-IN_THIS_PROCESS = [name for name in WRITING if name != "demo"]  # demo writes in processes of its own.
 
 
 def words(line: str, place: Place) -> list[str]:
@@ -229,7 +228,7 @@ def test_command(name, state, as_json, place, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", IN_THIS_PROCESS)
+@pytest.mark.parametrize("name", [name for name in WRITING if name != "demo"])
 def test_ctrl_c_at_many_moments(name, place, capsys):
     """130 or done, and never anything half-written, from the third call of ours on.
 
@@ -249,7 +248,7 @@ def test_ctrl_c_at_many_moments(name, place, capsys):
 @pytest.mark.parametrize(
     ("error", "code"), [(KeyboardInterrupt(), 130), (OSError(errno.ENOSPC, "No space left on device"), 1)]
 )
-@pytest.mark.parametrize("name", IN_THIS_PROCESS)
+@pytest.mark.parametrize("name", WRITING)
 def test_interrupted_and_full_disk_while_writing(name, error, code, as_json, place, capsys, monkeypatch):
     """Whatever of writing fails, nothing is seen of it afterwards."""
     for function in ("replace", "rename"):

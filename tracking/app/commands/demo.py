@@ -9,9 +9,8 @@ import math
 import os
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from html import escape
 from itertools import zip_longest
 from pathlib import Path
@@ -203,13 +202,23 @@ class _TrackJob:
 
 def demo(options: DemoOptions) -> CommandResult:
     """Writes simulated scenes, tracks and pages into the folder --out; scenes that are already there are kept."""
+    from sim.dataset.generate import generate
     from sim.io.files.atomic import write_file
     from sim.io.files.own_files import refuse_foreign_file
     from sim.io.source import open_source
+    from sim.workers.start import WorkerOptions
 
     start, out, quick = time.monotonic(), options.out, options.quick
     refuse_foreign_file(option_parsing.output_folder(out) / "index.html")
-    (rendered,), folders = _generate(out, quick)
+    names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
+    workers = os.cpu_count() or 1
+    with ProgressMeter("generate") as meter:
+        count = WorkerOptions(1 if quick else workers)
+        folders = generate(names, seeds, out / "data", workers=count, progress=meter.update, streams=())
+        settings = QUICK_PIXEL_SETTINGS if quick else ()
+        (rendered,) = generate(
+            [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
+        )  # fmt: skip
     sequences = [open_source(folder)[0] for folder in folders]
     trackers = QUICK_TRACKERS if quick else tracker_registry.names()
     of_pixels = QUICK_TRACKERS[:1] if quick else [n for n in trackers if "pixels" in tracker_registry.find(n).needs]
@@ -217,10 +226,13 @@ def demo(options: DemoOptions) -> CommandResult:
         _TrackJob(name, "image", [rendered], out / "tracks" / f"{name}-image", _pictures(out) / f"{name}.mp4")
         for name in of_pixels
     ]
-    file_jobs = [_TrackJob(name, "file", folders, out / "tracks" / name) for name in reversed(trackers)]
-    # Neighbours are of different kinds and trackers: two that run at once need not compile the same.
+    half = len(trackers) // 2
+    file_jobs = [
+        _TrackJob(name, "file", folders, out / "tracks" / name) for name in (*trackers[half:], *trackers[:half])
+    ]
+    # Neighbours are of different trackers: two that run at once need not compile the same.
     jobs = [job for two in zip_longest(image_jobs, file_jobs) for job in two if job is not None]
-    runs = _run(jobs)
+    runs = _run(jobs, workers)
     from_points, from_pixels = (
         {j.tracker: runs[j] for j in jobs if j.detections == mode} for mode in ("file", "image")
     )
@@ -239,38 +251,11 @@ def demo(options: DemoOptions) -> CommandResult:
     return CommandResult({"sequences": len(sequences), "scores": data, "page": page}, "\n".join(text))
 
 
-def _generate(out: Path, quick: bool) -> list[list[Path]]:
-    """Returns the folders of the scene with pictures, and of the scenes without."""
-    from sim.dataset.generate import generate
-    from sim.workers.start import results_in_order, start_workers
-
-    names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
-    settings = QUICK_PIXEL_SETTINGS if quick else ()
-    jobs = [
-        partial(generate, [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"),
-        partial(generate, names, seeds, out / "data", streams=()),
-    ]
-    folders = []
-    with ProgressMeter("generate", len(jobs)) as meter, start_workers(min(len(jobs), _processors())) as run:
-        for found in results_in_order(run, _called, jobs):
-            folders.append(found)
-            meter.step(found[0].name)
-    return folders
-
-
-def _called(job: Callable[[], list[Path]]) -> list[Path]:
-    return job()
-
-
-def _processors() -> int:
-    return os.cpu_count() or 1
-
-
-def _run(jobs: list[_TrackJob]) -> dict[_TrackJob, list[TrackingRun]]:
+def _run(jobs: list[_TrackJob], workers: int) -> dict[_TrackJob, list[TrackingRun]]:
     from sim.workers.start import results_in_order, start_workers
 
     runs = {}
-    with ProgressMeter("track", len(jobs)) as meter, start_workers(_processors()) as run:
+    with ProgressMeter("track", len(jobs)) as meter, start_workers(workers) as run:
         for job, found in zip(jobs, results_in_order(run, _tracked, jobs), strict=True):
             runs[job] = found
             meter.step(f"{job.tracker}{' from pixels' if job.overlay else ''}")

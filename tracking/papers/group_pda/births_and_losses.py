@@ -76,6 +76,7 @@ def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator
     """Remove groups and parts that were not measured for too long, at time t (s); yield a leave event of each group of
     which no part is left. Else the largest part has its id."""
     patience = np.where(bank.confirmed, scaled.config.coast_time, scaled.config.confirm_time)
+    patience = np.maximum(patience, scaled.dt)  # This frame is still to be measured: a frame before was missed.
     dead: Bools = t - bank.last_seen > patience + 1e-9
     for row in np.flatnonzero(dead & bank.confirmed & (bank.parent == NO_ID)).tolist():
         parts = np.flatnonzero(~dead & (bank.group == bank.id[row]))

@@ -113,7 +113,7 @@ class GroupBank:
             a, b = getattr(self, f.name), getattr(other, f.name)
             setattr(self, f.name, a + b if f.name in LISTS else np.concatenate([a, b]))
 
-    def move_with(self, rows: int | Ints, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
+    def move_with(self, rows: int | slice, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
         """Give these rows the velocity of the group in `row` of a bank, in place; nothing without `corrections`."""
         if scaled.config.corrections:
             self.x[rows, 2:] = bank.x[row, 2:]

@@ -142,7 +142,7 @@ class GroupChanges:
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
         """Split groups, and merge parts and groups; yield the events of groups. t: s."""
-        # First: an id that a part has from its lost group must not bring that group's past.
+        # First: an id that a part has from its lost group must not bring that group's past, if it is older.
         self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= PATIENCE + 1e-9}
         yield from self._split(bank, scaled, t)
         self._join_parts(bank, scaled, t)
@@ -335,7 +335,7 @@ def fall_apart(
         parts.parent[:] = bank.group[row]
         parts.parent[largest] = bank.parent[row]
         parts.id[:] = [bank.id[row] if k == largest else ids.new() for k in range(len(parts))]
-    parts.move_with(np.arange(len(parts)), bank, row, scaled)
+    parts.move_with(slice(None), bank, row, scaled)
     bank.remove(row)
     bank.add(parts)
 

@@ -162,8 +162,8 @@ class GroupPda:
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
-        Order: predict; remove lost groups; gate, associate, update, fall apart (Fig. 1), births; duplicates; split,
-        merge; confirm.
+        Order: predict; remove lost groups; gate, associate, update, fall apart (Fig. 1), births; remove duplicates;
+        split, merge; confirm.
         From points `detections.pos` is used (x, y), from pixels `frame.image`. A frame without them (None), and from
         pixels one with too much foreground, is predicted only; before the first detections the Tracks are empty. A
         config that has replaced `config` since the last frame holds from this frame on; the groups stay.
@@ -185,6 +185,7 @@ class GroupPda:
         if points is not None:
             self._measure(points, weights, scaled, t)
         self.duplicates.step(bank, scaled, t)
+        events += remove_lost(bank, scaled, t)
         events += self.changes.step(bank, scaled, t)
         events += confirm(bank, scaled, t, self.ids)
         return self._report(frame, events, scaled, self._outline(detections))

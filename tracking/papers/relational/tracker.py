@@ -108,16 +108,18 @@ class Slots(PersonTable):
     """The people of a sequence, one row for each of K slots of the particles (all ours).
 
     id (K,): the track's id, -1 until the person is first reported. missed (K,): time without a measurement in which the
-    person could have been seen, s, 0 if measured in this frame. next_id: the next new id.
+    person could have been seen, s. seen (K,): True if measured in this frame. next_id: the next new id.
     """
 
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    seen: Bools = field(default_factory=lambda: np.zeros(0, bool))
     next_id: int = 1
 
     def measure(self, seen: Array, pairs: Array, sizes: Array, dt: Array) -> None:
         """Note who was measured in a frame: those with seen (K,) above 1/2; dt (K,): s by which others count as
         missed."""
-        self.missed = np.where(seen > 0.5, 0.0, self.missed + dt)
+        self.seen = seen > 0.5
+        self.missed = np.where(self.seen, 0.0, self.missed + dt)
         if not pairs.size:
             return
         best = pairs.argmax(axis=1)
@@ -166,6 +168,7 @@ class Particle(PointTracker):
         """
         detections = self.detected(frame, detections, None if self.shown is None else self.shown.box)
         self.streams.frame += 1
+        self.slots.seen[:] = False
         self._forecast()
         if detections is not None:
             self._measure(detections)
@@ -242,7 +245,7 @@ class Particle(PointTracker):
         draws = self.streams.normals(BIRTHS, key, 2 * p.count, 2).reshape(2, p.count, len(points), 2)
         exist = c.birth_rate * self.dt / (c.birth_rate * self.dt + c.clutter_density)
         p.add(points + self.noise * draws[0], SPEED_PRIOR * draws[1], exist)
-        self.slots.extend(id=np.full(len(key), -1), size=sizes, key=key)
+        self.slots.extend(id=np.full(len(key), -1), seen=np.ones(len(key), bool), size=sizes, key=key)
         self._relate_newcomers(points)
 
     def _uniforms(self, people: Ints) -> Array:
@@ -264,7 +267,7 @@ class Particle(PointTracker):
         if self.plane == "image":
             pos, vel, cov = pos * self.unit, vel * self.unit, cov * self.unit**2
         box = boxes_at(pos, self.slots.size[rows]) if self.plane == "image" else None
-        alone, seen = np.full(len(id), -1), self.slots.missed[rows] == 0
+        alone, seen = np.full(len(id), -1), self.slots.seen[rows]
         return Tracks(frame.index, frame.t, self.plane, "person", id, alone, pos, vel, cov, box, score, seen=seen)
 
     def _follow(self, state: Array) -> None: ...

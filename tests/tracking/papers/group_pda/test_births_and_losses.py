@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from sim.truth.merge_split_rules import SPLIT_VELOCITY
-from sim.types import Array
+from sim.types import Array, Context
 from tests.painted import ids
 from tests.tracking.papers.group_pda.test_tracker import FPS, GROUND, block, changes, events, noisy, sizes, track
+from tracking.papers.group_pda.config import GroupPdaConfig
 
 
 def walk(velocity: tuple[float, float], hidden: range, seed: int = 0, after: Array | None = None) -> list[Array]:
@@ -62,6 +63,14 @@ def test_a_leave_tells_where_and_when_it_was_seen_last() -> None:
 @pytest.mark.parametrize(("hidden", "known"), [(range(40, 54), {1}), (range(40, 55), {1, 2})])
 def test_a_group_comes_back_until_coast_time_and_not_a_frame_later(hidden: range, known: set[int]) -> None:
     assert ids(track(walk((0.0, 0.0), hidden))) == known
+
+
+@pytest.mark.parametrize(("fps", "coast"), [(10, 0.0), (10, 0.05), (0.5, 1.5)])
+def test_who_is_measured_in_every_frame_is_not_lost(fps: float, coast: float) -> None:
+    made = [noisy([block(2, 2)], np.random.default_rng(k)) for k in range(20)]
+    said = track(made, GroupPdaConfig(coast_time=coast), context=Context(fps, float("nan")))
+    assert ids(said) == {1}
+    assert not events(said, "leave")
 
 
 def joining(seed: int, ranks: tuple[int, int]) -> list[Array]:

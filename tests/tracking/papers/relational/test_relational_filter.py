@@ -77,7 +77,10 @@ def seat(tracker, particles):
     tracker.particles = particles
     people = particles.people
     tracker.slots.extend(
-        id=np.full(people, -1), size=np.full((people, 2), np.nan), key=birth_keys(np.zeros((people, 2)), 1)
+        id=np.full(people, -1),
+        seen=np.zeros(people, bool),
+        size=np.full((people, 2), np.nan),
+        key=birth_keys(np.zeros((people, 2)), 1),
     )
 
 
@@ -193,6 +196,12 @@ def test_without_information_weights_stay_and_people_go_straight_on():
     assert np.array_equal(tracker.particles.weights, weights)
     assert first.id.tolist() == second.id.tolist() == before.id.tolist()
     np.testing.assert_allclose(second.pos, first.pos + 0.1 * second.vel, atol=1e-3)
+
+
+@pytest.mark.parametrize("kind", [Particle, Relational])
+def test_who_is_only_predicted_is_not_seen(kind):
+    seen = [t.seen.tolist() for t in stepped(kind(), 10, *[[(0, 0), (9, 0)]] * 5, None, [(0, 0)], [(0, 0), (9, 0)])]
+    assert seen[4:] == [[True, True], [False, False], [True, False], [True, True]]
 
 
 @pytest.mark.parametrize("detect", [np.zeros(2), np.full(2, 0.9)])
