@@ -20,7 +20,7 @@ BoxScale = tuple[float, float]  # factors of x and y that make the boxes of a te
 class BoxOptions:
     """How the boxes of a MOTChallenge text are read; None: not given."""
 
-    person_class: int | None = None  # the class of people
+    person_class: tuple[str, ...] | None = None  # the classes of people, as `parse_classes` returns them
     box_scale: BoxScale | None = None  # factors of x and y
     min_score: float | None = None  # least score of detections, as it stands there
 
@@ -73,3 +73,13 @@ def parse_box_scale(text: str) -> BoxScale:
             remedy="give pixels of the picture per unit of the boxes",
         )  # fmt: skip
     return factors[0], factors[-1]
+
+
+def parse_classes(given: int | str) -> tuple[str, ...]:
+    """Returns the classes that a number or a text such as "1,2" or "person" names, in lower case."""
+    classes = tuple(cell.strip().lower() for cell in str(given).split(","))
+    if all(classes):
+        return classes
+    raise InputError(
+        place="--class", got=repr(given), expected="classes apart by commas, as 1,2 or person", remedy="correct it"
+    )

@@ -242,7 +242,11 @@ def upright_boxes(camera: Camera, pos: Array) -> Array:
 
 
 def read_track_text(
-    path: Path, fps: float, length: int | None, person_class: int | None = None, box_scale: BoxScale | None = None
+    path: Path,
+    fps: float,
+    length: int | None,
+    person_class: tuple[str, ...] | None = None,
+    box_scale: BoxScale | None = None,
 ) -> list[Tracks]:
     """Returns the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`, sorted by id.
 
@@ -403,8 +407,8 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
 
 
 def read_checked_tracks(
-    path: str | Path, *, fps: float | None = None, length: int | None = None, person_class: int | None = None,
-    box_scale: BoxScale | None = None,
+    path: str | Path, *, fps: float | None = None, length: int | None = None,
+    person_class: tuple[str, ...] | None = None, box_scale: BoxScale | None = None,
 ) -> list[Tracks]:  # fmt: skip
     """Reads tracks as `read_tracks` does, but compares no hash of a run again."""
     path = Path(path)
