@@ -46,9 +46,9 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     found = mot_text.detections_of_table(table, options)
     if not len(found.frame):
         raise InputError(file=path, got="no box", expected="the boxes of a detector", remedy="check the file")
+    found = replace(found, frame=_frames_of_pictures(found.frame, sequence))
     if found.plane != "image" or found.box is None:
         raise InputError(file=path, got="points", expected="boxes, px", remedy="give the detector's boxes")
-    found = replace(found, frame=_frames_of_pictures(found.frame, sequence))
     last = int(found.frame.max())
     if sequence.length is not None and last > sequence.length:
         raise InputError(
