@@ -28,7 +28,7 @@ from sim.arrays import repeated_ids
 from sim.io.formats.biwi import labels_of
 from sim.io.formats.labels import CHORD, differentiate, labelled_truth_fields, require_size
 from sim.io.formats.mot_table import GROUND_COLUMNS, PEOPLE, MotTable, corner_doubt, read_table, require_pixels
-from sim.io.formats.options import BoxOptions
+from sim.io.formats.options import BoxOptions, Classes
 from sim.scene.visibility import scale_of_all_boxes
 from sim.truth.group_hulls import box_groups
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth, Unscored
@@ -141,8 +141,6 @@ def _stand_while_boxes_move(box: Array, id: Ints, first: Ints, second: Ints, ste
     stands = np.bincount(who, step > 0, minlength=len(people)) == 0
     return bool(moves.any() and (moves & stands).sum() > moves.sum() / 2)
 
-
-Classes = tuple[str, ...]  # classes of people, as `parse_classes` returns them
 
 DISTRACTORS = (2, 7, 8, 12)  # classes of distractors from MOT16 on
 
