@@ -19,7 +19,7 @@ from sim.io.files.own_files import is_hidden
 from sim.io.formats import biwi, caviar, mot_folder, people_texts, video
 from sim.io.formats.calibration import read_calibration
 from sim.io.formats.detector_boxes import with_boxes
-from sim.io.formats.options import BoxOptions, RecordingOptions, parse_box_scale
+from sim.io.formats.options import BoxOptions, RecordingOptions, parse_box_scale, parse_classes
 from sim.io.pictures.background_sample import parse_choice
 from sim.io.pictures.picture_folder import SUFFIXES as PICTURES
 from sim.io.store import sequence_folder
@@ -41,7 +41,7 @@ def open_source(
     camera: Camera | str | Path | None = None,
     images: bool = True,
     background: str | None = None,
-    person_class: int | None = None,
+    person_class: int | str | None = None,
     box_scale: str | None = None,
     min_score: float | None = None,
     boxes: str | Path | None = None,
@@ -58,7 +58,8 @@ def open_source(
         images: False leaves out the pictures of MOTChallenge folders.
         background: Frames for background models, "first:N" or "spread:N", or the path of a picture of the empty place,
             which spread:50 is added to; None: spread:50, or the stored empty frames.
-        person_class: Class of people in MOTChallenge texts that have classes; None: 1, with a warning about others.
+        person_class: Classes of people in MOTChallenge texts that have classes, as 1, "1,2" or "person"; None: 1, or
+            "person" and "pedestrian" if they are words, with a warning about others.
         box_scale: Factor of the boxes of MOTChallenge texts that are not in pixels of the pictures, "X" or "X,Y".
         min_score: Detections of MOTChallenge texts with a lower score, as it stands there, are left out.
         boxes: File with the detections of one sequence, which the three options above then belong to: MOTChallenge
@@ -77,7 +78,10 @@ def open_source(
             raise InputError(place=option, got=value, expected=expected, remedy=f"correct {option}")
     if isinstance(camera, str | Path):
         camera = read_calibration(Path(camera))
-    of_boxes = BoxOptions(person_class, None if box_scale is None else parse_box_scale(box_scale), min_score)
+    of_boxes = BoxOptions(
+        None if person_class is None else parse_classes(person_class),
+        None if box_scale is None else parse_box_scale(box_scale), min_score,
+    )  # fmt: skip
     options = RecordingOptions(
         fps, px_per_m, camera, images, None if background is None else parse_choice(background),
         of_boxes if boxes is None else BoxOptions(),

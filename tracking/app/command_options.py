@@ -25,7 +25,8 @@ TRACKS = partial(ARGUMENT, "Output of `track`, or MOT text.", None, metavar="TRA
 FPS = partial(option, "Frames per second of a recording, in place of its own. Not for generated sequences.", None)
 SCALE = partial(option, "Pixels per metre of a recording without a camera.", None)
 PERSON_CLASS = partial(
-    option, "Class of people (column 8) in MOT texts. Default: 1.", None, low=0, metavar="N", flag="--class")
+    option, "Classes of people in MOT texts (column 8), tables and COCO results. Default: 1, or person, pedestrian.",
+    None, metavar="A,B,…", flag="--class")
 BOX_SCALE = partial(
     option, "Factor of the boxes in MOT texts, except labels, if they are not in pixels of the pictures.", None,
     metavar="X|X,Y")
@@ -110,7 +111,7 @@ class TrackOptions:
         "Frames a background model is trained on, or a picture of the empty place.", None,
         metavar="first:N|spread:N|PICTURE")
     step_timeout: float | None = STEP_TIMEOUT()
-    person_class: int | None = PERSON_CLASS()
+    person_class: str | None = PERSON_CLASS()
     box_scale: str | None = BOX_SCALE()
     min_score: float | None = option("Leave out boxes with a lower score, as it stands in their file.", None)
     workers: int = PROCESSES()
@@ -127,7 +128,7 @@ class GroupOptions:
     fps: float | None = FPS()
     px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
-    person_class: int | None = PERSON_CLASS()
+    person_class: str | None = PERSON_CLASS()
     box_scale: str | None = BOX_SCALE()
 
 
@@ -147,7 +148,7 @@ class ScoreOptions:
     csv: Path | None = option("Write all scores of a ranking into this file.", None, metavar="FILE")
     fps: float | None = FPS()
     px_per_m: float | None = SCALE()
-    person_class: int | None = PERSON_CLASS()
+    person_class: str | None = PERSON_CLASS()
     box_scale: str | None = BOX_SCALE()
     workers: int = PROCESSES()
 
@@ -211,7 +212,7 @@ class ErrorsOptions:
     similarity: Similarity = SIMILARITY()
     fps: float | None = FPS()
     px_per_m: float | None = SCALE()
-    person_class: int | None = PERSON_CLASS()
+    person_class: str | None = PERSON_CLASS()
     box_scale: str | None = BOX_SCALE()
     workers: int = PROCESSES()
 
@@ -307,7 +308,7 @@ class CocoOptions:
     folder: Path = ARGUMENT("A sequence or dataset with labelled boxes.", metavar="DIR")
     out: Path = FILE("File to write; for several splits FILE-train.json, FILE-val.json, …", metavar="FILE.json")
     min_visibility: float = option("Leave out people who are less visible.", 0.0, low=0.0, high=1.0, metavar="V")
-    person_class: int | None = PERSON_CLASS()
+    person_class: str | None = PERSON_CLASS()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,7 +29,7 @@ class OpenedAs:
     camera: Path | None = None
     images: bool = True
     background: str | None = None
-    person_class: int | None = None
+    person_class: str | None = None
     box_scale: str | None = None
     min_score: float | None = None
     boxes: Path | None = None

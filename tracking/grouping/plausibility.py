@@ -31,8 +31,8 @@ def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float
     step = math.gcd(*np.diff([t.index for t in present]).astype(int).tolist())
     if step > 1:
         yield (
-            f"{name}: people only in every {step}th frame. If these are all frames there are, number them 1, 2, 3, … "
-            f"and give their rate, here --fps {fps / step:g}"
+            f"{name}: people only in every {step}th frame, so that no group lasts. Number these frames 1, 2, 3, … and "
+            f"give their own rate: --fps {fps:g} if the labels have this rate, --fps {fps / step:g} if the video has it"
         )
     if not present:
         return

@@ -34,7 +34,7 @@ SPLITS = ("train", "training", "val", "valid", "validation", "test", "testing", 
 
 
 def coco(
-    source: str | Path, out: str | Path, min_visibility: float = 0.0, *, person_class: int | None = None
+    source: str | Path, out: str | Path, min_visibility: float = 0.0, *, person_class: int | str | None = None
 ) -> list[Path]:
     """Writes the sequences of a source that have labelled boxes as COCO files.
 
@@ -47,7 +47,7 @@ def coco(
         out: The JSON file, replaced if it exists. If there are several splits (by seed, or by the recordings' folders),
             each has a file of its own: `coco-train.json`, `coco-val.json` for `coco.json`.
         min_visibility: People who are less visible, 0 to 1, are left out.
-        person_class: Class of people in MOTChallenge texts; None: 1.
+        person_class: Classes of people, as `open_source` takes them.
 
     Returns:
         The paths of the files. The same dataset gives the same bytes.

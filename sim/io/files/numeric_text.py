@@ -34,6 +34,7 @@ class NumericTable:
     line: Ints  # (N,) line number of each row in the file, from 1
     layout: str = ""  # what the columns must be, for the remedy of errors that most rows have
     unit: str = "line"  # what a row is in the file, for errors
+    classes: tuple[str, ...] = ()  # words that the numbers from 0 in the column of classes stand for; (): none
 
     def reject(self, wrong: Bools | np.bool_, expected: str, remedy: str, most: str | None = None) -> None:
         """Raises InputError about the first row where `wrong` (N,) is True; `most` is the remedy if most rows are."""
@@ -119,6 +120,14 @@ def read_numbers(
         rows.reject(np.ones(len(lines), bool), f"{span} columns", remedy, remedy)
     rows.reject(~np.isfinite(values).all(axis=1), "finite numbers", CORRECT)
     return rows
+
+
+def read_words(path: Path, column: int) -> list[str]:
+    """Returns the cells of a column below the first line, in lower case; [] if all are numbers."""
+    lines = [line for line in read_text(path).splitlines() if line.strip()][1:]
+    rows = [line.split("," if "," in lines[0] else None) for line in lines]
+    cells = [row[column].strip().strip('"').lower() for row in rows if len(row) > column]
+    return [] if all(map(is_number_text, cells)) else cells
 
 
 def _first_bad_line(

@@ -46,9 +46,10 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     found = mot_text.detections_of_table(table, options)
     if not len(found.frame):
         raise InputError(file=path, got="no box", expected="the boxes of a detector", remedy="check the file")
+    found = replace(found, frame=_frames_of_pictures(found.frame, sequence))
     if found.plane != "image" or found.box is None:
         raise InputError(file=path, got="points", expected="boxes, px", remedy="give the detector's boxes")
-    last = int(found.frame.max(initial=0))
+    last = int(found.frame.max())
     if sequence.length is not None and last > sequence.length:
         raise InputError(
             file=path, got=f"frame {last}", expected=f"at most {sequence.length}, the frames of {sequence.name}",
@@ -66,6 +67,14 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
         sequence, frames=lambda: joined(sequence.frames), bare=None if bare is None else lambda: joined(bare),
         has_detections=True, source=source,
     )  # fmt: skip
+
+
+def _frames_of_pictures(number: Ints, sequence: Sequence) -> Ints:
+    """Returns the frames of boxes (N,), which may be numbered like picture files that are counted otherwise."""
+    origin, step = sequence.source.get("numbering", (1, 1))
+    before, rest = np.divmod(number - origin, step)
+    like_files = number.max() > (sequence.length or np.inf) and not rest.any() and before.min() >= 0
+    return before + 1 if like_files else number
 
 
 def _frames_at(path: Path, sequence: Sequence, seconds: Array) -> Ints:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import configparser
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from itertools import repeat
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -157,7 +158,9 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     def truth() -> Truth:
         return mot_text.read_truth(gt, info.name, rate, length, options.scale, options.boxes.person_class)
 
-    shown = {} if choice is None else {"background": str(choice)}
+    shown: dict[str, Any] = {} if choice is None else {"background": str(choice)}
+    if pictures.numbering is not None:
+        shown["numbering"] = astuple(pictures.numbering)
     return Sequence(
         name=info.name, fps=rate, length=length, frames=frames if images and pictures.files else bare, bare=bare,
         load_truth=truth if gt.is_file() else None,

@@ -20,7 +20,7 @@ from typing import NoReturn
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.numeric_text import CORRECT, NumericTable, is_number_text, read_numbers, read_text
+from sim.io.files.numeric_text import CORRECT, NumericTable, is_number_text, read_numbers, read_text, read_words
 from sim.io.formats.options import BoxScale
 from sim.types import Array, Bools, Ints
 
@@ -137,6 +137,11 @@ NAMES = {
     "y": ("y", *(f"y_{unit}" for unit in UNITS)),
 }
 
+# further names of a column of classes in words, if PEOPLE are among these: it may hold anything else
+WORD_NAMES = ("label", "name", "class_name")
+
+PEOPLE = ("person", "pedestrian")  # words for the class of people
+
 FramesAt = Callable[[Column], Ints]  # frames (N,) from 1 of times (N,), s; 0: of no frame
 
 EXPECTED = (
@@ -164,7 +169,10 @@ def read_named(path: Path, names: list[str], frames_at: FramesAt | None = None) 
     Returns the rows, and the labels of a column `group`, (N,), -1 for alone; None without that column.
     """
     found: dict[str, int] = {}
+    word_column, words = _words_for_classes(path, names)
     for k, name in enumerate(names):
+        if words and name in NAMES["class"]:
+            continue
         meaning = next((key for key, some in NAMES.items() if name in some), None)
         if meaning == "time" and (frames_at is None or not set(NAMES["frame"]).isdisjoint(names)):
             continue
@@ -174,6 +182,11 @@ def read_named(path: Path, names: list[str], frames_at: FramesAt | None = None) 
             found[meaning] = k
     use, count = list(found.values()), len(names)
     rows = read_numbers(path, (count, count), header=True, layout="those that line 1 names", use=use)
+    if words:
+        classes, code = np.unique(words, return_inverse=True)
+        rows = replace(rows, values=np.column_stack([rows.values, code]), classes=tuple(classes.tolist()))
+        found["class"] = word_column
+        use.append(word_column)
     if "time" in found and frames_at is not None:
         found["frame"] = found.pop("time")
         k = use.index(found["frame"])
@@ -206,6 +219,15 @@ def read_named(path: Path, names: list[str], frames_at: FramesAt | None = None) 
         warnings.warn(f"{path}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
     group = replace(rows, values=column("group")[:, None]).integers(0, "group") if "group" in have else None
     return replace(rows, values=np.stack(columns, axis=1)), group
+
+
+def _words_for_classes(path: Path, names: list[str]) -> tuple[int, list[str]]:
+    """Returns the column that holds classes in words, and its cells; -1 and [] without one."""
+    for k, name in enumerate(names):
+        words = read_words(path, k) if name in (*NAMES["class"], *WORD_NAMES) else []
+        if words and (name in NAMES["class"] or not set(PEOPLE).isdisjoint(words)):
+            return k, words
+    return -1, []
 
 
 def _box(column: Callable[[str], Column], have: Set[str]) -> tuple[Column, Column, Column, Column] | None:

@@ -27,8 +27,8 @@ from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.biwi import labels_of
 from sim.io.formats.labels import CHORD, differentiate, labelled_truth_fields, require_size
-from sim.io.formats.mot_table import GROUND_COLUMNS, MotTable, corner_doubt, read_table, require_pixels
-from sim.io.formats.options import BoxOptions
+from sim.io.formats.mot_table import GROUND_COLUMNS, PEOPLE, MotTable, corner_doubt, read_table, require_pixels
+from sim.io.formats.options import BoxOptions, Classes
 from sim.scene.visibility import scale_of_all_boxes
 from sim.truth.group_hulls import box_groups
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth, Unscored
@@ -154,13 +154,14 @@ LABEL_COLUMNS = 3
 CLASSES = range(1, 14)  # classes of MOTChallenge. A text with another class has classes of its own, and no distractors.
 
 
-def unscored_rows(table: MotTable, people: Bools, name: str, person_class: int | None) -> Unscored | None:
+def unscored_rows(table: MotTable, people: Bools, name: str, person_class: Classes | None) -> Unscored | None:
     """Returns the labelled rows beside `people` (N,), sorted by frame; None if no distractor is among them."""
     found = classes_of(table, person_class is not None)
     if (
         found is None
+        or table.rows.classes
         or table.rest.shape[1] > LABEL_COLUMNS
-        or person_class not in (None, PEDESTRIAN)
+        or person_class not in (None, PEDESTRIANS)
         or not np.isin(found, CLASSES).all()
     ):
         return None
@@ -173,7 +174,7 @@ def unscored_rows(table: MotTable, people: Bools, name: str, person_class: int |
     return Unscored(table.frame[rows], table.box[rows], distractor[rows])
 
 
-PEDESTRIAN = 1  # class of a person from MOT16 on
+PEDESTRIANS = ("1",)  # classes of people from MOT16 on
 
 LABELS = "gt.txt"  # name of a text of labels. Its column 7 is a flag; that of another text may be a confidence.
 
@@ -182,10 +183,10 @@ LAST_CLASS = 100  # greatest class of the usual sets of classes; COCO has up to 
 SHOWN = 8  # most values that a message lists
 
 
-def labelled_people(table: MotTable, person_class: int | None) -> Bools:
+def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
     """Returns flags (N,) of rows that are people: an id from 0, another flag than 0, the right class.
 
-    person_class: the class of people; None: 1, with a warning about rows of other classes.
+    person_class: the classes of people; None: 1, or PEOPLE of words, with a warning about rows of other classes.
     """
     keep, file = np.asarray(table.id >= 0), table.rows.file
     if len(keep) and not keep.any():
@@ -209,32 +210,36 @@ def labelled_people(table: MotTable, person_class: int | None) -> Bools:
     return of_class(table, keep, person_class)
 
 
-def require_classes(table: MotTable, person_class: int | None) -> None:
+def require_classes(table: MotTable, person_class: Classes | None) -> None:
     """Raises InputError if the user named the class of people, and the text has no classes."""
     if person_class is not None and classes_of(table, True) is None:
         raise InputError(
-            file=table.rows.file, place="--class", got=f"{table.rows.values.shape[1]} columns without classes",
-            expected="a class in column 8", remedy="leave --class out",
+            file=table.rows.file, place="--class", got="no classes", expected="a column class, or classes in column 8",
+            remedy="leave --class out",
         )  # fmt: skip
 
 
-def of_class(table: MotTable, keep: Bools, person_class: int | None) -> Bools:
+def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bools:
     """Returns `keep` (N,) without the rows of other classes than that of people."""
     found, file = classes_of(table, person_class is not None), table.rows.file
     if found is None or not keep.any():
         return keep
-    wanted = PEDESTRIAN if person_class is None else person_class
-    people: Bools = np.asarray(keep & (found == wanted))
-    values, counts = np.unique(found[keep & ~people], return_counts=True)
-    words = ", ".join(f"{n} rows of class {v:g}" for v, n in zip(values[:SHOWN], counts[:SHOWN], strict=True))
-    words += ", …" if len(values) > SHOWN else ""
+    words = table.rows.classes
+    wanted = person_class or (PEOPLE if words else PEDESTRIANS)
+    values, row = np.unique(found, return_inverse=True)
+    name = [words[int(v)] if words else f"{v:.12g}" for v in values]
+    people: Bools = keep & np.isin(name, wanted)[row]
+    counts = np.bincount(row[keep & ~people], minlength=len(name))
+    others = [f"{n} rows of class {each}" for each, n in zip(name, counts, strict=True) if n]
+    said, people_are = ", ".join(others[:SHOWN]) + ", …" * (len(others) > SHOWN), " or ".join(wanted)
     if not people.any():
         raise InputError(
-            file=file, place="classes", got=words, expected=f"people, of class {wanted}",
-            remedy="name the class of people with --class N",
+            file=file, place="classes", got=said, expected=f"people, of class {people_are}",
+            remedy="name the classes of people with --class",
         )  # fmt: skip
-    if len(values) and person_class is None:
-        warnings.warn(f"{file}: {words} are left out; people are class {wanted} (--class says otherwise)", stacklevel=3)
+    if others and person_class is None:
+        text = f"{file}: {said} are left out; people are class {people_are} (--class says otherwise)"
+        warnings.warn(text, stacklevel=3)
     return people
 
 
@@ -369,7 +374,7 @@ def _reject_placeless(table: MotTable, ground: Array | None) -> Bools:
 
 def read_truth(
     path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan"),
-    person_class: int | None = None,
+    person_class: Classes | None = None,
 ) -> Truth:  # fmt: skip
     """Reads a gt.txt as truth of people without group labels, as MOTChallenge's own scoring counts them.
 
@@ -383,7 +388,7 @@ def read_truth(
 
 def truth_of_table(
     table: MotTable, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan"),
-    person_class: int | None = None,
+    person_class: Classes | None = None,
 ) -> Truth:  # fmt: skip
     """Returns a text's table as truth. See `read_truth`."""
     _check_boxes(table)

@@ -13,6 +13,7 @@ from sim.io.files.numeric_text import is_number_text
 from sim.io.pictures.background_sample import BackgroundChoice
 from sim.types import Camera
 
+Classes = tuple[str, ...]  # words, in lower case, or numbers as words
 BoxScale = tuple[float, float]  # factors of x and y that make the boxes of a text pixels of the pictures
 
 
@@ -20,7 +21,7 @@ BoxScale = tuple[float, float]  # factors of x and y that make the boxes of a te
 class BoxOptions:
     """How the boxes of a MOTChallenge text are read; None: not given."""
 
-    person_class: int | None = None  # the class of people
+    person_class: Classes | None = None  # the classes of people
     box_scale: BoxScale | None = None  # factors of x and y
     min_score: float | None = None  # least score of detections, as it stands there
 
@@ -73,3 +74,13 @@ def parse_box_scale(text: str) -> BoxScale:
             remedy="give pixels of the picture per unit of the boxes",
         )  # fmt: skip
     return factors[0], factors[-1]
+
+
+def parse_classes(given: int | str) -> Classes:
+    """Returns the classes that a number or a text such as "1,2" or "person" names, in lower case."""
+    classes = tuple(cell.strip().lower() for cell in str(given).split(","))
+    if all(classes):
+        return classes
+    raise InputError(
+        place="--class", got=repr(given), expected="classes apart by commas, as 1,2 or person", remedy="correct it"
+    )

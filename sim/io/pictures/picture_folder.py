@@ -81,6 +81,10 @@ def numbering_of(folder: Path, files: list[Path], length: int | None, labelled: 
         return Numbering(low, int(steps[0]))
     # Without labels, nothing says what the numbers are, but their lowest and highest.
     free = length is None and labelled is None
+    if free and len(steps) == 1 and steps[0] > 1:
+        frames = f"1 to {len(found)}; --fps is that of these pictures"
+        _say(folder, f"pictures {low} to {high} in steps of {steps[0]}", frames)
+        return Numbering(low, int(steps[0]))
     return Numbering(low if low == 0 or free or (length is not None and high > length) else 1)
 
 

@@ -33,7 +33,7 @@ from sim.io.formats.mot_text import (
     require_metres,
     unit_scores,
 )
-from sim.io.formats.options import BoxScale
+from sim.io.formats.options import BoxScale, Classes
 from sim.io.store import group_files
 from sim.io.store.group_files import AXES
 from sim.io.store.seal import EXACT, NAMES, PAIRS, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
@@ -242,7 +242,7 @@ def upright_boxes(camera: Camera, pos: Array) -> Array:
 
 
 def read_track_text(
-    path: Path, fps: float, length: int | None, person_class: int | None = None, box_scale: BoxScale | None = None
+    path: Path, fps: float, length: int | None, person_class: Classes | None = None, box_scale: BoxScale | None = None
 ) -> list[Tracks]:
     """Returns the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`, sorted by id.
 
@@ -403,7 +403,7 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
 
 
 def read_checked_tracks(
-    path: str | Path, *, fps: float | None = None, length: int | None = None, person_class: int | None = None,
+    path: str | Path, *, fps: float | None = None, length: int | None = None, person_class: Classes | None = None,
     box_scale: BoxScale | None = None,
 ) -> list[Tracks]:  # fmt: skip
     """Reads tracks as `read_tracks` does, but compares no hash of a run again."""

@@ -157,11 +157,12 @@ def _check_modes(
 
 
 def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:
-    ids = {int(id) for tracks in run for id in tracks.id}
-    return {**{key: run.info[key] for key in ROW_KEYS}, "tracks": len(ids), "folder": folder}
+    ids, groups = ({int(k) for tracks in run for k in getattr(tracks, name)} for name in ("id", "group"))
+    count = {"tracks": len(ids), "groups": len(groups - {-1})}
+    return {**{key: run.info[key] for key in ROW_KEYS}, **count, "folder": folder}
 
 
 def _line(row: dict[str, Any]) -> str:
     speed = f"{row['frames_per_second']:.0f} frames/s ({row['whole_frames_per_second']:.0f} with reading)"
-    counts = f"{counted(row['frames'], 'frame')}, {counted(row['tracks'], 'track')}"
+    counts = ", ".join(counted(row[f"{name}s"], name) for name in ("frame", "track", "group"))
     return printable(f"{row['sequence']}: {counts}, detections {input_summary(row)}, {speed} → {row['folder']}")

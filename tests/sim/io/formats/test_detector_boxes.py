@@ -12,6 +12,7 @@ from sim.io.formats.detector_boxes import with_boxes
 from sim.io.formats.options import BoxOptions
 from sim.io.source import open_source
 from sim.types import Frame
+from tests.recordings import mot_folder
 from tests.small_videos import picture, write_video
 from tracking.app.cli import run
 
@@ -51,11 +52,12 @@ def test_both_forms_are_the_same_detections(tmp_path, video):
     assert [f.image for f in one.without_pictures()] == [None] * 12
 
 
-def test_tracks_of_boxes_on_a_video(tmp_path, video):
+def test_tracks_of_boxes_on_a_video(tmp_path, video, capsys):
     boxes = coco(tmp_path / "det.json", category_id=3)
     command = ["track", "blob", str(video), "--boxes", str(boxes), "--px-per-m", "18"]
     assert run([*command, "--out", str(tmp_path / "a")]) == 2  # nobody is of category 1
     assert run([*command, "--class", "3", "--out", str(tmp_path / "a")]) == 0
+    assert "12 frames, 1 track, 0 groups" in capsys.readouterr().out
     assert json.loads((tmp_path / "a" / "run.json").read_text())["detections"] == "file"
     assert run(["overlay", str(video), str(tmp_path / "a"), "--out", str(tmp_path / "a.mp4")]) == 0
     assert run([*command, "--detections", "image", "--out", str(tmp_path / "b")]) == 2
@@ -109,6 +111,16 @@ def test_frames_are_used_if_there_are_times_too(tmp_path, video):
     with pytest.warns(UserWarning, match="not used: t"):
         found = with_boxes(plain, path)
     assert [len(frame.detections.box) for frame in found] == [0, 0, 1, *[0] * 9]
+
+
+@pytest.mark.filterwarnings("ignore:.*are taken as frames")
+@pytest.mark.parametrize("numbers", [(1, 2, 3), (4, 10, 16)])
+def test_boxes_may_be_numbered_like_the_pictures(tmp_path, numbers):
+    shown = {f"img1/{k:06d}.jpg": picture(k) for k in (4, 10, 16)}
+    (plain,) = open_source(mot_folder(tmp_path, None, None, "frameRate=10\n", shown))
+    rows = [(n, *row[1:]) for n, row in zip(numbers, ROWS, strict=False)]
+    found = with_boxes(plain, mot(tmp_path / "det.txt", rows))
+    assert [frame.detections.box.tolist() for frame in found] == [[list(row[1:5])] for row in ROWS[:3]]
 
 
 MISFITS = [
@@ -167,9 +179,9 @@ def test_a_text_without_boxes_is_refused(tmp_path, video):
 
 def test_a_class_of_a_text_without_classes_is_refused(tmp_path, video):
     (plain,) = open_source(video)
-    with pytest.raises(InputError, match="--class: got 7 columns without classes"):
-        with_boxes(plain, mot(tmp_path / "det.txt"), BoxOptions(person_class=1))
-    with pytest.raises(InputError, match="--class: got 7 columns without classes"):
+    with pytest.raises(InputError, match="--class: got no classes; expected a column class"):
+        with_boxes(plain, mot(tmp_path / "det.txt"), BoxOptions(person_class=("1",)))
+    with pytest.raises(InputError, match="--class: got no classes; expected a column class"):
         open_source(mot(tmp_path / "det.txt"), fps=10, person_class=1)
 
 

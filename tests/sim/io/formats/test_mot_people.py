@@ -3,7 +3,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.source import open_source
-from sim.io.store.track_files import read_tracks
+from sim.io.store.track_files import read_checked_tracks, read_tracks
 
 BOX = "10,10,20,50"
 
@@ -33,6 +33,49 @@ def test_classes_left_out_are_counted_and_can_be_named(tmp_path, tails):
     assert set(open_source(folder, fps=25, person_class=2)[0].truth.id) == {1, 3}
 
 
+@pytest.mark.filterwarnings("ignore:.*not taken as metres")
+def test_several_classes_may_be_people(tmp_path):
+    tails = ["1,1,0,0", "1,2,0,0", "1,4,0,0"]  # VisDrone's: pedestrian, people, car
+    path = text(tmp_path, tails)
+    assert set(open_source(path, fps=25, person_class="1,2")[0].truth.id) == {1, 2}
+    assert {k for t in read_checked_tracks(path, fps=25, person_class=("1", "2")) for k in t.id.tolist()} == {1, 2}
+    with pytest.raises(InputError, match="--class: got '1,,2'; expected classes apart by commas"):
+        open_source(path, fps=25, person_class="1,,2")
+
+
+WORDS = {
+    "class": ("class", ["Person", "bicycle", "pedestrian"]),
+    "quoted": ("category", ['"person"', '"traffic light"', '"person"']),
+    "label": ("label", ["person", "car", "person"]),
+    "name beside a number": ("class,name", ["0,person", "7,car", "0,person"]),
+}
+
+
+def words(tmp_path, kind):
+    names, cells = WORDS[kind]
+    lines = [f"{f},{k},{10 * k + f},10,20,50,{cell}" for f in (1, 2) for k, cell in enumerate(cells, 1)]
+    (tmp_path / "people.csv").write_text("\n".join([f"frame,id,left,top,width,height,{names}", *lines]))
+    return tmp_path / "people.csv"
+
+
+@pytest.mark.filterwarnings("ignore:.*columns that are not used")
+@pytest.mark.parametrize("kind", WORDS)
+def test_classes_in_words(tmp_path, kind):
+    path, other = words(tmp_path, kind), WORDS[kind][1][1].split(",")[-1].strip('"')
+    with pytest.warns(UserWarning, match=f"2 rows of class {other} are left out; people are class person or pedestr"):
+        assert set(open_source(path, fps=25)[0].truth.id) == {1, 3}
+    assert set(open_source(path, fps=25, person_class=other.title())[0].truth.id) == {2}
+    with pytest.raises(InputError, match=f"2 rows of class {other}.*expected people, of class 1"):
+        _ = open_source(path, fps=25, person_class=1)[0].truth
+
+
+def test_names_of_people_are_no_classes(tmp_path):
+    path = tmp_path / "people.csv"
+    path.write_text(f"frame,id,left,top,width,height,name\n1,1,{BOX},Ann\n1,2,{BOX},Bob\n")
+    with pytest.warns(UserWarning, match="columns that are not used: name"):
+        assert len(open_source(path, fps=25)[0].truth.id) == 2
+
+
 @pytest.mark.parametrize("wrong", [0, 2])
 def test_a_class_that_leaves_nobody_is_an_error_that_counts(tmp_path, wrong):
     folder = labels(tmp_path, [f"1,{wrong},1"] * 2)
@@ -42,7 +85,7 @@ def test_a_class_that_leaves_nobody_is_an_error_that_counts(tmp_path, wrong):
 
 
 def test_a_class_of_a_text_without_classes_is_refused(tmp_path):
-    with pytest.raises(InputError, match="without classes"):
+    with pytest.raises(InputError, match="got no classes"):
         _ = open_source(labels(tmp_path, ["1,-1,-1,-1"]), fps=25, person_class=2)[0].truth
 
 

@@ -87,6 +87,7 @@ NUMBERED = [
     (["000500.jpg", "000501.jpg", "000502.jpg"], {"ini": "seqLength=3\n"}, [0, 1, 2]),
     (["000003.jpg", "000004.jpg"], {"det": ROWS.replace(",1,", ",-1,", 1)}, [None, None, 0, 1, *[None] * 5]),
     (["9.jpg", "10.jpg", "11.jpg"], {}, [0, 1, 2]),
+    (["000004.jpg", "000010.jpg", "000022.jpg"], {}, [0, *[None] * 5, 1, *[None] * 11, 2]),
     (["a.jpg", "b.jpg", "c.jpg"], {}, [0, 1, 2]),
     (["a1.jpg", "b1.jpg", "c7.jpg"], {}, [0, 1, 2]),
     (["1600000000100.jpg", "1600000000200.jpg", "1600000000900.jpg"], {}, [0, 1, 2]),
@@ -96,6 +97,14 @@ NUMBERED = [
 @pytest.mark.parametrize(("names", "more", "right"), NUMBERED)
 def test_pictures_are_frames_by_their_numbers(tmp_path, names, more, right):
     assert shown(folder(tmp_path / "a", names, **more)) == right
+
+
+def test_every_nth_picture_is_counted_in_order(tmp_path):
+    path = folder(tmp_path / "a", names(range(1, 14, 6)))
+    with pytest.warns(UserWarning, match="1 to 13 in steps of 6 are taken as frames 1 to 3; --fps is that of these"):
+        assert shown(path) == [0, 1, 2]
+    alike = folder(tmp_path / "b", names(range(1, 14, 6)), det=rows(1, 7, 13))
+    assert shown(alike) == [0, *[None] * 5, 1, *[None] * 5, 2]
 
 
 def test_two_pictures_of_a_frame_are_refused(tmp_path):

@@ -200,7 +200,14 @@ def test_boxes(tmp_path, capsys):
     assert [g["members"] for g in row["groups"]] == [[1, 2, 3], [4, 6]]
 
 
+def every_tenth() -> str:
+    """The walk, of which each tenth frame is labelled."""
+    rows = (line.partition(",") for line in text().splitlines())
+    return "".join(f"{10 * int(frame) - 9},{rest}\n" for frame, _, rest in rows)
+
+
 SPEEDS = [
+    (every_tenth, ["--fps", "10"], "--fps 10 if the labels have this rate, --fps 1 if the video has it"),
     (text, ["--fps", "100"], "Check --fps, here 100, and that positions are in metres"),
     (boxes, ["--fps", "10", "--px-per-m", "4"], "--px-per-m, here 4"),
     (boxes, ["--fps", "10"], ""),
