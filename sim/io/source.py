@@ -108,7 +108,7 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
                 file=path, got="tracks, what `flockscope track` wrote", expected=KINDS,
                 remedy="give the sequence or dataset first, then the tracks: swap the arguments",
             )  # fmt: skip
-        loose = any(p.suffix.lower() in PICTURES for p in path.iterdir() if not is_hidden(p))
+        loose = sum(p.suffix.lower() in PICTURES for p in path.iterdir() if not is_hidden(p)) > 1
         got = "a folder of pictures, without img1" if loose else "a folder without sequences"
         remedy = f"move the pictures to {path / 'img1'}" if loose else "check the path"
         raise InputError(file=path, got=got, expected=KINDS, remedy=remedy)
@@ -166,7 +166,8 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
         options.reject(path, "a video without --boxes", "it has no boxes", "boxes")
         return video.open_video(path, options)
     if suffix not in (".txt", ".csv", people_texts.NDJSON):
-        remedy = "give boxes with --boxes, their video or folder as SOURCE" if suffix == ".json" else "check the path"
+        of_boxes = "if these are boxes: flockscope track TRACKER VIDEO --boxes FILE"
+        remedy = of_boxes if suffix == ".json" else "check the path"
         raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy=remedy)
     layout = people_texts.layout_of(path)
     if layout is None:

@@ -58,7 +58,8 @@ def _declared(f: Any) -> Any:
 
 
 class StrictCommand(TyperCommand):
-    """A command that raises InputError for an option given twice, unless it may be, and for numbers in other digits."""
+    """A command that raises InputError for an option given twice, unless it may be, for an empty value, and for a
+    number in other digits."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parses the words of the command line after the command's name, as Typer does."""
@@ -71,8 +72,10 @@ class StrictCommand(TyperCommand):
         rest = super().parse_args(ctx, args)
         for param in params:
             text = given.get(param.name)
-            if text == "":  # as of an unset variable of a shell
-                raise InputError(place=param.opts[0], got="''", expected="a value", remedy="give one, or leave it out")
+            # A variable of a shell that is not set gives "".
+            if "" in (text if isinstance(text, list | tuple) else [text]):
+                name = param.opts[0] if param.param_type_name == "option" else param.name.upper()
+                raise InputError(place=name, got="''", expected="a value", remedy="give one, or leave it out")
             if isinstance(text, str) and isinstance(ctx.params.get(param.name), int | float):
                 _check_number(param.opts[0], text)
         return rest

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 Form = Literal["csv", "parquet", "trajnet", "pedpy"]
 # name and beginning of the texts of people; of nobody, one is empty
 TEXTS = {
-    "trajnet": ("people.ndjson", rb'\{"scene": \{"id": 0, "p": \d+, "s": \d+, "e": \d+, "fps": [^}]*\}\}\n|\Z'),
+    "trajnet": ("people.ndjson", rb'\{"scene": \{"id": 0, "p": \d+, "s": \d+, "e": \d+, "fps": [0-9.e+-]+\}\}\n|\Z'),
     "pedpy": ("people.txt", rb"# framerate: \S+\n# id\tframe\tx/m\ty/m\n"),
 }
 MINUTE = 60.0  # s

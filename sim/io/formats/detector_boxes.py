@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import JSON_BYTES, is_number
+from scenarios.limits import is_number
 from scenarios.reading import parse_json
 from sim.io.files.numeric_text import NumericTable, read_text
 from sim.io.formats import mot_text
@@ -111,7 +111,7 @@ def _check_size(path: Path, box: Array, size: tuple[int, int]) -> None:
 
 def _coco_results(path: Path) -> NumericTable:
     """Returns frame, -1, left, top, width, height, score and category of each result."""
-    results = parse_json(read_text(path, JSON_BYTES), path, "check the file")
+    results = parse_json(read_text(path), path, "check the file")
     if not isinstance(results, list):
         raise InputError(
             file=path, got="no list", expected="a list of COCO results",

@@ -122,7 +122,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found = mot_text.read_detections(det, options.boxes, info.length) if is_present(det) else None
     if found is None:
-        options.reject(path, "a recording without det/det.txt", "they are for detections", "box_scale min_score")
+        options.reject(path, "a recording without det/det.txt", "it has no detections", "box_scale min_score")
     pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
     length = info.length or max(_labelled_frames(path).max(initial=0).item(), pictures.last)

@@ -345,17 +345,18 @@ def detections_of_table(table: MotTable, options: BoxOptions) -> DetectionTable:
     _check_boxes(table)
     ground = ground_positions(table)
     boxless = _reject_placeless(table, ground)
-    raw, path = table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.frame)), table.rows.file
-    good = _good_scores(path, raw, options.min_score)
+    path, rows = table.rows.file, np.argsort(table.frame, kind="stable")
+    rows = rows[of_class(table, np.ones(len(rows), bool), options.person_class)[rows]]
+    raw = table.rest[rows, 0] if table.rest.shape[1] else np.ones(len(rows))
     score, mapped = unit_scores(raw)
     if mapped:
         warnings.warn(f"{path}: {mapped}", stacklevel=3)
     plane: Plane = "image" if ground is None or np.isnan(ground).any() else "ground"
     pos = ground[:, :2] if plane == "ground" and ground is not None else table.box[:, :2] + table.box[:, 2:] / 2
-    order = np.argsort(table.frame, kind="stable")
-    order = order[of_class(table, good, options.person_class)[order]]
-    box = None if boxless.any() else table.box[order]
-    return DetectionTable(table.frame[order], table.id[order], plane, pos[order], box, score[order])
+    good = _good_scores(path, raw, options.min_score)
+    rows, score = rows[good], score[good]
+    box = None if boxless.any() else table.box[rows]
+    return DetectionTable(table.frame[rows], table.id[rows], plane, pos[rows], box, score)
 
 
 def _check_boxes(table: MotTable) -> None:

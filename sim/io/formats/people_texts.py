@@ -34,8 +34,9 @@ from sim.types import Ints, Sequence, Truth
 
 NDJSON = ".ndjson"
 ETH_FPS = 2.5
-FRAMERATE = re.compile(r"framerate[\s:=]*([-+0-9.,]+)", re.IGNORECASE)
-CENTIMETRES = re.compile(r"\bx\W?cm\b|\bin cm\b", re.IGNORECASE)
+FRAMERATE = re.compile(r"framerate[^\w+-]*([-+]?\d[\d.]*(?:,\d+)?)", re.IGNORECASE)
+X_IN_CM, X_IN_M = (re.compile(rf"\bx[\W_]{{0,2}}{unit}\b", re.IGNORECASE) for unit in ("cm", "m"))
+IN_CM = re.compile(r"\bin cm\b", re.IGNORECASE)
 PEDPY = re.compile(r"#.*framerate|#\s*(id|persid)\s+(frame|fr)\b", re.IGNORECASE)
 
 KITTI_FPS = 10.0
@@ -96,18 +97,19 @@ def _read_eth(path: Path, fps: float | None) -> People:
 
 
 def _read_pedpy(path: Path, fps: float | None) -> People:
-    comments = [line for line in read_text(path).splitlines() if line.startswith("#")]
-    rates = {found[1] for line in comments if (found := FRAMERATE.search(line))}
-    stated = float(*rates) if len(rates) == 1 and all(map(is_number_text, rates)) else None
+    comments = "\n".join(line for line in read_text(path).splitlines() if line.startswith("#"))
+    rates = {rate.rstrip(".") for rate in FRAMERATE.findall(comments)}
+    values = {float(rate) if is_number_text(rate) else float("nan") for rate in rates}
+    stated = values.pop() if len(values) == 1 else None
     if not is_number(fps or stated, *FRAME_RATES):
         expected = "frames per second from {:g} to {:g}".format(*FRAME_RATES)
         got = " and ".join(sorted(rates)) or "none"
         raise InputError(file=path, place="# framerate", got=got, expected=expected, remedy="correct it, or give --fps")
     rows = read_numbers(path, (4, 12), layout="id frame x y z", comments=True)
     raw = rows.integers(1, "frame")
-    scale = 0.01 if any(map(CENTIMETRES.search, comments)) else 1.0
-    values = np.column_stack([raw - raw.min(initial=LARGEST) + 1, rows.values[:, 0], scale * rows.values[:, 2:4]])
-    return replace(rows, values=values), stated
+    centimetres = X_IN_CM.search(comments) or (IN_CM.search(comments) and not X_IN_M.search(comments))
+    pos = rows.values[:, 2:4] * (0.01 if centimetres else 1.0)
+    return replace(rows, values=np.column_stack([raw - raw.min(initial=LARGEST) + 1, rows.values[:, 0], pos])), stated
 
 
 def _read_ndjson(path: Path, fps: float | None) -> People:
@@ -162,9 +164,11 @@ def _read_kitti(path: Path, fps: float | None) -> People:
         got = ", ".join(sorted({cells[2] for _, cells in numbered}))
         raise InputError(file=path, got=got, expected=" or ".join(PEOPLE), remedy="give labels of people")
     values = np.array([[*cells[:2], *cells[6:10]] for _, cells in people], float)
-    values[:, 0] += 1
-    values[:, 4:] -= values[:, 2:4]
-    return NumericTable(path, values, np.array([k for k, _ in people]), "frame + 1, id and box"), KITTI_FPS
+    rows = NumericTable(path, values, np.array([k for k, _ in people]), KITTI_LAYOUT)
+    rows.reject(~np.isfinite(values).all(axis=1), "finite numbers", CORRECT)
+    rows.reject(values[:, 0] < 0, "frames from 0", "correct the frame")
+    first, corner = values[:, :1] + 1, values[:, 2:4]
+    return replace(rows, values=np.hstack([first, values[:, 1:4], values[:, 4:] - corner])), KITTI_FPS
 
 
 LAYOUTS = {"trajnet": _read_ndjson, "eth": _read_eth, "pedpy": _read_pedpy, "kitti": _read_kitti}

@@ -231,8 +231,9 @@ class StoredPictures:
         if streams.suffix(stream, self.images) != "mp4":
             yield from (self.one(stream, k) for k in wanted or range(1, count + 1))
             return
-        path, found = self.folder / streams.file_name(stream, self.images, 1), 0
-        self.body(path.name)
+        name, found = streams.file_name(stream, self.images, 1), 0
+        path = self.folder / name
+        self.body(name)  # Compares its hash.
         for found, (_, picture) in enumerate(
             video_files.decode_frames(path, video_files.index_packets(path), wanted), 1
         ):

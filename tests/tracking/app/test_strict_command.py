@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -83,10 +84,13 @@ def test_a_number_is_written_in_digits_0_to_9(line: str, text: str, tmp_path: Pa
     assert shown.count("\n") == 1
 
 
-def test_an_empty_value_is_refused(capsys) -> None:
+@pytest.mark.parametrize(
+    ("line", "place"), [("export csv x --out ~", "--out"), ("score x ~", "TRACKS"), ("group ~ --out x", "SOURCE")]
+)
+def test_an_empty_value_is_refused(line, place, capsys) -> None:
     """`--out "$OUT"` without that variable would write into the working folder."""
-    assert run(["export", "csv", "x", "--out", ""]) == 2
-    assert "--out: got ''; expected a value" in capsys.readouterr().err
+    assert run([word.strip("~") for word in line.split()]) == 2
+    assert re.search(rf"{place}.*: got ''; expected a value", capsys.readouterr().err)
 
 
 @pytest.fixture(scope="module")

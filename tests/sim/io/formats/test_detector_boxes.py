@@ -204,6 +204,16 @@ def test_least_score_is_that_of_the_file(tmp_path, video):
             with_boxes(plain, path, BoxOptions(min_score=10.0))
 
 
+def test_scores_of_other_classes_do_not_count(tmp_path, video):
+    (plain,) = open_source(video)
+    path = tmp_path / "det.csv"
+    lines = [f"{k},{x},{y},{w},{h},{s},{c}" for k, x, y, w, h, _ in ROWS for s, c in ((0.3, 1), (9.0, 3))]
+    path.write_text("frame,left,top,width,height,score,class\n" + "\n".join(lines))
+    assert {s for f in with_boxes(plain, path, BoxOptions(("1",))) for s in f.detections.score.tolist()} == {0.3}
+    with pytest.raises(InputError, match=r"at most 0\.3, the greatest score"):
+        with_boxes(plain, path, BoxOptions(("1",), min_score=0.5))
+
+
 def test_least_score_of_a_recording(tmp_path):
     (tmp_path / "det").mkdir()
     mot(tmp_path / "det" / "det.txt", [(*row[:5], score) for row in ROWS for score in (0.3, 0.8)])

@@ -35,8 +35,8 @@ def test_people_with_boxes(tmp_path):
 WRONG_LINES = [
     (LINES.replace("1 0 Pedestrian 0 1 -0.3 103.0", "1 0 Pedestrian 0 1 -0.3 x"), "line 3"),
     (LINES.replace("133.0", "103.0"), "line 3"),
-    (LINES.replace("2 5 Person_sitting", "-1 5 Person_sitting"), "line 5"),
-    (LINES.replace("133.0", "nan"), r"line 3: .* numbers within"),
+    (LINES.replace("2 5 Person_sitting", "-1 5 Person_sitting"), "line 5: .* frames from 0"),
+    (LINES.replace("133.0", "nan"), r"line 3: .* finite numbers"),
     (LINES.replace("133.0", "1e9"), r"line 3: .* numbers within"),
     (LINES.replace("2 5 Person_sitting", "2 -1 Person_sitting"), "line 5: .* ids from 0"),
     (LINES.replace("Pedestrian", "Van").replace("Person_sitting", "Tram"), "Car, DontCare, Tram, Van"),

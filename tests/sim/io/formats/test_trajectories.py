@@ -99,10 +99,20 @@ def test_bad_input_is_one_line(tmp_path, case):
     assert str(tmp_path / name) in str(error.value)
 
 
-@pytest.mark.parametrize("words", ["X[cm] Y[cm]", "x(cm) y(cm)", "x/cm y/cm", "x y, in cm"])
+@pytest.mark.parametrize("words", ["X [cm] Y [cm]", "x (cm)", "x_cm y_cm", "x/cm y/cm", "x y, in cm"])
 def test_comments_state_centimetres(tmp_path, words):
     truth = opened(tmp_path, "hall.txt", PETRACK.replace("x/cm y/cm", words)).truth
     assert truth.pos == pytest.approx(np.array([p[2:] for p in PLACES]))
+
+
+def test_heights_in_centimetres_are_no_positions_in_centimetres(tmp_path):
+    truth = opened(tmp_path, "hall.txt", PETRACK.replace("x/cm y/cm z/cm", "x/m y/m; heights in cm")).truth
+    assert truth.pos == pytest.approx(100 * np.array([p[2:] for p in PLACES]))
+
+
+@pytest.mark.parametrize("words", ["16, x/cm", "16.", '"16"', "16\n# framerate: 16.00"])
+def test_a_rate_is_read_as_it_is_written(tmp_path, words):
+    assert opened(tmp_path, "hall.txt", PETRACK.replace("16.00 fps", words)).fps == 16
 
 
 def test_options_without_effect_are_refused(tmp_path):
