@@ -148,7 +148,8 @@ def points(template):
 
 def seen_at(cover, templates, k, template):
     """Row and column, -1 if the point is outside or hidden, of template k's points when it is at `template`."""
-    front = [t for t in templates if t[1] > templates[k][1]]
+    order = near_first(templates).tolist()
+    front = templates[order[: order.index(k)]]
     hidden = (cover >= EXPLAINED) | (painted(cover.shape, front) > 0)
     column, row = np.floor(points(template)).astype(int).T
     inside = (row >= 0) & (row < cover.shape[0]) & (column >= 0) & (column < cover.shape[1])
@@ -159,7 +160,7 @@ def seen_at(cover, templates, k, template):
 def fits(image, cover, templates, k, look, steps, step):
     """The fit of a look at each place of a grid round template k, rows down, columns right."""
     offset, found = step * np.arange(-steps, steps + 1), []
-    var = np.maximum(look[:, 3], looks.LEAST_VAR)
+    var = np.clip(look[:, 3], looks.LEAST_VAR, looks.ANY_VAR)
     for b in offset:
         for a in offset:
             row, column = seen_at(cover, templates, k, np.add(templates[k], (a, b, 0, 0)))

@@ -3,7 +3,7 @@
 A template (4,) is x, foot, h, w, px: an upright ellipse that fills a box. Its points are a grid of ROWS rows of COLUMNS
 points, each row as wide as the ellipse. A look (POINTS, 5) has for each point the mean blue, green and red, the
 variance of a colour channel, and the number of pictures from which they were learned. A pixel of colour c fits a point
-by the log-likelihood ratio of the point's Gaussian to one as broad as the colours of all people,
+by the log-likelihood ratio of the point's Gaussian to the peak of one as broad as the colours of all people,
 
     max(-|c - mean|^2 / (2 var) - 1.5 ln(var / ANY_VAR), WORST_FIT)
 
@@ -16,14 +16,14 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools, Image, Ints
-from tracking.papers.blob.person_template_kernels import EXPLAINED, FOOT, Cover, kernel, paint, window
+from tracking.papers.blob.person_template_kernels import EXPLAINED, Cover, kernel, near_first, paint, window
 
 ROWS, COLUMNS = 12, 3
 POINTS = ROWS * COLUMNS
 VAR, SEEN = 3, 4
 """Slots of a look's point, after the three colours."""
 FIRST_VAR = 25.0**2  # variance of a colour before it is learned, which counts as FIRST_COUNT pictures
-FIRST_COUNT = 2.0
+FIRST_COUNT = 3.0
 LEAST_VAR = 15.0**2  # a learned variance is taken to be at least this: light and places vary
 ANY_VAR = 60.0**2  # variance of the colours of all people
 WORST_FIT = -1.0  # least log-likelihood ratio of a point: something else may be in front of it
@@ -50,14 +50,15 @@ def point_offsets(h: float, w: float) -> Array:
 
 
 @kernel
-def hidden_by_others(cover: Cover, templates: Array, k: int) -> Bools:
-    """Returns a mask (H, W): True where a blob of one person explains a pixel of `cover` (H, W), or a template with a
-    lower foot than that of template k covers it."""
-    front = np.zeros(cover.shape, np.int16)
-    for other in range(len(templates)):
-        if templates[other, FOOT] > templates[k, FOOT]:
-            paint(front, templates[other], 1)
-    return (front > 0) | (cover >= EXPLAINED)
+def covered_in_front(shape: tuple[int, int], templates: Array, k: int) -> Bools:
+    """Returns a mask of `shape` (H, W): True where a template that comes before template k in `near_first` covers a
+    pixel."""
+    cover = np.zeros(shape, np.int16)
+    for other in near_first(templates):
+        if other == k:
+            break
+        paint(cover, templates[other], 1)
+    return cover > 0
 
 
 @kernel
@@ -70,14 +71,14 @@ def look_fits(image: Image, cover: Cover, templates: Array, k: int, look: Array,
     """
     low, high, left, right = window(templates[k], steps * step, cover.shape)
     part = templates - np.array([left, low, 0.0, 0.0])
-    hidden = hidden_by_others(cover[low:high, left:right], part, k)
-    seen, n = image[low:high, left:right], 2 * steps + 1
+    seen, cover, n = image[low:high, left:right], cover[low:high, left:right], 2 * steps + 1
+    hidden = covered_in_front(cover.shape, part, k) | (cover >= EXPLAINED)
     x, foot, h, w = part[k]
     offsets, found = point_offsets(h, w), np.zeros((n, n))
     for p in range(POINTS):
         if look[p, SEEN] < LEAST_SEEN:
             continue
-        var = max(look[p, VAR], LEAST_VAR)
+        var = min(max(look[p, VAR], LEAST_VAR), ANY_VAR)
         best = -1.5 * np.log(var / ANY_VAR)
         for i in range(n):
             row = int(np.floor(foot + offsets[p, 1] + (i - steps) * step))
@@ -90,16 +91,18 @@ def look_fits(image: Image, cover: Cover, templates: Array, k: int, look: Array,
 
 
 @kernel
-def learn(image: Image, templates: Array, looks: Array, rows: Ints, least_gain: float) -> None:
-    """Learn, in place, the looks (K, POINTS, 5) at `rows` from the pixels under the points of the templates (K, 4).
+def learn(image: Image, foreground: Bools, templates: Array, looks: Array, rows: Ints, least_gain: float) -> None:
+    """Learn, in place, the looks (K, POINTS, 5) at `rows` from the foreground (H, W) under the points of the templates
+    (K, 4).
 
     Hidden points stay as they are. Means and variances are those of all pictures at first, and later follow the last
     ones: the newest picture has at least the weight `least_gain`.
     """
     for k in rows:
-        low, high, left, right = window(templates[k], 0.0, image.shape[:2])
+        low, high, left, right = window(templates[k], 0.0, foreground.shape)
         part = templates - np.array([left, low, 0.0, 0.0])
-        hidden = hidden_by_others(np.zeros((high - low, right - left), np.int16), part, k)
+        ground = ~foreground[low:high, left:right]
+        hidden = covered_in_front(ground.shape, part, k) | ground
         x, foot, h, w = part[k]
         offsets = point_offsets(h, w)
         for p in range(POINTS):
@@ -129,7 +132,7 @@ def update_point(point: Array, colour: Array, least_gain: float) -> None:
     """Update a look's point (5,), in place, with a colour (3,)."""
     count = point[SEEN]
     if count > 0:
-        gain = max(1 / (count + 1 + FIRST_COUNT), least_gain)
+        gain = max(1 / (count + FIRST_COUNT), least_gain)
         point[VAR] += gain * (squared_distance(colour, point) / 3 - point[VAR])
     for c in range(3):
         point[c] += max(1 / (count + 1), least_gain) * (colour[c] - point[c])

@@ -19,9 +19,6 @@ from sim.types import Array, Bools, Image, Ints
 from tracking.detect.blobs import Labels
 from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob import person_template_search_kernels as search
-from tracking.papers.blob.person_look_kernels import POINTS
-
-NO_IMAGE, NO_LOOKS = np.zeros((0, 0, 3), np.uint8), np.zeros((0, POINTS, 5))
 
 
 class ExplainedForeground:
@@ -48,12 +45,10 @@ class ExplainedForeground:
         """Returns a mask (H, W): foreground that no painted template covers and no blob explains."""
         return np.asarray(self.foreground & (self.cover == 0))
 
-    def fit_places(
-        self, templates: Array, spread: Array, evidence: float, image: Image = NO_IMAGE, looks: Array = NO_LOOKS
-    ) -> Array:
+    def fit_places(self, templates: Array, spread: Array, evidence: float, image: Image, looks: Array) -> Array:
         """Returns the templates (K, 4) x, foot, h, w, px, at the places where they explain most together; paints them.
 
-        With the picture and the looks (K, POINTS, 5) of the people, places are better where these are seen.
+        Places are better where the picture shows the looks (K, POINTS, 5) of the people; (0, POINTS, 5): ignored.
         """
         return search.fit_places(self.foreground, self.cover, templates, spread, evidence, image, looks)
 

@@ -138,10 +138,10 @@ def best_place(worth: Array, step: float, at: Array, expected: Array, spread: Ar
 @kernel
 def touches_another(templates: Array, k: int) -> bool:
     """Returns True if the box of template k touches that of another of the templates (K, 4)."""
-    found = False
-    for other in range(len(templates)):
-        found |= other != k and boxes_touch(templates[k], templates[other])
-    return found
+    for other in range(len(templates)):  # noqa: SIM110  (numba has no `any` of a generator)
+        if other != k and boxes_touch(templates[k], templates[other]):
+            return True
+    return False
 
 
 @kernel

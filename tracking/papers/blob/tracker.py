@@ -62,8 +62,8 @@ Departures from pixels only:
   with θ. Why: a circle has no direction.
 - shared blobs: once the size of a person is known, templates share the foreground: each moves to the most support,
   confirmed tracks first; no gate (`split`). Paper: one measurement for each blob. Why: people merge in the mask.
-- looks (`split`): templates that touch move also to where the colours of the person are seen, learned while little of
-  the person is hidden. Paper: none. Why: people who meet in the mask must not change places.
+- looks (`split`): templates of confirmed tracks that touch move also to where the person's colours are seen, learned
+  where nobody hides them. Paper: none. Why: people who meet in the mask must not change places.
 - misses (`split`): too little foreground under the template. Paper: no blob in the gate. Why: templates always fit
   somewhere.
 - noise (`split`): divided by the square of the visible share; 25 times for h, w of templates, 25° for θ. Paper: R.

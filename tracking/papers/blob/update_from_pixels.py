@@ -7,7 +7,7 @@ Order of a frame, with the paper's sections:
     other foreground: split among the tracks expected there, by templates     ours (person_template)
     foreground that no track explains, as large as a person: new tracks       ours (new_people)
     axes return towards those of a person at the track's place                ours (track_management)
-    looks: the colours of people who are hardly hidden are learned            ours (person_look_kernels)
+    looks: the colours of people, where nobody hides them, are learned        ours (person_look_kernels)
     rho: confirm, delete, start tracks                                        secs. 4.5, 5 (track_management)
     adapt the background, except where confirmed tracks are                   ours
 
@@ -76,7 +76,6 @@ SHARED = 0.35  # share of a predicted box that a blob's box must cover for the t
 UPRIGHT = 25.0  # deg, standard deviation of the direction of a person measured by an upright template
 EXTENT = 0.75, 1.3  # least and largest height and width of a template relative to the expected person
 BLIND = 25.0  # a template's variance of height and width relative to a lone blob's: they are predicted, not measured
-LEARN_SHOWN = 0.7  # least visible share of a person whose look is learned
 LOOK_TIME = 2.0  # s: time constant with which looks follow people who turn
 LEAST_SHOWN = 0.2  # a person of whom a smaller share is visible is measured as if this share were
 
@@ -193,7 +192,7 @@ class PixelUpdater:
         away = people.update(made.rows, made.z, made.noise, made.angle_var)
         if split:
             self._relax_sizes()
-            self._learn_looks(seen.image, made.rows)
+            self._learn_looks(seen, made.rows)
         near = away <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
         people.record_measured(made.rows, near, made.support, evidence)
         person = people.new_people(unexplained[:, :4], np.ones(len(unexplained), bool))
@@ -206,11 +205,11 @@ class PixelUpdater:
         rows = np.flatnonzero(np.isfinite(axes).all(1))
         self.people.relax_axes(rows, -np.sort(-axes[rows]), PERSON_NOISE**2)
 
-    def _learn_looks(self, image: Image, rows: Ints) -> None:
+    def _learn_looks(self, seen: Segmented, rows: Ints) -> None:
         people = self.people
         at = box_geometry.standing(self._person_boxes(people.upright_boxes()))
-        shown = rows[people.visible_shares()[rows] >= LEARN_SHOWN]
-        person_look_kernels.learn(image, at, people.look, shown, people.dynamics.dt / LOOK_TIME)
+        gain = -np.expm1(-people.dynamics.dt / LOOK_TIME)
+        person_look_kernels.learn(seen.image, seen.mask, at, people.look, rows, gain)
 
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
         one = self.size.one_person(found.box, found.ellipse)
@@ -271,7 +270,8 @@ class PixelUpdater:
         at[:, 2:] = np.clip(at[:, 2:], EXTENT[0] * size, EXTENT[1] * size)
         var = (people.bank[kalman.VAR, open_rows] + people.noise)[:, :2]
         spread = np.sqrt(var) * people.scale[open_rows, None]
-        at = scene.fit_places(at, spread, EVIDENCE, image, people.look[open_rows])
+        looks = people.look[open_rows if confirmed else []]
+        at = scene.fit_places(at, spread, EVIDENCE, image, looks)
         keep = scene.prune(at, TRACK_SUPPORT if confirmed else ENTRY_SUPPORT, pieces=confirmed)
         at = at[keep]
         support, visible = scene.support(at), scene.visible_share(at)

@@ -9,10 +9,13 @@ from tests import reference_templates as slow
 from tests.tracking.papers.blob.test_new_people import mask_of
 from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob import person_template_search_kernels
+from tracking.papers.blob.person_look_kernels import POINTS
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 from tracking.papers.blob.person_template_kernels import EXPLAINED
 
 HIGH, WIDE = 90, 120
+NO_LOOKS = np.zeros((0, 0, 3), np.uint8), np.zeros((0, POINTS, 5))
+"""A picture and looks for who is placed by the foreground alone."""
 
 
 def somewhere(r, n):
@@ -48,7 +51,7 @@ def test_all_together_are_the_slow_way(seed):
     r, foreground, cover, expected = scenery(seed)
     scene, spread = ExplainedForeground(foreground), r.uniform(1, 6, (len(expected), 2))
     scene.cover[:] = cover
-    at = scene.fit_places(expected, spread, 40.0)
+    at = scene.fit_places(expected, spread, 40.0, *NO_LOOKS)
     assert np.array_equal(at, slow.settle(foreground, cover, expected, spread, 40.0))
     assert np.array_equal(scene.cover, cover + slow.painted(cover.shape, at))
     assert np.allclose(scene.support(at), slow.alone(foreground, cover, at), atol=1e-12)
@@ -84,7 +87,7 @@ def test_support_is_one_on_ones_own_pixels_and_minus_a_half_on_none():
 def test_two_in_one_blob_settle_where_they_are(gap):
     true = np.array([[50.0, 80.0, 60.0, 24.0], [50.0 + gap, 76.0, 60.0, 24.0]])
     expected = true + np.array([[3.0, -2.0, 0, 0], [-3.0, 2.0, 0, 0]])
-    found = ExplainedForeground(mask_of(*true)).fit_places(expected, np.full((2, 2), 4.0), 100.0)
+    found = ExplainedForeground(mask_of(*true)).fit_places(expected, np.full((2, 2), 4.0), 100.0, *NO_LOOKS)
     assert np.abs(found - true).max() <= 1.5
 
 
@@ -92,7 +95,7 @@ def test_a_post_in_front_keeps_the_template_whole():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     cut = mask_of(one[0])
     cut[:, 57:62] = False
-    found = ExplainedForeground(cut).fit_places(one + np.array([2.0, 1.0, 0, 0]), np.full((1, 2), 4.0), 20.0)
+    found = ExplainedForeground(cut).fit_places(one + np.array([2.0, 1.0, 0, 0]), np.full((1, 2), 4.0), 20.0, *NO_LOOKS)
     assert np.abs(found - one).max() <= 1.5
 
 

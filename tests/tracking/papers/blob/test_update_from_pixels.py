@@ -8,6 +8,7 @@ import pytest
 from tests import painted
 from tests.painted import TALL, box, ids, overlap, track
 from tracking.filters import kalman
+from tracking.papers.blob import person_look_kernels
 from tracking.papers.blob.config import BlobConfig
 
 
@@ -84,6 +85,19 @@ def test_two_who_cross_in_one_blob_keep_who_they_are():
         )
 
     assert both(made) >= both(unsplit)
+
+
+@pytest.mark.parametrize("by_looks", [True, False])
+def test_two_who_meet_in_one_blob_and_turn_back_keep_their_colours(monkeypatch, by_looks):
+    """By their motion alone they would cross."""
+    if not by_looks:
+        monkeypatch.setattr(person_look_kernels, "learn", lambda *_: None)
+    way = [*range(60, 161, 3), *range(159, 60, -3)]
+    pair = [[(x, 180, TALL), (320 - x, 176, TALL)] for x in way]
+    made = track(pair)
+    start, end = ([mine(made[k], person) for person in pair[k]] for k in (8, -1))
+    assert sorted(start) == [1, 2]
+    assert end == (start if by_looks else start[::-1])
 
 
 @pytest.mark.parametrize(("dark", "moved"), [(0.4, False), (1.0, True)])
