@@ -91,18 +91,16 @@ def look_fits(image: Image, cover: Cover, templates: Array, k: int, look: Array,
 
 
 @kernel
-def learn(image: Image, foreground: Bools, templates: Array, looks: Array, rows: Ints, least_gain: float) -> None:
-    """Learn, in place, the looks (K, POINTS, 5) at `rows` from the foreground (H, W) under the points of the templates
-    (K, 4).
+def learn(image: Image, templates: Array, looks: Array, rows: Ints, least_gain: float) -> None:
+    """Learn, in place, the looks (K, POINTS, 5) at `rows` from the image under the points of the templates (K, 4).
 
     Hidden points stay as they are. Means and variances are those of all pictures at first, and later follow the last
     ones: the newest picture has at least the weight `least_gain`.
     """
     for k in rows:
-        low, high, left, right = window(templates[k], 0.0, foreground.shape)
+        low, high, left, right = window(templates[k], 0.0, image.shape[:2])
         part = templates - np.array([left, low, 0.0, 0.0])
-        ground = ~foreground[low:high, left:right]
-        hidden = covered_in_front(ground.shape, part, k) | ground
+        hidden = covered_in_front((high - low, right - left), part, k)
         x, foot, h, w = part[k]
         offsets = point_offsets(h, w)
         for p in range(POINTS):

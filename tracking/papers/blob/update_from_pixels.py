@@ -29,7 +29,7 @@ from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground, Segmented
 from tracking.detect.person_size import KEPT, PersonSize
 from tracking.filters import kalman
-from tracking.papers.blob import box_geometry, new_people, person_look_kernels
+from tracking.papers.blob import box_geometry, new_people, person_look_kernels, person_template_kernels
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 from tracking.papers.blob.track_management import TrackedEllipses
@@ -76,6 +76,7 @@ SHARED = 0.35  # share of a predicted box that a blob's box must cover for the t
 UPRIGHT = 25.0  # deg, standard deviation of the direction of a person measured by an upright template
 EXTENT = 0.75, 1.3  # least and largest height and width of a template relative to the expected person
 BLIND = 25.0  # a template's variance of height and width relative to a lone blob's: they are predicted, not measured
+LEARN_SHOWN = 0.7  # least visible share of a person whose look is learned
 LOOK_TIME = 2.0  # s: time constant with which looks follow people who turn
 LEAST_SHOWN = 0.2  # a person of whom a smaller share is visible is measured as if this share were
 
@@ -192,7 +193,7 @@ class PixelUpdater:
         away = people.update(made.rows, made.z, made.noise, made.angle_var)
         if split:
             self._relax_sizes()
-            self._learn_looks(seen, made.rows)
+            self._learn_looks(seen.image, made.rows)
         near = away <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
         people.record_measured(made.rows, near, made.support, evidence)
         person = people.new_people(unexplained[:, :4], np.ones(len(unexplained), bool))
@@ -205,11 +206,12 @@ class PixelUpdater:
         rows = np.flatnonzero(np.isfinite(axes).all(1))
         self.people.relax_axes(rows, -np.sort(-axes[rows]), PERSON_NOISE**2)
 
-    def _learn_looks(self, seen: Segmented, rows: Ints) -> None:
+    def _learn_looks(self, image: Image, rows: Ints) -> None:
         people = self.people
         at = box_geometry.standing(self._person_boxes(people.upright_boxes()))
         gain = -np.expm1(-people.dynamics.dt / LOOK_TIME)
-        person_look_kernels.learn(seen.image, seen.mask, at, people.look, rows, gain)
+        shares = person_template_kernels.visible_share(np.zeros(image.shape[:2], np.int16), at)
+        person_look_kernels.learn(image, at, people.look, rows[shares[rows] >= LEARN_SHOWN], gain)
 
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
         one = self.size.one_person(found.box, found.ellipse)
