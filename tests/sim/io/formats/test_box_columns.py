@@ -124,16 +124,9 @@ def test_a_fault_of_every_line_is_no_fault_of_a_line(tmp_path, column, value, re
     rows[7, column] = value
     with pytest.raises(InputError, match="line 8: ") as error:
         read_track_text(written(tmp_path, rows), 10, FRAMES)
-    assert "correct the" in error.value.remedy or "correct" in error.value.remedy
+    assert "correct" in error.value.remedy
 
 
 def test_detections_are_no_tracks(tmp_path):
     with pytest.raises(InputError, match="these are detections: `flockscope track` them first"):
         read_track_text(written(tmp_path, people(ids=False)), 10, FRAMES)
-
-
-def test_frames_from_zero(tmp_path):
-    rows = people()
-    rows[:, 0] -= 1
-    with pytest.raises(InputError, match="add 1 to all frames, if the file counts them from 0"):
-        read_track_text(written(tmp_path, rows), 10, FRAMES)

@@ -84,11 +84,6 @@ def test_a_class_that_leaves_nobody_is_an_error_that_counts(tmp_path, wrong):
     assert len(open_source(folder, fps=25, person_class=wrong)[0].truth.id) == 6
 
 
-def test_a_class_of_a_text_without_classes_is_refused(tmp_path):
-    with pytest.raises(InputError, match="got no classes"):
-        _ = open_source(labels(tmp_path, ["1,-1,-1,-1"]), fps=25, person_class=2)[0].truth
-
-
 def test_confidences_that_are_all_zero_are_said(tmp_path):
     with pytest.warns(UserWarning, match="column 7 is 0 in all 6 rows"):
         assert len(open_source(text(tmp_path, ["0", "0"]), fps=25)[0].truth.id) == 6
