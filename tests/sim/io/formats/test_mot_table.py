@@ -36,7 +36,7 @@ def test_units_of_positions(tmp_path, unit, factor):
 WARNED = {
     "frame,id,x,y,place,mood\n1,1,0.5,1,hall,\n2,1,0.6,1,hall,3\n": "line 1: columns that are not used: place, mood",
     # as PeTrack writes them: id first, frames from 0, positions in cm
-    "id frame x_cm y_cm z\n1 0 50 100 170\n1 1 60 100 170\n": "frames are counted from 0; they are read as frames from 1",
+    "id frame x_cm y_cm z\n1 0 50 100 170\n1 1 60 100 170\n": "frames are counted from 0; they are read as frames",
 }
 
 
