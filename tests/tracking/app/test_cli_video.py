@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.refusals import refused
 from tests.small_videos import SIZE, damage, picture, write_video
 from tracking.app.cli import run
 
@@ -59,9 +60,7 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], list[str]]] = {
 def test_a_broken_recording_is_one_line(name, tmp_path, capsys):
     make, expected = BROKEN[name]
     out = tmp_path / "out"
-    line = ["track", "blob", str(make(tmp_path)), "--fps", "10", "--px-per-m", "20", "--out", str(out)]
-    assert run(line) == 2
-    (error,) = [text for text in capsys.readouterr().err.splitlines() if not text.startswith("warning: ")]
+    error = refused(capsys, "track", "blob", make(tmp_path), "--fps", 10, "--px-per-m", 20, "--out", out)
     assert all(word in error for word in expected), error
     assert not out.exists()
 
@@ -136,8 +135,7 @@ def test_options_that_cannot_work(option, words, tmp_path, capsys, monkeypatch):
     text(tmp_path / "text.png")
     cv2.imwrite(str(tmp_path / "small.png"), np.swapaxes(picture(0), 0, 1))
     monkeypatch.setattr("sim.io.pictures.background_sample.BackgroundSample.__call__", None)
-    assert run(["track", "blob", str(path), "--out", str(tmp_path / "out"), *option.format(tmp_path).split()]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
+    line = refused(capsys, "track", "blob", path, "--out", tmp_path / "out", *option.format(tmp_path).split())
     assert all(word in line for word in words), line
     assert not (tmp_path / "out").exists()
 
@@ -146,9 +144,9 @@ def test_a_background_for_a_tracker_that_needs_none(tmp_path, capsys):
     folder = jpegs(tmp_path / "mot", [picture(k) for k in range(30)])
     (folder / "gt").mkdir()
     (folder / "gt" / "gt.txt").write_text("".join(f"{k},1,{4 * k},20,16,16,1,1,1\n" for k in range(1, 30)))
-    line = ["track", "blob", str(folder), "--fps", "10", "--out", str(tmp_path / "out")]
-    assert run([*line, "--detections", "truth", "--background", "first:10"]) == 2
-    assert "leave --background out" in capsys.readouterr().err
+    options = ["--detections", "truth", "--background", "first:10"]
+    line = refused(capsys, "track", "blob", folder, "--fps", 10, *options, "--out", tmp_path / "out")
+    assert "leave --background out" in line
 
 
 BOXES_ONLY = (
@@ -181,8 +179,7 @@ def street(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("line", WITHOUT)
 def test_the_remedy_says_what_is_missing(line, street, capsys):
-    assert run(line.format(street).split()) == 2
-    assert WITHOUT[line].format(street) in capsys.readouterr().err
+    assert WITHOUT[line].format(street) in refused(capsys, *line.format(street).split())
 
 
 def test_a_sample_mostly_without_pictures_is_a_warning(tmp_path, capsys):

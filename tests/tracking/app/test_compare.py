@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.refusals import refused
 from tracking.app.cli import run
 
 KEYS = ("objective", "IDSW")
@@ -77,8 +78,7 @@ NOT_COMPARED = [
 @pytest.mark.parametrize(("write", "words"), NOT_COMPARED)
 def test_what_is_not_compared_ends_with_2(write, words, tmp_path, capsys):
     before = stored(tmp_path / "a.json", BASE, truth="a")
-    assert run(["compare", before, write(tmp_path / "b.json")]) == 2
-    assert words in capsys.readouterr().err
+    assert words in refused(capsys, "compare", before, write(tmp_path / "b.json"))
 
 
 OPTIONS = [
@@ -92,6 +92,5 @@ OPTIONS = [
 def test_scores_and_files_that_cannot_be(sequences, more, words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     few = stored(tmp_path / "a.json", BASE[:sequences])
-    assert run(["compare", few, few, *more]) == 2
-    assert words in capsys.readouterr().err
+    assert words in refused(capsys, "compare", few, few, *more)
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
