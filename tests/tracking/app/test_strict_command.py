@@ -5,29 +5,19 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
-import typer
 
+from tests.commands import commands
 from tests.refusals import refused
-from tracking.app.cli import app, run
+from tracking.app.cli import run
 
 ARABIC = str.maketrans("0123456789", "٠١٢٣٤٥٦٧٨٩")
 
 
-def commands(group: Any, above: tuple[str, ...] = ()) -> list[tuple[tuple[str, ...], Any]]:
-    """All commands with the words that call them."""
-    found = []
-    for name, command in group.commands.items():
-        words = (*above, name)
-        found += commands(command, words) if hasattr(command, "commands") else [(words, command)]
-    return found
-
-
 OPTIONS = [
     (words, param.opts[0], param.is_flag, param.multiple)
-    for words, command in commands(typer.main.get_command(app))
+    for words, command in commands().items()
     for param in command.params
     if param.param_type_name == "option"
 ]

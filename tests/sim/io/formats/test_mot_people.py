@@ -143,17 +143,19 @@ def test_columns_that_cannot_be_metres(tmp_path, kind):
     assert found[0].plane == "image"
 
 
-@pytest.mark.parametrize("people", [1, 3])
-def test_zeros_are_unknown(tmp_path, people):
-    path = placed(tmp_path, lambda f, k: (0, 0, 0), people)
-    assert open_source(path, fps=25)[0].truth.pos is None
-    assert read_tracks(path, fps=25)[0].plane == "image"
+PLACES = [
+    (1, lambda f, k: (0, 0, 0), None),  # zeros are unknown
+    (3, lambda f, k: (0, 0, 0), None),
+    (3, lambda f, k: (k + (0.05 * f if k > 1 else 0), 2.25, 0), (1, 2.25)),  # people who walk or stand
+]
 
 
-def test_people_who_walk_or_stand_are_in_metres(tmp_path):
-    path = placed(tmp_path, lambda f, k: (k + (0.05 * f if k > 1 else 0), 2.25, 0))
-    assert np.allclose(open_source(path, fps=25)[0].truth.pos[0], (1, 2.25))
-    assert read_tracks(path, fps=25)[0].plane == "ground"
+@pytest.mark.parametrize(("people", "place", "first"), PLACES)
+def test_zeros_are_unknown_and_people_who_walk_or_stand_are_in_metres(tmp_path, people, place, first):
+    path = placed(tmp_path, place, people)
+    pos = open_source(path, fps=25)[0].truth.pos
+    assert (None if pos is None else tuple(pos[0])) == first
+    assert read_tracks(path, fps=25)[0].plane == ("image" if first is None else "ground")
 
 
 def test_a_camera_file_beside_it_vouches_for_metres(tmp_path):

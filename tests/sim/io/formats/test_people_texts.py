@@ -127,15 +127,14 @@ def test_bad_input_is_one_line(tmp_path, case):
     assert str(tmp_path / name) in str(error.value)
 
 
-@pytest.mark.parametrize("words", ["X [cm] Y [cm]", "x (cm)", "x_cm y_cm", "x/cm y/cm", "x y, in cm"])
-def test_comments_state_centimetres(tmp_path, words):
-    truth = opened(tmp_path, "hall.txt", PETRACK.replace("x/cm y/cm", words)).truth
-    assert truth.pos == pytest.approx(np.array([p[2:] for p in PLACES]))
+UNITS = dict.fromkeys(["X [cm] Y [cm]", "x (cm)", "x_cm y_cm", "x/cm y/cm", "x y, in cm"], 1)
 
 
-def test_heights_in_centimetres_are_no_positions_in_centimetres(tmp_path):
-    truth = opened(tmp_path, "hall.txt", PETRACK.replace("x/cm y/cm z/cm", "x/m y/m; heights in cm")).truth
-    assert truth.pos == pytest.approx(100 * np.array([p[2:] for p in PLACES]))
+@pytest.mark.parametrize(("words", "factor"), (UNITS | {"x/m y/m; heights in cm": 100}).items())
+def test_comments_state_centimetres(tmp_path, words, factor):
+    """Heights in centimetres are no positions in centimetres."""
+    truth = opened(tmp_path, "hall.txt", PETRACK.replace("x/cm y/cm z/cm", words)).truth
+    assert truth.pos == pytest.approx(factor * np.array([p[2:] for p in PLACES]))
 
 
 @pytest.mark.parametrize("words", ["16, x/cm", "16.", '"16"', "16\n# framerate: 16.00"])
