@@ -282,8 +282,7 @@ def test_wrong_lineage(unit: str, more: list[int], kinds: list[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mode", "change", "cause"),
-    [("image", 1.5, "light"), ("image", 1.05, "tracker"), ("file", 1.5, "tracker")],
+    ("mode", "change", "cause"), [("image", 1.5, "light"), ("image", 1.05, "tracker"), ("file", 1.5, "tracker")]
 )
 def test_a_change_of_the_light_is_a_cause_of_errors_from_pixels(mode: str, change: float, cause: str) -> None:
     light = np.where(np.arange(FRAMES) < 24, 1.0, change)

@@ -274,14 +274,11 @@ def test_values_of_another_kind(folder, key, value):
     (folder / "run.json").write_bytes(json_document(with_hash(run)))
     with pytest.raises(InputError) as error:
         find_tracks(folder)
-    assert (error.value.file, error.value.place) == (str(folder / "run.json"), key)
+    assert (error.value.file, error.value.place.partition(".")[0]) == (str(folder / "run.json"), key)
     assert "track again" in error.value.remedy
 
 
 def test_right_values_and_further_keys(tmp_path):
-    for info in (
-        {},
-        dict.fromkeys(WRONG.keys() - {"tracker", "sequence", "boxes", "files"}),
-        {"mine": [1, {"a": None}]},
-    ):
+    nothing = dict.fromkeys(WRONG.keys() - {"tracker", "sequence", "boxes", "files"})
+    for info in ({}, nothing, {"mine": [1, {"a": None}]}):
         assert info.items() <= read_run(write_tracks(tmp_path / "t", make_tracks(1), fps=10.0, info=info)).items()
