@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.processes import ROOT
-from tests.recordings import biwi_walk
+from tests.recordings import biwi_walk, mot_folder
 from tests.refusals import refused
 from tests.small_disks import small_disk
 from tests.tuning_toys import TOY
@@ -217,10 +217,8 @@ def test_a_full_disk_or_nobody_behind_stdout(made):
 
 
 def test_tracks_at_another_frame_rate(tmp_path, capsys):
-    sequence = tmp_path / "seq" / "gt"
-    sequence.mkdir(parents=True)
-    (sequence / "gt.txt").write_text(ROWS)
-    line = ["track", "blob", str(sequence.parent), "--detections", "truth", "--fps", "5", "--out", str(tmp_path / "t")]
+    sequence = mot_folder(tmp_path / "seq", ROWS)
+    line = ["track", "blob", str(sequence), "--detections", "truth", "--fps", "5", "--out", str(tmp_path / "t")]
     assert run(line) == 0
-    assert "--fps 5" in refused_as_json(capsys, "score", sequence.parent, tmp_path / "t")
-    assert run(["score", str(sequence.parent), str(tmp_path / "t"), "--fps", "5"]) == 0
+    assert "--fps 5" in refused_as_json(capsys, "score", sequence, tmp_path / "t")
+    assert run(["score", str(sequence), str(tmp_path / "t"), "--fps", "5"]) == 0

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.recordings import mot_folder
 from tests.refusals import refused
 from tests.small_videos import SIZE, damage, picture, write_video
 from tracking.app.cli import run
@@ -20,10 +21,7 @@ def film(folder: Path, n: int = 60, name: str = "film.mp4", **more) -> Path:
 
 
 def jpegs(folder: Path, pictures: list[np.ndarray], suffix: str = ".jpg") -> Path:
-    (folder / "img1").mkdir(parents=True)
-    for k, image in enumerate(pictures, 1):
-        cv2.imwrite(str(folder / "img1" / f"{k:06d}{suffix}"), image)
-    return folder
+    return mot_folder(folder, pictures={f"img1/{k:06d}{suffix}": image for k, image in enumerate(pictures, 1)})
 
 
 def noise(k: int, size: tuple[int, int] = SIZE) -> np.ndarray:
@@ -142,8 +140,7 @@ def test_options_that_cannot_work(option, words, tmp_path, capsys, monkeypatch):
 
 def test_a_background_for_a_tracker_that_needs_none(tmp_path, capsys):
     folder = jpegs(tmp_path / "mot", [picture(k) for k in range(30)])
-    (folder / "gt").mkdir()
-    (folder / "gt" / "gt.txt").write_text("".join(f"{k},1,{4 * k},20,16,16,1,1,1\n" for k in range(1, 30)))
+    mot_folder(folder, "".join(f"{k},1,{4 * k},20,16,16,1,1,1\n" for k in range(1, 30)))
     options = ["--detections", "truth", "--background", "first:10"]
     line = refused(capsys, "track", "blob", folder, "--fps", 10, *options, "--out", tmp_path / "out")
     assert "leave --background out" in line
@@ -183,9 +180,8 @@ def test_the_remedy_says_what_is_missing(line, street, capsys):
 
 
 def test_a_sample_mostly_without_pictures_is_a_warning(tmp_path, capsys):
-    folder = jpegs(tmp_path / "mot", [picture(0), picture(1)])
-    for k in range(5, 122, 4):
-        cv2.imwrite(str(folder / "img1" / f"{k:06d}.jpg"), picture(k - 1))
+    shown = {f"img1/{k:06d}.jpg": picture(k) for k in (1, 2, *range(5, 122, 4))}
+    folder = mot_folder(tmp_path / "mot", pictures=shown)
     line = ["track", "blob", str(folder), "--fps", "10", "--px-per-m", "20", "--out", str(tmp_path / "out")]
     assert run(line) == 0
     assert "of the 50 frames of the background sample have a readable picture; number the" in capsys.readouterr().err

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from scenarios.errors import InputError
 from sim.io.store.seal import read_manifest, with_hash
+from tests.processes import ROOT
 from tests.short_scene import SCENE
 from tracking.app import progress
 from tracking.app.cli import run
@@ -23,7 +24,6 @@ from tracking.app.progress import ProgressMeter
 NAMES = ("[/red]", "x[door]y", ":smile:", "\x1b[31mred", "a\u202eb", "[link=http://x]y[/link]")
 SHOWN = ("[/red]", "x[door]y", ":smile:", "\\x1b[31mred", "a\\u202eb", "[link=http://x]y[/link]")
 COMMAND = [sys.executable, "-m", "tracking.app.cli"]
-ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.parametrize(("name", "shown"), [*zip(NAMES, SHOWN, strict=True)])

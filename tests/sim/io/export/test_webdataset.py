@@ -23,6 +23,7 @@ from sim.io.store.seal import read_manifest, with_hash
 from sim.io.store.validate import content_hash, validate
 from tests.fake_simulator import content
 from tests.made_up import make_pictured
+from tests.recordings import mot_folder
 
 Sample = dict[str, bytes]
 
@@ -174,8 +175,7 @@ def test_frames_of_videos_are_refused(tmp_path: Path) -> None:
 
 
 def test_what_is_not_ours_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "mot" / "det").mkdir(parents=True)
-    (tmp_path / "mot" / "det" / "det.txt").write_text("1,-1,0,0,4,6,1,-1,-1,-1\n")
+    mot_folder(tmp_path / "mot", det="1,-1,0,0,4,6,1,-1,-1,-1\n")
     for source, word in ((tmp_path / "mot", "a recording, mot"), (tmp_path / "no", "no sequences")):
         with pytest.raises(InputError, match=f"{word}.*flockscope generate"):
             webdataset(source, tmp_path / "out")

@@ -4,6 +4,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.io.store.track_files import read_checked_tracks, read_tracks
+from tests.recordings import mot_folder
 
 BOX = "10,10,20,50"
 
@@ -15,9 +16,7 @@ def rows(tails, frames=3):
 
 
 def labels(tmp_path, tails):
-    (tmp_path / "S" / "gt").mkdir(parents=True)
-    (tmp_path / "S" / "gt" / "gt.txt").write_text(rows(tails))
-    return tmp_path / "S"
+    return mot_folder(tmp_path / "S", rows(tails))
 
 
 def text(tmp_path, tails):
@@ -195,7 +194,6 @@ def test_positions_alone_are_in_metres_or_refused(tmp_path, unit, header):
 
 
 def test_labels_without_ids_are_an_error(tmp_path):
-    (tmp_path / "gt").mkdir()
-    (tmp_path / "gt" / "gt.txt").write_text(f"1,-1,{BOX},1,1,1\n")
+    mot_folder(tmp_path, f"1,-1,{BOX},1,1,1\n")
     with pytest.raises(InputError, match="negative ids in all 1 rows"):
         _ = open_source(tmp_path, fps=25)[0].truth

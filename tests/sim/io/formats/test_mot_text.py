@@ -216,8 +216,7 @@ def test_chords_look_back_only():
 
 def test_copied_names_of_sequences_are_said_and_the_folders_names_count(tmp_path):
     for name in ("cam1", "cam2"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "seqinfo.ini").write_text("[Sequence]\nname=MOT17-02\nframeRate=30\nseqLength=3\n")
+        mot_folder(tmp_path / name, ini="name=MOT17-02\nframeRate=30\nseqLength=3\n", det="")
     with pytest.warns(UserWarning, match="MOT17-02 is the name of 2 sequences"):
         assert [s.name for s in open_source(tmp_path)] == ["cam1", "cam2"]
 

@@ -10,6 +10,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.types import Sequence
+from tests.recordings import mot_folder
 from tracking.grouping.known_people import known_people
 
 PLACES = [(780, 1, 8.46, 3.59), (790, 1, 9.57, 3.79), (790, 2, 9.57, 4.79), (810, 2, 10.57, 4.79)]
@@ -177,8 +178,7 @@ def test_a_column_of_groups(tmp_path):
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_a_file_of_group_labels(tmp_path):
     """groups.txt beside gt.txt, NAME.groups.txt beside NAME.txt: one group a line, as in BIWI."""
-    (tmp_path / "mot" / "gt").mkdir(parents=True)
-    (tmp_path / "mot" / "gt" / "gt.txt").write_text(BOXES)
+    mot_folder(tmp_path / "mot", BOXES)
     (tmp_path / "mot" / "gt" / "groups.txt").write_text("1 2\n3\n")
     (tmp_path / "walk.groups.txt").write_text("1, 2\n")
     for truth in (open_source(tmp_path / "mot", fps=5)[0].truth, opened(tmp_path, "walk.txt", BOXES, fps=5).truth):
