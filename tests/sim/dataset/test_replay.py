@@ -124,15 +124,13 @@ def test_boxes_alone_want_a_calibration(tmp_path: Path) -> None:
     assert np.abs(away).max() < 0.3  # a box's lower edge is the near side of the feet
 
 
-def test_a_folder_of_many_and_nobody_labelled_are_refused(tmp_path: Path, walk: Sequence) -> None:
-    with pytest.raises(InputError, match="no labelled people"):
-        replay(Sequence("empty", 10.0, 5, lambda: iter(())), ObservationSpec())
-    with pytest.raises(InputError, match="nothing there"):
-        replay(tmp_path / "nowhere", ObservationSpec())
-    with pytest.raises(InputError, match="no such file"):
-        replay(walk, tmp_path / "none.toml")
-
-
-def test_a_calibration_of_no_use_is_refused(walk: Sequence) -> None:
+def test_a_source_of_no_use_is_refused(tmp_path: Path, walk: Sequence) -> None:
+    for source, spec, words in (
+        (Sequence("empty", 10.0, 5, lambda: iter(())), ObservationSpec(), "no labelled people"),
+        (tmp_path / "nowhere", ObservationSpec(), "nothing there"),
+        (walk, tmp_path / "none.toml", "no such file"),
+    ):
+        with pytest.raises(InputError, match=words):
+            replay(source, spec)
     with pytest.raises(InputError, match="--calibration"):
         replay(walk, ObservationSpec(), calibration=simulate(load("merge"), 3, streams=()).camera)

@@ -28,11 +28,6 @@ def noise(k: int, size: tuple[int, int] = SIZE) -> np.ndarray:
     return np.random.default_rng(k).integers(0, 255, (size[1], size[0], 3), dtype=np.uint8)
 
 
-def empty(path: Path) -> Path:
-    cv2.imwrite(str(path), picture(0))
-    return path
-
-
 def text(path: Path) -> Path:
     path.write_text("hello")
     return path
@@ -95,16 +90,13 @@ def test_strange_pictures_are_pictures(name, tmp_path, capsys):
 
 
 def test_which_background_is_told(tmp_path, capsys):
-    path = str(film(tmp_path))
+    path, empty = str(film(tmp_path)), str(tmp_path / "empty.png")
+    cv2.imwrite(empty, picture(0))
     for option, words, begins in (
         ([], "50 frames spread over the recording (not causal)", None),
         (["--background", "first:20"], "first 20 frames (causal from frame 20)", 20),
         (["--background", "spread:30"], "30 frames spread over the recording (not causal)", None),
-        (
-            ["--background", str(empty(tmp_path / "empty.png"))],
-            "empty.png and 50 frames spread over the recording (not causal)",
-            None,
-        ),
+        (["--background", empty], "empty.png and 50 frames spread over the recording (not causal)", None),
     ):
         out = tmp_path / "out"
         assert run(["track", "blob", path, "--px-per-m", "20", "--out", str(out), *option]) == 0

@@ -36,9 +36,6 @@ def test_an_option_given_twice_is_refused(words: tuple[str, ...], option: str, f
 TWICE = {
     "generate cross --seeds 1 --out x --set camera.fps=5 --set camera.fps=7": ("camera.fps", "5 and 7"),
     "generate cross --seeds 1 --out x --set camera.fps=5 --set scenario.camera.fps=5": ("camera.fps", "5 and 5"),
-    "generate cross --seeds 1 --out x --set sensor.clutter_rate=1 --set sensor.clutter_rate=2": (
-        "sensor.clutter_rate", "1 and 2",
-    ),
     "track blob x --out y --set gate=0.9 --set tracker.gate=0.99": ("gate", "0.9 and 0.99"),
     "tune blob --trials 3 --out x --suite quick --set gate=0.9 --set gate=0.8": ("gate", "0.9 and 0.8"),
     "replay x --seeds 1 --out y --set camera.fps=5 --set camera.fps=7": ("camera.fps", "5 and 7"),

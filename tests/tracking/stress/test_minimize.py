@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import get_args
@@ -15,6 +14,7 @@ from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario, group_names
 from scenarios.schema.values import bounds
 from tests.processes import FAKE
+from tests.refusals import answer, refused
 from tracking.app.cli import run
 from tracking.errors import groups
 from tracking.errors.people import PersonKind
@@ -237,12 +237,9 @@ def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
     assert "</html>" in Path("small.html").read_text()
     for words in Path("small.toml").read_text().splitlines()[:2]:
         assert run(words.removeprefix("# flockscope ").split()) == 0
-    capsys.readouterr()
-    assert run(["errors", "small-data/flockscope-train/scene-s00006", "small-tracks", "--json"]) == 0
-    (sequence,) = json.loads(capsys.readouterr().out)["sequences"]
+    (sequence,) = answer(capsys, "errors", "small-data/flockscope-train/scene-s00006", "small-tracks")["sequences"]
     assert "fragment" in {error["kind"] for error in sequence["errors"]}
-    assert run([*line, "HOTA<0.01", "--out", "other.toml"]) == 1
-    assert "got HOTA = 0." in capsys.readouterr().err
+    assert "got HOTA = 0." in refused(capsys, *line, "HOTA<0.01", "--out", "other.toml", code=1)
     assert run([*line, "fragment", "--out", "scene.toml"]) == 2
     assert Path("scene.toml").read_text() == SCENE
 
@@ -264,19 +261,15 @@ def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, c
     sequence = "data/flockscope-train/scene-s00004"
     given = "--detections truth --set sensor.detect_prob=0.6 --set coast_time=1.0 --seed 2"
     assert run(f"track blob {sequence} --out tracks {given}".split()) == 0
-    capsys.readouterr()
-    line = ["--while", "fragment", "--confirm", "0", "--episodes", "3", "--json", "--out", "small.toml"]
-    assert run(["minimize", "tracks", *line]) == 0
-    found = json.loads(capsys.readouterr().out)
+    line = ["--while", "fragment", "--confirm", "0", "--episodes", "3", "--out", "small.toml"]
+    found = answer(capsys, "minimize", "tracks", *line)
     assert found["commands"][1].endswith(
         "--detections truth --seed 2 --set coast_time=1.0 --set sensor.detect_prob=0.6 --out small-tracks"
     )
-    assert run(["minimize", sequence, "tracks", *line]) == 0
-    assert json.loads(capsys.readouterr().out) == found
+    assert answer(capsys, "minimize", sequence, "tracks", *line) == found
     Path("elsewhere").mkdir()
     monkeypatch.chdir("elsewhere")
-    assert run(["minimize", "../tracks", *line]) == 2
-    assert "recordings cannot be made smaller" in json.loads(capsys.readouterr().out)["error"]["remedy"]
+    assert "recordings cannot be made smaller" in refused(capsys, "minimize", "../tracks", *line)
 
 
 @pytest.mark.parametrize("condition", ["crash", "IDSW>=0"])
