@@ -68,6 +68,14 @@ def truth(scenes: Sequence[Scene], events: Sequence[GroupEvent] | None = (), **c
     return made.replace(**changes)
 
 
+def with_rows(true: Truth, kept: np.ndarray, **changes) -> Truth:
+    """A truth with these rows of it only."""
+    names = ("frame", "id", "group", "pos", "vel", "box", "visibility", "visible_box", "z", "heading", "height")
+    columns = {name: getattr(true, name) for name in (*names, "truncation")}
+    rows = {name: None if values is None else values[kept] for name, values in columns.items()}
+    return true.replace(**{**rows, **changes})
+
+
 def tracks(scenes: Sequence[Scene], events: Sequence[GroupEvent] = (), *, unit: str = "person", plane: str = "ground"):
     """A tracker's answers from frame 1 on; an event is told in the frame in which it was `emitted`."""
     found = []

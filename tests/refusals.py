@@ -1,4 +1,4 @@
-"""A command that refuses its input: exit code 2 and one line; and one that answers with an object."""
+"""A command that refuses its input: an exit code and one line; and one that answers with an object."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ import json
 from tracking.app.cli import run
 
 
-def refused(capsys, *words: object) -> str:
-    """The line that a command prints, which must be the only one."""
+def refused(capsys, *words: object, code: int = 2) -> str:
+    """The line that a command prints, which must be the only one but for warnings."""
     capsys.readouterr()
-    assert run([str(word) for word in words]) == 2
-    line = capsys.readouterr().err
-    assert line.count("\n") == 1
+    assert run([str(word) for word in words]) == code
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    (line,) = [row for row in printed.err.splitlines() if not row.startswith("warning: ")]
     return line
 
 

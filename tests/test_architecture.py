@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+from tests.processes import ROOT
+
 PACKAGES = ("scenarios", "sim", "tracking")
 LINES = 500
 SCORING = (

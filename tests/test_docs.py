@@ -9,9 +9,9 @@ from types import ModuleType
 
 import pytest
 
+from tests.processes import ROOT
 from tracking.app.commands.scenarios import list_keys
 
-ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)

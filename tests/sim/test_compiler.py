@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from sim import compiler
+from tests.processes import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 KERNEL = """
 import warnings
 import numpy as np

@@ -22,18 +22,15 @@ def test_truth_and_detections_are_as_they_were(name: str) -> None:
     assert golden.difference(name, KEPT["scenarios"].get(name), golden.present_hashes(name)) == ""
 
 
-def test_nothing_depends_on_the_processor() -> None:
-    assert golden.under(golden.SETTINGS["all of these"], "scenarios", *SOME) == {
-        name: KEPT["scenarios"][name] for name in SOME
-    }
+PROCESSORS = [golden.SETTINGS["all of these"], pytest.param(golden.KERNELS, marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("setting", PROCESSORS, ids=["all of these", "kernels of the oldest processor"])
+def test_nothing_depends_on_the_processor(setting) -> None:
+    assert golden.under(setting, "scenarios", *SOME) == {name: KEPT["scenarios"][name] for name in SOME}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("label", golden.SETTINGS)
 def test_no_scenario_depends_on_a_setting(label: str) -> None:
     assert golden.under(golden.SETTINGS[label], "scenarios", *names()) == KEPT["scenarios"]
-
-
-@pytest.mark.slow
-def test_kernels_compiled_for_the_oldest_processor_give_the_same() -> None:
-    assert golden.under(golden.KERNELS, "scenarios", *SOME) == {name: KEPT["scenarios"][name] for name in SOME}

@@ -15,6 +15,7 @@ from sim.dataset.replay import Cut, replay
 from sim.io.formats.biwi import open_folder
 from sim.sequence import simulate
 from sim.types import Sequence
+from tests.recordings import mot_folder
 
 
 @pytest.fixture
@@ -111,12 +112,10 @@ def test_what_cannot_be_is_refused(walk: Sequence, changes: list[str], cut: Cut,
 def test_boxes_alone_want_a_calibration(tmp_path: Path) -> None:
     own = simulate(load("merge"), 3, streams=())
     truth = own.truth
-    (tmp_path / "gt").mkdir()
     lines = [
         f"{f},{i},{x},{y},{w},{h},1,1,1" for f, i, (x, y, w, h) in zip(truth.frame, truth.id, truth.box, strict=True)
     ]
-    (tmp_path / "gt" / "gt.txt").write_text("\n".join(lines))
-    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nname=boxes\nframeRate=10\nimWidth=640\nimHeight=480\n")
+    mot_folder(tmp_path, "\n".join(lines), ini="name=boxes\nframeRate=10\nimWidth=640\nimHeight=480\n")
     with pytest.raises(InputError, match="--calibration"):
         replay(tmp_path, ObservationSpec(), streams=())
     made = replay(tmp_path, ObservationSpec(), calibration=own.camera, streams=())
@@ -125,15 +124,13 @@ def test_boxes_alone_want_a_calibration(tmp_path: Path) -> None:
     assert np.abs(away).max() < 0.3  # a box's lower edge is the near side of the feet
 
 
-def test_a_folder_of_many_and_nobody_labelled_are_refused(tmp_path: Path, walk: Sequence) -> None:
-    with pytest.raises(InputError, match="no labelled people"):
-        replay(Sequence("empty", 10.0, 5, lambda: iter(())), ObservationSpec())
-    with pytest.raises(InputError, match="nothing there"):
-        replay(tmp_path / "nowhere", ObservationSpec())
-    with pytest.raises(InputError, match="no such file"):
-        replay(walk, tmp_path / "none.toml")
-
-
-def test_a_calibration_of_no_use_is_refused(walk: Sequence) -> None:
+def test_a_source_of_no_use_is_refused(tmp_path: Path, walk: Sequence) -> None:
+    for source, spec, words in (
+        (Sequence("empty", 10.0, 5, lambda: iter(())), ObservationSpec(), "no labelled people"),
+        (tmp_path / "nowhere", ObservationSpec(), "nothing there"),
+        (walk, tmp_path / "none.toml", "no such file"),
+    ):
+        with pytest.raises(InputError, match=words):
+            replay(source, spec)
     with pytest.raises(InputError, match="--calibration"):
         replay(walk, ObservationSpec(), calibration=simulate(load("merge"), 3, streams=()).camera)

@@ -11,6 +11,7 @@ from sim.detector.sense import detection_probability, sense
 from sim.scene.camera import foot_points
 from sim.truth.label import bodies
 from sim.types import Detections, Truth
+from tests.hand_made import with_rows
 from tests.reference_sense import above, crowd, pinhole
 
 SIZE = (640, 480)
@@ -122,10 +123,7 @@ def test_a_person_or_a_frame_more_moves_nobody_else() -> None:
     sensor = Sensor(detect_prob=0.8, clutter_rate=1.0, persistence=0.5)
     truth = seen(people=8, frames=60)
     fewer = truth.id != 3
-    fields = ("frame", "id", "group", "pos", "vel", "box", "visibility", "visible_box", "z")
-    without = truth.replace(**{f: getattr(truth, f)[fewer] for f in fields})
-    early = truth.frame <= 30
-    shorter = truth.replace(length=30, **{f: getattr(truth, f)[early] for f in fields})
+    without, shorter = with_rows(truth, fewer), with_rows(truth, truth.frame <= 30, length=30)
     whole = sense(truth, sensor, 5, pinhole(), SIZE)
     for a, b in zip(whole, sense(shorter, sensor, 5, pinhole(), SIZE), strict=False):
         assert same(a, b)

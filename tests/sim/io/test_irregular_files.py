@@ -12,6 +12,7 @@ from scenarios.reading import read_regular
 from sim.io.source import open_source
 from tests.damaged.readers import READERS
 from tests.damaged.specimens import TEXTS, write_texts
+from tests.recordings import mot_folder
 
 # settings are no files, and these readers leave out what is beside the tracks and is no regular file
 LEFT_OUT = ("setting/", "tracker-setting/", "eth/walk.groups", "tracks-text/groups", "tracks-text/events")
@@ -48,11 +49,7 @@ def test_no_reader_opens_it(file, what, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("what", ["FIFO", "device", "folder", "circle"])
 def test_among_pictures(what, tmp_path):
-    import cv2
-
-    (tmp_path / "img1").mkdir()
-    for k in (1, 2, 3):
-        cv2.imwrite(str(tmp_path / "img1" / f"{k}.png"), np.zeros((8, 8, 3), np.uint8))
+    mot_folder(tmp_path, pictures=dict.fromkeys((f"img1/{k}.png" for k in (1, 2, 3)), np.zeros((8, 8, 3), np.uint8)))
     put(tmp_path / "img1" / "2.png", what)
     with pytest.raises(InputError, match=r"2\.png"):
         open_source(tmp_path, fps=5)

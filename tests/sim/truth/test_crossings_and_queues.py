@@ -176,11 +176,6 @@ def test_walking_in_file_or_shuffling_abreast_is_not_a_queue():
     assert len(queued([np.array([0.8 * k, 0]) + straight(0.3, 0) for k in range(4)])) == 1
 
 
-def found(pos, vel, there, group):
-    events = crossings(pos, vel, there, group, FPS) + queues(pos, vel, there, group, FPS)
-    return [(e.kind, e.start, e.end, set(e.members)) for e in events]
-
-
 def cut(a, b):
     """Signed crossings of two polylines, segment by segment: +1 where b passes from the left of a to its right."""
 

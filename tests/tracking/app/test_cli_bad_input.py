@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.processes import FAKE, ROOT
-from tests.recordings import biwi_walk
-from tests.sealing import seal_again
+from tests.processes import ROOT
+from tests.recordings import biwi_walk, mot_folder
+from tests.refusals import refused
 from tests.small_disks import small_disk
 from tests.tuning_toys import TOY
 from tracking.app.cli import run
@@ -33,18 +33,16 @@ def made(tmp_path_factory) -> Path:
     scene = folder / "scene.toml"
     scene.write_text(f"schema = 1\nduration = 2.0\ncamera = {{ fps = 5 }}\ngroup = [{GROUP}]")
     small = ["--set", "camera.image=[160,120]"]
-    assert run(["generate", str(scene), "--seeds", "40000", "--out", str(folder / "data"), *small]) == 0
+    assert run(["generate", str(scene), "--seeds", "40000:40002", "--out", str(folder / "data"), *small]) == 0
+    assert run(["track", "blob", str(folder / "data"), "--out", str(folder / "run")]) == 0
+    (folder / "people.ndjson").write_text('{"track": {"f": 1, "p": 1, "x": 8.46, "y": 3.59}}\n')
     return folder
 
 
-def refused(line: list[str], capsys, code: int = 2) -> str:
-    """Runs a command that must fail; returns its one line on stderr, after checking that --json has the same error."""
-    capsys.readouterr()
-    assert run(line) == code
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    (text,) = [row for row in printed.err.splitlines() if not row.startswith("warning: ")]
-    assert run([*line, "--json"]) == code
+def refused_as_json(capsys, *line: object, code: int = 2) -> str:
+    """Like `refused`, after a check that --json has the same error."""
+    text = refused(capsys, *line, code=code)
+    assert run([*map(str, line), "--json"]) == code
     answer = json.loads(capsys.readouterr().out)
     assert answer["status"] == ("refused" if code == 2 else "failed")
     error = answer["error"]
@@ -87,7 +85,7 @@ WORLDS = {
     ),
 }  # fmt: skip
 
-# an option that is wrong, without a file, and what the line must say.
+# an argument that is wrong, without a file, and what the line must say; "…" stands for anything.
 OPTIONS = {
     **{GOOD.replace("--seeds 0", f"--seeds={text}"): "seeds"
        for text in ("", "3:", "5:3", "-1:3", "1:2:3", "9990:10010", "0:30000", "39999:40001", "0.5")},
@@ -100,7 +98,6 @@ OPTIONS = {
     GOOD.replace("{tmp}/out", "{det}/out"): "det.txt",  # a path through a file
     f"{GOOD} --streams none --images png": "--images",
     f"{TRACK} --fps 5": "--fps",  # options for recordings, of a generated sequence
-    f"{TRACK} --camera {{made}}/scene.toml": "--camera",
     "track blob {biwi} --out {tmp}/out --px-per-m 30": "--px-per-m",  # metres already
     "track blob {caviar} --out {tmp}/out --camera {made}/scene.toml": "--camera",  # no ground
     "scenarios merge --out {tmp}/plan.pdf": "ends in .svg; write {tmp}/",
@@ -109,6 +106,25 @@ OPTIONS = {
     f"{REPLAY} --seeds 0": "train",
     f"{TUNE} --seeds 0-5": "--seeds: got '0-5'",
     f"{TUNE} --test 0:5": "--test: got 0:5; expected test seeds",
+    "score {made}/data {made}/data": "{made}/data: got a generated dataset, no tracks; … the --out of `flockscope",
+    "score {made}/data {made}/run {made}/data": "got a generated dataset, no tracks;",
+    "score {made}/run {made}/data": "{made}/run: got tracks, what `flockscope track` wrote; … swap the arguments",
+    "view {made}/run {made}/data --out {tmp}/x": "{made}/run: got tracks, what … swap the arguments",
+    "score {made}/data {made}/scene.toml": "{made}/scene.toml: got a .toml file, no … made by `flockscope track`",
+    "score {made}/data {made}/people.ndjson": "people.ndjson: got a .ndjson file, no tracks; … or MOTChallenge text",
+    "track blob {walk} --detections image --out {tmp}/x":
+        "with truth, without pictures; expected a sequence with pictures; … try --detections truth",
+    "track blob {made}/data --camera {made}/scene.toml --out {tmp}/x":
+        "{made}/scene.toml: --camera: got a TOML file; expected a camera.json … describes a view",
+    "generate crossing --seeds 0": "flockscope generate: got missing option '--out'; expected --out DIR: ",
+    "score {made}/data {made}/run {made}/run": "TRACKS: got … twice; expected each run once",
+    "score {made}/data {made}/run {made}/run/scene-s40000 --by HOTAA": "--by: got HOTAA … such as HOTA",
+    "score {made}/data {made}/run --by HOTA": "--by: got one run; expected several",
+    "score {made}/data {made}/run --csv {tmp}/x.csv": "--csv: got one run; expected several",
+    "score {made}/data {made}/run {made}/run/scene-s40000 --csv {tmp}/x.toml": "--csv: got … ends in .csv",
+    "export coco {made}/data --out {tmp}/scene.toml": "--out: got … ends in .json",
+    "replay {made}/data --out {tmp}/x --duration nan": "--duration: got nan; expected seconds above 0",
+    "export csv {made}/data --out {tmp}/x --line a=nan,2,3,4": "--line: got 'a=nan,2,3,4'",
 }  # fmt: skip
 
 
@@ -131,15 +147,15 @@ def test_wrong_files(name, places, capsys):
     bad = places["tmp"] / f"bad{suffix}"
     bad.write_bytes(content.encode("latin-1"))
     line = line.replace("{tmp}/bad", str(bad))
-    shown = refused([word.format(**places) for word in line.split()], capsys)
+    shown = refused_as_json(capsys, *[word.format(**places) for word in line.split()])
     assert all((str(bad) if word == "bad" else word) in shown for word in expected.split()), shown
     assert [path for path in places["tmp"].iterdir() if path.name != "__pycache__"] == [bad]
 
 
 @pytest.mark.parametrize("line", OPTIONS)
 def test_wrong_options(line, places, capsys):
-    shown = refused([word.format(**places) for word in line.split()], capsys)
-    assert OPTIONS[line].format(**places) in shown
+    shown = refused_as_json(capsys, *[word.format(**places) for word in line.split()])
+    assert all(words in shown for words in OPTIONS[line].format(**places).split(" … ")), shown
     assert not list(places["tmp"].iterdir())
 
 
@@ -149,7 +165,7 @@ def test_what_only_a_simulation_can_tell(name, tmp_path, capsys):
     text, code, output = WORLDS[name]
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(f"schema = 1\n{text}")
-    line = refused(["generate", str(scene), "--seeds", "0:2", "--out", str(out)], capsys, code)
+    line = refused_as_json(capsys, "generate", scene, "--seeds", "0:2", "--out", out, code=code)
     assert all(word in line for word in [f"{scene}: ", "(seed 0)", "scene-s00001", *output.split()]), line
     assert not out.exists()
 
@@ -158,7 +174,7 @@ def test_an_entry_of_a_suite_is_named_with_its_file(tmp_path, capsys):
     (tmp_path / "scene.toml").write_text(f"schema = 1\n{WORLDS['out of view'][0]}")
     suite = tmp_path / "suite.toml"
     suite.write_text('[[entry]]\nname = "low"\nscenario = "scene.toml"\n')
-    line = refused(["generate", str(suite), "--seeds", "0", "--out", str(tmp_path / "out")], capsys)
+    line = refused_as_json(capsys, "generate", suite, "--seeds", "0", "--out", tmp_path / "out")
     assert f"{suite}: entry low: camera.height" in line
 
 
@@ -179,7 +195,7 @@ def test_a_disk_that_cannot_be_written(made, tmp_path, capsys):
             ["scenarios", str(made / "scene.toml"), "--out", f"{out}/plan.svg"],
             ["demo", "--quick", "--out", out],
         ):
-            output = refused(line, capsys)
+            output = refused_as_json(capsys, *line)
             assert "Read-only" in output, output
             assert str(root) in output, output
 
@@ -201,19 +217,8 @@ def test_a_full_disk_or_nobody_behind_stdout(made):
 
 
 def test_tracks_at_another_frame_rate(tmp_path, capsys):
-    sequence = tmp_path / "seq" / "gt"
-    sequence.mkdir(parents=True)
-    (sequence / "gt.txt").write_text(ROWS)
-    line = ["track", "blob", str(sequence.parent), "--detections", "truth", "--fps", "5", "--out", str(tmp_path / "t")]
+    sequence = mot_folder(tmp_path / "seq", ROWS)
+    line = ["track", "blob", str(sequence), "--detections", "truth", "--fps", "5", "--out", str(tmp_path / "t")]
     assert run(line) == 0
-    assert "--fps 5" in refused(["score", str(sequence.parent), str(tmp_path / "t")], capsys)
-    assert run(["score", str(sequence.parent), str(tmp_path / "t"), "--fps", "5"]) == 0
-
-
-def test_a_sequence_without_its_tracks_is_named(made, tmp_path, capsys):
-    assert run(["track", FAKE, str(made / "data"), "--out", str(tmp_path / "t")]) == 0
-    (tmp_path / "t" / "scene-s40000").rename(tmp_path / "t" / "other")
-    seal_again(tmp_path / "t" / "other", sequence="other")
-    output = refused(["score", str(made / "data"), str(tmp_path / "t")], capsys)
-    assert "scene-s40000" in output
-    assert "other" in output
+    assert "--fps 5" in refused_as_json(capsys, "score", sequence, tmp_path / "t")
+    assert run(["score", str(sequence), str(tmp_path / "t"), "--fps", "5"]) == 0

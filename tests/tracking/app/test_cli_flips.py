@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import apply_settings
@@ -18,9 +17,10 @@ from scenarios.loading.validation import validate
 from scenarios.schema.scenario import Scenario
 from sim.io.store.sequence_folder import sequence_files
 from sim.io.store.track_files import tracks_files
+from tests.commands import commands
 from tests.processes import FAKE
 from tracking import track
-from tracking.app.cli import app, run
+from tracking.app.cli import run
 from tracking.app.commands.scenarios import list_keys
 from tracking.running import tracker_registry
 
@@ -93,6 +93,7 @@ KEYS = {key_of(setting): ("", setting) for setting in (
 
 WHEN = {
     "time": ("{ time = 1 }", "{ time = 2 }"),
+    "after": ("{ time = 1 }", "{ after = 'p' }"),
     "distance_lt": ("{ distance_lt = 4 }", "{ distance_lt = 9 }"),
     "reach.group": ("{ reach = { group = 'a' } }", "{ reach = { group = 'q-1' } }"),
     "reach.at": ("{ reach = { group = 'a' } }", "{ reach = { group = 'a', at = [6, 4] } }"),
@@ -163,7 +164,7 @@ def test_every_key_is_in_the_table():
     when = {key for key in known if ".when." in key} | {key for key in known if key.endswith(".type")}
     profile = {key for key in known if key.removeprefix("sensor.").startswith(PROFILE) and key.startswith("sensor.")}
     assert known - when - profile == set(KEYS) | set(PICTURES) | TEXT_ONLY
-    assert {key.partition(".when.")[2] for key in when if ".when." in key} == set(WHEN) | {"after"}
+    assert {key.partition(".when.")[2] for key in when if ".when." in key} == set(WHEN)
 
 
 @pytest.mark.parametrize("key", KEYS)
@@ -211,10 +212,6 @@ def test_a_key_changes_pictures_and_only_those(key):
 @pytest.mark.parametrize("key", WHEN)
 def test_a_trigger_changes_what_is_made(key):
     assert differ(*(f"event.m.when={when}" for when in WHEN[key]))
-
-
-def test_after_waits_for_another_order():
-    assert differ("", "event.p.when={ after = 'm' }")
 
 
 def trackers() -> list[tuple[str, str]]:
@@ -313,11 +310,13 @@ def test_a_parameter_changes_what_a_tracker_says(name, parameter):
     ends = spec.choices or (spec.low, spec.high)
     if isinstance(spec.default, tuple):
         ends = [tuple(2.0 * v for v in spec.default)]
-    others = [value for value in ends if value != spec.default and accepted(name, **{parameter: value})]
+    mode = {"management": "rho"} if spec.meaning.startswith("rho: ") else {}
+    others = [value for value in ends if value != spec.default and accepted(name, **mode, **{parameter: value})]
+    before, *after = ({**mode, parameter: value} for value in (spec.default, *others))
     assert any(
-        answers(name, pictures, **{parameter: value}) != answers(name, pictures, **{parameter: spec.default})
+        answers(name, pictures, **now) != answers(name, pictures, **before)
         for pictures in (False, True)
-        for value in others
+        for now in after
     )
 
 
@@ -448,20 +447,10 @@ OWN = (
 """Commands whose options are tested one by one in commands/, ../stress, ../errors, and test_*.py here."""
 
 
-def commands(group) -> list[tuple[str, list[str]]]:
-    found = []
-    for name, command in group.commands.items():
-        inner = getattr(command, "commands", None)
-        found += commands(command) if inner else [(name, [p.name for p in command.params])]
-    return found
-
-
 def test_every_option_is_in_the_table():
-    known = {(name, option) for name, options in commands(typer.main.get_command(app)) for option in options}
-    plain = {(name, option) for name, option in known if option in ("json", "help")}
-    out = {(name, "out") for name, _ in commands(typer.main.get_command(app))} - {("scenarios", "out")}
-    own = {(name, option) for name, option in known if name in OWN}
-    assert known - plain - out - own == set(OPTIONS) | ELSEWHERE
+    known = {(words[-1], param.name) for words, command in commands().items() for param in command.params}
+    plain = {(name, option) for name, option in known if name in OWN or option in ("json", "help", "out")}
+    assert known - plain | {("scenarios", "out")} == set(OPTIONS) | ELSEWHERE
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")

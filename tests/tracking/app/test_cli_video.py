@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.recordings import mot_folder
+from tests.refusals import refused
 from tests.small_videos import SIZE, damage, picture, write_video
 from tracking.app.cli import run
 
@@ -19,19 +21,11 @@ def film(folder: Path, n: int = 60, name: str = "film.mp4", **more) -> Path:
 
 
 def jpegs(folder: Path, pictures: list[np.ndarray], suffix: str = ".jpg") -> Path:
-    (folder / "img1").mkdir(parents=True)
-    for k, image in enumerate(pictures, 1):
-        cv2.imwrite(str(folder / "img1" / f"{k:06d}{suffix}"), image)
-    return folder
+    return mot_folder(folder, pictures={f"img1/{k:06d}{suffix}": image for k, image in enumerate(pictures, 1)})
 
 
 def noise(k: int, size: tuple[int, int] = SIZE) -> np.ndarray:
     return np.random.default_rng(k).integers(0, 255, (size[1], size[0], 3), dtype=np.uint8)
-
-
-def empty(path: Path) -> Path:
-    cv2.imwrite(str(path), picture(0))
-    return path
 
 
 def text(path: Path) -> Path:
@@ -59,9 +53,7 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], list[str]]] = {
 def test_a_broken_recording_is_one_line(name, tmp_path, capsys):
     make, expected = BROKEN[name]
     out = tmp_path / "out"
-    line = ["track", "blob", str(make(tmp_path)), "--fps", "10", "--px-per-m", "20", "--out", str(out)]
-    assert run(line) == 2
-    (error,) = [text for text in capsys.readouterr().err.splitlines() if not text.startswith("warning: ")]
+    error = refused(capsys, "track", "blob", make(tmp_path), "--fps", 10, "--px-per-m", 20, "--out", out)
     assert all(word in error for word in expected), error
     assert not out.exists()
 
@@ -98,16 +90,13 @@ def test_strange_pictures_are_pictures(name, tmp_path, capsys):
 
 
 def test_which_background_is_told(tmp_path, capsys):
-    path = str(film(tmp_path))
+    path, empty = str(film(tmp_path)), str(tmp_path / "empty.png")
+    cv2.imwrite(empty, picture(0))
     for option, words, begins in (
         ([], "50 frames spread over the recording (not causal)", None),
         (["--background", "first:20"], "first 20 frames (causal from frame 20)", 20),
         (["--background", "spread:30"], "30 frames spread over the recording (not causal)", None),
-        (
-            ["--background", str(empty(tmp_path / "empty.png"))],
-            "empty.png and 50 frames spread over the recording (not causal)",
-            None,
-        ),
+        (["--background", empty], "empty.png and 50 frames spread over the recording (not causal)", None),
     ):
         out = tmp_path / "out"
         assert run(["track", "blob", path, "--px-per-m", "20", "--out", str(out), *option]) == 0
@@ -136,19 +125,17 @@ def test_options_that_cannot_work(option, words, tmp_path, capsys, monkeypatch):
     text(tmp_path / "text.png")
     cv2.imwrite(str(tmp_path / "small.png"), np.swapaxes(picture(0), 0, 1))
     monkeypatch.setattr("sim.io.pictures.background_sample.BackgroundSample.__call__", None)
-    assert run(["track", "blob", str(path), "--out", str(tmp_path / "out"), *option.format(tmp_path).split()]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
+    line = refused(capsys, "track", "blob", path, "--out", tmp_path / "out", *option.format(tmp_path).split())
     assert all(word in line for word in words), line
     assert not (tmp_path / "out").exists()
 
 
 def test_a_background_for_a_tracker_that_needs_none(tmp_path, capsys):
     folder = jpegs(tmp_path / "mot", [picture(k) for k in range(30)])
-    (folder / "gt").mkdir()
-    (folder / "gt" / "gt.txt").write_text("".join(f"{k},1,{4 * k},20,16,16,1,1,1\n" for k in range(1, 30)))
-    line = ["track", "blob", str(folder), "--fps", "10", "--out", str(tmp_path / "out")]
-    assert run([*line, "--detections", "truth", "--background", "first:10"]) == 2
-    assert "leave --background out" in capsys.readouterr().err
+    mot_folder(folder, "".join(f"{k},1,{4 * k},20,16,16,1,1,1\n" for k in range(1, 30)))
+    options = ["--detections", "truth", "--background", "first:10"]
+    line = refused(capsys, "track", "blob", folder, "--fps", 10, *options, "--out", tmp_path / "out")
+    assert "leave --background out" in line
 
 
 BOXES_ONLY = (
@@ -159,7 +146,7 @@ BOXES_ONLY = (
 WITHOUT = {
     "track {0}/mine.py:Mine {0}/film.mp4 --out {0}/x": "give a detector's boxes with --boxes FILE",
     "track blob {0}/loose --out {0}/x": "move the pictures to {0}/loose/img1",
-    "track blob {0}/boxes.json --out {0}/x": "give boxes with --boxes",
+    "track blob {0}/boxes.json --out {0}/x": "if these are boxes: flockscope track TRACKER VIDEO --boxes",
     "errors {0}/film.mp4 {0}/run": "{0}/film.mp4: got no labels",
     "overlay {0}/film.mp4 {0}/other --out {0}/x.mp4": "give {0}/other/tracks.txt",
 }
@@ -172,7 +159,7 @@ def street(tmp_path_factory: pytest.TempPathFactory) -> Path:
     film(folder)
     (folder / "mine.py").write_text(BOXES_ONLY)
     (folder / "boxes.json").write_text("[]")
-    jpegs(folder, [picture(0)]).joinpath("img1").rename(folder / "loose")
+    jpegs(folder, [picture(0), picture(1)]).joinpath("img1").rename(folder / "loose")
     (folder / "other.txt").write_text("".join(f"{k},-1,{10 + k},20,16,40,0.9\n" for k in range(1, 20)))
     for source, out in (("film.mp4", "run"), ("other.txt", "other")):
         assert run(["track", "blob", str(folder / source), "--px-per-m", "20", "--out", str(folder / out)]) == 0
@@ -181,15 +168,12 @@ def street(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("line", WITHOUT)
 def test_the_remedy_says_what_is_missing(line, street, capsys):
-    assert run(line.format(street).split()) == 2
-    assert WITHOUT[line].format(street) in capsys.readouterr().err
+    assert WITHOUT[line].format(street) in refused(capsys, *line.format(street).split())
 
 
 def test_a_sample_mostly_without_pictures_is_a_warning(tmp_path, capsys):
-    folder = jpegs(tmp_path / "mot", [picture(k) for k in range(121)])
-    for k in range(1, 122):
-        if k % 4 != 1:
-            (folder / "img1" / f"{k:06d}.jpg").unlink()
+    shown = {f"img1/{k:06d}.jpg": picture(k) for k in (1, 2, *range(5, 122, 4))}
+    folder = mot_folder(tmp_path / "mot", pictures=shown)
     line = ["track", "blob", str(folder), "--fps", "10", "--px-per-m", "20", "--out", str(tmp_path / "out")]
-    run(line)
+    assert run(line) == 0
     assert "of the 50 frames of the background sample have a readable picture; number the" in capsys.readouterr().err

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.refusals import refused
 from tracking.app.cli import run
 
 KEYS = ("objective", "IDSW")
@@ -64,14 +65,6 @@ def test_a_saved_baseline_gives_the_same_verdict(tmp_path, capsys):
     assert len(small.read_bytes()) < 1000
 
 
-def test_scores_are_saved_as_json_only(tmp_path, capsys):
-    (tmp_path / "mine.txt").write_text("mine")
-    before = stored(tmp_path / "a.json", BASE)
-    assert run(["compare", before, before, "--save", str(tmp_path / "mine.txt")]) == 2
-    assert "ends in .json" in capsys.readouterr().err
-    assert (tmp_path / "mine.txt").read_text() == "mine"
-
-
 NOT_COMPARED = [
     (lambda p: stored(p, BASE[:4], truth="a"), "incomplete: got no s4, s5"),
     (lambda p: stored(p, np.append(BASE, 0.5), truth="a"), "incomplete: got s6, not in"),
@@ -85,14 +78,19 @@ NOT_COMPARED = [
 @pytest.mark.parametrize(("write", "words"), NOT_COMPARED)
 def test_what_is_not_compared_ends_with_2(write, words, tmp_path, capsys):
     before = stored(tmp_path / "a.json", BASE, truth="a")
-    assert run(["compare", before, write(tmp_path / "b.json")]) == 2
-    assert words in capsys.readouterr().err
+    assert words in refused(capsys, "compare", before, write(tmp_path / "b.json"))
 
 
-@pytest.mark.parametrize(
-    ("sequences", "by", "words"), [(1, [], "too few"), (2, ["--by", "HOTA"], "HOTA: got known in 0 sequences")]
-)
-def test_too_few_known_scores(sequences, by, words, tmp_path, capsys):
+OPTIONS = [
+    (1, [], "too few"),
+    (2, ["--by", "HOTA"], "HOTA: got known in 0 sequences"),
+    (6, ["--save", "mine.txt"], "ends in .json"),
+]
+
+
+@pytest.mark.parametrize(("sequences", "more", "words"), OPTIONS)
+def test_scores_and_files_that_cannot_be(sequences, more, words, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     few = stored(tmp_path / "a.json", BASE[:sequences])
-    assert run(["compare", few, few, *by]) == 2
-    assert words in capsys.readouterr().err
+    assert words in refused(capsys, "compare", few, few, *more)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.json"]

@@ -12,6 +12,7 @@ import numpy as np
 
 from sim.io.store.seal import read_manifest, with_hash
 from tests.recordings import mot_folder
+from tests.refusals import answer, refused
 from tracking.app.cli import run
 
 ROWS = "1,1,10,10,20,40,1,1,1\n2,1,11,10,20,40,1,1,1\n3,1,12,10,20,40,1,1,1\n"
@@ -54,9 +55,8 @@ def test_no_command_leaves_out(tmp_path: Path, capsys) -> None:
     listed = json.loads((inside / "out" / "coco.json").read_text())
     assert all((inside / "data" / image["file_name"]).is_file() for image in listed["images"])
     assert [video["name"] for video in listed["videos"]] == names
-    capsys.readouterr()
-    assert run(["score", str(inside / "data"), str(inside / "out" / "tracks"), "--json"]) == 0
-    assert [row["name"] for row in json.loads(capsys.readouterr().out)["sequences"]] == names
+    scored = answer(capsys, "score", inside / "data", inside / "out" / "tracks")["sequences"]
+    assert [row["name"] for row in scored] == names
 
 
 def test_a_manifest_names_files_of_its_own_folder_only(tmp_path: Path, capsys) -> None:
@@ -66,8 +66,8 @@ def test_a_manifest_names_files_of_its_own_folder_only(tmp_path: Path, capsys) -
     shutil.move(folder / "camera.json", tmp_path / "camera.json")
     manifest["files"]["../../../camera.json"] = manifest["files"].pop("camera.json")
     (folder / "manifest.json").write_text(json.dumps(with_hash(manifest)))
-    assert run(["export", "webdataset", str(tmp_path / "data"), "--out", str(tmp_path / "out")]) == 2
-    assert "../../../camera.json" in capsys.readouterr().err
+    line = refused(capsys, "export", "webdataset", tmp_path / "data", "--out", tmp_path / "out")
+    assert "../../../camera.json" in line
 
 
 def test_a_folder_whose_name_is_no_text(tmp_path: Path, capsys) -> None:

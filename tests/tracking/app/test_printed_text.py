@@ -13,6 +13,7 @@ from rich.table import Table
 
 from scenarios.errors import InputError
 from sim.io.store.seal import read_manifest, with_hash
+from tests.processes import ROOT
 from tests.short_scene import SCENE
 from tracking.app import progress
 from tracking.app.cli import run
@@ -22,8 +23,6 @@ from tracking.app.progress import ProgressMeter
 
 NAMES = ("[/red]", "x[door]y", ":smile:", "\x1b[31mred", "a\u202eb", "[link=http://x]y[/link]")
 SHOWN = ("[/red]", "x[door]y", ":smile:", "\\x1b[31mred", "a\\u202eb", "[link=http://x]y[/link]")
-COMMAND = [sys.executable, "-m", "tracking.app.cli"]
-ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.mark.parametrize(("name", "shown"), [*zip(NAMES, SHOWN, strict=True)])
@@ -92,7 +91,8 @@ def test_a_line_break_in_a_name_makes_no_row(line, broken_name, tmp_path, capsys
 
 def _command(*words: str | bytes, text: bool = True, **env: str) -> subprocess.CompletedProcess:
     environment = {**os.environ, "PYTHONPATH": str(ROOT), **env}
-    return subprocess.run([*COMMAND, *words], env=environment, capture_output=True, check=False, text=text)
+    line = [sys.executable, "-m", "tracking.app.cli", *words]
+    return subprocess.run(line, env=environment, capture_output=True, check=False, text=text)
 
 
 TERMINALS = [

@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.processes import FAKE
+from tests.refusals import answer
 from tests.tuning_toys import write_scenes
 from tracking.app.cli import run
 
@@ -21,9 +22,8 @@ def scene(tmp_path: Path, monkeypatch) -> str:
 
 
 def stress(scene: str, *more: str) -> int:
-    return run(
-        ["stress", FAKE, "--suite", scene, "--seeds", "0:3", "--start", "2", "--by", "HOTA", "--out", "o", *more]
-    )
+    options = ["--suite", scene, "--seeds", "0:3", "--start", "2", "--by", "HOTA", "--out", "o"]
+    return run(["stress", FAKE, *options, *more])
 
 
 def test_without_axes_a_row_for_each_scenario(scene: str, capsys) -> None:
@@ -56,9 +56,8 @@ def test_two_axes_make_a_matrix(scene: str, capsys) -> None:
 
 
 def test_a_found_scene_is_generated_by_its_command(scene: str, capsys) -> None:
-    assert (
-        stress(scene, "--vary", "detection", "--vary", "clutter", "--vary", "velocity-difference", "--search", "6") == 0
-    )
+    axes = ("--vary", "detection", "--vary", "clutter", "--vary", "velocity-difference")
+    assert stress(scene, *axes, "--search", "6") == 0
     text = capsys.readouterr().out
     data = json.loads(Path("o/stress.json").read_text())
     worst = data["found"][0]
@@ -69,9 +68,7 @@ def test_a_found_scene_is_generated_by_its_command(scene: str, capsys) -> None:
     seed = str(worst["seed"])
     assert run(["track", FAKE, "worst-1", "--detections", "file", "--seed", seed, "--out", "t"]) == 0
     (folder,) = Path("worst-1").glob("*/one-s*")
-    capsys.readouterr()
-    assert run(["score", str(folder), f"t/{folder.name}", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["sequences"][0]["HOTA"] == worst["score"]
+    assert answer(capsys, "score", folder, f"t/{folder.name}")["sequences"][0]["HOTA"] == worst["score"]
 
 
 WRONG_OPTIONS = [

@@ -258,7 +258,6 @@ def test_median_is_numpys(n):
 def test_a_frame_of_another_kind_is_refused():
     made = Background(shots(scene()), FPS)
     for wrong in (np.zeros((20, 20, 3), np.uint8), np.zeros((40, 50), np.uint8), np.zeros((40, 50, 3))):
-        with pytest.raises(InputError, match="as the background sample"):
-            made.classify(wrong)
-        with pytest.raises(InputError, match="as the background sample"):
-            made.adapt(wrong, np.zeros((40, 50), np.uint8))
+        for use in (made.classify, lambda picture: made.adapt(picture, np.zeros((40, 50), np.uint8))):
+            with pytest.raises(InputError, match="as the background sample"):
+                use(wrong)

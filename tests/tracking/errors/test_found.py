@@ -35,6 +35,11 @@ def sequence_of(scenes: list[Scene], **changes) -> Sequence:
     return Sequence("made", made.fps, made.length, lambda: iter(()), load_truth=lambda: made)
 
 
+def with_rows(t: Tracks, id, group, pos) -> Tracks:
+    n = len(id)
+    return t.replace(id=id, group=group, pos=pos, vel=np.zeros((n, 2)), cov=np.zeros((n, 4, 4)), score=np.ones(n))
+
+
 def changed(t: Tracks, keep=None, id=None, group=None, pos=None) -> Tracks:
     """The same frame with other columns; groups follow the column."""
     keep = np.ones(len(t.id), bool) if keep is None else keep
@@ -47,11 +52,7 @@ def changed(t: Tracks, keep=None, id=None, group=None, pos=None) -> Tracks:
         np.array(names, np.int64), members, np.zeros((count, 2)), np.zeros((count, 2)), np.zeros((count, 2, 2)),
         np.array([float(len(m)) for m in members]), (),
     )  # fmt: skip
-    place = (t.pos if pos is None else pos)[keep]
-    return t.replace(
-        id=ids, group=label, pos=place, vel=np.zeros((len(ids), 2)), cov=np.zeros((len(ids), 4, 4)),
-        score=np.ones(len(ids)), groups=groups,
-    )  # fmt: skip
+    return with_rows(t, ids, label, (t.pos if pos is None else pos)[keep]).replace(groups=groups)
 
 
 def lost(t, person, start, end):
@@ -69,11 +70,7 @@ def regrouped(t, people, group, start, end):
 def with_ghost(t, start, end):
     if not start <= t.index <= end:
         return t
-    one = np.array([[20.0, 20.0]])
-    return t.replace(
-        id=np.append(t.id, 99), group=np.append(t.group, -1), pos=np.concatenate([t.pos, one]),
-        vel=np.zeros((len(t.id) + 1, 2)), cov=np.zeros((len(t.id) + 1, 4, 4)), score=np.ones(len(t.id) + 1),
-    )  # fmt: skip
+    return with_rows(t, np.append(t.id, 99), np.append(t.group, -1), np.vstack([t.pos, [20.0, 20.0]]))
 
 
 def swapped(t, start):
@@ -132,9 +129,14 @@ def test_the_truth_has_no_errors() -> None:
     assert found.scores == {"HOTA": 1, "IDF1": 1, "group_F1": 1}
 
 
-def test_gains_add_up() -> None:
+def test_gains_add_up_and_the_table_by_cause_needs_no_single_costs() -> None:
     run = [with_ghost(swapped(lost(regrouped(t, [1, 2], -1, 10, 20), 2, 25, 40), 30), 5, 50) for t in tracks(SCENES)]
-    found = find_errors(sequence_of(SCENES), run)
+    found, without = (find_errors(sequence_of(SCENES), run, costs=costs) for costs in (EVERY, 0))
+    assert without.causes == found.causes
+    assert without.left == found.left
+    assert all(one.cost is None for one in without.errors)
+    gains = [row.gains["HOTA"] + row.gains["group_F1"] for row in found.causes]
+    assert gains[0] == max(gains)
     for key, score in found.scores.items():
         assert score + sum(row.gains[key] for row in found.causes) + found.left[key] == pytest.approx(1)
         assert found.left[key] == pytest.approx(0, abs=1e-9)
@@ -280,8 +282,7 @@ def test_wrong_lineage(unit: str, more: list[int], kinds: list[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mode", "change", "cause"),
-    [("image", 1.5, "light"), ("image", 1.05, "tracker"), ("file", 1.5, "tracker")],
+    ("mode", "change", "cause"), [("image", 1.5, "light"), ("image", 1.05, "tracker"), ("file", 1.5, "tracker")]
 )
 def test_a_change_of_the_light_is_a_cause_of_errors_from_pixels(mode: str, change: float, cause: str) -> None:
     light = np.where(np.arange(FRAMES) < 24, 1.0, change)
@@ -291,16 +292,6 @@ def test_a_change_of_the_light_is_a_cause_of_errors_from_pixels(mode: str, chang
     )
     found = find_errors(sequence, run)
     assert {one.error.kind: one.cause.name for one in found.errors} == {"fragment": cause, "missed group": cause}
-
-
-def test_the_table_by_cause_needs_no_single_costs() -> None:
-    run = [with_ghost(swapped(lost(regrouped(t, [1, 2], -1, 10, 20), 2, 25, 40), 30), 5, 50) for t in tracks(SCENES)]
-    with_costs, without = (find_errors(sequence_of(SCENES), run, costs=costs) for costs in (EVERY, 0))
-    assert without.causes == with_costs.causes
-    assert without.left == with_costs.left
-    assert all(one.cost is None for one in without.errors)
-    gains = [row.gains["HOTA"] + row.gains["group_F1"] for row in without.causes]
-    assert gains[0] == max(gains)
 
 
 def test_a_page_is_written_without_errors_that_cannot_be_found() -> None:

@@ -16,6 +16,7 @@ from sim.detector.draws import correlated_normals
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth
+from tests.hand_made import with_rows
 from tests.recordings import mot_folder
 from tracking.fitting import detection_matching as matching
 from tracking.fitting.error_correlation import (
@@ -108,11 +109,7 @@ def test_detections_in_frames_without_labels_are_no_false_alarms() -> None:
     scene = simulate(load("street", set=["sensor.clutter_rate=1"]), 30_000, streams=())
     dense, found = scene.truth, [f.detections for f in scene.without_pictures() if f.detections is not None]
     kept = (dense.frame - 1) % 5 == 0
-    rows = {
-        name: getattr(dense, name)[kept]
-        for name in ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading", "height", "truncation")
-    }
-    sparse = dense.replace(**rows, visible_box=None, labelled=np.zeros(dense.length, bool))
+    sparse = with_rows(dense, kept, visible_box=None, labelled=np.zeros(dense.length, bool))
     got = matching.match_sequence(replace(scene, load_truth=lambda: sparse))
     anew = sparse.replace(frame=(sparse.frame - 1) // 5 + 1, fps=2.0, length=dense.length // 5)
     told = [d.replace(index=k) for k, d in enumerate(found[::5], 1)]

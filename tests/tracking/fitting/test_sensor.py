@@ -15,6 +15,7 @@ from scenarios.schema.sensor import BoxNoise, FalseAlarms, Memory, Sensor
 from sim.detector.sense import sense
 from sim.sequence import simulate
 from sim.types import Detections, Frame, Sequence, Truth
+from tests.hand_made import with_rows
 from tracking.app.pictures.contact_sheet import choose_frames, sheet_picture
 from tracking.app.pictures.overlay import write_overlay
 from tracking.fitting.detection_matching import MatchedRecording, match_detections, match_sequence
@@ -163,9 +164,7 @@ def test_what_cannot_be_fitted_is_refused() -> None:
     for words, sequence in bad.items():
         with pytest.raises(InputError, match=words):
             match_sequence(sequence)
-    few = truth.frame <= 1
-    fields = ("frame", "id", "group", "pos", "vel", "box", "visibility", "visible_box", "z")
-    short = truth.replace(length=1, **{f: getattr(truth, f)[few] for f in fields})
+    short = with_rows(truth, truth.frame <= 1, length=1)
     with pytest.raises(InputError, match="labelled people"):
         fit_sensor([as_sequence(short, camera, KNOWN)])
 

@@ -33,6 +33,11 @@ def tracks(people, *, scale=1.0, there=None, boxes=False, group=None, vel=True, 
     return out
 
 
+def passing():
+    """Two pairs that walk through each other."""
+    return [paced((12, (v, 0)), start=(x, 5 + y)) for x, v in ((0, 1), (10, -1)) for y in (0, 0.7)]
+
+
 def events(made):
     return [(t.index, e.kind, e.start, e.before, e.after, e.members) for t in made for e in t.events]
 
@@ -98,8 +103,7 @@ def test_what_a_tracker_says_is_kept():
 
 def test_crossings_and_queues_of_tracks():
     """The hulls come within 1 m in frame 44 and part after frame 58; 20 frames later it is known."""
-    people = [paced((12, (v, 0)), start=(x, 5 + y)) for x, v in ((0, 1), (10, -1)) for y in (0, 0.7)]
-    found = events(derive(tracks(people), FPS))
+    found = events(derive(tracks(passing()), FPS))
     assert [(i, kind, start, members) for i, kind, start, _, _, members in found] == [(78, "cross", 44, (1, 2, 3, 4))]
     still = [paced((5, (-1, 0)), (7, (0, 0)), start=(5 + 0.8 * k, 0)) for k in range(3)]
     (row,) = [e for e in events(derive(tracks(still), FPS)) if e[1] == "queue"]
@@ -142,11 +146,6 @@ RULES = [
 @pytest.mark.parametrize(("people", "changed", "told"), RULES)
 def test_parameters_of_the_rule(people, changed, told):
     assert [e[0] for e in events(derive(tracks(people), FPS, rule=changed))] == [told]
-
-
-def passing():
-    """Two pairs that walk through each other."""
-    return [paced((12, (v, 0)), start=(x, 5 + y)) for x, v in ((0, 1), (10, -1)) for y in (0, 0.7)]
 
 
 def test_named_groups_without_events_get_them():

@@ -50,15 +50,17 @@ SPECS = [
     ("blop", "did you mean blob"), ("{mine}:None_", "a class of this module"), ("{mine}:", "a class of this module"),
     ("{mine}:Nothing", "no needs, reset, step"), ("{mine}:function", "got a function; expected a class"),
     ("{leaves}:Mine", "SystemExit: 3"), (":Mine", "Empty module name"), ("{missing}:Mine", "no such file"),
+    ("{alone}:Mine", "No module named 'wE_missing'; .*put its file beside the tracker's"),
     ("{broken}:Mine", "ZeroDivisionError"), ("no.such.module:Mine", "ModuleNotFoundError"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("spec", "words"), SPECS)
 def test_wrong_names_are_one_line(tmp_path, spec, words):
-    for name, text in {"mine": STRANGER.format("..."), "broken": "1 / 0", "leaves": "raise SystemExit(3)"}.items():
+    texts = {"mine": STRANGER.format("..."), "broken": "1 / 0", "leaves": "raise SystemExit(3)"}
+    for name, text in {**texts, "alone": "import wE_missing"}.items():
         (tmp_path / f"{name}.py").write_text(text)
-    paths = {name: tmp_path / f"{name}.py" for name in ("mine", "missing", "broken", "leaves")}
+    paths = {name: tmp_path / f"{name}.py" for name in (*texts, "alone", "missing")}
     with pytest.raises(InputError, match=words):
         tracker_registry.find(spec.format(**paths))
 
@@ -124,9 +126,3 @@ class Mine:
     def reset(self, context, seed): ...
     def step(self, frame, detections): ...
 """
-
-
-def test_a_missing_neighbour_is_named(tmp_path):
-    (tmp_path / "mine.py").write_text("import wE_missing")
-    with pytest.raises(InputError, match=r"No module named 'wE_missing'; .*put its file beside the tracker's"):
-        tracker_registry.find(f"{tmp_path}/mine.py:Mine")

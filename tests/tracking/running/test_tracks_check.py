@@ -56,11 +56,6 @@ WRONG_GROUPS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("changes", "words"), WRONG_GROUPS)
-def test_wrong_groups(changes, words):
-    refused(answer(groups=group(**changes)), words)
-
-
 WRONG_EVENTS = [
     ({"kind": "meet"}, "kind 'meet'; expected one of merge"), ({"emitted": 2}, "emitted 2; expected 3"),
     ({"emitted": 4}, "emitted 4; expected 3"), ({"start": 4, "end": 5}, "start 4; expected a frame from 1 to 3"),
@@ -70,9 +65,21 @@ WRONG_EVENTS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("changes", "words"), WRONG_EVENTS)
-def test_wrong_events(changes, words):
-    refused(answer(events=(event(**changes),)), words)
+WRONG_ANSWERS = [
+    ({"id": np.array([4, 4])}, "the same id twice"), ({"id": np.array([-1, 4])}, "id -1"),
+    ({"id": np.array([1.0, 2.0])}, "float64"), ({"pos": np.zeros((2, 3))}, r"pos of shape \(2, 3\)"),
+    ({"vel": np.zeros((1, 2))}, "vel of shape"), ({"cov": np.full((2, 4, 4), np.nan)}, "NaN or infinity in cov"),
+    ({"box": np.zeros((2, 3))}, "box of shape"), ({"index": 4}, "index 4"), ({"plane": "floor"}, "floor"),
+    *(({"groups": group(**changes)}, words) for changes, words in WRONG_GROUPS),
+    *(({"events": (event(**changes),)}, words) for changes, words in WRONG_EVENTS),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "words"), WRONG_ANSWERS)
+def test_wrong_answers_name_tracker_frame_and_fault(changes, words):
+    with pytest.raises(WorkError, match=words) as caught:
+        check_tracks(answer(**changes), 3, "mine.py:Mine")
+    assert str(caught.value).startswith("mine.py:Mine: frame 3")
 
 
 def test_when_an_event_was_told_is_filled_in():
@@ -115,21 +122,6 @@ def test_trackers_of_groups():
     refused(answer(unit="group", group=own[::-1].copy()), "group that is not id")
     refused(answer(unit="group", group=own, groups=group()), "1 in groups.members")
     refused(answer(unit="group", group=own, events=(event(),)), "1 in the members")
-
-
-WRONG_ANSWERS = [
-    ({"id": np.array([4, 4])}, "the same id twice"), ({"id": np.array([-1, 4])}, "id -1"),
-    ({"id": np.array([1.0, 2.0])}, "float64"), ({"pos": np.zeros((2, 3))}, r"pos of shape \(2, 3\)"),
-    ({"vel": np.zeros((1, 2))}, "vel of shape"), ({"cov": np.full((2, 4, 4), np.nan)}, "NaN or infinity in cov"),
-    ({"box": np.zeros((2, 3))}, "box of shape"), ({"index": 4}, "index 4"), ({"plane": "floor"}, "floor"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("changes", "words"), WRONG_ANSWERS)
-def test_wrong_answers_name_tracker_frame_and_fault(changes, words):
-    with pytest.raises(WorkError, match=words) as caught:
-        check_tracks(answer(**changes), 3, "mine.py:Mine")
-    assert str(caught.value).startswith("mine.py:Mine: frame 3")
 
 
 def test_right_answers_pass():

@@ -8,6 +8,7 @@ import pytest
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Groups, Truth
+from tests.hand_made import with_rows
 from tracking import track
 from tracking.objective import ObjectiveScorer
 from tracking.scoring import evaluate, score_arrays
@@ -92,20 +93,12 @@ def merge() -> tuple[Truth, tuple]:
 
 def thinned(dense: Truth, frames: np.ndarray) -> Truth:
     """A truth whose labels of people and groups stand in these frames only."""
-    kept, nobody = np.isin(dense.frame, frames), Groups.none()
-    flags = np.isin(np.arange(1, dense.length + 1), frames)
-
-    def cut(values):
-        return None if values is None else values[kept]
-
-    rows = ("frame", "id", "group", "pos", "vel", "box", "visibility", "z", "heading", "height", "truncation")
+    flags, nobody = np.isin(np.arange(1, dense.length + 1), frames), Groups.none()
     groups = {
         name: tuple(g if f else nobody for g, f in zip(getattr(dense, name), flags, strict=True))
         for name in ("groups", "groups_px")
     }
-    return dense.replace(
-        **{name: cut(getattr(dense, name)) for name in rows}, visible_box=None, labelled=flags, **groups
-    )
+    return with_rows(dense, np.isin(dense.frame, frames), visible_box=None, labelled=flags, **groups)
 
 
 @pytest.mark.parametrize("step", [2, 5, 10])

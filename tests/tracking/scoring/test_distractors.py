@@ -62,11 +62,19 @@ def test_equal_to_trackeval(tmp_path: Path, name: str, seed: int) -> None:
     assert weighted[list(found).index("MOTA")] == pytest.approx(expected["MOTA"], abs=1e-9)
 
 
-def test_a_vehicle_without_motor_is_a_distractor_in_mot20_alone(tmp_path: Path) -> None:
-    gt = np.array([[1, 1, 0, 0, 40, 100, 1, 1, 1], [1, 2, 500, 0, 40, 100, 0, 6, 1]])
-    for name, false in (("MOT17-01", 1), ("MOT20-01", 0)):
-        rows = np.c_[gt[:, :6], np.ones(2), -np.ones((2, 3))]
-        assert ours(*written(tmp_path / name, gt, rows, name))[1]["FP"] == false
+PERSON = [1, 1, 0, 0, 40, 100, 1, 1, 1]
+FALSE = [
+    ("MOT17-01", [[1, 2, 500, 0, 40, 100, 0, 6, 1]], 1),  # a vehicle without motor
+    ("MOT20-01", [[1, 2, 500, 0, 40, 100, 0, 6, 1]], 0),
+    ("S", [[1, 2, 500, 0, 40, 100, 1, 7, 1], [1, 3, 900, 0, 9, 9, 1, 40, 1]], 1),  # classes are not MOTChallenge's
+]
+
+
+@pytest.mark.parametrize(("name", "more", "false"), FALSE)
+def test_which_classes_are_distractors(tmp_path: Path, name: str, more: list[list[int]], false: int) -> None:
+    gt = np.array([PERSON, *more])
+    rows = np.c_[gt[:2, :6], np.ones(2), -np.ones((2, 3))]
+    assert ours(*written(tmp_path, gt, rows, name))[1]["FP"] == false
 
 
 def test_a_person_who_stands_on_a_distractor_keeps_the_track(tmp_path: Path) -> None:
@@ -77,9 +85,3 @@ def test_a_person_who_stands_on_a_distractor_keeps_the_track(tmp_path: Path) -> 
     for name, rows in (("one", one), ("two", two)):
         found = ours(*written(tmp_path / name, gt, rows, "MOT17-01"))[1]
         assert (found["TP"], found["FP"], found["FN"]) == (1, 0, 0), name
-
-
-def test_classes_that_are_not_those_of_motchallenge_have_no_distractors(tmp_path: Path) -> None:
-    gt = np.array([[1, 1, 0, 0, 40, 100, 1, 1, 1], [1, 2, 500, 0, 40, 100, 1, 7, 1], [1, 3, 900, 0, 9, 9, 1, 40, 1]])
-    rows = np.c_[gt[:2, :6], np.ones(2), -np.ones((2, 3))]
-    assert ours(*written(tmp_path, gt, rows, "S"))[1]["FP"] == 1

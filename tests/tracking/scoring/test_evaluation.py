@@ -13,7 +13,7 @@ import scenarios
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import EVENT_KINDS, Tracks, Truth
-from tests.hand_made import Scene, event, tracks, truth
+from tests.hand_made import Scene, event, tracks, truth, with_rows
 from tracking import track
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE, table
@@ -25,9 +25,6 @@ TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
 
 def truth_as_tracks(true: Truth, plane: str = "ground", late: int = 0) -> list[Tracks]:
     """What a tracker would say that knows everything, `late` frames late about groups."""
-    events = {e.start: [] for e in true.events or ()}
-    for e in true.events or ():
-        events[e.start].append(e)
     found = []
     for index in range(1, true.length + 1):
         now, then = true.at(index), true.at(max(index - late, 1))
@@ -37,7 +34,7 @@ def truth_as_tracks(true: Truth, plane: str = "ground", late: int = 0) -> list[T
         pos, groups, vel = now.pos, now.groups, now.vel
         if plane == "image":
             pos, groups, vel = now.box[:, :2] + now.box[:, 2:] / 2, now.groups_px, np.full((n, 2), np.nan)
-        told = tuple(events.get(index, ()))
+        told = tuple(e for e in true.events or () if e.start == index)
         cov = np.zeros((n, 4, 4))
         answer = Tracks(index, now.t, plane, "person", now.id, group, pos, vel, cov, now.box, np.ones(n), groups, told)
         found.append(answer.replace(groups=None, events=()) if late else answer.replace(own_events=EVENT_KINDS))
@@ -90,11 +87,9 @@ def test_a_beginning_is_scored_as_if_it_were_all() -> None:
     run, true = track("blob", sequence), sequence.truth
     for last in (1, 60, 120, true.length):
         kept = true.frame <= last
-        cut = true.replace(
-            length=last, frame=true.frame[kept], id=true.id[kept], group=true.group[kept], pos=true.pos[kept],
-            vel=true.vel[kept], box=true.box[kept], visibility=true.visibility[kept], groups=true.groups[:last],
-            groups_px=true.groups_px[:last], labelled=true.labelled[:last],
-                events=tuple(e for e in true.events if e.start <= last),
+        cut = with_rows(
+            true, kept, length=last, groups=true.groups[:last], groups_px=true.groups_px[:last],
+            labelled=true.labelled[:last], events=tuple(e for e in true.events if e.start <= last),
         )  # fmt: skip
         for part in (last, range(1, last + 1)):
             found, expected = evaluate(true, run, frames=part), evaluate(cut, run[:last])

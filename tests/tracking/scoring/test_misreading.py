@@ -91,21 +91,21 @@ def test_shares_of_the_picture():
     assert "--box-scale 1920,1080 (shares of the picture)" in text
 
 
-@pytest.mark.parametrize(("shift", "words"), [(1, "-1"), (-1, "+1"), (-20, "+20")])
-def test_shifted_frames(shift, words):
+RENUMBERED = [
+    (lambda frame: frame + 1, "with -1 on frame numbers, 100% would"),
+    (lambda frame: frame - 1, "with +1 on frame numbers, 100% would"),
+    (lambda frame: frame - 20, "with +20 on frame numbers, 100% would"),
+    (lambda frame: (frame - 1) / 5 + 1, "with frames numbered 1, 6, 11, …"),
+]
+
+
+@pytest.mark.parametrize(("number", "words"), RENUMBERED)
+def test_frames_with_other_numbers(number, words):
     rows = walk()
     rows[:, 2:4] += rows[:, :1] * (60, 0)  # fast enough for a frame to matter
-    moved = rows[(rows[:, 0] + shift >= 1) & (rows[:, 0] + shift <= FRAMES)]
-    text = likely_misreading(truth_of(rows), tracks_of(moved[:, 0] + shift, moved[:, 1], moved[:, 2:]))
-    assert f"with {words} on frame numbers, 100% would" in text
-
-
-def test_frames_at_another_rate():
-    rows = walk()
-    rows[:, 2:4] += rows[:, :1] * (60, 0)
-    some = rows[rows[:, 0] % 5 == 1]
-    text = likely_misreading(truth_of(rows), tracks_of((some[:, 0] - 1) // 5 + 1, some[:, 1], some[:, 2:]))
-    assert "with frames numbered 1, 6, 11, …" in text
+    frame = number(rows[:, 0])
+    kept = (frame >= 1) & (frame <= FRAMES) & (frame % 1 == 0)
+    assert words in likely_misreading(truth_of(rows), tracks_of(frame[kept], rows[kept, 1], rows[kept, 2:]))
 
 
 @pytest.mark.parametrize("share", [1, 0.3])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pytest
 from sim.io.source import open_source
 from sim.io.store.track_files import read_tracks
 from tests.reference_trackeval import trackeval_files
+from tests.refusals import answer
 from tracking.app.cli import run
 from tracking.scoring import evaluate
 
@@ -30,9 +30,8 @@ def test_a_generated_dataset(tmp_path: Path, capsys) -> None:
         lengths[folder.name] = open_source(folder)[0].length
     expected = trackeval_files(tmp_path / "data", tmp_path / "trackers", "blob", BENCHMARK="flockscope")
     assert expected.keys() == lengths.keys()
-    capsys.readouterr()
-    assert run(["score", str(data), str(tmp_path / "tracks"), "--similarity", "boxes", "--json"]) == 0
-    exact = {row["name"]: row for row in json.loads(capsys.readouterr().out)["sequences"]}
+    scored = answer(capsys, "score", data, tmp_path / "tracks", "--similarity", "boxes")
+    exact = {row["name"]: row for row in scored["sequences"]}
     for name, scores in expected.items():
         text, told = data / name / "gt" / "gt.txt", texts / f"{name}.txt"
         ours = evaluate(open_source(text, fps=10)[0].truth, read_tracks(told, fps=10, length=lengths[name]))

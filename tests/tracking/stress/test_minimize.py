@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import get_args
@@ -15,6 +14,7 @@ from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario, group_names
 from scenarios.schema.values import bounds
 from tests.processes import FAKE
+from tests.refusals import answer, refused
 from tracking.app.cli import run
 from tracking.errors import groups
 from tracking.errors.people import PersonKind
@@ -36,6 +36,13 @@ def search(fails: Oracle, seen: list[EpisodeOf] | None = None, **changes) -> Sea
             yield Outcome({"HOTA": 0.4 if fails(episode.scenario, episode.seed) else 0.9}, people=1)
 
     return Search(Subject("t", "t"), FAILURE, 3, **{"confirm": 5, "play": play, **changes})
+
+
+def minimised(fails: Oracle, scenario: Scenario | None = None, **changes) -> Search:
+    """The search after its run, of HARD if no scenario is given."""
+    made = search(fails, **changes)
+    made.run(HARD if scenario is None else scenario)
+    return made
 
 
 def names(scenario: Scenario) -> list[str]:
@@ -61,8 +68,7 @@ HARD = load(
 
 def test_the_smallest_scene_is_found_and_no_single_piece_can_be_removed() -> None:
     seen: list[EpisodeOf] = []
-    made = search(needs, seen)
-    made.run(HARD)
+    made = minimised(needs, seen=seen)
     small = made.smallest
     assert names(small) == ["stop-4", "north-1"]
     assert [group.size for group in small.group] == [2, 1]
@@ -84,8 +90,7 @@ def test_orders_go_with_their_groups() -> None:
     small = without(fixed, [piece for piece in script(fixed) if piece.path == ("group", 0)])
     assert small is not None
     assert [event.id for event in small.event] == ["q1"]
-    made = search(lambda s, seed: any(event.type == "split" for event in s.event))
-    made.run(scenario)
+    made = minimised(lambda s, seed: any(event.type == "split" for event in s.event), scenario)
     assert names(made.smallest) == ["a", "b"]
     assert [event.id for event in made.smallest.event] == ["m1", "s1"]  # without m1 there is no ab
 
@@ -126,17 +131,12 @@ def test_a_step_that_fails_with_the_own_seed_alone_is_not_taken() -> None:
     def fails(scenario: Scenario, seed: int) -> bool:
         return seed == 3 or "north-1" in names(scenario)
 
-    made = search(fails)
-    made.run(HARD)
-    assert names(made.smallest) == ["north-1"]
-    own = search(fails, confirm=0)
-    own.run(HARD)
-    assert names(own.smallest) != ["north-1"]
+    assert names(minimised(fails).smallest) == ["north-1"]
+    assert names(minimised(fails, confirm=0).smallest) != ["north-1"]
 
 
 def test_one_confirming_seed_of_five_may_differ() -> None:
-    made = search(lambda scenario, seed: seed != 5)
-    made.run(HARD)
+    made = minimised(lambda scenario, seed: seed != 5)
     assert len(made.smallest.group) == 1
     assert made.smallest.duration <= 1
 
@@ -145,8 +145,7 @@ def test_fresh_seeds_that_do_not_fail_send_the_search_back() -> None:
     def fails(scenario: Scenario, seed: int) -> bool:
         return seed <= 8 or "north-1" in names(scenario)  # the confirming seeds are 4 to 8
 
-    made = search(fails)
-    made.run(HARD)
+    made = minimised(fails)
     assert names(made.smallest) == ["north-1"]
     assert made.guard == list(range(4, 14))
     assert made.fresh_seeds() == list(range(14, 19))
@@ -154,8 +153,7 @@ def test_fresh_seeds_that_do_not_fail_send_the_search_back() -> None:
 
 @pytest.mark.parametrize("budget", [1, 9, 40])
 def test_a_budget_ends_with_the_smallest_scene_so_far(budget: int) -> None:
-    made = search(needs, episodes=budget)
-    made.run(HARD)
+    made = minimised(needs, episodes=budget)
     assert made.played == budget
     assert not made.complete
     assert needs(made.smallest, 3)
@@ -181,9 +179,7 @@ def test_an_order_that_does_not_come_true_is_no_failure() -> None:
         for e in episodes:
             yield Outcome({"HOTA": 0.1}) if e.scenario.duration > 30 else Outcome({"HOTA": 0.1}, problem=error)
 
-    made = search(needs, play=play)
-    made.run(HARD)
-    assert 30 < made.smallest.duration <= 31
+    assert 30 < minimised(needs, play=play).smallest.duration <= 31
 
 
 def test_a_scene_without_the_failure_is_refused_with_its_score() -> None:
@@ -206,10 +202,8 @@ def test_wrong_conditions(text: str, got: str) -> None:
 
 def test_conditions() -> None:
     outcome = Outcome({"IDSW": 3.0}, frozenset({("switch", "hidden")}))
-    for text in ("IDSW>=3", "IDSW > 2", "IDSW<=3", "switch", "switch:hidden"):
-        assert parse_failure(text).holds(outcome), text
-    for text in ("IDSW<3", "HOTA<0.5", "switch:near", "late split"):
-        assert not parse_failure(text).holds(outcome), text
+    true, false = ["IDSW>=3", "IDSW > 2", "IDSW<=3", "switch", "switch:hidden"], ["IDSW<3", "HOTA<0.5", "switch:near"]
+    assert [text for text in (*true, *false, "late split") if parse_failure(text).holds(outcome)] == true
 
 
 def test_every_kind_of_error_can_be_named() -> None:
@@ -243,12 +237,9 @@ def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
     assert "</html>" in Path("small.html").read_text()
     for words in Path("small.toml").read_text().splitlines()[:2]:
         assert run(words.removeprefix("# flockscope ").split()) == 0
-    capsys.readouterr()
-    assert run(["errors", "small-data/flockscope-train/scene-s00006", "small-tracks", "--json"]) == 0
-    (sequence,) = json.loads(capsys.readouterr().out)["sequences"]
+    (sequence,) = answer(capsys, "errors", "small-data/flockscope-train/scene-s00006", "small-tracks")["sequences"]
     assert "fragment" in {error["kind"] for error in sequence["errors"]}
-    assert run([*line, "HOTA<0.01", "--out", "other.toml"]) == 1
-    assert "got HOTA = 0." in capsys.readouterr().err
+    assert "got HOTA = 0." in refused(capsys, *line, "HOTA<0.01", "--out", "other.toml", code=1)
     assert run([*line, "fragment", "--out", "scene.toml"]) == 2
     assert Path("scene.toml").read_text() == SCENE
 
@@ -270,19 +261,15 @@ def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, c
     sequence = "data/flockscope-train/scene-s00004"
     given = "--detections truth --set sensor.detect_prob=0.6 --set coast_time=1.0 --seed 2"
     assert run(f"track blob {sequence} --out tracks {given}".split()) == 0
-    capsys.readouterr()
-    line = ["--while", "fragment", "--confirm", "0", "--episodes", "3", "--json", "--out", "small.toml"]
-    assert run(["minimize", "tracks", *line]) == 0
-    found = json.loads(capsys.readouterr().out)
+    line = ["--while", "fragment", "--confirm", "0", "--episodes", "3", "--out", "small.toml"]
+    found = answer(capsys, "minimize", "tracks", *line)
     assert found["commands"][1].endswith(
         "--detections truth --seed 2 --set coast_time=1.0 --set sensor.detect_prob=0.6 --out small-tracks"
     )
-    assert run(["minimize", sequence, "tracks", *line]) == 0
-    assert json.loads(capsys.readouterr().out) == found
+    assert answer(capsys, "minimize", sequence, "tracks", *line) == found
     Path("elsewhere").mkdir()
     monkeypatch.chdir("elsewhere")
-    assert run(["minimize", "../tracks", *line]) == 2
-    assert "recordings cannot be made smaller" in json.loads(capsys.readouterr().out)["error"]["remedy"]
+    assert "recordings cannot be made smaller" in refused(capsys, "minimize", "../tracks", *line)
 
 
 @pytest.mark.parametrize("condition", ["crash", "IDSW>=0"])

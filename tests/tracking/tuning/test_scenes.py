@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from scenarios.errors import InputError
+from tests.recordings import mot_folder
 from tests.tuning_toys import toy_plan, write_scenes
 from tracking.tuning import search_plan
 
@@ -40,9 +41,7 @@ def test_the_three_sets_share_no_source(tmp_path):
 
 
 def test_a_recording_is_never_tuned_on(tmp_path):
-    folder = tmp_path / "recording"
-    (folder / "gt").mkdir(parents=True)
-    (folder / "gt" / "gt.txt").write_text("1,1,0,0,5,5,1,1,1\n")
+    folder = mot_folder(tmp_path / "recording", "1,1,0,0,5,5,1,1,1\n")
     for option in ("suite", "check"):
         with pytest.raises(InputError, match="nothing is tuned on what was recorded") as caught:
             toy_plan(tmp_path, **{option: str(folder)})

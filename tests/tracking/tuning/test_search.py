@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import FlockscopeError, InputError
+from tests.processes import ROOT
 from tests.toy_tracker import Toy, ToyConfig
 from tests.tuning_toys import TOY, toy_plan, tune_arguments
 from tracking.tuning import tune
@@ -19,7 +20,6 @@ from tracking.tuning.parallel_episodes import episode_player
 from tracking.tuning.sampler import AGAIN
 from tracking.tuning.study import FINISHED, open_study, run_trials
 
-ROOT = Path(__file__).resolve().parents[3]
 KILLED_AT = """
 import os, signal, sys
 from pathlib import Path

@@ -6,13 +6,13 @@ import math
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
 from scenarios.errors import InputError
 from sim.hashing import runtime
+from tests.processes import ROOT
 from tests.tuning_toys import toy_plan
 from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
@@ -107,7 +107,7 @@ def test_a_lock_lives_as_long_as_its_process(tmp_path):
     )
     other = subprocess.Popen(
         [sys.executable, "-c", hold, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[3])},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert other.stdout.readline() == "held\n"
     locks = TrialLocks(path)

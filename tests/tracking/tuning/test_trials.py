@@ -66,14 +66,16 @@ def test_parameters_that_cannot_be_played_are_a_trial_without_value(tmp_path):
     assert len(trials) == 12
 
 
-def test_defaults_that_cannot_be_played_are_an_error(tmp_path):
-    with pytest.raises(InputError, match="expected another"):
-        played(tmp_path, Game(refused=0))
+UNPLAYABLE = [
+    (Game(refused=0), {}, "expected another"),
+    (Game(), {"objective": "queue_F1"}, "queue_F1 unknown in every training scene"),
+]
 
 
-def test_a_score_that_no_scene_has_is_an_error(tmp_path):
-    with pytest.raises(InputError, match="queue_F1 unknown in every training scene"):
-        played(tmp_path, objective="queue_F1")
+@pytest.mark.parametrize(("game", "more", "words"), UNPLAYABLE)
+def test_a_search_without_any_value_is_an_error(tmp_path, game, more, words):
+    with pytest.raises(InputError, match=words):
+        played(tmp_path, game, **more)
 
 
 def test_a_worker_whose_tracker_is_another_one_ends_it_all(tmp_path: Path) -> None:

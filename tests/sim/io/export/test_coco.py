@@ -27,12 +27,8 @@ def test_coco_has_every_box(tmp_path):
     assert [i["id"] for i in found["images"]] == list(range(1, 25))
     seen = [((t.box[:, :2] < (640, 480)) & (t.box[:, :2] + t.box[:, 2:] > 0)).all(axis=1) for t in truths]
     assert [a["id"] for a in found["annotations"]] == list(range(1, sum(map(sum, seen)) + 1))
-    assert [a["track_id"] for a in found["annotations"]] == np.concatenate([t.id for t in truths])[
-        np.concatenate(seen)
-    ].tolist()
-    assert [a["group_id"] for a in found["annotations"]] == np.concatenate([t.group for t in truths])[
-        np.concatenate(seen)
-    ].tolist()
+    rows = [(a["track_id"], a["group_id"]) for a in found["annotations"]]
+    assert rows == [pair for t, s in zip(truths, seen, strict=True) for pair in zip(t.id[s], t.group[s], strict=True)]
     images = {i["id"]: i for i in found["images"]}
     for a in found["annotations"]:
         image = images[a["image_id"]]

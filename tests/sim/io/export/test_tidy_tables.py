@@ -1,9 +1,10 @@
-"""Tidy tables: what they hold agrees with the run or truth, units stand in the names, CSV and Parquet hold the same."""
+"""Tidy tables and texts of trajectories: what they hold agrees with the run or truth; units stand in the names."""
 
 from __future__ import annotations
 
 import csv
 import io
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -171,8 +172,27 @@ def test_people_are_counted_in_frames_without_labels_of_groups():
     )
 
 
-def test_a_table_of_another_program_stays(tmp_path: Path):
-    (tmp_path / "people.csv").write_text("name,age\n")
-    with pytest.raises(InputError, match="did not write"):
-        write_tables(run_tables(walk(), 2.0), tmp_path, "csv", {})
-    assert [p.name for p in tmp_path.iterdir()] == ["people.csv"]
+@pytest.mark.parametrize("form", ["trajnet", "pedpy"])
+def test_texts_of_trajectories_are_read_back(tmp_path, form):
+    tables = run_tables(walk(), 2.0)
+    (path,) = write_tables(tables, tmp_path, form, {"fps": 2.0})
+    (back,) = open_source(path)
+    people, truth = tables.people.columns, back.truth
+    assert back.fps == 2.0
+    assert np.array_equal(truth.frame, people["frame"])
+    assert np.array_equal(truth.id, people["id"])
+    assert np.allclose(truth.pos, np.column_stack([people["x_m"], people["y_m"]]), atol=1e-4)
+
+
+def test_lines_of_trajectories(tmp_path):
+    (path,) = write_tables(run_tables(walk(), 2.0), tmp_path, "trajnet", {"fps": 2.0})
+    scene, *_, last = map(json.loads, path.read_text().splitlines())
+    assert scene == {"scene": {"id": 0, "p": 1, "s": 1, "e": 5, "fps": 2.0}}
+    assert last == {"track": {"f": 121, "p": 3, "x": 9.0, "y": 9.0}}
+    (path,) = write_tables(run_tables(walk(), 2.0), tmp_path, "pedpy", {"fps": 2.0})
+    assert path.read_text().splitlines()[:3] == ["# framerate: 2", "# id\tframe\tx/m\ty/m", "1\t1\t1.0000\t0.0000"]
+
+
+def test_trajectories_in_the_image_are_refused(tmp_path):
+    with pytest.raises(InputError, match="people in the image"):
+        write_tables(run_tables([frame(1, {1: (3, 4, -1)}, plane="image")], 2.0), tmp_path, "pedpy", {"fps": 2.0})

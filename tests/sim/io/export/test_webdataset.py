@@ -23,6 +23,7 @@ from sim.io.store.seal import read_manifest, with_hash
 from sim.io.store.validate import content_hash, validate
 from tests.fake_simulator import content
 from tests.made_up import make_pictured
+from tests.recordings import mot_folder
 
 Sample = dict[str, bytes]
 
@@ -174,8 +175,7 @@ def test_frames_of_videos_are_refused(tmp_path: Path) -> None:
 
 
 def test_what_is_not_ours_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "mot" / "det").mkdir(parents=True)
-    (tmp_path / "mot" / "det" / "det.txt").write_text("1,-1,0,0,4,6,1,-1,-1,-1\n")
+    mot_folder(tmp_path / "mot", det="1,-1,0,0,4,6,1,-1,-1,-1\n")
     for source, word in ((tmp_path / "mot", "a recording, mot"), (tmp_path / "no", "no sequences")):
         with pytest.raises(InputError, match=f"{word}.*flockscope generate"):
             webdataset(source, tmp_path / "out")
@@ -198,10 +198,6 @@ def copied(data: Path, tmp_path: Path, change: Callable[[dict[str, Any], Path], 
     return folder
 
 
-def name_no_files(manifest: dict[str, Any], folder: Path) -> None:
-    manifest.update(files={})
-
-
 def link_out_of_the_sequence(manifest: dict[str, Any], folder: Path) -> None:
     secret = folder.parent / "secret"
     (folder / "scenario.toml").rename(secret)
@@ -209,7 +205,7 @@ def link_out_of_the_sequence(manifest: dict[str, Any], folder: Path) -> None:
 
 
 CHANGED_MANIFESTS = [
-    (name_no_files, r"files: got no scenario.toml and \d+ more"),
+    (lambda manifest, _: manifest.update(files={}), r"files: got no scenario.toml and \d+ more"),
     (link_out_of_the_sequence, r"scenario.toml: got a link that leads out of the sequence"),
 ]
 

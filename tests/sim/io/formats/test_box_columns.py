@@ -26,6 +26,7 @@ def people(ids=True):
 
 def written(tmp_path, rows, name="a.txt"):
     path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
     np.savetxt(path, rows, fmt="%.6g", delimiter=",")
     return path
 
@@ -65,7 +66,6 @@ def test_wrong_scales(text):
 
 
 def test_labels_are_not_scaled(tmp_path):
-    (tmp_path / "gt").mkdir()
     written(tmp_path / "gt", people(), "gt.txt")
     with pytest.raises(InputError, match="none for a recording without det"):
         open_source(tmp_path, fps=10, box_scale="2")
@@ -81,7 +81,6 @@ OTHER_SIZES = [
 @pytest.mark.parametrize(("factor", "words"), OTHER_SIZES)
 def test_boxes_of_pictures_of_another_size(tmp_path, recwarn, factor, words):
     """The warning is gone with the right --box-scale."""
-    (tmp_path / "det").mkdir()
     (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\nseqLength=9\nimWidth=1000\nimHeight=1000\n")
     spread = np.linspace(0, 950, 160)
     box = np.c_[spread, np.random.default_rng(1).permutation(spread), np.full((160, 2), 50)]
@@ -101,7 +100,6 @@ def test_corners(tmp_path, ids):
     with pytest.warns(UserWarning, match="all 48 boxes look like x1,y1,x2,y2, but are read as left,top,width,height"):
         _ = open_source(written(tmp_path, rows), fps=10)[0].truth
     if ids:
-        (tmp_path / "gt").mkdir()
         written(tmp_path / "gt", rows, "gt.txt")
         with pytest.warns(UserWarning, match="look like x1,y1,x2,y2"):
             _ = open_source(tmp_path, fps=10)[0].truth
@@ -124,16 +122,9 @@ def test_a_fault_of_every_line_is_no_fault_of_a_line(tmp_path, column, value, re
     rows[7, column] = value
     with pytest.raises(InputError, match="line 8: ") as error:
         read_track_text(written(tmp_path, rows), 10, FRAMES)
-    assert "correct the" in error.value.remedy or "correct" in error.value.remedy
+    assert "correct" in error.value.remedy
 
 
 def test_detections_are_no_tracks(tmp_path):
     with pytest.raises(InputError, match="these are detections: `flockscope track` them first"):
         read_track_text(written(tmp_path, people(ids=False)), 10, FRAMES)
-
-
-def test_frames_from_zero(tmp_path):
-    rows = people()
-    rows[:, 0] -= 1
-    with pytest.raises(InputError, match="add 1 to all frames, if the file counts them from 0"):
-        read_track_text(written(tmp_path, rows), 10, FRAMES)

@@ -34,18 +34,20 @@ def by_the_book(x, y, z):
     return 1.1 * xd / 5.0e-3 + 324, yd / 4.0e-3 + 282
 
 
-def test_tsai_by_the_book(tmp_path):
+@pytest.fixture
+def bent(tmp_path):
     (tmp_path / "c.xml").write_text(XML)
-    camera = read_tsai(tmp_path / "c.xml")
-    assert camera.image == (768, 576)
+    return read_tsai(tmp_path / "c.xml")
+
+
+def test_tsai_by_the_book(bent):
+    assert bent.image == (768, 576)
     for xyz in np.random.default_rng(0).uniform(-8, 8, (50, 3)):
-        uv, _ = project(camera, xyz[None])
+        uv, _ = project(bent, xyz[None])
         assert uv[0] - 0.5 == pytest.approx(by_the_book(*(1000 * xyz)), abs=1e-6)
 
 
-def test_a_bent_camera_comes_back_and_a_straight_one_says_nothing_of_it(tmp_path):
-    (tmp_path / "c.xml").write_text(XML)
-    bent = read_tsai(tmp_path / "c.xml")
+def test_a_bent_camera_comes_back_and_a_straight_one_says_nothing_of_it(tmp_path, bent):
     for camera in (bent, bent.replace(radial=0.0)):
         document = camera_document(camera)
         assert ("radial" in document) == (camera.radial != 0)
@@ -53,16 +55,14 @@ def test_a_bent_camera_comes_back_and_a_straight_one_says_nothing_of_it(tmp_path
         same(camera, read_camera(tmp_path / "camera.json"))
 
 
-def test_a_calibration_is_scaled_to_the_recording(tmp_path):
-    (tmp_path / "c.xml").write_text(XML)
-    camera = read_tsai(tmp_path / "c.xml")
-    half = scaled_to_image(camera, (384, 288), tmp_path)
+def test_a_calibration_is_scaled_to_the_recording(tmp_path, bent):
+    half = scaled_to_image(bent, (384, 288), tmp_path)
     xyz = np.random.default_rng(0).uniform(-8, 8, (50, 3))
-    assert project(half, xyz)[0] == pytest.approx(project(camera, xyz)[0] / 2)
+    assert project(half, xyz)[0] == pytest.approx(project(bent, xyz)[0] / 2)
     assert half.image == (384, 288)
-    assert scaled_to_image(camera, None, tmp_path) is camera
+    assert scaled_to_image(bent, None, tmp_path) is bent
     with pytest.raises(InputError, match="768×576"):
-        scaled_to_image(camera, (640, 360), tmp_path)
+        scaled_to_image(bent, (640, 360), tmp_path)
 
 
 BROKEN = [

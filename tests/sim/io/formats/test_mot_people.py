@@ -4,6 +4,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.io.store.track_files import read_checked_tracks, read_tracks
+from tests.recordings import mot_folder
 
 BOX = "10,10,20,50"
 
@@ -15,9 +16,7 @@ def rows(tails, frames=3):
 
 
 def labels(tmp_path, tails):
-    (tmp_path / "S" / "gt").mkdir(parents=True)
-    (tmp_path / "S" / "gt" / "gt.txt").write_text(rows(tails))
-    return tmp_path / "S"
+    return mot_folder(tmp_path / "S", rows(tails))
 
 
 def text(tmp_path, tails):
@@ -84,11 +83,6 @@ def test_a_class_that_leaves_nobody_is_an_error_that_counts(tmp_path, wrong):
     assert len(open_source(folder, fps=25, person_class=wrong)[0].truth.id) == 6
 
 
-def test_a_class_of_a_text_without_classes_is_refused(tmp_path):
-    with pytest.raises(InputError, match="got no classes"):
-        _ = open_source(labels(tmp_path, ["1,-1,-1,-1"]), fps=25, person_class=2)[0].truth
-
-
 def test_confidences_that_are_all_zero_are_said(tmp_path):
     with pytest.warns(UserWarning, match="column 7 is 0 in all 6 rows"):
         assert len(open_source(text(tmp_path, ["0", "0"]), fps=25)[0].truth.id) == 6
@@ -148,17 +142,19 @@ def test_columns_that_cannot_be_metres(tmp_path, kind):
     assert found[0].plane == "image"
 
 
-@pytest.mark.parametrize("people", [1, 3])
-def test_zeros_are_unknown(tmp_path, people):
-    path = placed(tmp_path, lambda f, k: (0, 0, 0), people)
-    assert open_source(path, fps=25)[0].truth.pos is None
-    assert read_tracks(path, fps=25)[0].plane == "image"
+PLACES = [
+    (1, lambda f, k: (0, 0, 0), None),  # zeros are unknown
+    (3, lambda f, k: (0, 0, 0), None),
+    (3, lambda f, k: (k + (0.05 * f if k > 1 else 0), 2.25, 0), (1, 2.25)),  # people who walk or stand
+]
 
 
-def test_people_who_walk_or_stand_are_in_metres(tmp_path):
-    path = placed(tmp_path, lambda f, k: (k + (0.05 * f if k > 1 else 0), 2.25, 0))
-    assert np.allclose(open_source(path, fps=25)[0].truth.pos[0], (1, 2.25))
-    assert read_tracks(path, fps=25)[0].plane == "ground"
+@pytest.mark.parametrize(("people", "place", "first"), PLACES)
+def test_zeros_are_unknown_and_people_who_walk_or_stand_are_in_metres(tmp_path, people, place, first):
+    path = placed(tmp_path, place, people)
+    pos = open_source(path, fps=25)[0].truth.pos
+    assert (None if pos is None else tuple(pos[0])) == first
+    assert read_tracks(path, fps=25)[0].plane == ("image" if first is None else "ground")
 
 
 def test_a_camera_file_beside_it_vouches_for_metres(tmp_path):
@@ -198,7 +194,6 @@ def test_positions_alone_are_in_metres_or_refused(tmp_path, unit, header):
 
 
 def test_labels_without_ids_are_an_error(tmp_path):
-    (tmp_path / "gt").mkdir()
-    (tmp_path / "gt" / "gt.txt").write_text(f"1,-1,{BOX},1,1,1\n")
+    mot_folder(tmp_path, f"1,-1,{BOX},1,1,1\n")
     with pytest.raises(InputError, match="negative ids in all 1 rows"):
         _ = open_source(tmp_path, fps=25)[0].truth

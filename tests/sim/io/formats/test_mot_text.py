@@ -90,11 +90,10 @@ GOOD = "1,1,0,0,5,5,1,1,1\n"
 BAD_ROWS = [
     (GOOD + "2,1,0,0,nan,5,1,1,1\n", 2, "finite"), (GOOD + "\n2,1,0,0,5,0,1,1,1\n", 3, "above 0"),
     (GOOD + "1,1,0,0,5,5,1,1,1\n", 2, "once"), (GOOD + "4,1,0,0,5,5,1,1,1\n", 2, "1 to 3"),
-    (GOOD + "0,1,0,0,5,5,1,1,1\n", 2, "1 to 3"), (GOOD + "1.5,1,0,0,5,5,1,1,1\n", 2, "whole"),
+    (GOOD + "0,1,0,0,5,5,1,1,1\n", 2, "1 to 3.* add 1 to all frames, if"), (GOOD + "1.5,1,0,0,5,5,1,1,1\n", 2, "whole"),
     (GOOD + "2,1,0,0,5,x,1,1,1\n", 2, "'x'"), (GOOD + "2,1,0,0,5\n", 2, "9 columns"),
     (GOOD + "2,1,0,0,5,5,1,1,1.5\n", 2, "visibility"), ("1,2,3\n", 1, "columns"),
     (GOOD + "1,2,1e200,0,5,5,1,1,1\n", 2, "within 1e"), (GOOD + "1,1.5,0,0,5,5,1,1,1\n", 2, "whole number"),
-    (GOOD + "1,9007199254740993,0,0,5,5,1,1,1\n", 2, "whole number"),
     (GOOD + "1,1_0,0,0,5,5,1,1,1\n", 2, "'1_0'"), (GOOD + "1,²,0,0,5,5,1,1,1\n", 2, "'²'"),
 ]  # fmt: skip
 
@@ -136,9 +135,6 @@ def test_velocity_of_straight_walks_is_exact_in_any_row_order(seed):
 
 
 def test_nothing_says_how_long_it_is(tmp_path):
-    (tmp_path / "x.txt").write_text("\n")
-    with pytest.raises(InputError, match="no row"):
-        open_source(tmp_path / "x.txt", fps=10)
     with pytest.raises(InputError, match="tells its length"):
         open_source(mot_folder(tmp_path, det="", ini="frameRate=10\n"))
     (s,) = open_source(mot_folder(tmp_path, det="", ini="frameRate=10\nseqLength=3\n"))
@@ -174,10 +170,6 @@ def test_ground_positions_alone(tmp_path):
     assert truth.box is None
     assert truth.pos.tolist() == [[3, 4], [3.5, -1], [-1, -1]]
     assert truth.z.tolist() == [0, 0, 0]
-    for line in ("1,1,3\n", "1,1,3,4,5\n"):
-        path.write_text(line)
-        with pytest.raises(InputError, match="6 to 10 or 4 columns"):
-            mot_text.read_table(path)
 
 
 def test_a_row_that_does_not_count_hides_no_duplicate(tmp_path):
@@ -193,6 +185,7 @@ SEQINFOS = [
     ("seqLength", "9999999"), ("seqLength", "4.5"), ("seqLength", "²"), ("frameRate", "1e9"),
     ("seqLength", "-3"), ("frameRate", "fast"), ("frameRate", "0"), ("frameRate", "nan"),
     ("frameRate", "0.001"), ("imWidth", "60000"), ("imHeight", "480.5"), ("imWidth", "-1"),
+    ("frameRate", "1_0"), ("frameRate", "\u0661\u0660"),
 ]  # fmt: skip
 
 
@@ -223,8 +216,7 @@ def test_chords_look_back_only():
 
 def test_copied_names_of_sequences_are_said_and_the_folders_names_count(tmp_path):
     for name in ("cam1", "cam2"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "seqinfo.ini").write_text("[Sequence]\nname=MOT17-02\nframeRate=30\nseqLength=3\n")
+        mot_folder(tmp_path / name, ini="name=MOT17-02\nframeRate=30\nseqLength=3\n", det="")
     with pytest.warns(UserWarning, match="MOT17-02 is the name of 2 sequences"):
         assert [s.name for s in open_source(tmp_path)] == ["cam1", "cam2"]
 

@@ -10,7 +10,7 @@ ROW = "{} {} {} 0 {} 1.0 0 0.0\n"
 
 
 def biwi_folder(tmp_path, groups="", rows=None):
-    rows = rows or [(f, i, f / 10, i) for f in (1, 11, 21, 81) for i in (1, 2, 3)]
+    rows = [(f, i, f / 10, i) for f in (1, 11, 21, 81) for i in (1, 2, 3)] if rows is None else rows
     (tmp_path / "obsmat.txt").write_text("".join(ROW.format(*row) for row in rows))
     (tmp_path / "groups.txt").write_text(groups)
     return tmp_path
@@ -63,18 +63,23 @@ def test_biwi_without_groups_is_not_labelled(tmp_path):
 
 
 BAD_BIWI = [
-    ("1 x\n", None, "ids of people"),
-    ("", [(1, 1, 0, 0), (1, 1, 0, 0)], "once"),
-    ("", [(1, 1, "nan", 0)], "finite"),
-    ("", [(1, 1.5, 0, 0)], "whole"),
+    ("1 x\n", None, "line 1: .*ids of people"),
+    ("", [(1, 1, 0, 0), (1, 1, 0, 0)], "line 2: .*once"),
+    ("", [(1, 1, "nan", 0)], "line 1: .*finite"),
+    ("", [(1, 1.5, 0, 0)], "line 1: .*whole"),
+    ("", [(1, 1, 1e200, 0)], "line 1: .*within 1e"),
+    ("", [(1, -1, 0, 0)], "line 1: .*ids from 0"),
+    ("", [(1, 1, 0, 0), (11, 1, 0, 0), (80_000_000, 1, 0, 0)], "frames from 1 to 1000000"),
+    ("", [(k * 10, p, 0, 0) for k in (1, 2, 3, 900_000) for p in range(30)], "frames times people"),
+    ("", [(f, 1, f / 10, 1) for f in (0, 6, 12, 18, 24, 30, 31, 32, 33, 42, 48)], "nearer than a step"),
+    ("", [], "no line"),
 ]
 
 
 @pytest.mark.parametrize(("groups", "rows", "word"), BAD_BIWI)
 def test_bad_biwi_is_one_line(tmp_path, groups, rows, word):
-    with pytest.raises(InputError, match=word) as error:
+    with pytest.raises(InputError, match=word):
         open_source(biwi_folder(tmp_path, groups, rows))[0].truth  # noqa: B018
-    assert error.value.place.startswith("line ")
 
 
 DOES = "<hypothesislist><hypothesis><movement>walking</movement></hypothesis></hypothesislist>"
@@ -192,26 +197,6 @@ def test_biwi_that_changes_back_to_the_first_grid(tmp_path):
     (s,) = open_source(biwi_folder(tmp_path, "", rows))
     assert s.truth.frame.tolist() == [1, 2, 3, 5, 6, 7, 8, 9, 10, 13, 14]
     assert np.all(np.abs(s.truth.frame - 1 - (np.array([r[0] for r in rows]) - 780) / STEP) <= 1)
-
-
-def test_biwi_with_a_person_thrice_in_a_step_is_refused(tmp_path):
-    rows = [(f, 1, f / 10, 1) for f in (0, 6, 12, 18, 24, 30, 31, 32, 33, 42, 48)]
-    with pytest.raises(InputError, match="nearer than a step"):
-        open_source(biwi_folder(tmp_path, "", rows))
-
-
-def test_biwi_bounds(tmp_path):
-    for rows, word in (
-        ([(1, 1, 0, 0), (11, 1, 0, 0), (80_000_000, 1, 0, 0)], "frames from 1 to 1000000"),
-        ([(1, 1, 1e200, 0)], "within 1e"),
-        ([(1, -1, 0, 0)], "ids from 0"),
-        ([(k * 10, p, 0, 0) for k in (1, 2, 3, 900_000) for p in range(30)], "frames times people"),
-    ):
-        with pytest.raises(InputError, match=word):
-            open_source(biwi_folder(tmp_path, "", rows))
-    (tmp_path / "obsmat.txt").write_text("")
-    with pytest.raises(InputError, match="no line"):
-        open_source(tmp_path)
 
 
 def test_cvml_of_caviar_says_what_is_assumed(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.formats.calibration import read_calibration
 from sim.io.source import open_source
+from tests.recordings import mot_folder
 from tests.sim.scene.test_stereo import rig
 from tracking.running.run import track
 
@@ -59,11 +60,9 @@ def test_a_folder_with_right_pictures_is_a_stereo_recording(tmp_path) -> None:
     made = {
         name: [still + r.integers(0, 9, still.shape, np.uint8) for _ in range(12)] for name in ("img1", "img1_right")
     }
-    for name, pictures in made.items():
-        (tmp_path / "rec" / name).mkdir(parents=True)
-        for k, picture in enumerate(pictures, 1):
-            cv2.imwrite(str(tmp_path / "rec" / name / f"{k:06d}.png"), picture)
-    (tmp_path / "rec/img1_right/000007.png").unlink()
+    shown = {f"{name}/{k:06d}.png": p for name, pictures in made.items() for k, p in enumerate(pictures, 1)}
+    del shown["img1_right/000007.png"]
+    mot_folder(tmp_path / "rec", pictures=shown)
     write_yaml(tmp_path / "pair.yml", camera)
     (sequence,) = open_source(tmp_path / "rec", camera=tmp_path / "pair.yml", fps=30.0)
     with pytest.warns(UserWarning, match="frame 7"):
@@ -79,42 +78,34 @@ def test_a_folder_with_right_pictures_is_a_stereo_recording(tmp_path) -> None:
 
 def test_right_pictures_are_numbered_like_the_left_ones(tmp_path) -> None:
     """Also if the first right picture is lost: 000000.png of the left is frame 1, so 000002.png of the right is 3."""
-    for name, numbers in (("img1", range(4)), ("img1_right", (2, 3))):
-        (tmp_path / name).mkdir()
-        for k in numbers:
-            cv2.imwrite(str(tmp_path / name / f"{k:06d}.png"), np.full((*SIZE, 3), 10 * k, np.uint8))
-    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\n")
-    (sequence,) = open_source(tmp_path)
+    numbers = [("img1", k) for k in range(4)] + [("img1_right", k) for k in (2, 3)]
+    pictures = {f"{name}/{k:06d}.png": np.full((*SIZE, 3), 10 * k, np.uint8) for name, k in numbers}
+    (sequence,) = open_source(mot_folder(tmp_path, ini="frameRate=10\n", pictures=pictures))
     with pytest.warns(UserWarning, match="right: frame 1 has no readable picture"):
         frames = list(sequence)
     assert [f.image[0, 0, 0] for f in frames] == [0, 10, 20, 30]
     assert [None if f.right is None else f.right[0, 0, 0] for f in frames] == [None, None, 20, 30]
 
 
-@pytest.mark.parametrize("unit", [1000, 100])
-def test_a_baseline_that_is_not_in_metres_is_refused(tmp_path, unit) -> None:
+OTHER_UNITS = [
+    (120.0, 1, r"baseline: got 120 m.*divide by 1000"),
+    (12.0, 1, r"baseline: got 12 m.*divide by 1000"),
+    (120.0, 1000, r"position: got height .*all lengths in metres"),
+]
+
+
+@pytest.mark.parametrize(("baseline", "unit", "words"), OTHER_UNITS)
+def test_lengths_that_are_not_in_metres_are_refused(tmp_path, baseline, unit, words) -> None:
     """OpenCV's T is in the unit of the calibration board, often mm or cm."""
     camera = rig(40.0)
-    left = np.array([[camera.focal_px[0], 0, 40, 0], [0, camera.focal_px[1], 30, 0], [0, 0, 1, 0]])
-    right = left.copy()
-    right[0, 3] = -camera.focal_px[0] * unit * 0.12
-    write_yaml(tmp_path / "pair.yml", camera, P1=left, P2=right)
-    with pytest.raises(InputError, match=rf"baseline: got {unit * 0.12:g} m.*divide by 1000"):
-        read_calibration(tmp_path / "pair.yml")
-
-
-def test_a_whole_calibration_in_mm_is_refused(tmp_path) -> None:
-    camera = rig(40.0)
-    write_yaml(tmp_path / "pair.yml", camera.replace(baseline=120.0), position=1000 * camera.position)
-    with pytest.raises(InputError, match=r"position: got height .*all lengths in metres"):
+    write_yaml(tmp_path / "pair.yml", camera.replace(baseline=baseline), position=unit * camera.position)
+    with pytest.raises(InputError, match=words):
         read_calibration(tmp_path / "pair.yml")
 
 
 def test_right_pictures_without_numbers_are_as_many_as_the_left_ones(tmp_path) -> None:
-    for name, files in (("img1", "abc"), ("img1_right", "bc")):
-        (tmp_path / name).mkdir()
-        for file in files:
-            cv2.imwrite(str(tmp_path / name / f"{file}.png"), np.zeros((*SIZE, 3), np.uint8))
-    (tmp_path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\n")
+    files = ["img1/a", "img1/b", "img1/c", "img1_right/b", "img1_right/c"]
+    pictures = {f"{file}.png": np.zeros((*SIZE, 3), np.uint8) for file in files}
+    mot_folder(tmp_path, ini="frameRate=10\n", pictures=pictures)
     with pytest.raises(InputError, match="2 pictures without numbers; expected 3, as in img1"):
         open_source(tmp_path)

@@ -250,16 +250,6 @@ def test_the_background_sample(tmp_path, name, asked, wanted, words):
     assert np.array_equal(sequence.background(), np.stack([frames[k - 1] for k in wanted]))
 
 
-def test_a_sample_longer_than_the_video(tmp_path):
-    path = write_video(tmp_path / "a.mp4", [picture(k) for k in range(12)])
-    with pytest.raises(InputError, match="--background: got a recording of 12 frames; expected 30 or more"):
-        open_source(path, background="first:30")
-    sequence = one(path)
-    with pytest.warns(UserWarning, match="all 12 are taken"):
-        assert len(sequence.background()) == 12
-    assert sequence.source["background"].startswith("12 frames")
-
-
 def test_a_folder_of_videos(tmp_path):
     for name in ("b.mp4", "a.avi"):
         write_video(tmp_path / name, [picture(k) for k in range(3)])

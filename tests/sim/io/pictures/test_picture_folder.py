@@ -252,10 +252,9 @@ def test_a_folder_without_pictures(tmp_path):
     assert [f.image for f in sequence] == [None] * 9
     with pytest.raises(InputError, match="without pictures"):
         open_source(path, images=True, background="first:3")
-    for text in ("a.txt",):
-        (tmp_path / text).write_text(ROWS)
-        with pytest.raises(InputError, match="--background"):
-            open_source(tmp_path / text, background="first:3")
+    (tmp_path / "a.txt").write_text(ROWS)
+    with pytest.raises(InputError, match="--background"):
+        open_source(tmp_path / "a.txt", background="first:3")
 
 
 def test_the_sample_of_a_folder(tmp_path):

@@ -18,6 +18,7 @@ from sim.io.store.seal import NAMES, check_run
 from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
 from sim.types import Tracks
+from tests.recordings import mot_folder
 from tests.refusals import answer, refused
 from tests.sealing import seal_again
 from tests.short_scene import write_short_scene
@@ -123,10 +124,8 @@ def test_nothing_later_is_used(tmp_path, capsys, form):
             rows = (source / "obsmat.txt").read_text().splitlines(keepends=True)
             (source / "obsmat.txt").write_text("".join(rows[: len(WALK) * (50 if name == "whole" else cut)]))
         else:
-            source = folder / "walk" / "gt" / "gt.txt"
-            source.parent.mkdir(parents=True)
-            source.write_text(text(frames) if form == "ground text" else boxes(frames))
-            source = source if form == "ground text" else folder / "walk"
+            source = mot_folder(folder / "walk", text(frames) if form == "ground text" else boxes(frames))
+            source = source / "gt" / "gt.txt" if form == "ground text" else source
         answer(capsys, "group", source, *options, "--out", folder / "g")
         found.append(read_tracks(folder / "g")[: cut - 1])
     for a, b in zip(*found, strict=True):

@@ -33,6 +33,11 @@ def made(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.fixture
+def one(made: Path) -> Path:
+    return made / "data" / "flockscope-train" / "merge-s00005"
+
+
 @pytest.mark.parametrize("by", ["hull", "members"])
 def test_files_are_memory(made: Path, capsys, by: str) -> None:
     found = answer(capsys, "score", made / "data", made / "file", "--group-match", by)
@@ -50,14 +55,13 @@ def scene() -> Sequence:
 
 
 @pytest.mark.parametrize("plane", ["ground", "image"])
-def test_files_are_memory_for_groups_as_wholes(made: Path, scene: Sequence, tmp_path: Path, capsys, plane: str) -> None:
+def test_files_are_memory_for_groups_as_wholes(one: Path, scene: Sequence, tmp_path: Path, capsys, plane: str) -> None:
     """Hulls, extents, sizes and events come back exactly, and with them every score; of people there is none."""
     answers = wholes(scene, plane)
-    data = made / "data" / "flockscope-train" / "merge-s00005"
-    folder = tmp_path / data.name
+    folder = tmp_path / one.name
     write_tracks(folder, answers, fps=scene.fps, camera=scene.camera, scene=scene.scene)
     for by in ("hull", "members"):
-        (row,) = answer(capsys, "score", data, folder, "--group-match", by)["sequences"]
+        (row,) = answer(capsys, "score", one, folder, "--group-match", by)["sequences"]
         expected = evaluate(scene.truth, answers, group_match=by)
         assert row["surface"] == plane
         assert expected["group_F1"] > 0.8
@@ -91,7 +95,7 @@ def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, 
     assert "95 % low" not in text
 
 
-def test_the_mean_has_every_key_and_an_interval(made: Path, capsys) -> None:
+def test_the_mean_has_every_key_and_an_interval(made: Path, one: Path, capsys) -> None:
     found = answer(capsys, "score", made / "data", made / "file")
     assert list(found["mean"]) == list(CATALOGUE)
     first, second = (row["pairwise_F1"] for row in found["sequences"])
@@ -100,8 +104,8 @@ def test_the_mean_has_every_key_and_an_interval(made: Path, capsys) -> None:
     _, low, high = mean_interval(np.array([[first], [second]]))
     assert (mean["low"], mean["high"]) == (max(0.0, low[0]), min(1.0, high[0])), "within the score's range"
     assert found["mean"]["cross_F1"] == {"mean": None, "low": None, "high": None}
-    one = answer(capsys, "score", made / "data" / "flockscope-train" / "merge-s00005", made / "file")["mean"]["HOTA"]
-    assert one["low"] is one["high"] is None
+    alone = answer(capsys, "score", one, made / "file")["mean"]["HOTA"]
+    assert alone["low"] is alone["high"] is None
 
 
 def seen(scene: Sequence) -> list[Tracks]:
@@ -119,24 +123,22 @@ def in_image(folder: Path, scene: Sequence, detections: str) -> Path:
 
 
 def test_boxes_are_compared_by_their_feet_where_the_camera_is_known(
-    made: Path, scene: Sequence, tmp_path: Path, capsys
+    made: Path, one: Path, scene: Sequence, tmp_path: Path, capsys
 ) -> None:
     """A text of boxes was scored by overlap beside tracks on the ground; its HOTA was .26 lower for the same tracks."""
-    data = made / "data" / "flockscope-train" / "merge-s00005"
     folder = in_image(tmp_path / "image", scene, "file")
     text = tmp_path / "merge-s00005.txt"
     text.write_text((folder / "merge-s00005" / "tracks.mot.txt").read_text())
-    (ground,) = answer(capsys, "score", data, made / "file")["sequences"]
+    (ground,) = answer(capsys, "score", one, made / "file")["sequences"]
     for path in (folder, text):
-        (row,) = answer(capsys, "score", data, path)["sequences"]
+        (row,) = answer(capsys, "score", one, path)["sequences"]
         assert (row["similarity"], row["surface"]) == ("ground", "ground")
         assert row["HOTA"] == pytest.approx(ground["HOTA"], abs=0.1)
-        assert row["HOTA"] > answer(capsys, "score", data, path, "--similarity", "boxes")["sequences"][0]["HOTA"] + 0.05
+        assert row["HOTA"] > answer(capsys, "score", one, path, "--similarity", "boxes")["sequences"][0]["HOTA"] + 0.05
 
 
-def test_two_runs_of_one_recording(made: Path, capsys) -> None:
+def test_two_runs_of_one_recording(made: Path, one: Path, capsys) -> None:
     """Resampled frames were joined, and each join was a switch: IDSW 24 had the interval [46, 76]."""
-    one = made / "data" / "flockscope-train" / "merge-s00005"
     found = answer(capsys, "score", one, made / "truth", made / "file", "--blocks", "200")
     (pair,), alone = found["differences"], answer(capsys, "score", one, made / "truth", "--blocks", "200")["mean"]
     assert (pair["run"], pair["minus"]) == ("truth", "file")
@@ -154,13 +156,12 @@ def test_two_runs_of_one_recording(made: Path, capsys) -> None:
     assert answer(capsys, "score", one, made / "file", made / "truth", "--blocks", "200") == found
 
 
-def test_runs_are_compared_in_one_plane(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
+def test_runs_are_compared_in_one_plane(made: Path, one: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
     """One run is from pixels, the other on the ground: metres were subtracted from pixels."""
-    data = made / "data" / "flockscope-train" / "merge-s00005"
     image = in_image(tmp_path / "image", scene, "image")
-    alone = answer(capsys, "score", data, made / "file")["sequences"][0]
+    alone = answer(capsys, "score", one, made / "file")["sequences"][0]
     assert (alone["similarity"], alone["surface"]) == ("ground", "ground")
-    found = answer(capsys, "score", data, made / "file", image)
+    found = answer(capsys, "score", one, made / "file", image)
     assert found["similarity"] == "image"
     (scores,) = found["scores"]["file"].values()
     assert scores["GOSPA"] > 5 * alone["GOSPA"], "px"
@@ -169,10 +170,10 @@ def test_runs_are_compared_in_one_plane(made: Path, scene: Sequence, tmp_path: P
     assert "all tracks are compared in the image" in found["notes"][0]
 
 
-def test_runs_that_fit_no_common_plane_are_refused(made: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
-    data, folder = made / "data" / "flockscope-train" / "merge-s00005", tmp_path / "wholes"
+def test_runs_that_fit_no_plane_are_refused(made: Path, one: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
+    folder = tmp_path / "wholes"
     write_tracks(folder / "merge-s00005", wholes(scene, "ground"), fps=scene.fps)
     image = in_image(tmp_path / "image", scene, "image")
-    error = refused(capsys, "score", data, folder, image)
+    error = refused(capsys, "score", one, folder, image)
     assert "runs in the image (px), and one on the ground (m) with groups without people" in error
-    assert run(["score", str(data), str(folder), str(made / "file")]) == 0
+    assert run(["score", str(one), str(folder), str(made / "file")]) == 0

@@ -11,6 +11,7 @@ import pytest
 
 from sim.io.source import open_source
 from sim.io.store.track_files import read_tracks
+from tests.refusals import answer
 from tests.short_scene import write_short_scene
 from tracking.app.cli import run
 
@@ -30,8 +31,7 @@ def table(path: Path) -> list[dict[str, str]]:
 
 def test_a_run_agrees_with_its_tables(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stored = made / "runs" / "scene-s20000"
-    assert run(["export", "csv", str(stored), "--out", str(tmp_path), "--json"]) == 0
-    (told,) = json.loads(capsys.readouterr().out)["tables"]
+    (told,) = answer(capsys, "export", "csv", stored, "--out", tmp_path)["tables"]
     tracks = read_tracks(stored)
     people = [(t.index, int(i), int(g)) for t in tracks for i, g in zip(t.id, t.group, strict=True)]
     assert [(int(r["frame"]), int(r["id"]), int(r["group"])) for r in table(tmp_path / "people.csv")] == people

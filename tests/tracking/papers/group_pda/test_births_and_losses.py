@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sim.truth.merge_split_rules import SPLIT_VELOCITY
-from sim.types import Array, Context
+from sim.types import Array, Context, Tracks
 from tests.painted import ids
 from tests.tracking.papers.group_pda.test_tracker import FPS, GROUND, block, changes, events, noisy, sizes, track
 from tracking.papers.group_pda.config import GroupPdaConfig
@@ -154,25 +154,24 @@ def test_two_that_stand_beside_each_other_do_not_join_and_part(gap: float) -> No
         assert len(events(made, "merge")) <= 1
 
 
+def one_aside(seed: int, frames: int, back: float = np.inf, hidden: float = np.inf) -> list[Tracks]:
+    """Of five, one goes 1.4 m from the others, beyond the search region, and comes back; the others may be hidden."""
+    r, made = np.random.default_rng(seed), []
+    for k in range(frames):
+        aside = 0.8 + 0.6 * np.clip(min(k - 30, back - k) / 10, 0, 1)
+        made.append(noisy([block(2, 2)[: 0 if k > hidden else 4], np.array([[0.3 + aside, 0.0]])], r))
+    return track(made)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_member_who_steps_aside_for_a_moment_stays_in_the_group(seed: int) -> None:
-    """One of five is 1.4 m from the others for a second, beyond the search region, and comes back."""
-    r, made = np.random.default_rng(seed), []
-    for k in range(90):
-        aside = 0.8 + 0.6 * np.clip(min(k - 30, 60 - k) / 10, 0, 1)
-        made.append(noisy([block(2, 2), np.array([[0.3 + aside, 0.0]])], r))
-    said = track(made)
+    said = one_aside(seed, 90, back=60)
     assert not changes(said)
     assert [sizes(t).tolist() for t in said[-1:]] == [pytest.approx([5], abs=0.5)]
 
 
 def test_a_hidden_member_does_not_end_a_group_of_two_parts() -> None:
     """The larger part is lost while the other, who has come apart, stays: no leave, and the group keeps its id."""
-    r, made = np.random.default_rng(0), []
-    for k in range(80):
-        aside = 0.8 + 0.6 * np.clip((k - 30) / 10, 0, 1)
-        hidden = k > 50
-        made.append(noisy([block(2, 2)[: 0 if hidden else 4], np.array([[0.3 + aside, 0.0]])], r))
-    said = track(made)
+    said = one_aside(0, 80, hidden=50)
     assert ids(said) == {1}
     assert not events(said, "leave", "split")

@@ -97,15 +97,18 @@ def test_of_a_large_group_the_cut_between_two_clumps_is_found():
     assert share(drawn, true) > 0.9
 
 
-def test_a_group_takes_part_in_one_event_of_a_frame():
-    """Three people in a row, merges certain: two of them merge, the third cannot join in the same frame (D3)."""
-    drawn = proposed([[0, 0], [1, 0], [2, 0]], [0, 0, 0], weights(merge=100.0), rules(ratio=1.0))
-    assert {tuple(d) for d in drawn.tolist()} == {(1, 1, 0), (0, 2, 2)}
+MERGES = [
+    # three people in a row: two of them merge, the third cannot join in the same frame (D3)
+    ([[0, 0], [1, 0], [2, 0]], [0, 0, 0], {(1, 1, 0), (0, 2, 2)}),
+    # a group merges with the nearest one only
+    ([[0, 0], [0.8, 0], [3, 0], [9, 0]], [1, 1, 0, 0], {(1, 1, 1, 0), (1, 1, 3, 3)}),
+]
 
 
-def test_a_group_merges_with_the_nearest_one_only():
-    drawn = proposed([[0, 0], [0.8, 0], [3, 0], [9, 0]], [1, 1, 0, 0], weights(merge=100.0), rules(ratio=1.0))
-    assert {tuple(d) for d in drawn.tolist()} <= {(1, 1, 1, 0), (1, 1, 3, 3)}
+@pytest.mark.parametrize(("pos", "label", "outcomes"), MERGES)
+def test_a_group_takes_part_in_one_event_of_a_frame_and_merges_with_the_nearest(pos, label, outcomes):
+    drawn = proposed(pos, label, weights(merge=100.0), rules(ratio=1.0))
+    assert {tuple(d) for d in drawn.tolist()} == outcomes
 
 
 def test_features_are_those_of_the_definition():

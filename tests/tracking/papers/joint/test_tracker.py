@@ -5,32 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.types import Context, Detections, Frame
+from sim.types import Context, Frame
+from tests.point_frames import FPS, detections, stepped
 from tracking.papers.joint.config import LARGEST_DISTANCE, JointConfig
 from tracking.papers.joint.distributions import process_noise
 from tracking.papers.joint.tracker import Joint
 from tracking.stats import paired
 
-FPS = 10.0
 QUIET = {
     f"{event}_weights": (*weights[:-1], -100.0)
     for event, weights in zip(("merge", "split"), JointConfig().classifier.tolist(), strict=True)
 }
-
-
-def detections(index, points):
-    pos = np.array(points, float).reshape(-1, 2)
-    return Detections(index, (index - 1) / FPS, "ground", pos, None, None, np.ones(len(pos)))
-
-
-def stepped(tracker, frames, seed=0):
-    """The tracks of frames given as lists of points, None for a frame without information."""
-    tracker.reset(Context(FPS, float("nan")), seed)
-    out = []
-    for k, points in enumerate(frames, 1):
-        found = None if points is None else detections(k, points)
-        out.append(tracker.step(Frame(k, (k - 1) / FPS), found))
-    return out
 
 
 def walk(starts, velocity, frames, noise=0.0, seed=0):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from sim.types import Context
+from tests.point_frames import stepped
 from tests.reference_relational import drawn, relate
-from tests.tracking.papers.joint.test_tracker import stepped
 from tracking.papers.relational import sensor, sensor_kernels
 from tracking.papers.relational.association_sums_kernels import exact_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig

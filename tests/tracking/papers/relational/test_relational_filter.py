@@ -10,7 +10,8 @@ import pytest
 
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from sim.types import Context, Detections, Frame
+from sim.types import Context, Frame
+from tests.point_frames import detections, stepped
 from tests.reference_relational import drawn, relate, relations
 from tests.tracking.papers.relational.test_particle_weights import sight
 from tracking.filters.person_streams import birth_keys
@@ -40,21 +41,6 @@ def move(particles, noise, table, coupling, dt, shared=None, alike=ALWAYS, sprea
     transition_kernels.move(
         p.pos, p.vel, p.exist, p.pairs, p.related, noise, shared, table, coupling, alike, spread, dt
     )  # fmt: skip
-
-
-def detections(index, *points):
-    pos = np.array(points, float).reshape(-1, 2)
-    return Detections(index, index - 1.0, "ground", pos, None, None, np.ones(len(pos)))
-
-
-def stepped(tracker, fps, *frames, seed=0):
-    """The tracks of frames given as lists of points, None for a frame without information."""
-    tracker.reset(Context(fps, float("nan")), seed)
-    out = []
-    for k, points in enumerate(frames, 1):
-        found = None if points is None else detections(k, *points)
-        out.append(tracker.step(Frame(k, (k - 1) / fps), found))
-    return out
 
 
 def first(sequence, length):
@@ -110,7 +96,7 @@ def test_one_person_converges_to_the_kalman_filter(monkeypatch):
     counts, errors = [500, 2000, 8000], []
     for count in counts:
         tracker = Particle(dataclasses.replace(config, particles=count))
-        runs = [stepped(tracker, fps, *([p] for p in points), seed=s) for s in range(8)]
+        runs = [stepped(tracker, [[p] for p in points], s) for s in range(8)]
         means = np.array([[t.pos[0] for t in run] for run in runs])
         errors.append(np.sqrt(np.mean((means - true)[:, 2:] ** 2)))
     slope = np.polyfit(np.log(counts), np.log(errors), 1)[0]
@@ -188,7 +174,7 @@ def test_a_hidden_partner_has_a_bounded_velocity_variance():
 def test_without_information_weights_stay_and_people_go_straight_on():
     tracker = Relational(RelationalConfig(**flat_table(1e-6)))
     walk = [[(0.1 * k, 0.0), (0.1 * k, 1.0)] for k in range(15)]
-    before = stepped(tracker, 10.0, *walk)[-1]
+    before = stepped(tracker, walk)[-1]
     tracker.particles.weights = np.random.default_rng(0).dirichlet(np.ones(tracker.particles.count), 2).T.copy()
     weights = tracker.particles.weights.copy()
     first = tracker.step(Frame(16, 1.5), None)
@@ -200,8 +186,8 @@ def test_without_information_weights_stay_and_people_go_straight_on():
 
 @pytest.mark.parametrize("kind", [Particle, Relational])
 def test_who_is_only_predicted_is_not_seen(kind):
-    seen = [t.seen.tolist() for t in stepped(kind(), 10, *[[(0, 0), (9, 0)]] * 5, None, [(0, 0)], [(0, 0), (9, 0)])]
-    assert seen[4:] == [[True, True], [False, False], [True, False], [True, True]]
+    tracks = stepped(kind(), [*[[(0, 0), (9, 0)]] * 5, None, [(0, 0)], [(0, 0), (9, 0)]])
+    assert [t.seen.tolist() for t in tracks[4:]] == [[True, True], [False, False], [True, False], [True, True]]
 
 
 @pytest.mark.parametrize("detect", [np.zeros(2), np.full(2, 0.9)])
@@ -270,7 +256,7 @@ def test_with_the_papers_sensor_a_person_who_jumps_is_a_new_one():
     """No particle explains the detection, so that a float has no weight for it; the other person stays (E8)."""
     walk = [[(0.1 * k, 0.0), (0.1 * k, 5.0)] for k in range(10)]
     walk += [[(60.0 + 0.1 * k, 0.0), (1.0 + 0.1 * k, 5.0)] for k in range(35)]
-    before, *_, last = stepped(Particle(ParticleConfig(**CERTAIN, noise_scale=1.0)), 10.0, *walk)[9:]
+    before, *_, last = stepped(Particle(ParticleConfig(**CERTAIN, noise_scale=1.0)), walk)[9:]
     assert len(before.id) == len(last.id) == 2
     assert len(set(before.id.tolist()) & set(last.id.tolist())) == 1
     np.testing.assert_allclose(np.sort(last.pos[:, 0]), [4.4, 63.4], atol=0.2)
@@ -395,7 +381,7 @@ def walked(evidence, apart, frames):
     out = []
     for k in range(frames):
         x = 0.12 * k
-        tracker.step(Frame(k + 1, k / 10), detections(k + 1, (x, 0), (x, apart(k / 10))))
+        tracker.step(Frame(k + 1, k / 10), detections(k + 1, [(x, 0), (x, apart(k / 10))]))
         ids, together = tracker.walking_together()
         out.append(together[0, 1] if len(ids) == 2 else np.nan)
     return np.array(out)

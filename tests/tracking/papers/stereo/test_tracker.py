@@ -16,7 +16,7 @@ from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
 from tracking.papers.stereo import space_group
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.group_life import merge, overlap, pooled, separation, sphere_groups
+from tracking.papers.stereo.group_life import overlap, pooled, separation, sphere_groups
 from tracking.papers.stereo.points import stereo_camera
 from tracking.papers.stereo.space_group import VEL, PairMeasurement, PlaceMeasurement
 from tracking.papers.stereo.tracker import Stereo
@@ -127,12 +127,7 @@ def test_a_point_in_no_region_belongs_to_nobody(away: float, owner: int) -> None
     group = space_group.newborn(step, PLACE, space_group.motion_model(config, 1 / FPS), 0.0)
     cov = 4e-4 * np.eye(3)[None]
     point = SpacePoints(
-        np.array([99]),
-        group.pos[None] + [away, 0, 0],
-        cov,
-        group.ekf.x[None, VEL, 0],
-        25 * cov,
-        np.zeros(1),
+        np.array([99]), group.pos[None] + [away, 0, 0], cov, group.ekf.x[None, VEL, 0], 25 * cov, np.zeros(1)
     )
     assert sphere_groups(np.concatenate([step.pos, point.pos]), config.radius, 1).tolist() == [0] * 13
     assert space_group.associated([group], point, config).tolist() == [owner]
@@ -172,23 +167,6 @@ def test_groups_of_one_velocity_merge_and_opposite_ones_never() -> None:
         assert "merge" not in kinds(scripted(together(a, b))[1])
 
 
-def people(*groups: tuple[int, int, float, float]) -> list[space_group.SpaceGroup]:
-    """Groups that walk alike: id, number of points, place, first time."""
-    model, made = space_group.motion_model(StereoConfig(), 1 / FPS), []
-    for id, count, start, first_seen in groups:
-        (step,) = together(walkers(count, count, [start, 5, 1], [1, 0, 0], 1))
-        made.append(space_group.newborn(step, PLACE, model, first_seen))
-        made[-1].id = id
-    return made
-
-
-def test_the_larger_group_keeps_its_id_when_two_merge() -> None:
-    groups = people((1, 12, 1.0, 0.0), (2, 30, 1.0, 4.3))
-    (found,) = merge(groups, StereoConfig(), 5.0)
-    assert (found.kind, found.before) == ("merge", (1, 2))
-    assert [g.id for g in groups] == [2]
-
-
 @pytest.mark.parametrize("distance", [0.0, 0.1, 0.5, 1.0, 2.0, 4.0])
 @pytest.mark.parametrize("direction", [0.0, 0.8, 1.6])
 def test_regions_of_opposite_groups_overlap_at_no_distance(distance: float, direction: float) -> None:
@@ -199,10 +177,8 @@ def test_regions_of_opposite_groups_overlap_at_no_distance(distance: float, dire
     def group(at: float, speed: float):
         pos = np.array([at, 5.0, 1.0]) + 0.25 * r.standard_normal((15, 3))
         vel = speed * along + 0.1 * r.standard_normal((15, 3))
-        cov = np.repeat(4e-4 * np.eye(3)[None], 15, 0)
-        return space_group.newborn(
-            SpacePoints(np.arange(15), pos, cov, vel, 25 * cov, np.zeros(15)), PLACE, motion, 0.0
-        )
+        (step,) = together([(pos, vel, np.arange(15))])
+        return space_group.newborn(step, PLACE, motion, 0.0)
 
     assert not overlap(group(0.0, 0.9), group(distance, -0.9), config.merge_gate)
     assert overlap(group(0.0, 0.9), group(distance, 0.9), config.merge_gate) == (distance < 1.5)

@@ -1,4 +1,4 @@
-"""Texts of trajectories as TrajNet++, ETH and UCY, PedPy and JuPedSim have them, and group labels of texts."""
+"""Texts of TrajNet++, ETH and UCY, PedPy and JuPedSim, boxes of KITTI's tracking, and group labels of texts."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.types import Sequence
+from tests.recordings import mot_folder
 from tracking.grouping.known_people import known_people
 
 PLACES = [(780, 1, 8.46, 3.59), (790, 1, 9.57, 3.79), (790, 2, 9.57, 4.79), (810, 2, 10.57, 4.79)]
@@ -26,6 +27,16 @@ JUPEDSIM = (
     + "".join(f"{p}\t{f // 10}\t{x}\t{y}\t0.00\t0.30\t0.30\t12.0\t255\n" for f, p, x, y in PLACES)
 )
 TEXTS = {"walk.ndjson": TRAJNET, "walk.txt": ETH, "hall.txt": PETRACK, "room.txt": JUPEDSIM}
+KITTI = "".join(
+    f"{line} 1.7 0.6 0.8 1.0 1.6 9.0 0.2{score}\n"
+    for line, score in [
+        ("0 -1 DontCare -1 -1 -10 219.3 188.5 245.5 218.6", ""),
+        ("0 0 Pedestrian 0 0 -0.3 100.0 150.0 130.5 230.0", ""),
+        ("1 0 Pedestrian 0 1 -0.3 103.0 150.0 133.0 230.0", ""),
+        ("1 2 Car 0 0 -0.3 296.7 161.7 455.2 292.3", ""),
+        ("2 5 Person_sitting 0 2 -0.3 10.0 150.0 40.0 210.0", " 0.8"),
+    ]
+)
 RATES = {"walk.ndjson": 2.5, "walk.txt": 2.5, "hall.txt": 16.0, "room.txt": 8.0}
 
 
@@ -44,6 +55,15 @@ def test_frames_positions_and_rate(tmp_path, name):
     assert truth.id.tolist() == [1, 1, 2, 2]
     assert truth.pos == pytest.approx(np.array([p[2:] for p in PLACES]))
     assert not truth.labelled.any()
+
+
+def test_people_with_boxes(tmp_path):
+    sequence = opened(tmp_path, "0012.txt", KITTI)
+    truth = sequence.truth
+    assert (sequence.fps, sequence.length, sequence.has_detections) == (10.0, 3, False)
+    assert list(zip(truth.frame.tolist(), truth.id.tolist(), strict=True)) == [(1, 0), (2, 0), (3, 5)]
+    np.testing.assert_allclose(truth.box[0], [100, 150, 30.5, 80])
+    assert truth.pos is None
 
 
 def test_the_rate_of_eth_is_assumed_with_a_warning(tmp_path):
@@ -87,7 +107,16 @@ BAD = {
     "rates": ("a.txt", "# framerate: 8.00\n" + PETRACK, "# framerate: got 16.00 and 8.00"),
     "NaN": ("a.txt", PETRACK + "3 1 nan 1 1\n", "line 8: .*finite"),
     "twice": ("a.txt", PETRACK + "1 1 2 2 2\n", "line 8: .*each id once in a frame"),
-}
+    "KITTI, a word": ("a.txt", KITTI.replace("103.0", "x"), "line 3"),
+    "KITTI, no width": ("a.txt", KITTI.replace("133.0", "103.0"), "line 3"),
+    "KITTI, NaN": ("a.txt", KITTI.replace("133.0", "nan"), r"line 3: .* finite numbers"),
+    "KITTI, far away": ("a.txt", KITTI.replace("133.0", "1e9"), r"line 3: .* numbers within"),
+    "KITTI, frame -1": ("a.txt", KITTI.replace("2 5 Person", "-1 5 Person"), "line 5: .* frames from 0"),
+    "KITTI, id -1": ("a.txt", KITTI.replace("2 5 Person", "2 -1 Person"), "line 5: .* ids from 0"),
+    "KITTI, no people": (
+        "a.txt", KITTI.replace("Pedestrian", "Van").replace("Person_sitting", "Tram"), "Car, DontCare, Tram, Van"
+    ),
+}  # fmt: skip
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
@@ -99,15 +128,14 @@ def test_bad_input_is_one_line(tmp_path, case):
     assert str(tmp_path / name) in str(error.value)
 
 
-@pytest.mark.parametrize("words", ["X [cm] Y [cm]", "x (cm)", "x_cm y_cm", "x/cm y/cm", "x y, in cm"])
-def test_comments_state_centimetres(tmp_path, words):
-    truth = opened(tmp_path, "hall.txt", PETRACK.replace("x/cm y/cm", words)).truth
-    assert truth.pos == pytest.approx(np.array([p[2:] for p in PLACES]))
+UNITS = dict.fromkeys(["X [cm] Y [cm]", "x (cm)", "x_cm y_cm", "x/cm y/cm", "x y, in cm"], 1)
 
 
-def test_heights_in_centimetres_are_no_positions_in_centimetres(tmp_path):
-    truth = opened(tmp_path, "hall.txt", PETRACK.replace("x/cm y/cm z/cm", "x/m y/m; heights in cm")).truth
-    assert truth.pos == pytest.approx(100 * np.array([p[2:] for p in PLACES]))
+@pytest.mark.parametrize(("words", "factor"), (UNITS | {"x/m y/m; heights in cm": 100}).items())
+def test_comments_state_centimetres(tmp_path, words, factor):
+    """Heights in centimetres are no positions in centimetres."""
+    truth = opened(tmp_path, "hall.txt", PETRACK.replace("x/cm y/cm z/cm", words)).truth
+    assert truth.pos == pytest.approx(factor * np.array([p[2:] for p in PLACES]))
 
 
 @pytest.mark.parametrize("words", ["16, x/cm", "16.", '"16"', "16\n# framerate: 16.00"])
@@ -115,9 +143,16 @@ def test_a_rate_is_read_as_it_is_written(tmp_path, words):
     assert opened(tmp_path, "hall.txt", PETRACK.replace("16.00 fps", words)).fps == 16
 
 
-def test_options_without_effect_are_refused(tmp_path):
-    with pytest.raises(InputError, match="got --px-per-m; expected none for a text of trajectories"):
-        opened(tmp_path, "walk.ndjson", TRAJNET, px_per_m=20)
+OPTIONS = [
+    ("walk.ndjson", TRAJNET, {"px_per_m": 20}, "got --px-per-m; expected none for a text of trajectories"),
+    ("0012.txt", KITTI, {"person_class": 1}, "--class"),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "options", "words"), OPTIONS)
+def test_options_without_effect_are_refused(tmp_path, name, text, options, words):
+    with pytest.raises(InputError, match=words):
+        opened(tmp_path, name, text, **options)
 
 
 WALK = [(k, p, 0.2 * k, float(p)) for k in range(1, 41) for p in (1, 2, 3)]
@@ -143,8 +178,7 @@ def test_a_column_of_groups(tmp_path):
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_a_file_of_group_labels(tmp_path):
     """groups.txt beside gt.txt, NAME.groups.txt beside NAME.txt: one group a line, as in BIWI."""
-    (tmp_path / "mot" / "gt").mkdir(parents=True)
-    (tmp_path / "mot" / "gt" / "gt.txt").write_text(BOXES)
+    mot_folder(tmp_path / "mot", BOXES)
     (tmp_path / "mot" / "gt" / "groups.txt").write_text("1 2\n3\n")
     (tmp_path / "walk.groups.txt").write_text("1, 2\n")
     for truth in (open_source(tmp_path / "mot", fps=5)[0].truth, opened(tmp_path, "walk.txt", BOXES, fps=5).truth):
