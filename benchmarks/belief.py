@@ -1,7 +1,8 @@
 """Who belongs together, by the rule, by the belief and by SPENCER's relations, from labelled people.
 
     python -m benchmarks.belief recordings [--data FOLDER]
-    python -m benchmarks.belief suites [--scenes standard friends-meet …] [--people truth|rough|file|image]
+    python -m benchmarks.belief suites [--scenes standard friends-meet …]
+    python -m benchmarks.belief decisions [--scenes standard friends-meet streets] [--seeds 20000:20001]
     python -m benchmarks.belief calibration [--scenes streets] [--seeds 20000:20001] [--out CHART.svg]
     python -m benchmarks.belief ablation --train standard streets … [--seeds 30000:30002] [--check 20000:20001]
 
@@ -10,9 +11,9 @@ positions that err by 0.1 m, with 5 % missed, mean over 10 draws. CAVIAR's Meet_
 (Linder et al. 2016) relates pairs of each frame by a linear model and takes connected components; it uses labelled
 velocities.
 suites: pairwise F1, group F1, event F1, merges that are wrong or missed, and seconds until a merge is reported; means
-over sequences with 95 % intervals, and the paired difference. --people: labelled people
-(truth), the same with positions that err by 0.1 m and 5 % missed (rough), or the tracks of `blob` from stored
-detections (file) or pictures (image).
+over sequences with 95 % intervals, and the paired difference.
+decisions: pairwise F1 by the groups of now, by those of events, which change late, and of pairs whose probability is
+above 0.5; in means over sequences, of `streets` by quarters of density, too.
 calibration: probability and share of mates by bin, expected calibration error, all scenes weighing the same; --out:
 the same as a reliability plot.
 ablation: the fit without each quantity: log loss and F1 on --check seeds, and F1 on the recordings.
@@ -23,26 +24,27 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from benchmarks.support.chart import Panel, lines
-from benchmarks.support.in_memory import in_memory
 from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA, add_data, add_seeds, new_parser, seed_range
+from benchmarks.support.replaced_code import replaced_code
 from benchmarks.support.tables import head, interval, number, row, signed, table
-from scenarios.loading.resolve import Entry, resolve
+from scenarios.loading.resolve import resolve
 from sim.io.source import open_source
-from sim.sequence import simulate
-from sim.types import Array, Bools, Ints, Tracks, Truth
-from tracking import track
+from sim.types import Array, Bools, Ints, Truth
 from tracking.fitting.belief import BINS, belief_scores, fit_belief, reliability, sample_of
 from tracking.fitting.grouping_scenes import DETECTED, MISSED, pair_scenes, simulated
-from tracking.grouping.belief import Belief
-from tracking.grouping.grouped_tracks import derive, without_groups
-from tracking.grouping.grouping_choice import Grouping, grouping_of
+from tracking.grouping import grouping_choice
+from tracking.grouping.belief import Belief, pair_probabilities
+from tracking.grouping.grouped_tracks import derive
+from tracking.grouping.grouping_choice import FoundGroups, Grouping, belief_groups, grouping_of
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.pair_evidence import NAMES, NEAR, QUANTITIES, TIMES
@@ -64,7 +66,7 @@ def pairs_in_frames(truth: Truth) -> tuple[Ints, Ints, Bools]:
 
 
 def linked_pairs(truth: Truth, rule: Grouping, i: Ints, j: Ints) -> Bools:
-    """Returns which pairs of rows the rule puts into one group, ."""
+    """Returns which pairs of rows the rule puts into one group."""
     derived = derive(people_as_tracks(truth), truth.fps, truth.px_per_m, rule)
     group = np.concatenate([t.group for t in derived])
     return (group[i] >= 0) & (group[i] == group[j])
@@ -144,24 +146,14 @@ def _truth(path: Path) -> Truth:
 COLUMNS = ["pairwise F1", "group F1", "event F1", "merge reported after, s", "merges right, wrong, missed"]
 
 
-def _people(entry: Entry, seed: int, source: str) -> tuple[Truth, Sequence[Tracks]]:
-    """Returns the truth of a sequence and its people without groups; source: "truth", "rough", "file" or "image"."""
-    if source in ("truth", "rough"):
-        truth = simulated(entry, seed)
-        return truth, people_as_tracks(rough(truth, seed) if source == "rough" else truth)
-    live = simulate(entry.scenario, seed, entry.repeat, streams=("left",) if source == "image" else ())
-    assert live.truth is not None
-    run = track("blob", in_memory(live) if source == "image" else live, detections=source)  # type: ignore[arg-type]
-    return live.truth, without_groups(run)
-
-
-def scores_of(name: str, seeds: range, groupings: Mapping[str, Grouping], source: str) -> dict[str, tuple[Array, str]]:
+def scores_of(name: str, seeds: range, groupings: Mapping[str, Grouping]) -> dict[str, tuple[Array, str]]:
     """Returns for each grouping the scores `KEYS` of each sequence of a suite, (S, 4), and its merges as text."""
     found: dict[str, list[list[float]]] = {key: [] for key in groupings}
     merges = {key: np.zeros(3) for key in groupings}
     for entry in resolve(name):
         for seed in seeds:
-            truth, people = _people(entry, seed, source)
+            truth = simulated(entry, seed)
+            people = people_as_tracks(truth)
             for key, grouping in groupings.items():
                 scores = evaluate(truth, derive(people, truth.fps, truth.px_per_m, grouping))
                 found[key].append([scores[k] for k in KEYS])
@@ -169,9 +161,9 @@ def scores_of(name: str, seeds: range, groupings: Mapping[str, Grouping], source
     return {key: (np.array(rows), ", ".join(f"{n:.0f}" for n in merges[key])) for key, rows in found.items()}
 
 
-def suites(names: Sequence[str], seeds: range, belief: Belief, source: str) -> None:
+def suites(names: Sequence[str], seeds: range, belief: Belief) -> None:
     for name in names:
-        found = scores_of(name, seeds, {"rule": LinkRule(), "belief": belief}, source)
+        found = scores_of(name, seeds, {"rule": LinkRule(), "belief": belief})
         cells = {key: [*_cells(interval, values), text] for key, (values, text) in found.items()}
         cells["belief minus rule"] = [*_cells(signed, found["belief"][0] - found["rule"][0]), ""]
         title = f"{Path(name).stem}, seeds {seeds.start}:{seeds.stop}, {len(found['rule'][0])} sequences"
@@ -181,6 +173,51 @@ def suites(names: Sequence[str], seeds: range, belief: Belief, source: str) -> N
 def _cells(write: object, values: Array) -> list[str]:
     ends = mean_interval(values)
     return [write(*map(float, x)) for x in zip(*ends, strict=True)]  # type: ignore[operator]
+
+
+def late_groups(*rows: Any, **options: Any) -> FoundGroups:
+    """Returns the groups of events in place of those of now."""
+    return replace(belief_groups(*rows, **{**options, "events": True}), now=None)
+
+
+def probable_pairs(truth: Truth, belief: Belief, i: Ints, j: Ints) -> Bools:
+    """Returns which pairs of rows are together with a probability above 0.5."""
+    found = pair_probabilities(people_as_tracks(truth), truth.fps, truth.px_per_m, belief)
+    told = found.probability > 0.5
+    size = int(truth.id.max()) + 1
+    low, high = np.sort([truth.id[i], truth.id[j]], axis=0)
+    keys = (found.frame * size + found.a) * size + found.b
+    return np.isin((truth.frame[i] * size + low) * size + high, keys[told])
+
+
+def decision_scores(truth: Truth, belief: Belief) -> list[float]:
+    """Returns the pairwise F1 of each decision of `DECIDED`, nan without mates."""
+    i, j, same = pairs_in_frames(truth)
+    with replaced_code([(grouping_choice, "belief_groups", late_groups)]):
+        late = linked_pairs(truth, belief, i, j)
+    found = (spencer(truth, i, j), linked_pairs(truth, belief, i, j), late, probable_pairs(truth, belief, i, j))
+    once, frame = np.ones((1, truth.length)), truth.frame[i] - 1
+    return [float(f1(once, frame, same, x)[0]) if same.any() else float("nan") for x in found]
+
+
+DECIDED = ("SPENCER", "now", "groups of events", "probability above 0.5")
+
+
+def decisions(names: Sequence[str], seeds: range, belief: Belief, data: Path) -> None:
+    head(["", *DECIDED, "now minus above 0.5"])
+    for folder in (HOTEL, ZARA):
+        scores = decision_scores(_truth(data / folder), belief)
+        row([Path(folder).name, *map(number, scores), f"{scores[1] - scores[3]:+.3f}"])
+    for name in names:
+        truths = [simulated(entry, seed) for entry in resolve(name) for seed in seeds]
+        found = np.array([decision_scores(truth, belief) for truth in truths])
+        rows = {f"{Path(name).stem}, {len(truths)} sequences": np.arange(len(truths))}
+        if name == "streets":
+            order = np.argsort([len(truth.frame) / truth.length for truth in truths])
+            rows |= {f"{name}, quarter {k} by people in view": q for k, q in enumerate(np.array_split(order, 4), 1)}
+        for title, chosen in rows.items():
+            scores = found[chosen][np.isfinite(found[chosen, 0])]
+            row([title, *_cells(interval, scores), *_cells(signed, scores[:, [1]] - scores[:, [3]])])
 
 
 def calibration(names: Sequence[str], seeds: range, belief: Belief, out: Path | None) -> None:
@@ -226,10 +263,9 @@ def ablation(names: Sequence[str], seeds: range, check: range, data: Path) -> No
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["recordings", "suites", "calibration", "ablation"])
+    parser.add_argument("mode", choices=["recordings", "suites", "decisions", "calibration", "ablation"])
     parser.add_argument("--scenes", nargs="+", metavar="NAME", help="scenarios, suites or *.toml files")
     parser.add_argument("--train", nargs="+", metavar="NAME", help="ablation: to fit to", default=["standard"])
-    parser.add_argument("--people", choices=["truth", "rough", "file", "image"], default="truth", help="suites: whose")
     parser.add_argument("--grouping", default="belief", metavar="FILE.toml", help="another belief")
     add_seeds(parser, "20000:20001")
     parser.add_argument("--check", type=seed_range, default="20000:20001", metavar="A:B", help="ablation: test seeds")
@@ -245,7 +281,9 @@ def _run(args: argparse.Namespace, belief: Belief) -> None:
     if args.mode == "recordings":
         recordings(args.data, belief)
     elif args.mode == "suites":
-        suites(args.scenes or ["standard", "friends-meet"], args.seeds, belief, args.people)
+        suites(args.scenes or ["standard", "friends-meet"], args.seeds, belief)
+    elif args.mode == "decisions":
+        decisions(args.scenes or ["standard", "friends-meet", "streets"], args.seeds, belief, args.data)
     elif args.mode == "calibration":
         calibration(args.scenes or ["standard"], args.seeds, belief, args.out)
     else:

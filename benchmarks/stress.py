@@ -1,6 +1,6 @@
 """`flockscope stress` on trackers whose weaknesses are known.
 
-    python -m benchmarks.stress [breaks] [search] [story] [cost] [--runs 20] [--episodes 40] [--searches 10]
+    python -m benchmarks.stress [breaks] [search] [story] [--runs 20] [--episodes 40] [--searches 10]
         [--scenes 96]
 
 breaks: the oracle's tracks, spoilt in one way each. FORGETS: who is hidden for more than 1 s gets a new id. THIRTY:
@@ -19,16 +19,11 @@ Failures: mean number of such scenes. Scenarios: mean number of scenarios among 
 story: the same for a tracker that loses 0.5 where two groups cross while the brightness changes by more than a tenth
 within a second; axes: the time at which the light is switched to 0.7, detection and clutter; seeds on which nothing was
 tuned. The worst failures are minimised with 5 confirming seeds, and the smallest scenes are played on 5 fresh ones.
-
-cost: CPU seconds of `stress blob relational --suite standard` on 4 seeds, and of the same episodes without oracle,
-report and files; MB of the process.
 """
 
 from __future__ import annotations
 
-import resource
 import tempfile
-import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
@@ -46,19 +41,17 @@ from scenarios.schema.scenario import Scenario
 from sim.render.weather import brightness
 from sim.sequence import simulate
 from sim.types import Array, Sequence, Tracks, Truth
-from tracking.app.cli import run
-from tracking.environment.episode_cache import Source, sources
+from tracking.environment.episode_cache import Source
 from tracking.oracle import oracle
 from tracking.running.tracker_registry import find
 from tracking.scoring.evaluation import Scorer, people_scores
 from tracking.stress import failures, minimize
 from tracking.stress.axes import AXES, Axis
 from tracking.stress.curves import breaking_point, crossing, curve
-from tracking.stress.episodes import OracleTask, Outcome, Store, Tasks, contender, play_scene
+from tracking.stress.episodes import OracleTask, Outcome, Store, Tasks
 from tracking.stress.reductions import difficulties
 from tracking.stress.search import Failure, search, worst
 from tracking.stress.sweep import Plan, Sweep
-from tracking.tuning.parallel_episodes import EpisodeTask
 from tracking.tuning.tuned_tracker import TunedTracker
 
 TRUE_SEEDS = range(28_000, 28_040)
@@ -341,27 +334,10 @@ def _play_in_light(episodes: SequenceOf[failures.EpisodeOf]) -> Generator[failur
         yield failures.Outcome({"HOTA": BEST - loss}, people=len({*sequence.truth.id.tolist()}))
 
 
-def cost(folder: Path) -> None:
-    """Prints what `stress` costs beyond simulating, tracking and scoring."""
-    names, seeds = ("blob", "relational"), range(20_000, 20_004)
-    trackers = [contender(name) for name in names]
-    begun = time.process_time()
-    for source in sources((SUITE,), tuple(seeds), ()):
-        play_scene(tuple(EpisodeTask(t.tracker, source, {}, "file", True, t.code, None) for t in trackers))
-    plain, begun = time.process_time() - begun, time.process_time()
-    given = ["--suite", SUITE, "--seeds", f"{seeds.start}:{seeds.stop}", "--out", str(folder / "cost")]
-    assert run(["stress", *names, *given]) == 0
-    whole = time.process_time() - begun
-    print(f"\nstress {' '.join([*names, *given[:-2]])}")
-    head(["episodes alone, CPU s", "all, CPU s", "beyond them", "MB"])
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
-    row([f"{plain:.0f}", f"{whole:.0f}", f"{whole / plain - 1:.1%}", f"{most:.0f}"])
-
-
 def main() -> None:
     one_thread()
     parser = new_parser(__doc__)
-    parser.add_argument("parts", nargs="*", default=["breaks", "search", "story"], help="breaks, search, story, cost")
+    parser.add_argument("parts", nargs="*", default=["breaks", "search", "story"], help="breaks, search, story")
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--episodes", type=int, default=40)
     parser.add_argument("--searches", type=int, default=10)
@@ -374,8 +350,6 @@ def main() -> None:
             searches(FROM, args.searches, args.scenes, Path(name))
         if "story" in args.parts:
             story(args.searches, args.scenes, Path(name))
-        if "cost" in args.parts:
-            cost(Path(name))
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ Also here: how well beliefs tell who belongs together: log loss, calibration err
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -25,16 +26,18 @@ KNOTS = 6  # Most knots of a table: quantiles of the quantity, evenly spaced fro
 # Weights of the penalties: of curvature, and of squared log-odds.
 CURVED, LARGE = 3e-4, 1e-4
 STEPS = 200  # Most iterations.
+THRESHOLDS = 100  # Evenly spaced probabilities, of which the threshold is one.
 
 
 @dataclass(frozen=True)
 class PairSample:
     """Rows of scenes: values (R, len(NAMES)); together (R,); weight (R,), of sum 1, equal for all pairs of a
-    scene, and in proportion to the weights of scenes."""
+    scene, and in proportion to the weights of scenes; scene (R,): number of the scene, from 0."""
 
     values: np.ndarray
     together: Bools
     weight: Array
+    scene: Ints
     pairs: int  # number of pairs
 
 
@@ -45,7 +48,8 @@ def sample_of(scenes: Sequence[PairScene]) -> PairSample:
         raise InputError(place="fit grouping", got="no two people within 4 m", expected="pairs", remedy=remedy)
     weight = np.concatenate([_weights(s.pair) * s.weight for s in scenes]) / sum(s.weight for s in scenes)
     values, together = (np.concatenate([getattr(s, name) for s in scenes]) for name in ("values", "together"))
-    return PairSample(values, together, weight, sum(len(np.unique(s.pair)) for s in scenes))
+    scene = np.repeat(np.arange(len(scenes)), [len(s.pair) for s in scenes])
+    return PairSample(values, together, weight, scene, sum(len(np.unique(s.pair)) for s in scenes))
 
 
 def _weights(pair: Ints) -> Array:
@@ -66,7 +70,7 @@ def fit_belief(now: PairSample, events: PairSample | None = None, used: Sequence
     *heights, bias = np.split(columns, cuts, axis=1)
     tables = tuple(Table(*row) for row in zip(knots_of, knots_of.values(), heights, strict=True))
     belief = Belief(tables, bias[:, 0])
-    return replace(belief, threshold=best_threshold(belief.log_odds(now.values)[:, 0]))
+    return replace(belief, threshold=best_threshold(now, belief.log_odds(now.values)[:, 0]))
 
 
 def _fit_column(sample: PairSample, knots_of: Mapping[str, Array]) -> Array:
@@ -87,14 +91,16 @@ def _fit_column(sample: PairSample, knots_of: Mapping[str, Array]) -> Array:
     return np.asarray(minimize(objective, start, jac=True, method="L-BFGS-B", options=options).x)
 
 
-def best_threshold(log_odds: Array) -> float:
-    """Returns the probability above which a pair is to count as together, for the greatest expected F1 of rows (R,).
-
-    It is half of the greatest expected F1 (Lipton, Elkan & Narayanaswamy 2014).
-    """
-    probability = np.sort(1 / (1 + np.exp(-log_odds)))[::-1]
-    hits = np.cumsum(probability)
-    return float((hits / (hits[-1] + np.arange(1, len(hits) + 1))).max())
+def best_threshold(sample: PairSample, log_odds: Array) -> float:
+    """Returns the probability above which a pair is to count as together, for the greatest mean F1 of scenes' rows."""
+    place = (THRESHOLDS / (1 + np.exp(-log_odds))).astype(np.int64).clip(0, THRESHOLDS - 1)
+    shape = (sample.scene[-1] + 1, THRESHOLDS)
+    place += sample.scene * THRESHOLDS
+    count = [np.bincount(place, x, math.prod(shape)).reshape(shape) for x in (sample.together, None)]
+    hits, told = (c[:, ::-1].cumsum(axis=1)[:, ::-1] for c in count)  # by scene: rows above k / THRESHOLDS
+    mates = hits[:, :1]
+    weight = np.bincount(sample.scene, sample.weight) * (mates[:, 0] > 0)
+    return float(np.argmax(weight @ (2 * hits / np.maximum(told + mates, 1)))) / THRESHOLDS
 
 
 def _knots(values: Array) -> Array:

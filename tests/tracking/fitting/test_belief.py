@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tracking.fitting.belief import sample_of
+from tracking.fitting.belief import PairSample, best_threshold, sample_of
 from tracking.fitting.grouping_scenes import pair_scenes
 
 
@@ -16,3 +16,19 @@ def test_what_is_named_twice_comes_once_and_weighs_twice():
     repeated = np.append(np.arange(rows), np.arange(sum(len(s.values) for s in one)))
     for quantity in (found.together, found.values[:, 0] < 1):
         assert np.isclose(found.weight[quantity].sum(), long.weight[quantity[repeated]].sum())
+
+
+def test_the_threshold_is_best_for_the_mean_of_scenes():
+    """Of a scene of many rows a low threshold is best, of two small ones a high one; scenes count by their weight."""
+    scenes = [(np.array([-3.0, -1.0, 1.0]), 500), *[(np.array([-1.0, 1.0, 3.0]), 2)] * 2]
+    log_odds = np.concatenate([np.repeat(x, n) for x, n in scenes])
+    together = np.concatenate([np.repeat([False, True, True] if n > 2 else [False, False, True], n) for _, n in scenes])
+    scene = np.repeat([0, 1, 2], [3 * n for _, n in scenes])
+
+    def found(weight):
+        rows = np.array(weight)[scene] / np.bincount(scene)[scene]
+        threshold = best_threshold(PairSample(np.zeros((len(scene), 0)), together, rows, scene, 9), log_odds)
+        return np.log(threshold / (1 - threshold))
+
+    assert 1 <= found([0.2, 0.4, 0.4]) < 3
+    assert -3 <= found([0.8, 0.1, 0.1]) < -1
