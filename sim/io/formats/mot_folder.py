@@ -120,9 +120,11 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     info, images, background = _info(path), options.images, options.background
     rate = frame_rate(options.fps, info.fps, path)
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
-    found = mot_text.read_detections(det, options.boxes, info.length) if is_present(det) else None
+    alone = not is_present(gt)
+    found = mot_text.read_detections(det, options.boxes, info.length, alone) if is_present(det) else None
     if found is None:
-        options.reject(path, "a recording without det/det.txt", "it has no detections", "box_scale min_score")
+        names = "box_scale min_score" + " person_class" * alone
+        options.reject(path, "a recording without det/det.txt", "it has no detections", names)
     pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
     length = info.length or max(_labelled_frames(path).max(initial=0).item(), pictures.last)

@@ -334,9 +334,14 @@ class DetectionTable:
         return Detections(index, (index - 1) / fps, self.plane, self.pos[low:high], None, box, self.score[low:high])
 
 
-def read_detections(path: Path, options: BoxOptions, length: int | None = None) -> DetectionTable:
-    """Reads a det.txt as `detections_of_table`. length: the last frame allowed."""
+def read_detections(path: Path, options: BoxOptions, length: int | None = None, alone: bool = False) -> DetectionTable:
+    """Reads a det.txt as `detections_of_table`.
+
+    length: the last frame allowed. alone: True if no labels are beside it, to which --class may belong instead.
+    """
     table = read_table(path, length=length, boxless=True, box_scale=options.box_scale)
+    if alone:
+        require_classes(table, options.person_class)
     return detections_of_table(table, options)
 
 

@@ -193,5 +193,7 @@ def test_least_score_of_a_recording(tmp_path):
     mot(tmp_path / "det" / "det.txt", [(*row[:5], score) for row in ROWS for score in (0.3, 0.8)])
     (sequence,) = open_source(tmp_path, fps=10, min_score=0.5)
     assert [frame.detections.score.tolist() for frame in sequence] == [[0.8]] * 12
+    with pytest.raises(InputError, match="--class: got no classes"):
+        open_source(tmp_path, fps=10, person_class=1)
     with pytest.raises(InputError, match="--min-score"):
         open_source(write_video(tmp_path / "street.mp4", [picture(0)]), min_score=0.5)
