@@ -27,7 +27,8 @@ from sim.io.store.seal import is_sequence
 from sim.types import Camera, Sequence
 
 KINDS = (
-    "a generated sequence or dataset, a MOTChallenge folder or text, trajectories, a BIWI folder, a CAVIAR XML, a video"
+    "a generated sequence or dataset, a MOTChallenge folder or text, trajectories, a text of KITTI, a BIWI folder, "
+    "a CAVIAR XML, a video"
 )
 VIDEOS = f"{KINDS} ({' '.join(video.SUFFIXES)})"
 DEPTH = 3

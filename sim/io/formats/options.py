@@ -53,8 +53,8 @@ class RecordingOptions:
 
 
 def refuse_options(values: Mapping[str, Any], names: str, path: Path, kind: str, why: str) -> None:
-    """Raises InputError if any of the options `names` ("camera fps") has a value: `why` says why it has no effect."""
-    found = [name for name in names.split() if values[name] is not None]
+    """Raises InputError if any of the options `names` ("camera fps") is given: `why` says why it has no effect."""
+    found = [name for name in names.split() if values[name] not in (None, False)]
     given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
     if given:
         remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"

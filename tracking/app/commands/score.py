@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.options import BoxScale, parse_box_scale
+from sim.io.formats.options import BoxScale, parse_box_scale, refuse_options
 from sim.io.store.seal import tracked_hash
 from sim.types import Sequence
 from tracking.app.command_options import ScoreOptions
@@ -33,9 +33,7 @@ def score(options: ScoreOptions) -> CommandResult:
     check_blocks(options.blocks, len(sequences))
     if len(options.tracks) > 1 or is_class(options.tracks[0]):
         return ranking(options, source, sequences)
-    for flag, value in (("--by", options.by), ("--csv", options.csv), ("--all", options.all or None)):
-        if value is not None:
-            raise InputError(place=flag, got="one run", expected="several, which are ranked", remedy="leave it out")
+    refuse_options(vars(options), "by csv all", Path(options.tracks[0]), "one run", "only several are ranked")
     scored = _score_all(options, source, sequences)
     rows = [
         SequenceScores(sequence.name, one.scores[0], one.given[0])
