@@ -101,7 +101,8 @@ class Tracks(Frozen):
     """What one tracker reports for frame `index` (from 1) at time t (s): N people or groups, one row each.
 
     plane: "ground", "space" (m) or "image" (px). unit "person": rows are people, group (N,) is the id of each person's
-    group, -1 for alone. unit "group": rows are groups, group == id. pos, vel (N, D): plane's unit, and per s. cov (N,
+    group, -1 for alone. unit "group": rows are groups, group == id. pos, vel (N, D): plane's unit, and per s; in the
+    image, pos is the middle of a person's box. cov (N,
     2D, 2D): covariance of x, y, (z), vx, vy, (vz). box (N, 4): left, top, width, height in px, or None. score (N,): in
     [0, 1], or empty. groups, events: None and () if the tracker of people leaves them to the grouping, which fills them
     in and sets `derived`. own_events: kinds of events that the tracker reports itself; they are never filled in.
@@ -147,7 +148,7 @@ class Stairs(Frozen):
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene(Frozen):
     """The static world, in m: size (2,) x, y, from the origin on; walls (W, 2, 2): segments [x1, y1], [x2, y2]; pillars
-    (P, 3): x, y, radius; doors (D, 2, 2): segments, openings in walls; service (S, 2): service points x, y; stairs;
+    (P, 3): x, y, radius; doors (D, 2, 2): segments, openings that `walls` leave free; service (S, 2): service points x, y; stairs;
     heights of walls and pillars. Empty arrays and () by default."""
 
     size: Array
@@ -183,8 +184,8 @@ class Camera(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Context(Frozen):
-    """What a tracker may know before the first frame; None where unknown. fps: frames/s. px_per_m: image scale, nan if
-    unknown. camera, scene: of the recording. image_size: (width, height) px. background: sample pictures (K, H, W, 3)
+    """What a tracker may know before the first frame; None where unknown. fps: frames/s. px_per_m: image scale, for all of
+    the image (of a pinhole camera, that of a person in the middle), nan if unknown. camera, scene: of the recording. image_size: (width, height) px. background: sample pictures (K, H, W, 3)
     BGR uint8 to train a background model."""
 
     fps: float
@@ -215,8 +216,8 @@ class Order:
 class States(Frozen):
     """The states of a crowd from which groups and events are measured: C ticks at `rate` per s from t = 0, P people.
 
-    The other fields are those of Motion, with ticks in place of frames. A simulated crowd has the ticks of its script,
-    whatever the frame rate of the camera."""
+    pos, vel (C, P, 2): m, m/s; heading (C, P): rad; present (C, P); intent (C, P): number of the group that the script
+    assigns the person to. A simulated crowd has the ticks of its script, whatever the frame rate of the camera."""
 
     rate: float
     pos: Array
@@ -290,7 +291,7 @@ class Near(Frozen):
 class FrameTruth(Frozen):
     """The truth of frame `index` (from 1) at time t (s), one row for each of N people. It never reaches a tracker. id
     (N,): persons. group (N,): id of the person's group, -1 for alone. pos (N, 2): x, y in m. vel (N, 2): m/s. box (N,
-    4): left, top, width, height in px, of the whole body, unclipped. visibility (N,): as in Truth. groups: on the
+    4): left, top, width, height in px, of the whole body, unclipped. visibility (N,): visible share of the whole body, 0 to 1. groups: on the
     ground, in m; groups_px: in the image, in px. pixels: who is in each pixel. None: unknown."""
 
     index: int
@@ -308,8 +309,8 @@ class FrameTruth(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PixelTruth(Frozen):
-    """The truth of one frame's pixels; its N people are the frame's people, sorted by id. ids (H, W): person id, -2 for
-    walls and pillars, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the point; None if not
+    """The truth of one frame's pixels; its N people are the frame's people, sorted by id. ids (H, W): person id (from 1), -2
+    for walls and pillars, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the point; None if not
     computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number inside the image that would
     without occlusion. box (N, 4): left, top, width, height in px of the visible pixels, nan without any. blob (N,):
     number, from 0, of the region of people who touch each other in the image, -1 if hidden."""
@@ -455,5 +456,8 @@ class Tracker(Protocol):
         """Forgets all state and starts a new sequence. seed: for the tracker's random numbers."""
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Returns this tracker's tracks of `frame`, from this and earlier frames only."""
+        """Returns this tracker's tracks of `frame`, from this and earlier frames only.
+
+        detections: of the frame, perhaps none; None if the tracker is given pictures only.
+        """
         ...

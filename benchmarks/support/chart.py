@@ -47,7 +47,13 @@ def lines(panels: Sequence[Panel], path: Path, columns: int = 2) -> Path:
         for axes, panel in zip(figure.subplots(rows, columns, squeeze=False).flat, panels, strict=False):
             _draw(axes, panel, colour)
         handles = [matplotlib.lines.Line2D([], [], color=colour[name]) for name in names]
-        figure.legend(handles, names, loc="outside lower left", ncols=2 * columns, frameon=False)
+        figure.legend(
+            handles,
+            [name.replace("`", "") for name in names],
+            loc="outside lower left",
+            ncols=2 * columns,
+            frameon=False,
+        )
         figure.savefig(path, metadata={"Date": None})
     return path
 
