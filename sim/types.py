@@ -148,8 +148,8 @@ class Stairs(Frozen):
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene(Frozen):
     """The static world, in m: size (2,) x, y, from the origin on; walls (W, 2, 2): segments [x1, y1], [x2, y2]; pillars
-    (P, 3): x, y, radius; doors (D, 2, 2): segments, openings that `walls` leave free; service (S, 2): service points x, y; stairs;
-    heights of walls and pillars. Empty arrays and () by default."""
+    (P, 3): x, y, radius; doors (D, 2, 2): segments, openings that `walls` leave free; service (S, 2): service points x,
+    y; stairs; heights of walls and pillars. Empty arrays and () by default."""
 
     size: Array
     walls: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
@@ -184,9 +184,9 @@ class Camera(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Context(Frozen):
-    """What a tracker may know before the first frame; None where unknown. fps: frames/s. px_per_m: image scale, for all of
-    the image (of a pinhole camera, that of a person in the middle), nan if unknown. camera, scene: of the recording. image_size: (width, height) px. background: sample pictures (K, H, W, 3)
-    BGR uint8 to train a background model."""
+    """What a tracker may know before the first frame; None where unknown. fps: frames/s. px_per_m: image scale, for all
+    of the image (of a pinhole camera, that of a person in the middle), nan if unknown. camera, scene: of the recording.
+    image_size: (width, height) px. background: sample pictures (K, H, W, 3) BGR uint8 to train a background model."""
 
     fps: float
     px_per_m: float
@@ -291,8 +291,8 @@ class Near(Frozen):
 class FrameTruth(Frozen):
     """The truth of frame `index` (from 1) at time t (s), one row for each of N people. It never reaches a tracker. id
     (N,): persons. group (N,): id of the person's group, -1 for alone. pos (N, 2): x, y in m. vel (N, 2): m/s. box (N,
-    4): left, top, width, height in px, of the whole body, unclipped. visibility (N,): visible share of the whole body, 0 to 1. groups: on the
-    ground, in m; groups_px: in the image, in px. pixels: who is in each pixel. None: unknown."""
+    4): left, top, width, height in px, of the whole body, unclipped. visibility (N,): visible share of the whole body,
+    0 to 1. groups: on the ground, in m; groups_px: in the image, in px. pixels: who is in each pixel. None: unknown."""
 
     index: int
     t: float
@@ -309,11 +309,11 @@ class FrameTruth(Frozen):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PixelTruth(Frozen):
-    """The truth of one frame's pixels; its N people are the frame's people, sorted by id. ids (H, W): person id (from 1), -2
-    for walls and pillars, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the point; None if not
-    computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number inside the image that would
-    without occlusion. box (N, 4): left, top, width, height in px of the visible pixels, nan without any. blob (N,):
-    number, from 0, of the region of people who touch each other in the image, -1 if hidden."""
+    """The truth of one frame's pixels; its N people are the frame's people, sorted by id. ids (H, W): person id (from
+    1), -2 for walls and pillars, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the point;
+    None if not computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number inside the
+    image that would without occlusion. box (N, 4): left, top, width, height in px of the visible pixels, nan without
+    any. blob (N,): number, from 0, of the region of people who touch each other in the image, -1 if hidden."""
 
     ids: Ints
     disparity: Array | None
