@@ -18,9 +18,6 @@ from sim.types import Array, Bools, Ints
 SPEED, DRIFT, SPREAD = range(3)
 """Columns of a speed table (5, 3): upper end of a row's speeds, mean loss of speed in a step and standard deviation of
 the velocity after it, per axis; all in m/s."""
-FOLLOW, COMMON = range(2)
-"""Slots of `coupling` (2,): share of the difference to the mean velocity of a group that a member loses in a step, and
-share of the variance of a member's noise that the group has in common; the paper: 1 and 0."""
 RATE, BIAS, DISTANCE, VELOCITY = range(4)
 """Slots of `rules` (4,): weight that the old relation loses in a step, 1 - exp(-rate dt); log odds of walking together
 at the same place, their loss per m of distance and per m/s of velocity difference."""
@@ -49,21 +46,22 @@ def _boxes(pos):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def move(
     pos: Array, vel: Array, exist: Array, pairs: Ints, related: Bools, noise: Array, shared: Array, table: Array,
-    coupling: Array, alike: Array, spread: Array, dt: float,
+    common: float, alike: Array, spread: Array, dt: float,
 ) -> None:  # fmt: skip
     """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
 
     pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; pairs (N, 2), related (N,
-    P): old relations; noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling
-    (2,); alike (4,): rules by which a partner counts; spread (N, 2): of `pair_spread`.
+    P): old relations; noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; common:
+    share of the noise's variance that a group has in common; alike (4,): rules by which a partner counts; spread (N,
+    2): of `pair_spread`.
 
     v_i = u - B u / |u| + C e_i, x_i = x_i + v_i dt, with B, C of the table's row for |u| (Table 3). For a person alone
     u = v_i and e_i = noise. A partner j who walks together with i counts with w_j = `belonging` by `alike` at their old
     distance and velocity difference, of whose squares `spread` is taken off, down to 0; the person itself with w_i = 1.
-    With m the mean velocity of all these, weighted by w and existence, and c = COMMON max_j w_j: u = v_i + FOLLOW (m -
-    v_i), e_i = sqrt(1 - c) noise + sqrt(c) s_i and s_i = sum w shared / sqrt(sum w^2). The weights, FOLLOW and COMMON
-    are ours; the paper: BIAS inf, so that w = 1, FOLLOW 1 and COMMON 0, so that u = m and e_i = noise. If a group's
-    pairs are not all related, m is not yet the group's mean velocity.
+    u is the mean velocity of all these, weighted by w and existence, and with c = common max_j w_j: e_i = sqrt(1 - c)
+    noise + sqrt(c) s_i and s_i = sum w shared / sqrt(sum w^2). The weights and common are ours; the paper: BIAS inf, so
+    that w = 1, and common 0, so that e_i = noise. If a group's pairs are not all related, u is not yet the group's mean
+    velocity.
     """
     particles, n, _ = pos.shape
     sums = np.empty((n, 7))
@@ -91,11 +89,10 @@ def move(
             x, y, ex, ey = vel[p, i, 0], vel[p, i, 1], noise[p, i, 0], noise[p, i, 1]
             weight, square, most = sums[i, 2], sums[i, 5], sums[i, 6]
             if most > 0:
-                own, part = math.sqrt(1.0 - most * coupling[COMMON]), math.sqrt(most * coupling[COMMON] / square)
+                own, part = math.sqrt(1.0 - most * common), math.sqrt(most * common / square)
                 ex, ey = own * ex + part * sums[i, 3], own * ey + part * sums[i, 4]
             if most > 0 and weight > 0:
-                x += coupling[FOLLOW] * (sums[i, 0] / weight - x)
-                y += coupling[FOLLOW] * (sums[i, 1] / weight - y)
+                x, y = sums[i, 0] / weight, sums[i, 1] / weight
             speed = math.sqrt(x * x + y * y)
             row = 0
             while speed > table[row, SPEED]:
@@ -159,26 +156,6 @@ def near_pairs(pos: Array, rules: Array) -> Ints:
 
 
 @njit(cache=True)
-def pairs_of_people(pairs: Ints, people: int) -> tuple[Ints, Ints]:
-    """Returns the rows of the pairs (N, 2) of each person: those of person a are rows[start[a] : start[a + 1]], in
-    order."""
-    start, rows = np.zeros(people + 1, np.int64), np.empty(2 * len(pairs), np.int64)
-    for k in range(len(pairs)):
-        for side in range(2):
-            start[pairs[k, side] + 1] += 1
-    end = np.empty(people, np.int64)
-    for a in range(people):
-        start[a + 1] += start[a]
-        end[a] = start[a]
-    for k in range(len(pairs)):
-        for side in range(2):
-            a = pairs[k, side]
-            rows[end[a]] = k
-            end[a] += 1
-    return start, rows
-
-
-@njit(cache=True)
 def relate(
     pos: Array, vel: Array, pairs: Ints, related: Bools, odds: Array, uniforms: Array, rules: Array
 ) -> None:  # fmt: skip
@@ -191,21 +168,18 @@ def relate(
     a chain of two states that starts and stops with the hazards rate g and rate (1 - g), and a person leaves or joins a
     group at once.
     """
-    change, n = 1.0 - math.sqrt(1.0 - rules[RATE]), pos.shape[1]
-    start, rows = pairs_of_people(pairs, n)
-    for p in range(len(pos)):
-        for a in range(n):
-            if uniforms[p, a, 0] >= change:
+    change = 1.0 - math.sqrt(1.0 - rules[RATE])
+    for k in range(len(pairs)):
+        i, j = pairs[k, 0], pairs[k, 1]
+        for p in range(len(pos)):
+            # where both reconsider, j does so after i
+            a = j if uniforms[p, j, 0] < change else i
+            if uniforms[p, a, 0] >= change or math.isnan(odds[k]):
                 continue
-            for row in range(start[a], start[a + 1]):
-                k = rows[row]
-                if math.isnan(odds[k]):
-                    continue
-                i, j = pairs[k, 0], pairs[k, 1]
-                dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
-                du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
-                lost = rules[DISTANCE] * math.sqrt(dx * dx + dy * dy) + rules[VELOCITY] * math.sqrt(du * du + dv * dv)
-                related[k, p] = uniforms[p, a, 1] < 1.0 / (1.0 + math.exp(lost - odds[k]))
+            dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
+            du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
+            lost = rules[DISTANCE] * math.sqrt(dx * dx + dy * dy) + rules[VELOCITY] * math.sqrt(du * du + dv * dv)
+            related[k, p] = uniforms[p, a, 1] < 1.0 / (1.0 + math.exp(lost - odds[k]))
 
 
 @njit(cache=True)
