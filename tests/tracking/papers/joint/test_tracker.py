@@ -129,7 +129,7 @@ def test_a_member_who_is_missed_stays_in_the_group():
     """Without a measurement nothing is known of a change of groups."""
     points = walk([[0, 0], [0, 0.7], [0, 1.4]], [1.2, 0.0], 40, noise=0.05)
     shown = [p if k < 25 else p[:2] for k, p in enumerate(points)]
-    tracks = stepped(Joint(), shown)
+    tracks = stepped(Joint(JointConfig(coast_time=1.0)), shown)
     for t in tracks[24:]:
         assert len(set(t.group.tolist())) == 1
         assert t.group[0] >= 0
