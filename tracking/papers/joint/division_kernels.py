@@ -125,27 +125,34 @@ def place_newcomers(points: Array, label: Ints, uniforms: Array, sharpness: floa
     of apart and together are proportional to exp(-sharpness d_cl) of the two clusters apart and as one.
     """
     particles, partitions, n = label.shape
-    total, size = np.empty((n, 2)), np.empty(n)
+    # by the head of a cluster: sum and mean of the places, number of members, the last of them
+    total, centre = np.empty((n, 2)), np.empty((n, 2))
+    size, last = np.empty(n), np.empty(n, np.int64)
     own, other = np.empty(points.shape[2]), np.empty(points.shape[2])
     for i in range(particles):
         for j in range(partitions):
             groups = label[i, j]
-            total[:], size[:] = 0.0, 0.0
+            total[:], size[:], centre[:] = 0.0, 0.0, np.inf  # who is no head is far away
             for k in range(n):
-                _add(points[i], k, k if groups[k] == 0 else groups[k] - 1, total, size)
+                head = k if groups[k] == 0 else groups[k] - 1
+                _add(points[i], k, head, total, size)
+                last[head] = k
+            for g in range(n):
+                if size[g] > 0:
+                    centre[g, 0], centre[g, 1] = total[g, 0] / size[g], total[g, 1] / size[g]
             for person in range(n - uniforms.shape[2], n):
-                g = -1 if groups[person] > 0 else _nearest(person, total, size)
+                g = -1 if groups[person] > 0 else _nearest(centre, person)
                 if g < 0:
                     continue
-                join = _join_probability(points[i], person, g, groups, size[g], sharpness, scales, own, other)
+                some = groups[: last[g] + 1]
+                join = _join_probability(points[i], person, g, some, size[g], sharpness, scales, own, other)
                 if uniforms[i, j, person - n] >= join:
                     continue
                 _add(points[i], person, g, total, size)
-                size[person] = 0.0
                 head = min(person, g)
-                total[head], size[head] = total[g], size[g]
-                if head < g:
-                    size[g] = 0.0
+                total[head], size[head], last[head] = total[g], size[g], max(person, last[g])
+                centre[max(person, g)] = np.inf
+                centre[head, 0], centre[head, 1] = total[head, 0] / size[head], total[head, 1] / size[head]
                 for k in range(n):
                     if k == person or _is_member(groups, k, g):
                         groups[k] = -1
@@ -167,14 +174,13 @@ def _add(points, k, head, total, size):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _nearest(person, total, size):  # type: ignore[no-untyped-def]
-    """Returns the head of the cluster whose centre is nearest to the person's, -1 without another one."""
+def _nearest(places, person):  # type: ignore[no-untyped-def]
+    """Returns the place that is nearest to the person's, -1 without another one."""
     best, least = -1, np.inf
-    for g in range(len(size)):
-        if size[g] > 0 and g != person:
-            x, y = total[g, 0] / size[g] - total[person, 0], total[g, 1] / size[g] - total[person, 1]
-            if x * x + y * y < least:
-                best, least = g, x * x + y * y
+    for g in range(len(places)):
+        x, y = places[g, 0] - places[person, 0], places[g, 1] - places[person, 1]
+        if g != person and x * x + y * y < least:
+            best, least = g, x * x + y * y
     return best
 
 
