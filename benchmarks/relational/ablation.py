@@ -21,13 +21,12 @@ from tracking.grouping.grouped_tracks import with_groups, without_groups
 from tracking.papers.relational import sensor_kernels, tracker, transition_kernels
 
 DEPARTURES = (
-    "relation_evidence=state", "common_noise=0", "relation_bias=40", "NO_SPREAD", "NO_FACTORS", "NO_OCCLUDERS",
-    "detect_prob=1 clutter_density=0", "outlier_share=0", "hidden_time=2", "noise_scale=1", "clutter_density=0.02",
+    "relation_evidence=state", "coupling_time=0", "common_noise=0", "relation_bias=40", "NO_SPREAD", "NO_FACTORS",
+    "NO_OCCLUDERS", "detect_prob=1 clutter_density=0", "outlier_share=0", "hidden_time=2", "noise_scale=1",
+    "clutter_density=0.02",
 )  # fmt: skip
 """Settings of the ablation beside the defaults. With relation_bias 40 partners count fully; detect_prob 1 and
 clutter_density 0 are the paper's sensor and weights. Capitals: of SWITCHES."""
-
-
 PARTNERS = 40
 """Walks of the table of a hidden partner."""
 

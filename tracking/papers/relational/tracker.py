@@ -33,8 +33,8 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
   seconds.
 - unreported people: their relations stay as they are (`relation_evidence`). Paper: forecast. Why: no belief about
   them.
-- mean velocity: partners weighted by existence and, with the belief (`relation_evidence`), by g(l), less the filter's
-  scatter. Paper: all alike. Why: members differ.
+- coupling: approached within `coupling_time`; partners weighted by existence and, with the belief
+  (`relation_evidence`), by g(l), less the filter's scatter. Paper: the group's mean velocity. Why: members differ.
 - noise: a shared part (`common_noise`). Paper: independent. Why: a hidden member turns, too.
 - people*: slots common to all particles. Paper: each particle has a number of people. Why: few particles would have
   each newcomer.
@@ -71,6 +71,7 @@ fitted: `time_window`, the spread of a newcomer's velocity, the number of partic
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -188,10 +189,10 @@ class Particle(PointTracker):
     def _forecast(self) -> None:
         p, c = self.particles, self.config
         noise = self.streams.normals(MOTION, self.slots.key, p.count, 2)
-        shared, common, alike, spread = self._coupling()
+        shared, coupling, alike, spread = self._coupling()
         table = c.speed_table(self.dt)
         transition_kernels.move(
-            p.pos, p.vel, p.exist, p.pairs, p.related, noise, shared, table, common, alike, spread, self.dt
+            p.pos, p.vel, p.exist, p.pairs, p.related, noise, shared, table, coupling, alike, spread, self.dt
         )
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
@@ -205,8 +206,8 @@ class Particle(PointTracker):
         camera = self.context.camera if self.plane == "ground" else None
         return camera.position[:2] if camera is not None and camera.kind == "pinhole" else np.full(2, np.nan)
 
-    def _coupling(self) -> tuple[Array, float, Array, Array]:
-        return np.zeros(self.particles.pos.shape), 0.0, np.zeros(4), np.zeros((0, 2))
+    def _coupling(self) -> tuple[Array, Array, Array, Array]:
+        return np.zeros(self.particles.pos.shape), np.zeros(2), np.zeros(4), np.zeros((0, 2))
 
     def _relate(self) -> None: ...
 
@@ -299,13 +300,15 @@ class Relational(Particle):
         new = -np.expm1(-c.relation_rate * self.dt)
         return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
 
-    def _coupling(self) -> tuple[Array, float, Array, Array]:
-        p, common = self.particles, self.config.common_noise
+    def _coupling(self) -> tuple[Array, Array, Array, Array]:
+        p, time = self.particles, self.config.coupling_time
+        follow = 1.0 if time == 0 else -math.expm1(-self.dt / time)
+        coupling = np.array([follow, self.config.common_noise])
         shared = self.streams.normals(COUPLING, self.slots.key, p.count, 2)
         p.drop_strangers()
         if self.belief is None:
-            return shared, common, ALWAYS, np.zeros(p.pairs.shape)
-        return shared, common, self._rules, transition_kernels.pair_spread(p.pos, p.vel, p.pairs)
+            return shared, coupling, ALWAYS, np.zeros(p.pairs.shape)
+        return shared, coupling, self._rules, transition_kernels.pair_spread(p.pos, p.vel, p.pairs)
 
     def _relate(self) -> None:
         p, rules = self.particles, self._rules

@@ -24,6 +24,8 @@ from tracking.running.prepare import prepare
 
 ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])
 """The paper's rule: partners count fully."""
+AT_ONCE = np.array([1.0, 0.0])
+"""The paper's coupling: members of a group have its mean velocity, and noise of their own."""
 CERTAIN = {"detect_prob": 1.0, "clutter_density": 0.0}
 
 
@@ -32,13 +34,12 @@ def flat_table(diffusion):
     return {"drift": [0.0] * 5, "diffusion": [diffusion] * 5, "noise_scale": 1.0}
 
 
-def move(particles, noise, table, dt, common=0.0, shared=None, alike=ALWAYS, spread=0.0):
-    """Move the particles by a step of dt s; by default members of a group have noise of their own, as in the paper.
-    spread: of the squares of distances and velocity differences."""
+def move(particles, noise, table, coupling, dt, shared=None, alike=ALWAYS, spread=0.0):
+    """Move the particles by a step of dt s; spread: of the squares of distances and velocity differences."""
     p, shared = particles, np.zeros(noise.shape) if shared is None else shared
     spread = np.full(p.pairs.shape, spread)
     transition_kernels.move(
-        p.pos, p.vel, p.exist, p.pairs, p.related, noise, shared, table, common, alike, spread, dt
+        p.pos, p.vel, p.exist, p.pairs, p.related, noise, shared, table, coupling, alike, spread, dt
     )  # fmt: skip
 
 
@@ -148,7 +149,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
     relate(particles, 0, 1, related)
     truth, velocity = np.zeros(2), np.zeros(2)
     for _ in range(steps):
-        move(particles, rng.standard_normal((count, 2, 2)), config.speed_table(1.0), 1.0)
+        move(particles, rng.standard_normal((count, 2, 2)), config.speed_table(1.0), AT_ONCE, 1.0)
         velocity = 0.7 * velocity + rng.standard_normal(2)
         truth = truth + velocity
         points = (truth + r * rng.standard_normal(2))[None] if seen else np.zeros((0, 2))
@@ -265,19 +266,34 @@ def test_with_the_papers_sensor_a_person_who_jumps_is_a_new_one():
 
 
 @pytest.mark.parametrize("related", [False, True])
-@pytest.mark.parametrize("common", [0.0, 0.5])
-def test_diffusion_is_that_of_any_frame_rate(related, common):
+@pytest.mark.parametrize("time", [0.0, 0.4])
+def test_diffusion_is_that_of_any_frame_rate(related, time):
     spreads = []
     for fps in (25.0, 12.5):
         particles, rng = placed(20_000, [[0, 0], [1, 0]], [[1, 0], [1, 0]]), np.random.default_rng(3)
         relate(particles, 0, 1, related)
+        coupling = np.array([1 - np.exp(-1 / (fps * time)), 0.5]) if time else AT_ONCE
         for _ in range(round(fps)):
             noise, shared = rng.standard_normal((2, 20_000, 2, 2))
-            move(particles, noise, ParticleConfig().speed_table(1 / fps), 1 / fps, common, shared)
+            move(particles, noise, ParticleConfig().speed_table(1 / fps), coupling, 1 / fps, shared)
         mean = particles.vel.mean(axis=1) if related else particles.vel[:, 0]
         place = particles.pos.mean(axis=1) if related else particles.pos[:, 0]
         spreads.append([mean.std(axis=0).mean(), place.std(axis=0).mean()])
     np.testing.assert_allclose(spreads[0], spreads[1], rtol=0.05)
+
+
+def test_velocities_of_partners_approach_each_other_with_the_time_constant():
+    """Their difference falls by e in coupling_time, at any frame rate, and the mean stays; a person alone goes on."""
+    for fps in (10.0, 40.0):
+        particles = placed(1, [[0, 0], [0, 1], [9, 9]], [[2, 0], [0, 1], [1, 1]])
+        relate(particles, 0, 1)
+        coupling = np.array([1 - np.exp(-1 / (fps * 0.5)), 0.5])
+        for _ in range(round(0.5 * fps)):
+            move(particles, np.zeros((1, 3, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), coupling, 1 / fps)
+        a, b, alone = particles.vel[0]
+        np.testing.assert_allclose(a - b, np.array([2, -1]) / np.e, rtol=1e-12)
+        np.testing.assert_allclose((a + b) / 2, [1, 0.5], rtol=1e-12)
+        assert alone.tolist() == [1, 1]
 
 
 def test_all_members_of_a_particles_group_have_its_mean_velocity():
@@ -287,7 +303,7 @@ def test_all_members_of_a_particles_group_have_its_mean_velocity():
     relate(particles, 1, 2, np.array([True, False, False]))
     particles.close_groups()
     assert particles.pairs.tolist() == [[0, 1], [0, 2], [1, 2]]
-    move(particles, np.zeros((3, 4, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), 1.0)
+    move(particles, np.zeros((3, 4, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), AT_ONCE, 1.0)
     expected = np.array([
         [[1, 1], [1, 1], [1, 1], [1, 1]], [[1.5, 0], [1.5, 0], [0, 3], [1, 1]], [[3, 0], [0, 0], [0, 3], [1, 1]],
     ])  # fmt: skip
@@ -317,14 +333,14 @@ def test_partners_count_by_how_alike_they_are():
     alike, w = np.array([0.0, 3.0, 2.0, 3.0]), 1 / (1 + np.exp(2))
     particles = placed(1, [[0, 0], [0, 1]], [[2, 0], [1, 0]])
     relate(particles, 0, 1)
-    move(particles, np.zeros((1, 2, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), 1.0, alike=alike)
+    move(particles, np.zeros((1, 2, 2)), ParticleConfig(**flat_table(0.0)).speed_table(1.0), AT_ONCE, 1.0, None, alike)
     np.testing.assert_allclose(particles.vel[0, :, 0], [(2 + w) / (1 + w), (1 + 2 * w) / (1 + w)], rtol=1e-12)
     count, rng = 40_000, np.random.default_rng(5)
     particles = placed(count, [[0, 0], [0, 1.3]])
     relate(particles, 0, 1)
     noise, shared = rng.standard_normal((2, count, 2, 2))
-    w = 1 / (1 + np.exp(2 * 1.3 - 3))
-    move(particles, noise, ParticleConfig(**flat_table(1.0)).speed_table(1.0), 1.0, 0.7, shared, alike)
+    coupling, w = np.array([0.5, 0.7]), 1 / (1 + np.exp(2 * 1.3 - 3))
+    move(particles, noise, ParticleConfig(**flat_table(1.0)).speed_table(1.0), coupling, 1.0, shared, alike)
     common = 2 * 0.7 * w**2 / (1 + w**2)
     np.testing.assert_allclose(np.cov(particles.vel[..., 0].T), [[1, common], [common, 1]], atol=0.02)
 
