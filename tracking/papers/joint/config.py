@@ -69,8 +69,8 @@ class JointConfig(BackgroundSettings):
         "of the belief's `stay` for people reported in one group, and of its `come` for others (ours)")
     confirm_time: float = param(0.3, (0.0, 3.0), "s",
         "a new person is tracked so long after the first measurement, or given up so long after the last (ours)")
-    coast_time: float = param(0.6, (0.1, 10.0), "s",
-        "people are removed who are missed for longer (ours)", "log")
+    coast_time: float = param(1.0, (0.1, 10.0), "s",
+        "people are removed who are missed for longer, in a group all together (ours)", "log")
     # fmt: on
     merge_weights: tuple[float, ...] = _weights("merge")
     split_weights: tuple[float, ...] = _weights("split")

@@ -38,6 +38,13 @@ class People(PersonTable):
         self.missed[rows] = 0.0
         self.size[rows] = followed_sizes(self.size[rows], sizes, dt)
 
+    def absence(self, group: Ints) -> Array:
+        """Returns for how long each person has been missed, s, (K,); in a group of whom nobody was measured, the sum
+        over its members."""
+        same = ((group[:, None] == group) & (group >= 0)) | np.eye(len(group), dtype=bool)
+        measured = (same & (self.missed == 0)).any(axis=1)
+        return np.where(measured, self.missed, same @ self.missed)
+
 
 @dataclass
 class Newcomers(PersonTable):

@@ -40,7 +40,8 @@ Departures. A star marks those that stay in the preset `paper`:
   Why: detections are anonymous.
 - births*: a free detection, followed by a Kalman filter, is a person after `confirm_time`. Paper: not stated. Why:
   false alarms.
-- losses*: removed after `coast_time`. Paper: restarted from the truth. Why: no truth.
+- losses*: removed after `coast_time`; in an unseen group times are summed. Paper: restarted from the truth. Why: no
+  truth; a group that nobody sees has left.
 - p(y | x)*: normal about the place; 1 if missed. Paper: colour templates. Why: input is points.
 - pixels*: each blob one detection (`pixel_noise`). Paper: boxes. Why: no detector.
 - proposal*: mixture for each person, the dynamics alone if missed. Paper: mixture of products. Why: people differ.
@@ -156,7 +157,7 @@ class Joint(PointTracker):
             free = np.ones(len(points), bool)
             free[columns] = False
             self.people.record(rows, sizes[columns], self.dt)
-            self._keep(self.people.missed <= self.config.coast_time + 1e-9)
+            self._keep(self.people.absence(tracks.group) <= self.config.coast_time + 1e-9)
             self._newcomers(points[free], sizes[free])
         return tracks
 
