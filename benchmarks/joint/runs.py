@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from benchmarks.support import tables
-from benchmarks.support.replaced_code import Replacement, replaced_code
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import resolve
 from sim.sequence import simulate
@@ -30,28 +29,18 @@ OTHERS = (
 
 @dataclass(frozen=True)
 class Variant:
-    """A tracker, its parameters and its detections; seeds: False if its seed has no effect.
-
-    replaced: attributes of the tracker's code that are replaced while it runs: owner, name, value.
-    """
+    """Parameters of `joint`, and the detections it gets."""
 
     name: str
-    tracker: str = "joint"
     params: Mapping[str, object] = field(default_factory=dict)
     detections: DetectionMode = "file"
-    seeds: bool = True
-    replaced: tuple[Replacement, ...] = ()
 
 
 def measured(sequence: Recording, variant: Variant, seeds: Iterable[int], settings: Sequence[str] = ()) -> list[Row]:
     """Returns the scores of a variant for each filter seed, with frames/s and the tracker's diagnostics."""
-    params: object = variant.params
-    if variant.tracker == "joint":
-        params = JointConfig.from_dict(dict(variant.params)).with_set(*settings)
-    rows = []
-    for seed in list(seeds)[: None if variant.seeds else 1]:
-        with replaced_code(variant.replaced):
-            run = track(variant.tracker, sequence, params=params, detections=variant.detections, seed=seed)
+    params, rows = JointConfig.from_dict(dict(variant.params)).with_set(*settings), []
+    for seed in seeds:
+        run = track("joint", sequence, params=params, detections=variant.detections, seed=seed)
         own = {k: v for k, v in run.info.get("diagnostics", {}).items() if v is not None}
         rows.append({**evaluate(sequence.truth, run), **own, "speed": run.info["frames_per_second"]})
     return rows

@@ -21,12 +21,13 @@ from benchmarks.joint.runs import (
     with_false_events,
 )
 from benchmarks.support import chart, tables
+from benchmarks.support.replaced_code import Replacement, replaced_code
 from sim.types import Array, Ints
 from tracking.papers.joint.people import People
 
 COUNTS = (10, 25, 50, 100)
 DEPARTURES = (
-    "variant=full", "belief_rate=0 belief_memory=0", "belief_memory=0", "validity_rate=0", "alpha=0.5",
+    "variant=full", "belief_rate=0 belief_memory=0", "belief_memory=0",
     "algorithm=paper",
 )  # fmt: skip
 """Settings of the mode ablation."""
@@ -37,9 +38,7 @@ def _own_absence(people: People, group: Ints) -> Array:
     return people.missed
 
 
-RULES: Mapping[str, tuple[object, str, object]] = {
-    "absence of groups": (People, "absence", _own_absence),
-}
+RULES: Mapping[str, Replacement] = {"absence of groups": (People, "absence", _own_absence)}
 """Rules without a parameter that the mode ablation switches off: owner, name and replacement by the name of the row."""
 
 
@@ -48,14 +47,14 @@ def ablation(given: argparse.Namespace) -> None:
     differences to the defaults."""
     made = list(sequences(given.seeds, given.suite or "friends-meet"))
     base: list[Row] = []
-    deltas = {"GDSR": "group_GDSR", "MOTA": "group_MOTA", "event F1": "event_F1", "false events": "false"}
+    deltas = {"GDSR": "group_GDSR", "MOTA": "group_MOTA", "HOTA": "HOTA", "group F1": "group_F1_hull",
+              "event F1": "event_F1", "false events": "false"}  # fmt: skip
     shown = "event F1", "of the least person"
     tables.head(["setting", *(f"{name}, %" for name in SHARES), *shown, *(f"Δ {name}" for name in deltas)])
     for setting in ("", *(given.only.split(",") if given.only else (*DEPARTURES, *RULES))):
-        rule = setting in RULES
-        v = Variant("", replaced=(RULES[setting],) if rule else ())
-        words = [*given.set, *([] if rule else setting.split())]
-        rows = [with_false_events(mean_row(measured(s, v, given.filter_seeds, words))) for s in made]
+        words = [*given.set, *([] if setting in RULES else setting.split())]
+        with replaced_code([RULES[setting]] if setting in RULES else []):
+            rows = [with_false_events(mean_row(measured(s, Variant(""), given.filter_seeds, words))) for s in made]
         base = base or rows
         differences = [difference(rows, base, key) for key in deltas.values()]
         own = dict(zip(OTHERS, others(rows), strict=True))

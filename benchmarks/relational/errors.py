@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -109,17 +109,16 @@ def _difference(values: dict[str, Any]) -> str:
     return tables.signed(*map(float, paired(before, after)))
 
 
-def _row(first: str, mean: dict[str, list[float]]) -> None:
+def _row(first: str, mean: Mapping[str, Array | list[float]]) -> None:
     values = {name: np.array(x) for name, x in mean.items()}
     cells = [tables.interval(*map(float, mean_interval(values[name]))) for name in FILTERS]
     tables.row([first, *cells, _difference(values)])
 
 
-def pair(seed: int, length: float) -> tuple[Array, Iterator[Frame]]:
+def pair(seed: int) -> tuple[Array, Iterator[Frame]]:
     """Returns the places (T, 2, 2) of two people who walk together, and the frames of a detector.
 
-    Their common velocity wanders; the second is not detected from SEEN s on, for `length` s. The walk and the errors of
-    a seed do not depend on the length.
+    Their common velocity wanders; the second is not detected from SEEN s on, for the longest of LENGTHS.
     """
     rng, dt = np.random.default_rng(seed), 1 / FPS
     count = round((SEEN + max(LENGTHS) + 1) * FPS)
@@ -128,7 +127,7 @@ def pair(seed: int, length: float) -> tuple[Array, Iterator[Frame]]:
     sway = 0.05 * np.sin(2 * np.pi * np.arange(count)[:, None, None] * dt / 2 + rng.uniform(0, 6, (1, 2, 2)))
     pos = middle[:, None] + np.array([[0, 0.35], [0, -0.35]]) + sway
     seen = pos + rng.normal(0, NOISE, pos.shape)
-    first, last = round(SEEN * FPS), round((SEEN + length) * FPS)
+    first, last = round(SEEN * FPS), round((SEEN + max(LENGTHS)) * FPS)
 
     def frames() -> Iterator[Frame]:
         for k in range(last):
@@ -139,29 +138,31 @@ def pair(seed: int, length: float) -> tuple[Array, Iterator[Frame]]:
     return pos, frames()
 
 
+def hidden_partner(name: str, seed: int, given: argparse.Namespace) -> Array:
+    """Returns the error of the hidden one of two people, (L,), m, when an occlusion of each of LENGTHS would end."""
+    tracker = find(name)(config_of(name, given.counts[0], given))
+    tracker.reset(Context(FPS, float("nan")), seed)
+    (pos, frames), found = pair(seed), []
+    last = [round((SEEN + length) * FPS) for length in LENGTHS]
+    for frame in frames:
+        tracks = tracker.step(frame, frame.detections)
+        if frame.index in last:
+            true = pos[frame.index - 1]
+            away = np.hypot(*(true[:, None] - tracks.pos[None]).transpose(2, 0, 1))
+            people, tracked = optimal(away, CUT)
+            found.append(dict(zip(people.tolist(), away[people, tracked], strict=True)).get(1, CUT))
+    return np.array(found)
+
+
 def hidden(given: argparse.Namespace) -> None:
     """Prints a table: rows are lengths of the occlusion, columns the error of the hidden person in its last frame."""
     print("\nerror of the hidden one of two people in the last frame of the occlusion, m, at most 2")
     tables.head(["occlusion, s", *FILTERS, DIFFERENCE])
-    curves: dict[str, list[Array]] = {name: [] for name in FILTERS}
-    for length in LENGTHS:
-        mean = {name: [] for name in FILTERS}
-        for seed in given.seeds:
-            for name in FILTERS:
-                tracker = find(name)(config_of(name, given.counts[0], given))
-                tracker.reset(Context(FPS, float("nan")), seed)
-                pos, frames = pair(seed, length)
-                for frame in frames:
-                    tracks = tracker.step(frame, frame.detections)
-                true = pos[frame.index - 1]
-                away = np.hypot(*(true[:, None] - tracks.pos[None]).transpose(2, 0, 1))
-                people, found = optimal(away, CUT)
-                mean[name].append(dict(zip(people.tolist(), away[people, found], strict=True)).get(1, CUT))
-        _row(f"{length:g}", mean)
-        for name in FILTERS:
-            curves[name].append(np.array(mean_interval(np.array(mean[name]))))
+    found = {name: np.array([hidden_partner(name, seed, given) for seed in given.seeds]) for name in FILTERS}
+    for k, length in enumerate(LENGTHS):
+        _row(f"{length:g}", {name: values[:, k] for name, values in found.items()})
     if given.chart:
-        shown = {name: tuple(np.array(values).T) for name, values in curves.items()}
+        shown = {name: mean_interval(values) for name, values in found.items()}
         title = "error of a hidden partner, m"
         chart.lines([chart.Panel(title, LENGTHS, shown, "length of the occlusion, s", y_range=(0, 1.6))], given.chart)
 

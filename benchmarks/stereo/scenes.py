@@ -1,4 +1,5 @@
-"""The paper's scenes (sec. 4, Table 1) for `stereo` and its preset `paper`; then its decisions, each switched off.
+"""The paper's scenes (sec. 4, Table 1) for `stereo` and its preset `paper`; then its decisions, each switched off: from
+pictures in these scenes, from points on the suite standard (the first seed).
 
 A true group with two members or more is compared with the nearest reported group, if that is at most 1.5 m away on the
 ground; `found`: share of those true groups that have one. A true group's height is the mean of its members' body
@@ -33,7 +34,7 @@ from benchmarks.support.tables import interval, number, signed, table
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import Entry, resolve
 from sim.sequence import simulate
-from sim.types import Array, Tracks
+from sim.types import Array, DetectionMode, Tracks
 from sim.types import Sequence as Recording
 from tracking.papers.stereo import space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
@@ -67,26 +68,29 @@ VARIANTS: Mapping[str, Variant] = {
     "top_offset": Variant({"top_offset": 0.0}),
     "density_width": Variant({"density_width": 20.0}),
     "point_covariance": Variant({"point_covariance": False}),
-    "spread_weight": Variant({"spread_weight": 0.1}),
-    "split_time": Variant({"split_time": 0.0}),
-    "confirm_time": Variant({"confirm_time": 0.0}),
-    "report_coast": Variant({"report_coast": 5.0, "coast_time": 10.0}),
     "expected places": Variant(replaced=((space_group, "expected_places", _measured_places),)),
     "half a footprint": Variant(replaced=((tracker, "FEATURE_OUTLINE", 1.0),)),
 }
+FROM_POINTS: Mapping[str, Variant] = {
+    "spread_weight": Variant({"spread_weight": 0.1}),
+    "splits": Variant({"split_time": 100.0}),
+    "split_time": Variant({"split_time": 0.0}),
+    "confirm_time": Variant({"confirm_time": 0.0}),
+}
+"""Decisions that pictures of so few sequences cannot judge: from the simulated detector, on the suite standard."""
 
 
-def recordings(entry: Entry, seeds: Iterable[int]) -> Iterator[Recording]:
-    """Yields the pairs of pictures of each seed, kept in memory; a seed that cannot be simulated is printed and left
+def recordings(entry: Entry, seeds: Iterable[int], streams: tuple[str, ...] = ("left", "right")) -> Iterator[Recording]:
+    """Yields the sequence of each seed with its pictures in memory; a seed that cannot be simulated is printed and left
     out."""
     for seed in seeds:
         try:
-            live = simulate(entry.scenario, seed, entry.repeat, streams=("left", "right"))
+            live = simulate(entry.scenario, seed, entry.repeat, streams=streams)
             assert live.truth is not None
         except FlockscopeError as error:
             print(f"{entry.name}, seed {seed}, left out: {error.line()}", file=sys.stderr)
             continue
-        yield in_memory(live)
+        yield in_memory(live, with_background=bool(streams))
 
 
 def entries() -> dict[str, Entry]:
@@ -94,10 +98,10 @@ def entries() -> dict[str, Entry]:
     return {e.name.removeprefix("stereo-"): e for e in resolve("subtraction-stereo")}
 
 
-def row_of(sequence: Recording, variant: Variant) -> Row:
+def row_of(sequence: Recording, variant: Variant, detections: DetectionMode = "image") -> Row:
     """Returns position errors and scores of one sequence."""
     with replaced_code(variant.replaced):
-        run = track("stereo", sequence, params=variant.params or None, detections="image")
+        run = track("stereo", sequence, params=variant.params or None, detections=detections)
     truth = sequence.truth
     assert truth is not None
     kinds, true = [e.kind for t in run for e in t.events], [e.kind for e in truth.events or ()]
@@ -168,11 +172,21 @@ def scenes(args: argparse.Namespace) -> dict[str, dict[str, list[Row]]]:
     )  # fmt: skip
     rows = {f"{scene}, {name}": _cells(scene, made[scene][name]) for scene in SCENES for name in ("paper", "default")}
     table("Scenes of the paper: its preset, and the default", "scene", columns, rows)
+    _switched_off("from pictures", made, VARIANTS)
+    made["points"] = {name: [] for name in ("default", *FROM_POINTS)}
+    for entry in resolve("suite:standard"):
+        for sequence in recordings(entry, args.seeds[:1], ()):
+            for name, rows in made["points"].items():
+                rows.append(row_of(sequence, FROM_POINTS.get(name, Variant()), "file"))
+    _switched_off("from points", {"points": made["points"]}, FROM_POINTS)
+    return made
+
+
+def _switched_off(source: str, made: Mapping[str, Mapping[str, list[Row]]], names: Iterable[str]) -> None:
     keys = {"group F1": "group_F1_hull", "MOTA": "group_MOTA", "ground, m": "ground", "3-D, middle": "middle",
             "extra": "extra"}  # fmt: skip
-    off = {name: [_difference(made, name, key) for key in keys.values()] for name in VARIANTS}
-    table("Each decision switched off: difference to the default", "decision", tuple(keys), off)
-    return made
+    off = {name: [_difference(made, name, key) for key in keys.values()] for name in names}
+    table(f"Each decision switched off, {source}: difference to the default", "decision", tuple(keys), off)
 
 
 def _difference(made: Mapping[str, Mapping[str, list[Row]]], name: str, key: str) -> str:

@@ -1,10 +1,9 @@
 """Kernels of cell lists: which of N places in the plane are near a point, without a look at all of them.
 
 A grid of square cells covers most of the places. It is a tuple: x and y of its corner, width of a cell, numbers of
-columns and rows. Places beyond the grid are in its border cells, so that one far away costs nothing. A list to which
-places are added, and from which they are taken, is a tuple of `first` (C,), the first place of each cell, `after` (N,),
-the next one in the cell of each place, -1 being the end, and the grid. A list that stays as it is, is a tuple of
-`start` (C + 1,), `order` (N,) and the grid: the places of cell c are order[start[c] : start[c + 1]].
+columns and rows. Places beyond the grid are in its border cells, so that one far away costs nothing. A list is a tuple
+of `first` (C,), the first place of each cell, `after` (N,), the next one in the cell of each place, -1 being the end,
+and the grid.
 """
 
 from __future__ import annotations
@@ -72,20 +71,6 @@ def insert(k: int, x: float, y: float, cells: Any) -> None:
 
 
 @njit(cache=True)
-def remove(k: int, x: float, y: float, cells: Any) -> None:
-    """Takes place k, which was added at x, y, out of a list."""
-    first, after, grid = cells
-    c = _column(x, grid) * grid[4] + _row(y, grid)
-    at = first[c]
-    if at == k:
-        first[c] = after[k]
-        return
-    while after[at] != k:
-        at = after[at]
-    after[at] = after[k]
-
-
-@njit(cache=True)
 def nearest_place(places: Array, k: int, cells: Any) -> int:
     """Returns the listed place nearest to place k, of equal ones the first; -1 without another one."""
     first, after, grid = cells
@@ -131,34 +116,3 @@ def nearest_places(places: Array, count: int, nearest: Ints) -> None:
         insert(k, places[k, 0], places[k, 1], cells)
     for k in range(count):
         nearest[k] = nearest_place(places, k, cells)
-
-
-@njit(cache=True)
-def cell_list(places: Array, count: int) -> Any:
-    """Returns the list of `count` places (N, 2 or more), which stays as it is."""
-    grid = grid_of(places, count)
-    start, order, cell = np.zeros(grid[3] * grid[4] + 1, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
-    for k in range(count):
-        cell[k] = _column(places[k, 0], grid) * grid[4] + _row(places[k, 1], grid)
-        start[cell[k] + 1] += 1
-    for c in range(1, len(start)):
-        start[c] += start[c - 1]
-    end = np.empty(len(start), np.int64)
-    for c in range(len(start)):
-        end[c] = start[c]
-    for k in range(count):
-        order[end[cell[k]]] = k
-        end[cell[k]] += 1
-    return start, order, grid
-
-
-@njit(cache=True)
-def listed_near(x: float, y: float, reach: float, cells: Any, out: Ints) -> int:
-    """Writes the places of the cells within `reach` of a point into out (N,), and returns their number."""
-    start, order, grid = cells
-    low, high, found = _row(y - reach, grid), _row(y + reach, grid), 0
-    for column in range(_column(x - reach, grid), _column(x + reach, grid) + 1):
-        for at in range(start[column * grid[4] + low], start[column * grid[4] + high + 1]):
-            out[found] = order[at]
-            found += 1
-    return found

@@ -95,25 +95,3 @@ def test_the_nearest_place_is_that_of_a_look_at_all(places):
     np.fill_diagonal(square, np.inf)
     expected = square.argmin(axis=1) if len(places) > 1 else [-1]
     assert found.tolist() == list(expected)
-
-
-@pytest.mark.parametrize("places", list(scenes()))
-@pytest.mark.parametrize("reach", [0.0, 1.0, 7.0, 1e6])
-def test_all_places_within_reach_are_listed_once(places, reach):
-    made, out = cells.cell_list(places, len(places)), np.empty(len(places), np.int64)
-    for x, y in (*places[:40], (3.3, 900.0)):
-        listed = out[: cells.listed_near(x, y, reach, made, out)].tolist()
-        assert len(set(listed)) == len(listed)
-        assert set(np.flatnonzero(np.hypot(*(places - (x, y)).T) <= reach)) <= set(listed)
-
-
-def test_places_that_are_taken_out_are_found_no_more():
-    places = np.random.default_rng(1).uniform(0, 10, (60, 2))
-    made = cells.empty_list(60, cells.grid_of(places, 60))
-    for k, (x, y) in enumerate(places):
-        cells.insert(k, x, y, made)
-    for k in range(1, 59):
-        cells.remove(k, *places[k], made)
-    assert cells.nearest_place(places, 0, made) == 59
-    cells.remove(59, *places[59], made)
-    assert cells.nearest_place(places, 0, made) == -1

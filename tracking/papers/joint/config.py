@@ -26,6 +26,8 @@ GATE = 0.999  # Probability that a detection of a person is in the gate (ours).
 SCATTER, APART = 0.5, 2.0
 SIZE_MEAN, SIZE_STD = 1.0, 1.5  # mu and sigma of the prior over group sizes, people.
 EVENT_TIME = 0.1  # s between the two times of the features for which the event classifier is fitted (ours).
+ALPHA = 0.5  # Share of the dynamics in the individuals' proposal; the paper does not print it.
+VALIDITY_RATE = 60.0  # 1/s: lambda_cl, weight of the cluster validity in p(Z | X); not printed, fitted.
 SHARPNESS = 8.0  # Weight of the validity in the choice of parts of a split, and of a new person's group (ours).
 
 
@@ -55,17 +57,14 @@ class JointConfig(BackgroundSettings):
         "measured: the individuals are the detections, known exactly (DEEPER-JIGT.2)", "categorical", tunable=False)
     algorithm: str = param("ours", ("ours", "paper"), "",
         "paper: a particle has one weight, the proposal is about the detection; ours: neither", "categorical")
-    alpha: float = param(0.1, (0.0, 1.0), "share", "of the dynamics in the individuals' proposal")
     place_noise: float = param(0.25, (0.01, 2.0), "m/s^0.5",
         "jitter of the places in Sigma; the paper gives no Sigma", "log")
     velocity_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5", "change of the velocities in Sigma", "log")
     point_noise: float = param(0.08, (0.005, 2.0), "m", "standard deviation of a measured position, per axis", "log")
     pixel_noise: float = param(0.15, (0.005, 2.0), "m",
         "from pixels: standard deviation of the centre of a blob, per axis (ours)", "log", sees="pixels")
-    validity_rate: float = param(20.0, (0.0, 500.0), "1/s",
-        "lambda_cl: weight of the cluster validity in p(Z | X), per second (ours)")
     belief_rate: float = param(20.0, (0.0, 100.0), "1/s",
-        "weight of the beliefs of pairs in log p(Z | X), per second (ours)")
+        "log p(Z | X) is this times the sum of the beliefs of pairs, per second; 0: by the validity (ours)")
     belief_memory: float = param(0.2, (0.0, 2.0), "share",
         "of the belief's `stay` for people reported in one group, and of its `come` for others (ours)")
     confirm_time: float = param(0.3, (0.0, 3.0), "s",

@@ -17,7 +17,7 @@ import numpy as np
 from sim.types import Array, Ints
 from tracking.filters.person_streams import NOBODY, Keys, PersonStreams
 from tracking.papers.joint import group_events_kernels, partition_kernels
-from tracking.papers.joint.config import SCALES, JointConfig
+from tracking.papers.joint.config import ALPHA, SCALES, VALIDITY_RATE, JointConfig
 from tracking.papers.joint.decentralised_filter import log_sum
 from tracking.papers.joint.individuals_kernels import CROSS, PLACE, RATE, group_dynamics, own_dynamics
 
@@ -142,7 +142,7 @@ class FrameModel:
         c, shape = self.config, x.shape[:2]
         normals = self.streams.normals(MOTION, self.key, shape[0], STATE)
         uniforms = self.streams.uniforms(CHOICES, self.key, shape[0], 1)[..., 0]
-        proposal = Proposal(self.sigma, self.noise, self.dt, c.alpha, c.own_weights)
+        proposal = Proposal(self.sigma, self.noise, self.dt, ALPHA, c.own_weights)
         if c.individuals == "measured":
             place = np.where(np.isfinite(self.z), self.z, moved(x, self.dt)[..., :2])
             return np.concatenate([place, (place - x[..., :2]) / self.dt], axis=-1), np.zeros(shape)
@@ -177,19 +177,17 @@ class FrameModel:
         return drawn.reshape(shape[0], shape[1], len(key), columns)
 
     def energy(self, new: Array, z: Ints) -> Array:
-        """log p(Z_t | X_t) of eq. 4: -lambda_cl d_cl(Z_t, X_t), per second, plus the belief of the pairs in one group
-        (ours); 0 in VAR3."""
+        """log p(Z_t | X_t) of eq. 4: the beliefs of the pairs in one group (ours) or, without, -lambda_cl d_cl(Z_t,
+        X_t), per second; 0 in VAR3."""
         c = self.config
         out = np.zeros(z.shape[:2])
         if c.variant == "VAR3":
             return out
-        partition_kernels.validities(new, z, SCALES, out)
-        out *= -c.validity_rate * self.dt
         if c.belief_rate > 0:
-            worth = np.empty_like(out)
-            partition_kernels.pair_sums(self.belief, z, worth)
-            out += c.belief_rate * self.dt * worth
-        return out
+            partition_kernels.pair_sums(self.belief, z, out)
+            return np.asarray(c.belief_rate * self.dt * out)
+        partition_kernels.validities(new, z, SCALES, out)
+        return np.asarray(-VALIDITY_RATE * self.dt * out)
 
 
 @cache

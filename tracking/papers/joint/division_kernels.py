@@ -9,7 +9,6 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
-from tracking.filters.cell_list_kernels import empty_list, grid_of, insert, nearest_place, remove
 from tracking.papers.joint.partition_kernels import APART, SCATTER, validity_of
 
 MOST_LISTED = 6
@@ -123,84 +122,72 @@ def place_newcomers(points: Array, label: Ints, uniforms: Array, sharpness: floa
     partitions in which the person is alone (ours).
 
     points (N_x, K, D): as validity_of; label (N_x, N_z, K): changed in place; uniforms (N_x, N_z, M). The probabilities
-    of apart and together are proportional to exp(-sharpness d_cl) of the two clusters apart and as one. Clusters are in
-    a cell list, so that a person does not cost more the more others there are.
+    of apart and together are proportional to exp(-sharpness d_cl) of the two clusters apart and as one.
     """
     particles, partitions, n = label.shape
-    centre, head = np.empty((n, 2)), np.empty(n, np.int64)
-    following, count = np.empty(n, np.int64), np.empty(n, np.int64)
+    # by the head of a cluster: sum and mean of the places, number of members, the last of them
+    total, centre = np.empty((n, 2)), np.empty((n, 2))
+    size, last = np.empty(n), np.empty(n, np.int64)
     own, other = np.empty(points.shape[2]), np.empty(points.shape[2])
     for i in range(particles):
-        state, grid = points[i], grid_of(points[i], n)
         for j in range(partitions):
             groups = label[i, j]
-            _list_clusters(state, groups, head, following, count, centre)
-            cells = empty_list(n, grid)
+            total[:], size[:], centre[:] = 0.0, 0.0, np.inf  # who is no head is far away
             for k in range(n):
-                if head[k] == k:
-                    insert(k, centre[k, 0], centre[k, 1], cells)
+                head = k if groups[k] == 0 else groups[k] - 1
+                _add(points[i], k, head, total, size)
+                last[head] = k
+            for g in range(n):
+                if size[g] > 0:
+                    centre[g, 0], centre[g, 1] = total[g, 0] / size[g], total[g, 1] / size[g]
             for person in range(n - uniforms.shape[2], n):
-                if groups[person] > 0:
-                    continue
-                g = nearest_place(centre, person, cells)
+                g = -1 if groups[person] > 0 else _nearest(centre, person)
                 if g < 0:
                     continue
-                join = _join_probability(state, person, g, following, count[g], sharpness, scales, own, other)
+                some = groups[: last[g] + 1]
+                join = _join_probability(points[i], person, g, some, size[g], sharpness, scales, own, other)
                 if uniforms[i, j, person - n] >= join:
                     continue
-                remove(person, centre[person, 0], centre[person, 1], cells)
-                remove(g, centre[g, 0], centre[g, 1], cells)
-                g = _united(person, g, following, count)
-                _centre_of(state, g, following, count[g], centre)
-                insert(g, centre[g, 0], centre[g, 1], cells)
-                k = g
-                while k >= 0:
-                    groups[k] = 1 + g
-                    k = following[k]
+                _add(points[i], person, g, total, size)
+                head = min(person, g)
+                total[head], size[head], last[head] = total[g], size[g], max(person, last[g])
+                centre[max(person, g)] = np.inf
+                centre[head, 0], centre[head, 1] = total[head, 0] / size[head], total[head, 1] / size[head]
+                for k in range(n):
+                    if k == person or _is_member(groups, k, g):
+                        groups[k] = -1
+                for k in range(n):
+                    if groups[k] < 0:
+                        groups[k] = 1 + head
 
 
 @njit(cache=True)
-def _list_clusters(points, label, head, following, count, centre):  # type: ignore[no-untyped-def]
-    last = np.empty(len(label), np.int64)
-    for k in range(len(label)):
-        g = k if label[k] == 0 else label[k] - 1
-        head[k], following[k] = g, -1
-        if g == k:
-            count[g] = 1
-        else:
-            count[g] += 1
-            following[last[g]] = k
-        last[g] = k
-    for k in range(len(label)):
-        if head[k] == k:
-            _centre_of(points, k, following, count[k], centre)
+def _is_member(label, k, head):  # type: ignore[no-untyped-def]
+    return k == head or label[k] == 1 + head
 
 
 @njit(cache=True)
-def _centre_of(points, g, following, count, centre):  # type: ignore[no-untyped-def]
-    x, y, k = 0.0, 0.0, g
-    while k >= 0:
-        x, y, k = x + points[k, 0], y + points[k, 1], following[k]
-    centre[g, 0], centre[g, 1] = x / count, y / count
+def _add(points, k, head, total, size):  # type: ignore[no-untyped-def]
+    total[head, 0] += points[k, 0]
+    total[head, 1] += points[k, 1]
+    size[head] += 1
 
 
 @njit(cache=True)
-def _united(person, g, following, count):  # type: ignore[no-untyped-def]
-    if person < g:
-        following[person], count[person] = g, count[g] + 1
-        return person
-    at = g
-    while 0 <= following[at] < person:
-        at = following[at]
-    following[person], following[at] = following[at], person
-    count[g] += 1
-    return g
+def _nearest(places, person):  # type: ignore[no-untyped-def]
+    """Returns the place that is nearest to the person's, -1 without another one."""
+    best, least = -1, np.inf
+    for g in range(len(places)):
+        x, y = places[g, 0] - places[person, 0], places[g, 1] - places[person, 1]
+        if g != person and x * x + y * y < least:
+            best, least = g, x * x + y * y
+    return best
 
 
 @njit(cache=True)
-def _join_probability(points, person, g, following, count, sharpness, scales, own, other):  # type: ignore[no-untyped-def]
+def _join_probability(points, person, g, label, count, sharpness, scales, own, other):  # type: ignore[no-untyped-def]
     s0, apart = scales[SCATTER], scales[APART]
-    single, all_of_them = _scatter(points, person, g, following, count, s0, own, other)
+    single, all_of_them = _scatter(points, person, g, label, count, s0, own, other)
     away = 0.0
     for d in range(len(own)):
         away += (points[person, d] - other[d]) ** 2
@@ -210,24 +197,23 @@ def _join_probability(points, person, g, following, count, sharpness, scales, ow
 
 
 @njit(cache=True)
-def _scatter(points, person, g, following, count, s0, both, other):  # type: ignore[no-untyped-def]
+def _scatter(points, person, g, label, count, s0, both, other):  # type: ignore[no-untyped-def]
     dims = len(both)
     for d in range(dims):
         both[d], other[d] = points[person, d], 0.0
-    k = g
-    while k >= 0:
-        for d in range(dims):
-            both[d] += points[k, d]
-            other[d] += points[k, d]
-        k = following[k]
+    for k in range(g, len(label)):
+        if _is_member(label, k, g):
+            for d in range(dims):
+                both[d] += points[k, d]
+                other[d] += points[k, d]
     for d in range(dims):
         both[d] /= count + 1
         other[d] /= count
-    without, with_person, k = s0, s0 + _distance(points, person, both), g
-    while k >= 0:
-        without += _distance(points, k, other) if count > 1 else 0.0
-        with_person += _distance(points, k, both)
-        k = following[k]
+    without, with_person = s0, s0 + _distance(points, person, both)
+    for k in range(g, len(label)):
+        if _is_member(label, k, g):
+            without += _distance(points, k, other) if count > 1 else 0.0
+            with_person += _distance(points, k, both)
     return without / (count + 1), with_person / (count + 2)
 
 

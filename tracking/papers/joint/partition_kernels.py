@@ -13,7 +13,6 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.types import Array, Ints
-from tracking.filters.cell_list_kernels import FEW, cell_list, listed_near
 
 SCATTER, APART = range(2)
 """Slots of `scales` (2,): prior scatter s_0, virtual distance D_0; m."""
@@ -110,14 +109,11 @@ def validity_of(points: Array, cluster: Ints, count: int, scales: Array, centre:
     worst = np.empty(count)
     for g in range(count):
         worst[g] = scatter[g] / apart
-    if count > FEW:
-        _worst_near(centre, scatter[:count], scales, worst)
-    else:
-        for g in range(count):
-            for h in range(g):
-                ratio = _ratio(centre, scatter, g, h, s0)
-                worst[g] = max(worst[g], ratio)
-                worst[h] = max(worst[h], ratio)
+    for g in range(count):
+        for h in range(g):
+            ratio = _ratio(centre, scatter, g, h, s0)
+            worst[g] = max(worst[g], ratio)
+            worst[h] = max(worst[h], ratio)
     total = 0.0
     for g in range(count):
         total += worst[g]
@@ -130,23 +126,6 @@ def _ratio(centre, scatter, g, h, s0):  # type: ignore[no-untyped-def]
     for d in range(centre.shape[1]):
         total += (centre[g, d] - centre[h, d]) ** 2
     return (scatter[g] + scatter[h]) / max(math.sqrt(total), s0)
-
-
-@njit(cache=True)
-def _worst_near(centre, scatter, scales, worst):  # type: ignore[no-untyped-def]
-    count, widest = len(scatter), 0.0
-    for g in range(count):
-        widest = max(widest, scatter[g])
-    cells, near = cell_list(centre, count), np.empty(count, np.int64)
-    for g in range(count):
-        x, y = centre[g, 0], centre[g, 1]
-        for narrow in (True, False):
-            reach = cells[2][2] / 2 if narrow else (scatter[g] + widest) / worst[g] * (1 + 1e-9)
-            for h in near[: listed_near(x, y, max(reach, 0.0), cells, near)]:
-                away = (x - centre[h, 0]) ** 2 + (y - centre[h, 1]) ** 2
-                most = (scatter[g] + scatter[h]) * (1 + 1e-9)
-                if h != g and away * worst[g] ** 2 < most * most:
-                    worst[g] = max(worst[g], _ratio(centre, scatter, g, h, scales[SCATTER]))
 
 
 @njit(cache=True)
@@ -168,43 +147,26 @@ def validities(points: Array, label: Ints, scales: Array, out: Array) -> None:
 
 
 @njit(cache=True)
-def next_member(k: int, label: Ints, last: Ints, following: Ints) -> int:
-    """Returns the first member of person k's group who is before k, -1 without one, and add k to the members.
-
-    To be called for k = 0, 1, ... of a label (K,). following (K,): the next member of the group, up to k; last (K,):
-    the last one so far, by heads. A loop over members costs no more the more other people there are.
-    """
-    g = label[k] - 1
-    following[k] = -1
-    if g >= 0 and g < k:
-        following[last[g]] = k
-    if g >= 0:
-        last[g] = k
-    return g if 0 <= g < k else -1
-
-
-@njit(cache=True)
-def _pair_sum(worth, label, last, following):  # type: ignore[no-untyped-def]
+def _pair_sum(worth, label):  # type: ignore[no-untyped-def]
     total = 0.0
     for k in range(len(label)):
-        other = next_member(k, label, last, following)
-        while 0 <= other < k:
-            total += worth[k, other]
-            other = following[other]
+        if label[k] > 0:
+            for other in range(label[k] - 1, k):  # from the group's least member on
+                if label[other] == label[k]:
+                    total += worth[k, other]
     return total
 
 
 @njit(cache=True)
 def pair_sums(worth: Array, label: Ints, out: Array) -> None:
     """Writes the sum of worth (K, K) over the pairs in one group of each partition, (N_x, N_z); label (N_x, N_z, K)."""
-    particles, partitions, n = label.shape
-    last, following = np.empty(n, np.int64), np.empty(n, np.int64)
+    particles, partitions, _ = label.shape
     for i in range(particles):
         for j in range(partitions):
             if j > 0 and same_row(label[i, j], label[i, j - 1]):
                 out[i, j] = out[i, j - 1]
                 continue
-            out[i, j] = _pair_sum(worth, label[i, j], last, following)
+            out[i, j] = _pair_sum(worth, label[i, j])
 
 
 @njit(cache=True)

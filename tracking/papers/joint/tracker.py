@@ -5,7 +5,7 @@ state is (X, Z): X places and velocities of K individuals, Z the partition of th
 particles of X, N_z partitions under each. The steps of a frame, with the numbers of Algorithm 1:
 
     4  X' ~ pi(X' | X, y)              composite proposal                     before eq. 3   distributions
-         `alpha` of N(A x, Sigma), the rest pi_det
+         alpha of N(A x, Sigma), the rest pi_det
     5  q = qbar p(X' | X, Z)           groups move individuals                eq. 5          individuals_kernels
          N(x + B g, Sigma) for each person, g the mean of the group
     6  resample Z by q                                                                       decentralised_filter
@@ -31,8 +31,8 @@ Readings, where the paper is silent or contradicts itself:
 - The first partition of a person is drawn by the validity: the person is alone or joins the nearest group.
 - Velocities at the start are those of a Kalman filter over `confirm_time`.
 
-Fitted, as the paper leaves them open: `confirm_time` and λ_cl (`validity_rate`) on friends-meet, training seeds 0:2;
-event_classifier.toml, which names scenes and seeds. Not fitted: N_x, N_z, Σ, λ_y, `alpha`.
+Fitted, as the paper leaves them open: `confirm_time` and λ_cl on friends-meet, training seeds 0:2;
+event_classifier.toml, which names scenes and seeds. Not fitted: N_x, N_z, Σ, λ_y, α.
 
 Departures. A star marks those that stay in the preset `paper`:
 
@@ -52,8 +52,8 @@ Departures. A star marks those that stay in the preset `paper`:
 - moments: by the own part (`algorithm`). Paper: by w. Why: as the weights.
 - validity*: with prior scatter, virtual cluster and least distance. Paper: Davies-Bouldin. Why: undefined for one
   cluster or equal centres.
-- λ_cl*: per second (`validity_rate`). Paper: each frame. Why: any frame rate.
-- beliefs: pairs in one group add their belief (`belief_rate`, `belief_memory`). Paper: none. Why: passing strangers
+- λ_cl*: per second. Paper: each frame. Why: any frame rate.
+- p(Z | X): by the beliefs of pairs (`belief_rate`, `belief_memory`). Paper: by the validity. Why: passing strangers
   look alike.
 - eq. 5: left out (`variant`). Paper: the group's velocity moves people. Why: no score is surely better with it.
 - events*: also people alone; in random order, each changes once. Paper: groups, all at once. Why: people alone must

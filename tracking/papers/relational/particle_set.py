@@ -106,7 +106,10 @@ class ParticleSet:
         else:
             for values in (self.pos, self.vel, self.exist, self.ancestor):
                 values[:, few] = values[chosen, few]
-            particle_set_kernels.redraw_relations(self.pairs, self.related, few, chosen)
+            # a relation is drawn with each person alone: particles of both are independent then
+            for person, own in zip(few.tolist(), chosen.T, strict=True):
+                rows = (self.pairs == person).any(axis=1)
+                self.related[rows] = self.related[rows][:, own]
         self.weights[:, few] = 1 / self.count
         return few
 

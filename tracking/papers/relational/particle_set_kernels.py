@@ -1,4 +1,4 @@
-"""Kernels of tracking.papers.relational.particle_set: groups, resampled relations, means over the particles.
+"""Kernels of tracking.papers.relational.particle_set: groups, means over the particles.
 
 Arrays are over P particles and K people, as in `transition_kernels`.
 """
@@ -11,7 +11,6 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.types import Array, Bools, Ints
-from tracking.papers.relational.transition_kernels import pairs_of_people
 
 
 @njit(cache=True)
@@ -83,33 +82,6 @@ def _root(label, p, i):  # type: ignore[no-untyped-def]
         label[p, i] = label[p, label[p, i]]
         i = label[p, i]
     return i
-
-
-@njit(cache=True)
-def redraw_relations(pairs: Ints, related: Bools, people: Ints, chosen: Ints) -> None:
-    """Replace the relations of resampled people, one after the other; related (N, P) is changed.
-
-    What the partners' weights say of a relation is lost where the person alone is resampled: the particles of both are
-    independent then.
-
-    people (R,): who; chosen (P, R): the particle from which each takes the own relations.
-    """
-    if len(pairs) == 0:
-        return
-    last, particles = 0, related.shape[1]
-    for column in range(len(people)):
-        last = max(last, people[column])
-    for k in range(len(pairs)):
-        last = max(last, pairs[k, 1])
-    start, rows = pairs_of_people(pairs, last + 1)
-    old = np.empty(particles, np.bool_)
-    for column in range(len(people)):
-        for row in range(start[people[column]], start[people[column] + 1]):
-            k = rows[row]
-            for p in range(particles):
-                old[p] = related[k, p]
-            for p in range(particles):
-                related[k, p] = old[chosen[p, column]]
 
 
 @njit(cache=True)

@@ -159,26 +159,6 @@ def near_pairs(pos: Array, rules: Array) -> Ints:
 
 
 @njit(cache=True)
-def pairs_of_people(pairs: Ints, people: int) -> tuple[Ints, Ints]:
-    """Returns the rows of the pairs (N, 2) of each person: those of person a are rows[start[a] : start[a + 1]], in
-    order."""
-    start, rows = np.zeros(people + 1, np.int64), np.empty(2 * len(pairs), np.int64)
-    for k in range(len(pairs)):
-        for side in range(2):
-            start[pairs[k, side] + 1] += 1
-    end = np.empty(people, np.int64)
-    for a in range(people):
-        start[a + 1] += start[a]
-        end[a] = start[a]
-    for k in range(len(pairs)):
-        for side in range(2):
-            a = pairs[k, side]
-            rows[end[a]] = k
-            end[a] += 1
-    return start, rows
-
-
-@njit(cache=True)
 def relate(
     pos: Array, vel: Array, pairs: Ints, related: Bools, odds: Array, uniforms: Array, rules: Array
 ) -> None:  # fmt: skip
@@ -191,21 +171,18 @@ def relate(
     a chain of two states that starts and stops with the hazards rate g and rate (1 - g), and a person leaves or joins a
     group at once.
     """
-    change, n = 1.0 - math.sqrt(1.0 - rules[RATE]), pos.shape[1]
-    start, rows = pairs_of_people(pairs, n)
-    for p in range(len(pos)):
-        for a in range(n):
-            if uniforms[p, a, 0] >= change:
+    change = 1.0 - math.sqrt(1.0 - rules[RATE])
+    for k in range(len(pairs)):
+        i, j = pairs[k, 0], pairs[k, 1]
+        for p in range(len(pos)):
+            # where both reconsider, j does so after i
+            a = j if uniforms[p, j, 0] < change else i
+            if uniforms[p, a, 0] >= change or math.isnan(odds[k]):
                 continue
-            for row in range(start[a], start[a + 1]):
-                k = rows[row]
-                if math.isnan(odds[k]):
-                    continue
-                i, j = pairs[k, 0], pairs[k, 1]
-                dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
-                du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
-                lost = rules[DISTANCE] * math.sqrt(dx * dx + dy * dy) + rules[VELOCITY] * math.sqrt(du * du + dv * dv)
-                related[k, p] = uniforms[p, a, 1] < 1.0 / (1.0 + math.exp(lost - odds[k]))
+            dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
+            du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
+            lost = rules[DISTANCE] * math.sqrt(dx * dx + dy * dy) + rules[VELOCITY] * math.sqrt(du * du + dv * dv)
+            related[k, p] = uniforms[p, a, 1] < 1.0 / (1.0 + math.exp(lost - odds[k]))
 
 
 @njit(cache=True)

@@ -61,6 +61,4 @@ class StereoConfig(BackgroundSettings):
         "a new group is confirmed after so long with measurements, and deleted after so long without (ours)")
     coast_time: float = param(1.5, (0.0, 10.0), "s",
         "a confirmed group is deleted after so long without measurements (ours)")
-    report_coast: float = param(0.5, (0.0, 5.0), "s",
-        "time after the last measurement for which a group is reported (ours)")
     # fmt: on

@@ -61,7 +61,7 @@ Departures. Without a parameter that switches it off, one holds in the preset `p
 - splits: linked parts for `split_time`, unless they would merge again. Paper: none. Why: groups part.
 - parts: start anew from their points, with the group's velocity; the largest keeps the id. Paper: none. Why: tracks
   need ids.
-- confirmation, deletion: `confirm_time`, `coast_time`, `report_coast`. Paper: none. Why: wrong matches.
+- confirmation, deletion: `confirm_time`, `coast_time`. Paper: none. Why: wrong matches.
 - too much foreground: features start anew, so nothing is measured for `window_time`; groups go on. Paper: none. Why:
   light changes.
 - hulls: round places corrected for errors (`point_covariance`), half a footprint each, from points a whole one. Paper:
@@ -165,8 +165,8 @@ class Stereo:
         return self._report(frame, events)
 
     def _report(self, frame: Frame, events: list[WholeGroupEvent]) -> Tracks:
-        """Returns the confirmed groups measured within the last `report_coast` s, by id."""
-        shown = [g for g in self.groups if g.confirmed and frame.t - g.last_seen <= self.config.report_coast + 1e-9]
+        """Returns the confirmed groups that are measured in this frame, by id."""
+        shown = [g for g in self.groups if g.confirmed and g.last_seen == frame.t]
         shown.sort(key=lambda g: g.id)
         axes, s, from_points = 3 if self.plane == "space" else 2, self.scale, self.pictures is None
         order, flat = POS[:axes] + VEL[:axes], np.ix_(POS[:2], POS[:2])

@@ -49,13 +49,11 @@ def kalman(tracker, points, config):
 
 
 @pytest.mark.parametrize(("algorithm", "error"), [("ours", 0.006), ("paper", 0.025)])
-def test_people_alone_have_the_kalman_filter(algorithm, error):
-    """Z all alone, no validity, exact association; ours: locally optimal proposal (E2); paper: all three people are
+def test_people_alone_have_the_kalman_filter(algorithm, error, monkeypatch):
+    """Z all alone, exact association; ours: locally optimal proposal (E2); paper: all three people are
     drawn from the transition and weighted together, so that few of 1000 particles count."""
-    config = JointConfig(
-        particles=1000, partitions=1, place_noise=0.15, algorithm=algorithm, alpha=0.0, validity_rate=0.0,
-        **QUIET,
-    )  # fmt: skip
+    monkeypatch.setattr("tracking.papers.joint.distributions.ALPHA", 0.0)
+    config = JointConfig(particles=1000, partitions=1, place_noise=0.15, algorithm=algorithm, **QUIET)
     points = walk([[0, 0], [20, 0], [40, 5]], [1.2, 0.3], 25, noise=0.08)
     runs = [stepped(Joint(config), points, seed) for seed in range(6)]
     for person in range(3):
@@ -131,7 +129,7 @@ def test_a_member_who_is_missed_stays_in_the_group():
     """Without a measurement nothing is known of a change of groups."""
     points = walk([[0, 0], [0, 0.7], [0, 1.4]], [1.2, 0.0], 40, noise=0.05)
     shown = [p if k < 25 else p[:2] for k, p in enumerate(points)]
-    tracks = stepped(Joint(), shown)
+    tracks = stepped(Joint(JointConfig(coast_time=1.0)), shown)
     for t in tracks[24:]:
         assert len(set(t.group.tolist())) == 1
         assert t.group[0] >= 0
