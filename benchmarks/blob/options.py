@@ -26,7 +26,7 @@ from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE
 from benchmarks.support.replaced_code import Replacement, replaced_code
 from benchmarks.support.tables import head, row, signed
 from sim.io.source import open_source
-from tracking.papers.blob import existence, track_management
+from tracking.papers.blob import existence, track_management, update_from_boxes
 from tracking.papers.blob.track_management import TrackedPeople
 from tracking.stats import mean_interval
 
@@ -45,6 +45,7 @@ PARTS: dict[str, Replacement] = {
     "nobody hides anybody": (TrackedPeople, "visible_shares", lambda people: np.ones(len(people.id))),
     "no second boxes": (track_management, "DOUBLES", 0.0),
     "tracks on one body stay": (track_management, "SAME_BODY", 0.0),
+    "sizes change on": (update_from_boxes, "SIZE_RATE_TIME", 1e9),
     "reported while they exist": (track_management, "BODY", 1e9),
 }
 

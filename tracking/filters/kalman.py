@@ -65,6 +65,13 @@ def predict(state: Array, dt: float, q: Array) -> None:
     state[VAR:] += q if q.ndim == 3 else q[:, None]
 
 
+def fade_rates(state: Array, stay: float) -> None:
+    """Multiplies the rates of a bank by `stay`, 0 to 1, in place: without measurements they return to zero."""
+    state[RATE] *= stay
+    state[COV] *= stay
+    state[RATE_VAR] *= stay**2
+
+
 def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
     """Updates the filters `rows` (K,) with measurements z (K, D), in place; each row once at most.
 

@@ -20,7 +20,7 @@ from sim.truth.merge_split_rules import frames_of, runs, stretches
 from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import KIND, UNSEEN, Belief, default_belief, pair_beliefs
 from tracking.grouping.link_rule import LinkRule, Links, find_links
-from tracking.grouping.pair_evidence import frames_per_step, in_steps, lately_measured, step_positions
+from tracking.grouping.pair_evidence import frames_per_step, in_steps, step_positions
 from tracking.grouping.tracks_table import TracksTable
 
 
@@ -62,11 +62,11 @@ def belief_groups(
 ) -> FoundGroups:  # fmt: skip
     """Returns the groups of a sequence of `length` frames; any two members of a group of events are linked.
 
-    measured (R,): False in rows of people who are predicted only; these are no evidence after `PREDICTED` s. None: all.
+    measured (R,): False in rows of people who are predicted only; these are no evidence. None: all are measured.
     """
     size = frames_per_step(fps)
     people = int(column.max(initial=0)) + 1
-    rows = lately_measured(frame, column, np.ones(len(frame), bool) if measured is None else measured, fps)
+    rows = np.ones(len(frame), bool) if measured is None else measured
     places, times = step_positions(frame[rows], column[rows], pos[rows], length, people, fps)
     shape = (len(places), people)
     found = pair_beliefs(places, times, size / fps, belief)

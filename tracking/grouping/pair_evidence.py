@@ -19,7 +19,6 @@ from sim.truth.merge_split_rules import close_pairs
 from sim.types import Array, Bools, Ints
 
 STEP = 0.4  # s: longest step, unless one frame lasts longer.
-PREDICTED = 0.2  # s: a prediction from so short a time ago is as good as a measurement. Without it links come too late.
 CHORD = 0.8  # s over which velocities are measured: two frames of a recording with 2.5 frames/s.
 REACH = 4.0  # m: pairs farther apart have no evidence.
 STANDING = 0.3  # m/s.
@@ -77,18 +76,6 @@ def in_steps(frame: Ints, column: Ints, steps: int, people: int, size: int) -> B
     step = -(-frame // size)
     out, whole = np.zeros((steps, people), bool), step < steps
     out[step[whole], column[whole]] = True
-    return out
-
-
-def lately_measured(frame: Ints, column: Ints, measured: Bools, fps: float) -> Bools:
-    """Returns flags (R,): True in rows of people who were measured at most `PREDICTED` s ago."""
-    most = int(PREDICTED * fps + 1e-9)
-    number = column * (int(frame.max(initial=0)) + most + 2) + frame  # rows of two people are farther apart than `most`
-    order = np.argsort(number)
-    number = number[order]
-    last = np.maximum.accumulate(np.where(measured[order], number, -most - 1))
-    out = np.zeros(len(frame), bool)
-    out[order] = number - last <= most
     return out
 
 

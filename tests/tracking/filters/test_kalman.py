@@ -46,6 +46,19 @@ def test_bank_equals_filterpy_over_random_misses(seed):
             assert np.allclose(bank[kalman.VAR :, i], expected, rtol=1e-9, atol=1e-9)
 
 
+def test_fading_rates_is_the_transition_of_a_decaying_rate():
+    r = np.random.default_rng(0)
+    dt, sigma, noise, var, rate_var, place = make(r)
+    bank = kalman.born(place, var, rate_var)
+    kalman.predict(bank, dt, kalman.white_acceleration(dt, sigma))
+    kalman.update(bank, np.arange(len(place)), r.normal(0, 10, place.shape), noise)
+    x, rate, *p = bank.copy()
+    kalman.fade_rates(bank, 0.6)
+    fade = np.diag([1.0, 0.6])
+    expected = np.einsum("ij,jkab,kl->ilab", fade, np.array([[p[0], p[1]], [p[1], p[2]]]), fade)
+    assert np.allclose(bank, [x, 0.6 * rate, expected[0, 0], expected[0, 1], expected[1, 1]], rtol=1e-12)
+
+
 @pytest.mark.parametrize("index", [0.01, 0.1, 1.0, 5.0])
 def test_asymptote_is_the_riccati_solution_and_the_limit_of_updates(index):
     dt, noise = 0.2, 0.7

@@ -11,7 +11,7 @@ from sim.sequence import simulate
 from tests import reference_belief as slow
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
 from tracking.grouping.grouping_choice import belief_groups, groups_of_steps
-from tracking.grouping.pair_evidence import NAMES, evidence, lately_measured
+from tracking.grouping.pair_evidence import NAMES, evidence
 
 
 def walk(seed: int, frames: int, people: int):
@@ -177,13 +177,15 @@ def test_predictions_neither_link_nor_part(together):
     assert ((free.now[-1] >= 0) != together).all()
 
 
-def test_short_predictions_are_evidence():
-    measured = np.array([1, 0, 0, 0, 1, 0, 0, 0, 1], bool)
-    frame, column = np.array([0, 1, 2, 3, 4, 0, 1, 2, 3]), np.repeat([0, 1], [5, 4])
-    order = np.lexsort((column, frame))
-    found = lately_measured(frame[order], column[order], measured[order], 10.0)
-    expected = np.array([1, 1, 1, 0, 1, 0, 0, 0, 1], bool)  # the second person is predicted before any measurement
-    assert found.tolist() == expected[order].tolist()
+def test_people_who_are_not_measured_in_one_step_form_no_group():
+    # a new track of a person whose old track is still predicted, at 10 frames per s: at 1 m/s, 0.3 m apart
+    frame, column, pos, length, _ = side_by_side([1.2] * 40)
+    reported = (column == 0) | (frame > 20)
+    frame, column, pos = frame[reported], column[reported], pos[reported] / 4
+    seen = (frame > 20) == (column == 1)
+    held, free = (belief_groups(frame, column, pos, length, 10.0, default_belief(), some) for some in (seen, None))
+    assert (held.now < 0).all()
+    assert (free.now[-1] == 0).all()
 
 
 def test_a_missed_pair_that_was_seen_apart_is_not_together():

@@ -17,6 +17,9 @@ from tracking.papers.blob.existence import ScoreCalibration
 from tracking.papers.blob.track_management import LEAST_EXISTENCE, TrackedPeople
 from tracking.running import image_scale
 
+# s: time constant with which rates of height and width return to zero. Without it a missed person shrinks or grows.
+SIZE_RATE_TIME = 1.0
+
 
 class BoxUpdater:
     """Updates the tracks of `people`, a table that must follow `config` already, from the boxes of each frame.
@@ -42,6 +45,8 @@ class BoxUpdater:
         if len(z):
             image_scale.required(people.px_per_m)
         people.predict()
+        if people.by_existence:
+            kalman.fade_rates(people.bank[:, :, 2:], np.exp(-people.dynamics.dt / SIZE_RATE_TIME))
         people.widen_view(z)
         d2, log_det = people.innovations(z)
         evidence, ratio, inside = people.evidence(d2, log_det), self.scores.ratios(score), d2 <= self.gate

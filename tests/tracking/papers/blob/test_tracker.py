@@ -110,6 +110,14 @@ def test_a_hidden_person_lasts_longer_than_one_who_is_merely_missed():
     assert existence(True) > 2 * existence(False)
 
 
+@pytest.mark.parametrize("growth", [-3.0, 3.0])
+def test_a_missed_person_keeps_its_size(growth):
+    high = 68 + growth * (np.arange(12) - 11)
+    made = run([[[200, 300 - h, 28, h]] for h in high] + 6 * [[]])
+    last, missed = (made[k].box[0, 3] for k in (11, 17))
+    assert abs(missed - last) < 5
+
+
 def test_a_second_box_of_a_person_and_a_coasting_track_on_a_body_are_nobody():
     double = [[104 + 4 * k, 198, 30, 72] for k in range(40)]
     made = run([[*at((100 + 4 * k, 200)), *([double[k]] if k % 4 == 0 else [])] for k in range(40)])
