@@ -44,12 +44,16 @@ def instant(pos, vel, a, b):
     if pace >= 0.3:
         side, along = abs(apart[0] * m[1] - apart[1] * m[0]) / pace, abs(apart @ m) / pace
     speeds = [np.hypot(*vel[p]) for p in (a, b)]
-    turn = math.nan
+    differ, turn, walking, one = np.hypot(*(vel[b] - vel[a])), math.nan, math.nan, math.nan
+    if not math.isnan(differ):
+        one = float(min(speeds) < 0.3 <= max(speeds))
     if min(speeds) >= 0.3:
+        walking = differ
         turn = math.acos(min(max(vel[a] @ vel[b] / speeds[0] / speeds[1], -1.0), 1.0))
     return {
-        "distance": distance, "velocity difference": np.hypot(*(vel[b] - vel[a])), "sideways": side,
-        "lengthwise": along, "growth": apart @ (vel[b] - vel[a]) / max(distance, 0.1), "turn": turn,
+        "distance": distance, "velocity difference": differ, "sideways": side, "lengthwise": along,
+        "growth": apart @ (vel[b] - vel[a]) / max(distance, 0.1), "turn": turn, "walking difference": walking,
+        "one walks": one,
     }  # fmt: skip
 
 

@@ -28,8 +28,11 @@ LONGEST = 20.0  # s: longer times near each other tell no more.
 # Averaged over the pair's rows, with weights exp(-age / time). Unknown velocities leave nan out of the means.
 # velocity difference: of vectors, m/s. sideways, lengthwise: parts of the distance, m, across and along the mean
 # velocity of the two where that is at least 0.3 m/s, else the whole distance and nan. growth: of the distance, m/s.
-# turn: angle between the two velocities, rad, nan if one is slower than 0.3 m/s.
-QUANTITIES = ("distance", "velocity difference", "sideways", "lengthwise", "growth", "turn")
+# turn: angle between the two velocities, rad, nan if one is slower than 0.3 m/s; walking difference: the velocity
+# difference, m/s, nan in the same rows, so that its means outlast a stop; one walks: 1 if just one is slower, else 0.
+QUANTITIES = (
+    "distance", "velocity difference", "sideways", "lengthwise", "growth", "turn", "walking difference", "one walks"
+)  # fmt: skip
 NEAR = ("time near",)  # Not averaged: the time of the pair's rows so far, s.
 # Names of the columns of `PairRows.values`.
 NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *NEAR)
@@ -104,7 +107,7 @@ def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
 
 
 def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints) -> Array:
-    """Returns the `QUANTITIES` (R, 6) of each pair of rows i, j (R,); pos, vel (N, 2): m, m/s, by person and step."""
+    """Returns the `QUANTITIES` (R, 8) of each pair of rows i, j (R,); pos, vel (N, 2): m, m/s, by person and step."""
     apart, change, mean = pos[j] - pos[i], vel[j] - vel[i], (vel[i] + vel[j]) / 2
     distance, differ, pace = (np.hypot(*x.T) for x in (apart, change, mean))
     walks = pace >= STANDING  # False where nan
@@ -112,12 +115,14 @@ def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints) -> Array:
     across = np.abs(apart[:, 0] * unit[:, 1] - apart[:, 1] * unit[:, 0])
     along = np.abs((apart * unit).sum(axis=1))
     speed = np.hypot(*vel.T)
-    both = (speed[i] >= STANDING) & (speed[j] >= STANDING)
+    first, second = speed[i] >= STANDING, speed[j] >= STANDING
+    both = first & second
     cosine = (vel[i] * vel[j]).sum(axis=1) / np.where(both, speed[i] * speed[j], 1.0)
     return np.column_stack([
         distance, differ, np.where(walks, across, distance), np.where(walks, along, np.nan),
         (apart * change).sum(axis=1) / np.maximum(distance, TOUCHING),
         np.where(both, np.arccos(np.clip(cosine, -1.0, 1.0)), np.nan),
+        np.where(both, differ, np.nan), np.where(np.isfinite(differ), first != second, np.nan),
     ])  # fmt: skip
 
 
@@ -132,7 +137,7 @@ def _portions(step: Ints) -> Iterator[slice]:
 class ExponentialMeans:
     """Means of the quantities of pairs over their rows so far, weighted by exp(-age / time), for each of the `TIMES`.
 
-    total, weight (K, 6, 3): sums by pair, quantity and time. last (K,): step of a pair's last row; rows (K,): how many.
+    total, weight (K, 8, 3): sums by pair, quantity and time. last (K,): step of a pair's last row; rows (K,): how many.
     """
 
     def __init__(self, pairs: int, seconds: float) -> None:
