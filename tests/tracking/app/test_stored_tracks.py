@@ -212,6 +212,7 @@ def test_two_workers_are_one(data: Path, jobs: list[str]) -> None:
     assert alone[0][:2] == ["a on scene-s00000", "b on scene-s00001"]
 
 
+@pytest.mark.slow
 def test_a_sequence_that_kills_its_worker_is_named(data: Path) -> None:
     found, _, error = outcome(data, ["a", "die", "c", "d"], 2)
     assert found == ["a on scene-s00000"]
