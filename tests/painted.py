@@ -88,7 +88,7 @@ def learned(
 ) -> tuple[Blob, np.random.Generator]:
     """A tracker that knows the ground, and what draws the noise of the pictures after its sample; to be copied."""
     r, tracker = np.random.default_rng(seed), Blob(config)
-    tracker.reset(Context(FPS, TALL / 1.7, image_size=size, background=sample(r, 28, people, **still)), 0)
+    tracker.reset(Context(FPS, TALL / 1.7, image_size=size, background=sample(r, 14, people, **still)), 0)
     return tracker, r
 
 

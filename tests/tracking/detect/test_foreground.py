@@ -22,7 +22,7 @@ SCALE, PERSON = TALL / 1.7, (160.0, 180.0, TALL)
 
 @cache
 def context(scale=SCALE, people=()):
-    sample = painted.sample(np.random.default_rng(0), 28, people)
+    sample = painted.sample(np.random.default_rng(0), 14, people)
     return Context(painted.FPS, scale, image_size=(painted.WIDE, painted.HIGH), background=sample)
 
 

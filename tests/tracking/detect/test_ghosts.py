@@ -38,7 +38,7 @@ def trained(sample, fps=10.0, **settings):
 
 
 def made(people, look="colour", fps=10.0, **settings):
-    return trained([(people, look)] * 20, fps, **settings)
+    return trained([(people, look)] * 12, fps, **settings)
 
 
 def watch(pipeline, people, seconds, look="colour", protected=None):
@@ -68,7 +68,7 @@ def test_who_stood_in_the_whole_sample_leaves_no_ghost(fps, look):
 def test_who_stood_through_a_part_of_the_sample_is_no_background(stay, look):
     """However long they stayed, if the others of the sample show the ground."""
     pair = [PERSON, (184.0, 181.0, TALL)]
-    sample = [(pair if k < 30 * stay else [], look) for k in range(30)]
+    sample = [(pair if k < 20 * stay else [], look) for k in range(20)]
     found = learned_ground(trained(sample), look)[painted.shape(PERSON)]
     assert (found < 10).mean() > 0.95
     if stay > 0.5:
@@ -84,7 +84,7 @@ def learned_ground(pipeline, look):
 
 def test_a_thing_that_passes_often_does_not_replace_the_ground():
     """Nor does a colour that a quarter of the frames show."""
-    pipeline = trained([([PERSON] if k % 4 == 0 else [], "colour") for k in range(40)])
+    pipeline = trained([([PERSON] if k % 4 == 0 else [], "colour") for k in range(24)])
     assert np.quantile(learned_ground(pipeline, "colour"), 0.999) < 10
 
 
