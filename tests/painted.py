@@ -61,7 +61,9 @@ def picture(
     if post is not None:
         image[:, int(post) - 3 : int(post) + 3] = (60, 90, 60)
     image += 2 * r.standard_normal(image.shape, np.float32)
-    return np.clip(image, 0, 255, out=image).astype(np.uint8)
+    made = np.clip(image, 0, 255, out=image).astype(np.uint8)
+    made.setflags(write=False)  # as in frames; kernels are compiled anew for what can be written
+    return made
 
 
 def sample(r: np.random.Generator, frames: int = 20, people: Sequence[Person] = (), **kind) -> np.ndarray:

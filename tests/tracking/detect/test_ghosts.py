@@ -27,7 +27,9 @@ def picture(people, seed, look="colour"):
 @cache
 def painted_once(people, seed, look):
     image = painted.picture(people, np.random.default_rng(seed))
-    return image if look == "colour" else np.repeat(image[..., 1:2], 3, -1)
+    image = image if look == "colour" else np.repeat(image[..., 1:2], 3, -1)
+    image.setflags(write=False)
+    return image
 
 
 def trained(sample, fps=10.0, **settings):
@@ -138,6 +140,7 @@ def test_the_kernel_equals_its_twin():
     for k in range(40):
         noise = r.integers(-5, 6, still.shape) + 60 * (r.random((12, 15, 1)) < 0.03)
         image = (still + noise).astype(np.uint8)
+        image.setflags(write=False)
         background_kernels.watch(image, gain, reach, colour, sightings)
         twin = reference.watch(image, gain, reach, *twin)
         np.testing.assert_allclose(colour, twin[0], rtol=1e-4, err_msg=str(k))

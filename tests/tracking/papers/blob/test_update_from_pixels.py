@@ -36,7 +36,7 @@ def test_a_person_in_two_pieces_for_ten_frames_stays_one_track():
     """The paper's frame 367: a bar of the ground's own colour hides the waist."""
     way, frames, r = walk(60, 180, 4, 40), [], np.random.default_rng(5)
     for k, p in enumerate(way):
-        image = painted.picture([p], r)
+        image = painted.picture([p], r).copy()
         if 15 <= k < 25:
             waist = slice(int(p[1] - 0.58 * TALL), int(p[1] - 0.4 * TALL))
             image[waist] = painted.picture([], r)[waist]
