@@ -85,9 +85,7 @@ def watched(tracker: Tracker, frames: Iterable[Sequence[Person]], scale: float, 
 
 
 @functools.cache
-def learned(
-    config: BlobConfig | None, people: tuple[Person, ...], seed: int, size: tuple[int, int] | None, **still
-) -> tuple[Blob, np.random.Generator]:
+def learned(config, people: tuple[Person, ...], seed: int, size, **still) -> tuple[Blob, np.random.Generator]:
     """A tracker that knows the ground, and what draws the noise of the pictures after its sample; to be copied."""
     r, tracker = np.random.default_rng(seed), Blob(config)
     tracker.reset(Context(FPS, TALL / 1.7, image_size=size, background=sample(r, 14, people, **still)), 0)

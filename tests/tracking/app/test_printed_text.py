@@ -21,7 +21,6 @@ from tracking.app.command_line import _print_warnings_once
 from tracking.app.command_result import CommandResult, print_error, print_result
 from tracking.app.progress import ProgressMeter
 
-SMALL = ["--set", "camera.image=[128,96]"]
 NAMES = ("[/red]", "x[door]y", ":smile:", "\x1b[31mred", "a\u202eb", "[link=http://x]y[/link]")
 SHOWN = ("[/red]", "x[door]y", ":smile:", "\\x1b[31mred", "a\\u202eb", "[link=http://x]y[/link]")
 
@@ -63,8 +62,8 @@ def broken_name(tmp_path_factory) -> Path:
     """A dataset of four sequences, one with line breaks in the name that its manifest states; its tracks."""
     folder = tmp_path_factory.mktemp("broken")
     (folder / "scene.toml").write_text(SCENE)
-    words = ["generate", str(folder / "scene.toml"), "--seeds", "20000:20004", "--streams", "left", *SMALL]
-    assert run([*words, "--out", str(folder / "data")]) == 0
+    words = ["generate", str(folder / "scene.toml"), "--seeds", "20000:20004", "--streams", "left"]
+    assert run([*words, "--set", "camera.image=[128,96]", "--out", str(folder / "data")]) == 0
     first = next((folder / "data").rglob("*s20000"))
     manifest = read_manifest(first)
     manifest["sequence"]["name"] = "walk\nHOTA 1.000\r\n"
