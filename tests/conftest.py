@@ -1,8 +1,9 @@
-"""What all tests share: real recordings, one thread per library, which tests are slow, each kernel compiled once."""
+"""What all tests share: real recordings, one thread per library, slow tests, kernels compiled once, less garbage."""
 
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import signal
 import tempfile
@@ -22,6 +23,8 @@ hypothesis.settings.load_profile("repeatable")
 
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
+
+gc.set_threshold(10_000, 20, 50)
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as in a job that a shell started in the background
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -62,6 +65,11 @@ def shared_data() -> Path:
     if not root.is_dir():
         pytest.skip(f"real recordings are not here: {root} (set FLOCKSCOPE_DATA)")
     return root
+
+
+def pytest_collection_finish() -> None:
+    """Looking through all modules and tests again and again for garbage took a tenth of the time."""
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Iterable, Sequence
 
@@ -23,7 +24,7 @@ def ground(seed: int = 0) -> np.ndarray:
     """(H, W, 3) a mottled ground in three greys, so that no shift of it is the same."""
     r = np.random.default_rng(seed)
     rough = r.uniform(90, 170, (HIGH // 8 + 1, WIDE // 8 + 1, 3))
-    return np.kron(rough, np.ones((8, 8, 1)))[:HIGH, :WIDE]
+    return np.kron(rough, np.ones((8, 8, 1)))[:HIGH, :WIDE].astype(np.float32)
 
 
 def inside(x: float, y: float, across: float, up: float) -> np.ndarray:
@@ -59,7 +60,10 @@ def picture(
         image[shape(people[k])] = COLOURS[k % len(COLOURS)]
     if post is not None:
         image[:, int(post) - 3 : int(post) + 3] = (60, 90, 60)
-    return np.clip(image + 2 * r.standard_normal(image.shape, np.float32), 0, 255).astype(np.uint8)
+    image += 2 * r.standard_normal(image.shape, np.float32)
+    made = np.clip(image, 0, 255, out=image).astype(np.uint8)
+    made.setflags(write=False)  # as in frames; kernels are compiled anew for what can be written
+    return made
 
 
 def sample(r: np.random.Generator, frames: int = 20, people: Sequence[Person] = (), **kind) -> np.ndarray:
@@ -80,6 +84,14 @@ def watched(tracker: Tracker, frames: Iterable[Sequence[Person]], scale: float, 
     return [tracker.step(Frame(k + 1, k / FPS, image=image), None) for k, image in enumerate(pictures)]
 
 
+@functools.cache
+def learned(config, people: tuple[Person, ...], seed: int, size, **still) -> tuple[Blob, np.random.Generator]:
+    """A tracker that knows the ground, and what draws the noise of the pictures after its sample; to be copied."""
+    r, tracker = np.random.default_rng(seed), Blob(config)
+    tracker.reset(Context(FPS, TALL / 1.7, image_size=size, background=sample(r, 14, people, **still)), 0)
+    return tracker, r
+
+
 def track(
     frames: Sequence[Sequence[Person] | np.ndarray | None],
     config: BlobConfig | None = None,
@@ -94,11 +106,9 @@ def track(
 
     people: those in the sample; size: what the tracker is told of the image.
     """
-    r = np.random.default_rng(seed)
     shown = spread() if people is None else people
     still = {k: v for k, v in kind.items() if k != "shadow"}
-    tracker = Blob(config)
-    tracker.reset(Context(FPS, TALL / 1.7, image_size=size, background=sample(r, 28, shown, **still)), 0)
+    tracker, r = copy.deepcopy(learned(config, tuple(shown), seed, size, **still))
     made = []
     for k, people_or_image in enumerate(frames):
         image = people_or_image

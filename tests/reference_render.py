@@ -118,9 +118,8 @@ def look(camera: Camera, motion: Motion, index: int) -> Seen:
     return Seen(depth.reshape(size), ids.reshape(size), masks, place.reshape(*size, 3))
 
 
-def disparity(camera: Camera, motion: Motion, index: int, gap: float = 1e-3) -> Array:
+def disparity(seen: Seen, camera: Camera, motion: Motion, index: int, gap: float = 1e-3) -> Array:
     """f B / z (H, W) of what the left camera sees; nan where the right one sees nothing, or what is `gap` m nearer."""
-    seen = look(camera, motion, index)
     eye = camera.position + camera.baseline * camera.rotation[0]
     points = seen.place.reshape(-1, 3)
     x = (points - eye) @ camera.rotation.T

@@ -31,11 +31,6 @@ def modules() -> dict[str, Path]:
     return dict(zip(names, found, strict=True))
 
 
-@cache
-def tree(name: str) -> ast.Module:
-    return ast.parse(modules()[name].read_text(encoding="utf-8"))
-
-
 def imported(node: ast.AST, names: bool = True) -> Iterator[str]:
     """Dotted names that an import statement brings: `from a import b` is both a and a.b."""
     if isinstance(node, ast.Import):
@@ -49,9 +44,14 @@ def imported(node: ast.AST, names: bool = True) -> Iterator[str]:
 
 
 @cache
+def nodes(name: str) -> tuple[ast.AST, ...]:
+    return tuple(ast.walk(ast.parse(modules()[name].read_text(encoding="utf-8"))))
+
+
+@cache
 def imports(name: str) -> frozenset[str]:
     """All dotted names that a module imports anywhere, those for the type checker included."""
-    return frozenset(dotted for node in ast.walk(tree(name)) for dotted in imported(node))
+    return frozenset(dotted for node in nodes(name) for dotted in imported(node))
 
 
 def inside(dotted: str, *packages: str) -> bool:
@@ -84,7 +84,7 @@ def test_trackers_and_detectors_see_neither_truth_nor_scores():
     assert offences(names, *hidden) == []
     assert offences(names, *(f"sim.types.{word}" for word in TRUTH)) == []
     for name in names:
-        read = {node.attr for node in ast.walk(tree(name)) if isinstance(node, ast.Attribute)}
+        read = {node.attr for node in nodes(name) if isinstance(node, ast.Attribute)}
         assert read.isdisjoint(TRUTH), f"{name} reads {read & set(TRUTH)}"
 
 
@@ -123,7 +123,7 @@ def test_no_global_state_of_chance_and_time():
     """Randomness comes as a Generator (sim.rng), time from frames."""
     for name in modules():
         assert not any(inside(dotted, "random") for dotted in imports(name)), f"{name} imports random"
-        read = {dotted_name(node) for node in ast.walk(tree(name)) if isinstance(node, ast.Attribute)}
+        read = {dotted_name(node) for node in nodes(name) if isinstance(node, ast.Attribute)}
         clocks = {"time.time", "datetime.now", "datetime.datetime.now"}
         assert inside(name, "tracking.app") or read.isdisjoint(clocks), name
 
@@ -187,6 +187,6 @@ def by_processor(node: ast.AST) -> str | None:
 
 def test_nothing_that_decides_the_truth_depends_on_the_processor() -> None:
     for name in of(*DECIDING):
-        found = [f"{name}:{node.lineno}: {what}" for node in ast.walk(tree(name)) if (what := by_processor(node))]
+        found = [f"{name}:{node.lineno}: {what}" for node in nodes(name) if (what := by_processor(node))]
         kernels = name.endswith("_kernels")  # numba's argsort is code of its own, the same everywhere
         assert [f for f in found if not (kernels and "argsort" in f)] == []

@@ -34,7 +34,7 @@ def test_dump_loads_back_equal_and_twice_the_same(path: Path) -> None:
     assert again.name == "tour"
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50, deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=25, deadline=None)
 @example(about='\x7f\x00\t"\\ü€\u2028', turn=1e-300, size=1)
 @given(about=st.text(), turn=st.floats(-1e6, 1e6), size=st.integers(1, 400))
 def test_dump_holds_any_text_and_number(path: Path, about: str, turn: float, size: int) -> None:

@@ -23,20 +23,20 @@ def failing(*seeds: int):
     return make
 
 
-def test_one_of_twenty_is_left_out_and_named(tmp_path, monkeypatch):
+def test_one_of_twenty_is_left_out_and_named(tmp_path, monkeypatch, simulate):
     monkeypatch.setattr(sequence_job, "simulate_and_store", failing(3))
-    made = generate(["cross"], range(20), tmp_path, set=["duration=1"], streams=())
+    made = generate(["cross"], range(20), tmp_path, streams=())
     assert len(made) == 19
     assert {name: error.got for name, error in made.left_out.items()} == {"cross-s00003": "a merge that never fired"}
     assert "cross-s00003" not in (tmp_path / "seqmaps/flockscope-train.txt").read_text()
 
 
-def test_more_than_five_per_cent_are_a_failure(tmp_path, monkeypatch):
+def test_more_than_five_per_cent_are_a_failure(tmp_path, monkeypatch, simulate):
     monkeypatch.setattr(sequence_job, "simulate_and_store", failing(0, 1))
     with pytest.raises(WorkError, match=r"never fired \(and 1 more of 20"):
-        generate(["cross"], range(20), tmp_path, set=["duration=1"], streams=())
+        generate(["cross"], range(20), tmp_path, streams=())
     with pytest.raises(WorkError, match="never fired"):
-        generate(["cross"], range(1), tmp_path / "one", set=["duration=1"], streams=())
+        generate(["cross"], range(1), tmp_path / "one", streams=())
 
 
 def test_a_search_counts_its_scenes():

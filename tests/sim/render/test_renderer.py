@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -37,11 +39,16 @@ def motion_in(scene: Scene, people: int = 14) -> Motion:
     return crowd(3, people=people, frames=12, scene=scene)
 
 
+@cache
+def slowly_seen(view: str, scene: str) -> slow.Seen:
+    return slow.look(VIEWS[view], motion_in(SCENES[scene]), 5)
+
+
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("view", VIEWS)
 def test_ids_masks_and_counts_are_those_of_a_slow_renderer(view: str, scene: str) -> None:
     motion, camera = motion_in(SCENES[scene]), VIEWS[view]
-    seen, pixels = slow.look(camera, motion, 5), make_renderer(motion, camera).pixels(5)
+    seen, pixels = slowly_seen(view, scene), make_renderer(motion, camera).pixels(5)
     assert (seen.ids > 0).sum() > 300  # the oracle sees somebody
     assert (pixels.ids != seen.ids).sum() <= 2  # a ray that grazes two things
     ids = np.flatnonzero(motion.present[4]) + 1
@@ -62,7 +69,8 @@ def test_ids_masks_and_counts_are_those_of_a_slow_renderer(view: str, scene: str
 @pytest.mark.parametrize("view", ["high", "low", "turned"])
 def test_disparities_are_those_of_a_slow_renderer(view: str, scene: str) -> None:
     motion, camera = motion_in(SCENES[scene]), VIEWS[view]
-    wanted, found = slow.disparity(camera, motion, 5), make_renderer(motion, camera).pixels(5, disparity=True).disparity
+    wanted = slow.disparity(slowly_seen(view, scene), camera, motion, 5)
+    found = make_renderer(motion, camera).pixels(5, disparity=True).disparity
     assert np.isnan(wanted).sum() > 100
     both = np.isfinite(wanted) & np.isfinite(found)
     assert (np.isfinite(wanted) != np.isfinite(found)).sum() <= 12  # of 19,200: grazing rays, and 1 mm of depth
@@ -92,7 +100,7 @@ def test_blobs_are_connected_regions() -> None:
 def test_shadows_fall_where_somebody_stands_before_the_sun(view: str) -> None:
     motion, camera = motion_in(BARE), VIEWS[view]
     made = make_renderer(motion, camera, Light(shadow=0.5, penumbra=0.0), SHARP)
-    seen, sun = slow.look(camera, motion, 5), made.illumination.sun
+    seen, sun = slowly_seen(view, "bare"), made.illumination.sun
     shadow = slow.in_shadow(seen.place, motion, 5, sun) & (seen.ids == 0) & np.isfinite(seen.depth)
     ground = (seen.ids == 0) & ~shadow
     empty = np.clip(made.left_view.empty_scene.colour, 0, 255)

@@ -96,7 +96,7 @@ COMMANDS = {
         "generate {scene} --seeds 5 --set camera.image=[128,96] --out {out}",
         "generate {scene} --seeds 5 --streams left,centre --out {out}",
     ),
-    "replay": ("replay {one} --out {out}", "replay {out}/nothing --out {out}/x"),
+    "replay": ("replay {one} --set camera.image=[128,96] --out {out}", "replay {out}/nothing --out {out}/x"),
     "fit sensor": ("fit sensor {data} --out {out}/mine.toml", "fit sensor {out}/nothing --out {out}/mine.toml"),
     "fit grouping": (
         "fit grouping side-by-side --seeds 0 --check 1 --out {out}/mine.toml",
@@ -107,7 +107,7 @@ COMMANDS = {
         "fit relational no-such-scene --out {out}/mine.toml",
     ),
     "fit joint": (
-        "fit joint party --seeds 30000:30003 --out {out}/mine.toml", "fit joint no-such-scene --out {out}/mine.toml",
+        "fit joint party --seeds 30000 --out {out}/mine.toml", "fit joint no-such-scene --out {out}/mine.toml",
     ),
     "track": ("track " + FAKE + " {data} --out {out}", "track " + FAKE + " {out}/nothing --out {out}/x"),
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),

@@ -63,7 +63,7 @@ def broken_name(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("broken")
     (folder / "scene.toml").write_text(SCENE)
     words = ["generate", str(folder / "scene.toml"), "--seeds", "20000:20004", "--streams", "left"]
-    assert run([*words, "--out", str(folder / "data")]) == 0
+    assert run([*words, "--set", "camera.image=[128,96]", "--out", str(folder / "data")]) == 0
     first = next((folder / "data").rglob("*s20000"))
     manifest = read_manifest(first)
     manifest["sequence"]["name"] = "walk\nHOTA 1.000\r\n"

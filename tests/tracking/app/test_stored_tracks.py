@@ -132,7 +132,7 @@ def test_what_was_tracked_before_anybody_labelled_it(tmp_path):
     assert run(["score", str(walk), str(tmp_path / "t"), "--fps", "5"]) == 0
 
 
-def test_validate_says_whether_a_run_is_whole(made, tracks, capsys):
+def test_validate_says_whether_a_run_is_whole(tracks, capsys):
     assert answer(capsys, "validate", tracks) == {"status": "ok", "problems": [], "content_hash": None}
     assert run(["validate", str(tracks / "scene-s40000")]) == 0
     assert capsys.readouterr().out.endswith("scene-s40000: no problems\n")
@@ -144,7 +144,6 @@ def test_validate_says_whether_a_run_is_whole(made, tracks, capsys):
     assert len(lines) == 2
     assert f"{path}: got truncated" in lines[0]
     assert "scene-s40001: got tracks without run.json" in lines[1]
-    assert run(["validate", str(made)]) in (0, 1)  # data and tracks together
 
 
 def test_one_run_at_a_time_writes_to_a_folder(made, tmp_path, capsys):
@@ -205,13 +204,13 @@ def outcome(data: Path, jobs: list[str], workers: int) -> tuple[list[str], list[
     return found, [str(w.message) for w in caught], error
 
 
-@pytest.mark.parametrize("jobs", [["a", "b", "c", "d"], ["a", "b", "fail", "d"]])
-def test_two_workers_are_one(data: Path, jobs: list[str]) -> None:
-    alone, both = (outcome(data, jobs, n) for n in (1, 2))
+def test_two_workers_are_one(data: Path) -> None:
+    alone, both = (outcome(data, ["a", "b", "fail", "d"], n) for n in (1, 2))
     assert alone == both
     assert alone[0][:2] == ["a on scene-s00000", "b on scene-s00001"]
 
 
+@pytest.mark.slow
 def test_a_sequence_that_kills_its_worker_is_named(data: Path) -> None:
     found, _, error = outcome(data, ["a", "die", "c", "d"], 2)
     assert found == ["a on scene-s00000"]

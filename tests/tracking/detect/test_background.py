@@ -29,14 +29,20 @@ def scene(high=40, wide=50, seed=0, low=60, top=160):
     return np.random.default_rng(seed).uniform(low, top, (high, wide, 3))
 
 
+def read_only(pictures):
+    """The same, as frames and samples are: kernels are compiled anew for what can be written."""
+    pictures.setflags(write=False)
+    return pictures
+
+
 def shot(colours, rng, sigma=SIGMA, gain=1.0):
     noisy = colours * gain + rng.normal(size=colours.shape) * sigma
-    return np.clip(np.round(noisy), 0, 255).astype(np.uint8)
+    return read_only(np.clip(np.round(noisy), 0, 255).astype(np.uint8))
 
 
 def shots(colours, number=50, seed=1, **how):
     rng = np.random.default_rng(seed)
-    return np.stack([shot(colours, rng, **how) for _ in range(number)])
+    return read_only(np.stack([shot(colours, rng, **how) for _ in range(number)]))
 
 
 def model(colours=None, seed=1, **settings):
@@ -84,11 +90,11 @@ def test_five_classes_of_known_colours(background, monkeypatch):
 
 def test_people_in_the_sample_leave_no_trace():
     mean, rng = scene(), np.random.default_rng(2)
-    sample = shots(mean)
+    sample = shots(mean).copy()
     for k, frame in enumerate(sample):
         if k % 5 < 2:
             frame[10:30, 10:30] = rng.integers(0, 255, 3)
-    with_people, without = train(sample, 0.999, False), train(shots(mean), 0.999, False)
+    with_people, without = train(read_only(sample), 0.999, False), train(shots(mean), 0.999, False)
     there = np.s_[10:30, 10:30]
     assert with_people.valid.all()
     assert np.abs(with_people.mean - mean)[there].mean() < 1.3 * np.abs(without.mean - mean)[there].mean() + 0.2
@@ -99,7 +105,7 @@ def test_people_in_the_sample_leave_no_trace():
 @pytest.mark.parametrize("gain", [0.7, 1.3, (0.75, 1.0, 1.25)])
 def test_a_sudden_change_of_light_does_not_flood_the_frame(gain):
     mean, rng = scene(), np.random.default_rng(7)
-    picture = shot(mean, rng, gain=np.array(gain))
+    picture = shot(mean, rng, gain=np.array(gain)).copy()
     picture[5:20, 5:15] = (20, 200, 20)
     classes = model(mean, detection_rate=0.9999).classify(picture)
     hole = np.ones(classes.shape, bool)
@@ -176,10 +182,10 @@ def test_light_that_drifts_by_a_third_either_way_is_followed():
 @pytest.mark.parametrize("follow", [True, False])
 def test_training_equals_its_twin(follow):
     rng = np.random.default_rng(14)
-    sample = shots(scene(), 30)
+    sample = shots(scene(), 30).copy()
     sample[::3, 5:20, 5:20] = rng.integers(0, 255, 3)
     sample[:, :4, :4] = rng.integers(0, 255, (30, 4, 4, 3))
-    made = train(sample, 0.999, follow)
+    made = train(read_only(sample), 0.999, follow)
     from tracking.detect.background_training import frame_gains
 
     gains = frame_gains(sample) if follow else np.ones((30, 3))
@@ -200,9 +206,9 @@ def test_kernels_equal_their_twins():
     made = model(scene(), dark=0.7)
     rng = np.random.default_rng(15)
     for _ in range(6):
-        picture = shot(scene() * rng.uniform(0.4, 1.8, (40, 50, 1)), rng)
+        picture = shot(scene() * rng.uniform(0.4, 1.8, (40, 50, 1)), rng).copy()
         picture[:6] = rng.integers(0, 255, (6, 50, 3))
-        classes = made.classify(picture)
+        classes = made.classify(read_only(picture))
         planes = np.moveaxis(made.mean, 0, -1).astype(float), np.moveaxis(made.var, 0, -1).astype(float)
         limits = (*made.thresholds, 0.7, BRIGHT)
         twin = reference.classify(picture, planes[0], np.sqrt(planes[1]), made.s, made.b, made.valid, made.gain, limits)
@@ -217,7 +223,7 @@ def test_kernels_equal_their_twins():
 
 
 def test_a_still_picture_can_be_trained_on():
-    still = np.repeat(scene()[None].astype(np.uint8), 12, axis=0)
+    still = read_only(np.repeat(scene()[None].astype(np.uint8), 12, axis=0))
     made = Background(still, FPS)
     assert np.isfinite(made.mean).all()
     assert made.var.min() >= FLOOR**2
@@ -236,7 +242,7 @@ NO_SAMPLES = [
     (np.zeros((50, 8, 8, 3)), "uint8, BGR"),
     (np.zeros((50, 0, 8, 3), np.uint8), "uint8, BGR"),
     (np.zeros((9, 8, 8, 3), np.uint8), "at least 10 frames"),
-    (np.random.default_rng(0).integers(0, 255, (50, 8, 8, 3), np.uint8), "no background can be learned"),
+    (read_only(np.random.default_rng(0).integers(0, 255, (50, 8, 8, 3), np.uint8)), "no background can be learned"),
 ]
 
 

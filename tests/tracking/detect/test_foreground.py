@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -17,13 +20,19 @@ from tracking.detect.person_size import PersonSize
 SCALE, PERSON = TALL / 1.7, (160.0, 180.0, TALL)
 
 
+@cache
 def context(scale=SCALE, people=()):
-    sample = painted.sample(np.random.default_rng(0), 28, people)
+    sample = painted.sample(np.random.default_rng(0), 14, people)
     return Context(painted.FPS, scale, image_size=(painted.WIDE, painted.HIGH), background=sample)
 
 
-def made(scale=SCALE, *, people=(), **settings):
-    return Foreground(context(scale, people), BackgroundSettings(**settings))
+@cache
+def trained(scale, **settings):
+    return Foreground(context(scale), BackgroundSettings(**settings))
+
+
+def made(scale=SCALE, **settings):
+    return deepcopy(trained(scale, **settings))
 
 
 def picture(*people, seed=1):
@@ -66,7 +75,7 @@ def test_an_unknown_scale_is_guessed_from_the_images_height(unknown):
 
 
 def test_the_sample_shows_how_large_people_are():
-    shown = context(np.nan, painted.spread())
+    shown = context(np.nan, tuple(painted.spread()))
     size = PersonSize(shown)
     Foreground(shown, BackgroundSettings()).learn_person_size(size, shown.background)
     assert size.px_per_m == pytest.approx(SCALE, rel=0.06)

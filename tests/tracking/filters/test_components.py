@@ -31,7 +31,7 @@ def random_set(r):
 
 def test_every_prefix_of_random_sets() -> None:
     verdicts = []
-    for seed in range(300):
+    for seed in range(100):
         r = np.random.default_rng(seed)
         points, weights, rule = random_set(r)
         start = int(r.integers(0, len(points) + 1))
@@ -43,14 +43,14 @@ def test_every_prefix_of_random_sets() -> None:
 
 def test_partitions_of_random_sets() -> None:
     joined = noise = 0
-    for seed in range(300):
+    for seed in range(150):
         points, weights, rule = random_set(np.random.default_rng(seed))
         label, group = linked(points, rule.link), partition(points, weights, rule)
         assert np.array_equal(label, reference.linked(points, rule.link)), seed
         assert np.array_equal(group, reference.partition(points, weights, rule)), seed
         joined += group.max() < label.max()
         noise += group.min() < 0
-    assert min(joined, noise) > 30
+    assert min(joined, noise) > 15
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -10,23 +10,28 @@ import pytest
 from scenarios.loading.resolve import load
 from sim.io.store.track_files import write_tracks
 from sim.sequence import simulate
-from sim.types import Sequence, Tracks
+from sim.types import Sequence
 from tests.groups_as_wholes import wholes
 from tests.refusals import answer, refused
+from tests.sealing import seal_again
+from tests.short_scene import write_short_scene
 from tracking import track
 from tracking.app.cli import run
+from tracking.running.run import TrackingRun
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.people_comparison import in_one_plane
 from tracking.stats import mean_interval
+
+SLOW = ["camera.fps=5"]
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> Path:
     """Two seeds of a scene with a merge; blob's tracks from its sensor's detections, and from the truth."""
     folder = tmp_path_factory.mktemp("score")
-    line = ["generate", "merge", "--seeds", "5:7", "--streams", "none", "--out", str(folder / "data")]
-    assert run(line) == 0
+    line = ["generate", "merge", "--seeds", "5:7", "--streams", "none", "--set", *SLOW]
+    assert run([*line, "--out", str(folder / "data")]) == 0
     for name in ("file", "truth"):
         options = ["--detections", name, "--out", str(folder / name)]
         assert run(["track", "blob", str(folder / "data"), *options]) == 0
@@ -38,20 +43,23 @@ def one(made: Path) -> Path:
     return made / "data" / "flockscope-train" / "merge-s00005"
 
 
-@pytest.mark.parametrize("by", ["hull", "members"])
-def test_files_are_memory(made: Path, capsys, by: str) -> None:
-    found = answer(capsys, "score", made / "data", made / "file", "--group-match", by)
-    for seed, row in zip((5, 6), found["sequences"], strict=True):
-        sequence = simulate(load("merge"), seed)
-        expected = evaluate(sequence.truth, track("blob", sequence, detections="file"), group_match=by)
-        assert (row["name"], row["group_match"], row["surface"]) == (f"merge-s{seed:05d}", by, "ground")
-        for key, value in expected.items():
-            assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
+@pytest.fixture(scope="module")
+def scene() -> Sequence:
+    return simulate(load("merge", SLOW), 5)
 
 
 @pytest.fixture(scope="module")
-def scene() -> Sequence:
-    return simulate(load("merge"), 5)
+def tracked(scene: Sequence) -> TrackingRun:
+    return track("blob", scene, detections="file")
+
+
+@pytest.mark.parametrize("by", ["hull", "members"])
+def test_files_are_memory(made: Path, scene: Sequence, tracked: TrackingRun, capsys, by: str) -> None:
+    row, _ = answer(capsys, "score", made / "data", made / "file", "--group-match", by)["sequences"]
+    expected = evaluate(scene.truth, tracked, group_match=by)
+    assert (row["name"], row["group_match"], row["surface"]) == ("merge-s00005", by, "ground")
+    for key, value in expected.items():
+        assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
 
 
 @pytest.mark.parametrize("plane", ["ground", "image"])
@@ -73,15 +81,14 @@ def test_files_are_memory_for_groups_as_wholes(one: Path, scene: Sequence, tmp_p
 
 def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, capsys) -> None:
     """A seed tracked from its sensor's boxes, one from labels, one from noisy ones, one as a text without run.json."""
-    line = ["generate", "merge", "--seeds", "3:7", "--streams", "none", "--set", "camera.fps=5"]
-    assert run([*line, "--out", str(tmp_path / "data")]) == 0
+    write_short_scene(tmp_path, "3:7")
     data, tracks = tmp_path / "data" / "flockscope-train", tmp_path / "tracks"
     noisy = ["truth", "--set", "sensor.box_noise.scale=2"]
     for seed, mode in zip((3, 4, 5), (["file"], ["truth"], noisy), strict=True):
-        name = f"merge-s{seed:05d}"
+        name = f"scene-s{seed:05d}"
         assert run(["track", "blob", str(data / name), "--detections", *mode, "--out", str(tracks / name)]) == 0
-    assert run(["track", "blob", str(data / "merge-s00006"), "--out", str(tmp_path / "other")]) == 0
-    (tracks / "merge-s00006.txt").write_bytes((tmp_path / "other" / "tracks.mot.txt").read_bytes())
+    assert run(["track", "blob", str(data / "scene-s00006"), "--out", str(tmp_path / "other")]) == 0
+    (tracks / "scene-s00006.txt").write_bytes((tmp_path / "other" / "tracks.mot.txt").read_bytes())
     found = answer(capsys, "score", tmp_path / "data", tracks)
     expected = ["file", "truth", "truth (box_noise.scale = 2)", ""]
     assert [row["given"] for row in found["sequences"]] == expected
@@ -108,29 +115,23 @@ def test_the_mean_has_every_key_and_an_interval(made: Path, one: Path, capsys) -
     assert alone["low"] is alone["high"] is None
 
 
-def seen(scene: Sequence) -> list[Tracks]:
-    """blob's tracks at the centres of their boxes in the image."""
-    (moved,), _ = in_one_plane(scene.truth, [track("blob", scene, detections="file")], [False], "image")
-    return moved
-
-
-def in_image(folder: Path, scene: Sequence, detections: str) -> Path:
-    """A run of one sequence whose people lie in the image; from pixels if `detections` is "image"."""
-    info = {"tracker": "blob", "sequence": "merge-s00005", "plane": "image", "fps": scene.fps, "detections": detections}
-    answers, place = seen(scene), folder / "merge-s00005"
-    write_tracks(place, answers, fps=scene.fps, camera=scene.camera, scene=scene.scene, info=info)
+@pytest.fixture
+def in_image(scene: Sequence, tracked: TrackingRun, tmp_path: Path) -> Path:
+    """blob's run at the centres of its boxes in the image, as if it was from pixels."""
+    (answers,), _ = in_one_plane(scene.truth, [tracked], [False], "image")
+    info = {"tracker": "blob", "sequence": "merge-s00005", "plane": "image", "fps": scene.fps, "detections": "image"}
+    folder = tmp_path / "image"
+    write_tracks(folder / "merge-s00005", answers, fps=scene.fps, camera=scene.camera, scene=scene.scene, info=info)
     return folder
 
 
-def test_boxes_are_compared_by_their_feet_where_the_camera_is_known(
-    made: Path, one: Path, scene: Sequence, tmp_path: Path, capsys
-) -> None:
+def test_boxes_are_compared_by_their_feet_if_the_camera_is_known(made: Path, one: Path, in_image: Path, capsys) -> None:
     """A text of boxes was scored by overlap beside tracks on the ground; its HOTA was .26 lower for the same tracks."""
-    folder = in_image(tmp_path / "image", scene, "file")
-    text = tmp_path / "merge-s00005.txt"
-    text.write_text((folder / "merge-s00005" / "tracks.mot.txt").read_text())
+    seal_again(in_image / "merge-s00005", detections="file")
+    text = in_image.parent / "merge-s00005.txt"
+    text.write_text((in_image / "merge-s00005" / "tracks.mot.txt").read_text())
     (ground,) = answer(capsys, "score", one, made / "file")["sequences"]
-    for path in (folder, text):
+    for path in (in_image, text):
         (row,) = answer(capsys, "score", one, path)["sequences"]
         assert (row["similarity"], row["surface"]) == ("ground", "ground")
         assert row["HOTA"] == pytest.approx(ground["HOTA"], abs=0.1)
@@ -156,12 +157,11 @@ def test_two_runs_of_one_recording(made: Path, one: Path, capsys) -> None:
     assert answer(capsys, "score", one, made / "file", made / "truth", "--blocks", "200") == found
 
 
-def test_runs_are_compared_in_one_plane(made: Path, one: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
+def test_runs_are_compared_in_one_plane(made: Path, one: Path, in_image: Path, capsys) -> None:
     """One run is from pixels, the other on the ground: metres were subtracted from pixels."""
-    image = in_image(tmp_path / "image", scene, "image")
     alone = answer(capsys, "score", one, made / "file")["sequences"][0]
     assert (alone["similarity"], alone["surface"]) == ("ground", "ground")
-    found = answer(capsys, "score", one, made / "file", image)
+    found = answer(capsys, "score", one, made / "file", in_image)
     assert found["similarity"] == "image"
     (scores,) = found["scores"]["file"].values()
     assert scores["GOSPA"] > 5 * alone["GOSPA"], "px"
@@ -170,10 +170,9 @@ def test_runs_are_compared_in_one_plane(made: Path, one: Path, scene: Sequence, 
     assert "all tracks are compared in the image" in found["notes"][0]
 
 
-def test_runs_that_fit_no_plane_are_refused(made: Path, one: Path, scene: Sequence, tmp_path: Path, capsys) -> None:
-    folder = tmp_path / "wholes"
+def test_runs_that_fit_no_plane_are_refused(made: Path, one: Path, scene: Sequence, in_image: Path, capsys) -> None:
+    folder = in_image.parent / "wholes"
     write_tracks(folder / "merge-s00005", wholes(scene, "ground"), fps=scene.fps)
-    image = in_image(tmp_path / "image", scene, "image")
-    error = refused(capsys, "score", one, folder, image)
+    error = refused(capsys, "score", one, folder, in_image)
     assert "runs in the image (px), and one on the ground (m) with groups without people" in error
     assert run(["score", str(one), str(folder), str(made / "file")]) == 0

@@ -18,9 +18,9 @@ from tracking.app.commands.score_ranking import run_differences
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory) -> Path:
-    """Six short scenes, two runs, and the tracks of one of them as texts."""
+    """Four short scenes, two runs, and the tracks of one of them as texts."""
     folder = tmp_path_factory.mktemp("ranking")
-    write_short_scene(folder, "0:6")
+    write_short_scene(folder, "0:4")
     for name, options in (("good", []), ("bad", ["--set", "tracker.gate=0.6"])):
         assert run(["track", "blob", str(folder / "data"), *options, "--out", str(folder / name)]) == 0
     (folder / "texts").mkdir()

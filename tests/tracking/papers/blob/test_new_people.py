@@ -48,7 +48,7 @@ def test_guesses_are_the_slow_way(seed):
     assert np.array_equal(got, np.concatenate(slow.guesses(found.label == 1, 6, Fixed(h, w))))
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_who_enters_is_the_slow_way(seed):
     mask, (h, w) = region(seed)
     guesses = slow.guesses(blobs.find(mask, 20).label == 1, 4, Fixed(h, w))

@@ -18,6 +18,7 @@ def picture(*people):
     image = np.full((HIGH, WIDE, 3), GREY, np.uint8)
     for template, colour in people:
         image[slow.pixels((HIGH, WIDE), *template)] = colour
+    image.setflags(write=False)
     return image
 
 
@@ -47,6 +48,7 @@ def test_what_is_learned_is_mean_and_variance_of_what_is_not_hidden():
     near, far = np.array([60.0, 84.0, 60.0, 24.0]), np.array([70.0, 80.0, 60.0, 24.0])
     both, found = np.stack([near, far]), looks.unknown(2)
     images = np.random.default_rng(0).integers(0, 256, (400, HIGH, WIDE, 3)).astype(np.uint8)
+    images.setflags(write=False)
     for image in images:
         looks.learn(image, both, found, np.array([1]), 0.0)
     assert np.array_equal(found[0], looks.unknown(1)[0])

@@ -16,6 +16,7 @@ from tracking.papers.blob.person_template_kernels import EXPLAINED
 HIGH, WIDE = 90, 120
 NO_LOOKS = np.zeros((0, 0, 3), np.uint8), np.zeros((0, POINTS, 5))
 """A picture and looks for who is placed by the foreground alone."""
+NO_LOOKS[0].setflags(write=False)
 
 
 def somewhere(r, n):
@@ -46,7 +47,7 @@ def test_kernels_are_the_slow_way(seed):
     assert np.array_equal(template_mask((HIGH, WIDE), some), slow.painted((HIGH, WIDE), some) > 0)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_all_together_are_the_slow_way(seed):
     r, foreground, cover, expected = scenery(seed)
     scene, spread = ExplainedForeground(foreground), r.uniform(1, 6, (len(expected), 2))

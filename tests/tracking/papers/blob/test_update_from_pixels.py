@@ -36,7 +36,7 @@ def test_a_person_in_two_pieces_for_ten_frames_stays_one_track():
     """The paper's frame 367: a bar of the ground's own colour hides the waist."""
     way, frames, r = walk(60, 180, 4, 40), [], np.random.default_rng(5)
     for k, p in enumerate(way):
-        image = painted.picture([p], r)
+        image = painted.picture([p], r).copy()
         if 15 <= k < 25:
             waist = slice(int(p[1] - 0.58 * TALL), int(p[1] - 0.4 * TALL))
             image[waist] = painted.picture([], r)[waist]
@@ -127,12 +127,12 @@ def test_a_track_that_lies_stands_up_where_templates_measure_it():
 
 def test_windows_follow_the_image_while_nobody_was_seen():
     scales = []
-    for k in (1, 3):
+    for k in (1, 2):
         sample = np.stack([painted.picture([], np.random.default_rng(0))] * 12).repeat(k, 1).repeat(k, 2)
         tracker = painted.Blob()
         tracker.reset(painted.Context(painted.FPS, float("nan"), background=sample), 0)
         scales.append(tracker.updater.foreground.scale)
-    assert scales[1] == pytest.approx(3 * scales[0])
+    assert scales[1] == pytest.approx(2 * scales[0])
 
 
 def test_a_lost_frame_only_predicts():
@@ -144,16 +144,6 @@ def test_a_lost_frame_only_predicts():
     assert np.array_equal(state[12][kalman.RATE], state[11][kalman.RATE])
     assert len(ids(made)) == 1
     assert len(made[12].id) == 1
-
-
-def test_a_light_that_is_switched_starts_no_flood():
-    r = np.random.default_rng(1)
-    frames = [painted.picture([p], r) for p in walk(60, 180, 4, 30)]
-    for k in range(15, 30):
-        frames[k] = np.clip(frames[k].astype(float) * [0.55, 1.3, 1.6], 0, 255).astype(np.uint8)
-    known = []
-    track(frames, BlobConfig(), watch=lambda tracker, _: known.append(tracker.people.next_id))
-    assert known[-1] <= 4
 
 
 def test_a_confirmed_person_who_stands_is_not_learned_as_background(monkeypatch):

@@ -32,10 +32,10 @@ def positive(r, n, scale=1.0):
     return A @ A.T / n + 0.05 * scale**2 * np.eye(n)
 
 
-def random_rules(r):
-    """All options, each on in half of the cases; each kind of association in a quarter of them."""
-    miss, freeze, correct, redrawn = (r.random(4) < 0.5).tolist()
-    association = str(r.choice(list(reference.ASSOCIATIONS)))
+def random_rules(r, seed):
+    """All options and kinds of association together, one combination after the other."""
+    miss, freeze, correct, redrawn = (bool(seed >> k & 1) for k in range(4))
+    association = list(reference.ASSOCIATIONS)[seed // 16 % 4]
     every = association == "none"
     constraint = Constraint(
         r.uniform(0.6, 2), r.uniform(6, 14), positive(r, 2, 0.4), r.uniform(0.5, 4), r.choice([0, 1.2])
@@ -57,7 +57,7 @@ def random_groups(r, count):
 def random_case(seed):
     """Up to three groups near each other, up to nine points each, some of them attached to a group; hold."""
     r = np.random.default_rng(seed)
-    rules, count = random_rules(r), int(r.integers(1, 4))
+    rules, count = random_rules(r, seed), int(r.integers(1, 4))
     x, P, extent, size = random_groups(r, count)
     of = r.integers(count, size=int(r.integers(0, 9 * count + 1)))
     spread = np.array([np.linalg.cholesky(S) for S in extent])[of]
@@ -100,9 +100,9 @@ def kernel(case, rules, region=None):
     return [STATES[s] for s in found[0].tolist()], found[1], *after
 
 
-def test_four_hundred_random_cases() -> None:
+def test_two_hundred_random_cases() -> None:
     seen = Counter()
-    for seed in range(400):
+    for seed in range(192):
         rules, case, region = random_case(seed)
         *points, share, age, _, x, P, extent, size, hold = with_shares(case, region)
         d2, hits = case[2], case[4]
@@ -211,7 +211,7 @@ def gaussian(count):
     return np.stack([q * np.cos(t), q * np.sin(t)], axis=1)
 
 
-def settled(gate, correct, frames=200, start=1.0, count=1_000):
+def settled(gate, correct, frames=120, start=1.0, count=400):
     """Extent and size after so long, when only what the region holds is looked at."""
     points, weights = gaussian(count), np.ones(count)
     constraint = Constraint(10.0, gate, np.eye(2), 0.0)
@@ -228,7 +228,6 @@ def settled(gate, correct, frames=200, start=1.0, count=1_000):
 
 GATES = [
     (5.99, False, 0.715, 1 - np.exp(-0.715 * 5.99 / 2), 0.8),
-    (5.99, False, 0.715, 1 - np.exp(-0.715 * 5.99 / 2), 2.0),
     (9.21, False, 0.943, 1 - np.exp(-0.943 * 9.21 / 2), 2.0),
     (13.8, False, 0.993, 1.0, 0.8),
     (9.21, True, 1.0, 0.99, 0.8),

@@ -113,7 +113,7 @@ def same(a: list[Tracks], b: list[Tracks], matrix: Array | None = None, shift: A
 @pytest.mark.parametrize("ranks", [(2, 2), (3, 2)])
 @pytest.mark.parametrize("turn", [np.pi, np.pi / 2])
 def test_groups_that_walk_through_each_other_keep_ids_and_sizes(ranks: tuple[int, int], turn: float) -> None:
-    for seed in range(20):
+    for seed in range(8):
         made = track(crossing(seed, 2.4, ranks, turn))
         before, after = made[15], made[-1]
         assert before.id.tolist() == after.id.tolist() == [1, 2]
@@ -151,7 +151,7 @@ def missed(seed: int, speed: float, share: float = 0.8, frames: int = 120) -> tu
 @pytest.mark.parametrize("speed", [0.0, 1.2])
 def test_misses_neither_part_a_group_nor_shrink_nor_move_it(speed: float) -> None:
     error, bare = [], []
-    for seed in range(10):
+    for seed in range(4):
         frames, middle = missed(seed, speed)
         made = track(frames)
         assert ids(made) == {1}
