@@ -8,7 +8,7 @@ Six things save more than half of the time that compilation takes. What other ke
 included, is compiled without the wrappers for calls from Python, and LLVM optimises it within its callers only.
 Constants in such a call are no types of their own. numba's answers to what type `a + b` has are remembered. `a[i, j]`
 needs half of numba's instructions. Values of a tuple that was just made are not read back. Python collects no garbage
-meanwhile.
+meanwhile. Results are the same to the last bit.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
-from numba.core import cgutils, codegen, compiler, event, targetconfig, types
+from numba.core import cgutils, codegen, compiler, event, ir, targetconfig, types
 from numba.core.typing import templates
 from numba.np import arrayobj
 
@@ -38,6 +38,7 @@ function_type: Any = types.BaseFunction
 overload: Any = templates._OverloadFunctionTemplate
 compilation_flags: Any = targetconfig.ConfigStack
 numba_arrays: Any = arrayobj
+numba_ir: Any = ir
 llvm: Any = codegen.llvmir
 item_pointer: Any = cgutils.get_item_pointer2
 JITCodeLibrary: Any = codegen.JITCodeLibrary
@@ -234,6 +235,18 @@ def _of_insertions(extract: Any) -> Any:
     return extract_value
 
 
+def _variables(find: Any) -> Any:
+    """Returns numba's Inst._rec_list_vars, which is asked most often for what holds no variable."""
+    without = {str, int, bool, type(None), numba_ir.Loc, type(len)}
+
+    @wraps(find)
+    def _rec_list_vars(self: Any, value: Any) -> Any:
+        return [] if value.__class__ in without else find(self, value)
+
+    return _rec_list_vars
+
+
+numba_ir.Inst._rec_list_vars = _variables(numba_ir.Inst._rec_list_vars)
 numba_arrays.basic_indexing = _with_short_way(numba_arrays.basic_indexing)
 llvm.IRBuilder.extract_value = _of_insertions(llvm.IRBuilder.extract_value)
 

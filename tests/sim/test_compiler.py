@@ -103,7 +103,7 @@ def test_other_faults_of_a_kernel_stay_errors(monkeypatch):
         compiler.njit(cache=True)(test_other_faults_of_a_kernel_stay_errors)
 
 
-@compiler.njit
+@compiler.njit()
 def _elements(a, i, j):
     a[i, j] += 10
     pair = (a[i, j], (a[-1, 0], a[np.int32(i), -2], a[np.uint8(1), j]))
