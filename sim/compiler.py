@@ -39,7 +39,9 @@ overload: Any = templates._OverloadFunctionTemplate
 compilation_flags: Any = targetconfig.ConfigStack
 numba_arrays: Any = arrayobj
 numba_ir: Any = ir
-llvm: Any = codegen.llvmir
+numba_codegen: Any = codegen
+numba_compiler: Any = compiler
+llvm: Any = numba_codegen.llvmir
 item_pointer: Any = cgutils.get_item_pointer2
 JITCodeLibrary: Any = codegen.JITCodeLibrary
 Compiler: Any = compiler.Compiler
@@ -122,7 +124,7 @@ class _InnerCompiler(Compiler):  # type: ignore[misc]
 
 
 INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _InnerCompiler}
-_jit_of_overloads, _compile_internal = overload._get_jit_decorator, compiler.compile_internal
+_jit_of_overloads, _compile_internal = overload._get_jit_decorator, numba_compiler.compile_internal
 overload._get_jit_decorator = lambda self: partial(_jit_of_overloads(self), **INNER)  # such as np.empty
 
 
@@ -149,7 +151,7 @@ def _compile_part(typing: Any, target: Any, library: Any, *rest: Any, **named: A
     return _compile_internal(typing, target, _InnerCode(target.codegen(), library.name), *rest, **named)
 
 
-compiler.compile_internal = _compile_part
+numba_compiler.compile_internal = _compile_part
 
 
 def _with_memory(resolve: Any) -> Any:
