@@ -27,7 +27,7 @@ def sort_by(key: Array, rows: Ints) -> None:
         gap //= 2
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def find_root(parent: Ints, k: int) -> int:
     """Returns the root of element k in a forest of parents (M,), and shortens the path to it (path halving)."""
     while parent[k] != k:

@@ -13,7 +13,7 @@ from sim.render.canvas import TILE_H, TILE_W
 from sim.scene.body import XX, XY, YY
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def ellipse_row(y, a, b, d):  # type: ignore[no-untyped-def]
     """Returns the ends x0 <= x1 of row y of the ellipse a x² + 2 b x y + d y² <= 1; (1, -1) if it is missed."""
     root = b * b * y * y - a * (d * y * y - 1.0)
@@ -23,7 +23,7 @@ def ellipse_row(y, a, b, d):  # type: ignore[no-untyped-def]
     return (-b * y - root) / a, (-b * y + root) / a
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def outline_columns(v, i, e, middle, inverse, width):  # type: ignore[no-untyped-def]
     """Returns the first column and the last + 1 of row v in the outline of part e of person i; equal if none.
 

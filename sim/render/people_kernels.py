@@ -92,7 +92,7 @@ X, Y, Z = range(3)
 FEET, WAIST, HEAD = range(3)  # columns of `sunlit`
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _row_of_rays(i, e, v, start, step, ray):  # type: ignore[no-untyped-def]
     """Sets ray (3, 4) to the rays of image row v in the own axes of part e of person i, a ball of radius 1."""
     for k in range(3):
@@ -102,7 +102,7 @@ def _row_of_rays(i, e, v, start, step, ray):  # type: ignore[no-untyped-def]
         ray[k, D_PER_COLUMN] = step[i, e, k, 0]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _hit_depths(ray, left, many, t):  # type: ignore[no-untyped-def]
     """Sets t (many,) to the depths m at which a row's rays meet the unit ball; a miss gives its nearest point."""
     px0, px1, dx0, dx1 = ray[X, P_AT_0], ray[X, P_PER_COLUMN], ray[X, D_AT_0], ray[X, D_PER_COLUMN]
@@ -118,7 +118,7 @@ def _hit_depths(ray, left, many, t):  # type: ignore[no-untyped-def]
         t[k] = (-b - np.sqrt(root if root > 0.0 else 0.0)) / a
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _texture_and_light(  # type: ignore[no-untyped-def]
     ray, left, many, t, half, sun, shadow, sunlit, head, place, across, up, light
 ):
@@ -163,7 +163,7 @@ def _texture_and_light(  # type: ignore[no-untyped-def]
         place[k] = j * np.int32(ROUND + 1) + i
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def draw_people(  # type: ignore[no-untyped-def]
     order, start, step, half, middle, inverse, bounds, id, sun, shadow, sunlit, pages, atlas,
     shade, label, depth, ids, colour, dirty, margin, amodal,

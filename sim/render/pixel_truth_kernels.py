@@ -20,7 +20,7 @@ from sim.scene.raycast_kernels import at_pixel, first_hit
 SAME = 1e-3  # m: a point in front by less than this counts as the same point
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def empty_scene_disparities(depth, scale, origin, direction, solids, out):  # type: ignore[no-untyped-def]
     """Sets out (H, W) to the disparities scale / depth of the empty scene, at the left camera's pixels.
 
@@ -41,7 +41,7 @@ def empty_scene_disparities(depth, scale, origin, direction, solids, out):  # ty
                     out[v, u] = np.nan
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _part_is_before(x, i, e, start, step, row, z):  # type: ignore[no-untyped-def]
     """Returns True if the right camera's ray at u = x px meets part e of person i before depth z (m)."""
     a = b = c = 0.0
@@ -54,7 +54,7 @@ def _part_is_before(x, i, e, start, step, row, z):  # type: ignore[no-untyped-de
     return root >= 0.0 and (-b - np.sqrt(root)) / a < z - SAME
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, solids, out):  # type: ignore[no-untyped-def]
     """Sets out (H, W) to the disparity at the pixels of people; nan where the right camera does not see the point."""
     width = depth.shape[1]
@@ -77,7 +77,7 @@ def _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, s
                             out[v, u] = np.nan
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def add_people(  # type: ignore[no-untyped-def]
     depth, ids, bounds, id, scale, start, step, middle, inverse, nearest, right_depth, origin, direction, solids, out
 ):
@@ -115,7 +115,7 @@ def add_people(  # type: ignore[no-untyped-def]
 LEFT, RIGHT, TOP, BOTTOM = range(4)  # columns of `edges`
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def count_pixels(ids, bounds, id, row_of, count, edges, blob):  # type: ignore[no-untyped-def]
     """Counts the visible pixels of N people in an id map (H, W), and finds who touch in the image.
 

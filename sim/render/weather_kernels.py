@@ -72,7 +72,7 @@ def sway(empty, share, runs, nodes, step, colour, dirty, margin):  # type: ignor
         mark_dirty(dirty, v, left, right, margin, height, width)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _shade_line(place, many, centre, shape, sx, sy, softness, shade):  # type: ignore[no-untyped-def]
     """Raises shade (many,) to 255 times the share of the sun that one body part takes at places (many, 3) m."""
     f = np.float32
@@ -89,7 +89,7 @@ def _shade_line(place, many, centre, shape, sx, sy, softness, shade):  # type: i
         shade[k] = max(shade[k], dark)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def draw_shadows(  # type: ignore[no-untyped-def]
     place, direct, bounds, flat, middle, inverse, centre, shape, sun, softness, shaded, colour, dirty, margin
 ):

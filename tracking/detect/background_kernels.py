@@ -31,7 +31,7 @@ MEMORY = np.float32(30)
 """Sightings after which the mean of a colour forgets the older ones, so that it follows slow changes."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def classify(
     i0: Image, i1: Image, i2: Image, E: Floats, V: Floats, s: Floats, b: Floats, g: Floats, limits: Floats, out: Image
 ) -> None:
@@ -68,7 +68,7 @@ def classify(
         out[n] = np.uint8(FOREGROUND) if cd2 > most * most else kind
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def adapt(
     image: Image,
     classes: Image,
@@ -110,7 +110,7 @@ def adapt(
                     V[k, r, c] = max(V[k, r, c] + rate * (d * d * g[k] * g[k] - V[k, r, c]), floor)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def watch(image: Image, gain: Floats, reach: Floats, colour: Floats, sightings: Floats) -> None:
     """Update, in place, each pixel's mean colour since it last changed, and in how many pictures it has been seen.
 

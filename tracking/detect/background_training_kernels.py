@@ -19,7 +19,7 @@ BRIGHTNESS, CHROMATICITY = range(2)
 """Second axis of `counts`: the normalised distortions."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def sort(values: Floats) -> None:
     """Sort values (K,) in place, ascending, by Shell's method, which is quick for small K. Returns nothing."""
     for gap in (13, 4, 1):
@@ -31,7 +31,7 @@ def sort(values: Floats) -> None:
             values[j] = x
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def shortest(values: Floats, held: int) -> tuple[int, float]:
     """Returns the start index and the length of the shortest interval that holds `held` neighbours of `values`.
 
@@ -49,7 +49,7 @@ HALF_AS_SIGMA = 1.48
 """Standard deviation of a Gaussian over half the length of the central interval that holds half of it."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def guess(
     value: Floats, shown: Bools, held: int, as_sigma: float, least: float, order: Floats, m: Array, sd: Array
 ) -> None:
@@ -85,8 +85,10 @@ def guess(
         sd[k] = max(sd[k], least)
 
 
-@njit(cache=True, error_model="numpy")
-def inliers(value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[float, float, float, int]) -> bool:
+@njit(cache=True)
+def inliers(
+    value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[float, float, float, int]
+) -> tuple[bool, int]:
     """Compute one pixel's mean E, standard deviation sigma and inlier frames in turn until they settle; all in place.
 
     value (K, 3): the pixel's grey levels at gain 1 in K frames. m, sd (3,): E and sigma of each channel; they hold
@@ -94,11 +96,11 @@ def inliers(value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[floa
     of E. rules: least sigma (grey levels); sigmas within which a frame is an inlier; sigmas within which a frame is
     clean; most rounds (at least 1).
 
-    Returns True if all frames of the pixel are clean. E stays at 1 or above, sigma at the least sigma or above, also if
-    no frame is an inlier.
+    Returns whether all frames of the pixel are clean, and the number of inliers. E stays at 1 or above, sigma at the
+    least sigma or above, also if no frame is an inlier.
     """
     least, inside, untouched, rounds = rules
-    clean = True
+    clean, n = True, 0
     inlier[:] = False
     for _ in range(rounds):
         clean, settled = True, True
@@ -116,17 +118,17 @@ def inliers(value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[floa
                     d = value[t, k] - m[k]
                     sums[k] += d
                     squares[k] += d * d
-        n = max(n, 1)
+        many = max(n, 1)
         for k in range(3):
-            shift = sums[k] / n
+            shift = sums[k] / many
             m[k] = max(m[k] + shift, 1.0)  # E (eq. 3) and sigma (eq. 4) of the inliers
-            sd[k] = max(np.sqrt(max(squares[k] / n - shift * shift, 0.0)), least)
+            sd[k] = max(np.sqrt(max(squares[k] / many - shift * shift, 0.0)), least)
         if settled:
             break
-    return clean
+    return clean, n
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def distortions(value: Floats, m: Array, sd: Array, inlier: Bools, alpha: Array, cd: Array) -> tuple[float, float]:
     """Returns s and b of one pixel: the RMS over its inlier frames of the two distortions, 0 if there is no inlier.
 
@@ -154,7 +156,7 @@ def distortions(value: Floats, m: Array, sd: Array, inlier: Bools, alpha: Array,
     return np.sqrt(sa / n), np.sqrt(sb / n)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def learn(
     sample: Image,
     gains: Floats,
@@ -188,26 +190,31 @@ def learn(
     number, span = bins
     frames, high, wide, _ = sample.shape
     value, order = np.empty((frames, 3), np.float32), np.empty(frames, np.float32)
-    every, inlier, other_inlier = np.ones(frames, np.bool_), np.empty(frames, np.bool_), np.empty(frames, np.bool_)
+    every, inlier, outlier = np.ones(frames, np.bool_), np.empty(frames, np.bool_), np.empty(frames, np.bool_)
     alpha, cd = np.empty(frames), np.empty(frames)
     m, sd, other, other_sd = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for r in range(high):
         for c in range(wide):
             for k in range(3):
+                second[r, c, k] = np.nan
                 for t in range(frames):
                     value[t, k] = np.float32(sample[t, r, c, k]) / gains[t, k]
             guess(value, every, held, as_sigma, least, order, m, sd)
-            good = sd.max() <= widest
-            clean = inliers(value, m, sd, inlier, (least, inside, untouched, rounds))
-            second[r, c], out = np.nan, frames - inlier.sum()
+            good = max(sd[0], sd[1], sd[2]) <= widest
+            clean, found = inliers(value, m, sd, inlier, (least, inside, untouched, rounds))
+            out = frames - found
             if out >= fewest:
-                guess(value, ~inlier, max(fewest, held * out // frames), as_sigma, least, order, other, other_sd)
-                if other_sd.max() <= widest:
-                    second[r, c] = other
-                    inliers(value, other, other_sd, other_inlier, (least, inside, untouched, rounds))
-                    if other_inlier.sum() > inlier.sum():
-                        second[r, c], clean = m, False
-                        m[:], sd[:], inlier[:] = other, other_sd, other_inlier
+                for t in range(frames):
+                    outlier[t] = not inlier[t]
+                guess(value, outlier, max(fewest, held * out // frames), as_sigma, least, order, other, other_sd)
+                if max(other_sd[0], other_sd[1], other_sd[2]) <= widest:
+                    for k in range(3):
+                        second[r, c, k] = other[k]
+                    if inliers(value, other, other_sd, outlier, (least, inside, untouched, rounds))[1] > found:
+                        for k in range(3):
+                            second[r, c, k] = m[k]
+                        clean = False
+                        m, sd, inlier, other, other_sd, outlier = other, other_sd, outlier, m, sd, inlier
             sa, sb = distortions(value, m, sd, inlier, alpha, cd)
             noise = 3 * least / (sd[0] + sd[1] + sd[2])
             # s = a |E / sigma| (eq. 7) and b (eq. 8); of noise `least` alone s would be `noise`, and b sqrt(2) times it

@@ -24,7 +24,7 @@ ELLIPSE = np.pi / 4  # share of its box that an ellipse fills
 LEAST_INSIDE = 0.3  # a template of which a smaller share is inside the image counts as if this share were
 BARE = 0.1  # a template of which less than this share is free of others is hidden: it has no piece support
 
-kernel = njit(cache=True, error_model="numpy")
+kernel = njit(cache=True)
 
 
 @kernel
