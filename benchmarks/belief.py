@@ -2,7 +2,7 @@
 
     python -m benchmarks.belief recordings [--data FOLDER]
     python -m benchmarks.belief suites [--scenes standard friends-meet …]
-    python -m benchmarks.belief decisions [--scenes standard friends-meet streets] [--seeds 20000:20001]
+    python -m benchmarks.belief decisions [--scenes standard …] [--seeds 20000:20001] [--data FOLDER]
     python -m benchmarks.belief calibration [--scenes streets] [--seeds 20000:20001] [--out CHART.svg]
     python -m benchmarks.belief ablation --train standard streets … [--seeds 30000:30002] [--check 20000:20001]
 
@@ -12,8 +12,8 @@ positions that err by 0.1 m, with 5 % missed, mean over 10 draws. CAVIAR's Meet_
 velocities.
 suites: pairwise F1, group F1, event F1, merges that are wrong or missed, and seconds until a merge is reported; means
 over sequences with 95 % intervals, and the paired difference.
-decisions: pairwise F1 by the groups of now, by those of events, which change late, and of pairs whose probability is
-above 0.5; in means over sequences, of `streets` by quarters of density, too.
+decisions: pairwise F1 by SPENCER, by the groups of now, by those of events, which change late, and of pairs whose
+probability is above 0.5; on two recordings, and in means over sequences, of `streets` by quarters of density, too.
 calibration: probability and share of mates by bin, expected calibration error, all scenes weighing the same; --out:
 the same as a reliability plot.
 ablation: the fit without each quantity: log loss and F1 on --check seeds, and F1 on the recordings.
@@ -177,7 +177,7 @@ def _cells(write: object, values: Array) -> list[str]:
 
 def late_groups(*rows: Any, **options: Any) -> FoundGroups:
     """Returns the groups of events in place of those of now."""
-    return replace(belief_groups(*rows, **{**options, "events": True}), now=None)
+    return replace(belief_groups(*rows, **options), now=None)
 
 
 def probable_pairs(truth: Truth, belief: Belief, i: Ints, j: Ints) -> Bools:

@@ -36,7 +36,7 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import weighted_scorers
 from tracking.stats import block_intervals
 from tracking.tuning import tune
-from tracking.tuning.result import TuningResult
+from tracking.tuning.result import TuningResult, short
 
 SUITE = Path(__file__).parent / "tuning_suites" / "boxes.toml"
 SCORE = "HOTA"
@@ -133,7 +133,7 @@ def main() -> None:
             old, new = on_second_half(tracker, recording, found.config)
             ours = next((c for c in found.comparisons if c.key == SCORE), None)
             scenes = ["–", "–"] if ours is None else [number(ours.before), signed(ours.difference, ours.low, ours.high)]
-            changed = ", ".join(f"{key} {before:g} → {now:.3g}" for key, (before, now) in found.changed.items())
+            changed = ", ".join(f"{key} {short(before)} → {short(now)}" for key, (before, now) in found.changed.items())
             rows[Path(name).name] = [*scenes, interval(*old), signed(*new), changed or "nothing"]
         table(f"{tracker.__name__}, {SCORE}", "recording", COLUMNS, rows)
 

@@ -2,13 +2,14 @@
 
 numba caches compiled kernels beside their files or in the user's cache folder. In a container neither may be writable,
 and numba then refuses to compile. The cache goes to a temporary folder of the user in that case, or is left out. numba
-looks at the file of a kernel alone; here, a change of what a kernel imports makes it compile anew, too.
+looks at the file of a kernel alone; here, a change of its options, of this module or of what it imports makes it
+compile anew, too.
 
-Six things save more than half of the time that compilation takes. What other kernels call, numba's own functions
-included, is compiled without the wrappers for calls from Python, and LLVM optimises it within its callers only.
-Constants in such a call are no types of their own. numba's answers to what type `a + b` has are remembered. `a[i, j]`
-needs half of numba's instructions. Values of a tuple that was just made are not read back. Python collects no garbage
-meanwhile. Results are the same to the last bit.
+Seven things save compilation time. What other kernels call, numba's own functions included, is compiled without the
+wrappers for calls from Python, and LLVM optimises it within its callers only. Constants in such a call are no types of
+their own. numba's answers to what type `a + b` has are remembered. `a[i, j]` needs fewer instructions than numba's.
+Values of a tuple that was just made are not read back. What holds no variable is not searched for variables. Python
+collects no garbage meanwhile. Results are the same to the last bit. The changes of numba hold for the whole process.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ llvm: Any = numba_codegen.llvmir
 item_pointer: Any = cgutils.get_item_pointer2
 JITCodeLibrary: Any = codegen.JITCodeLibrary
 Compiler: Any = compiler.Compiler
+OWN = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
 NO_CACHE = (
     "kernels are compiled anew in every process: their cache has no place, because neither the installation nor the "
     "home folder nor the temporary folder can be written; set NUMBA_CACHE_DIR to a folder that can"
@@ -52,7 +54,9 @@ NO_CACHE = (
 
 
 def cached_njit(shared: bool = False, **options: Any) -> Callable[[Any], Any]:
-    """Returns a decorator: numba's njit, whose cache goes to the first place that can be written. x / 0 is inf or nan.
+    """Returns a decorator: numba's njit, whose cache goes to the first place that can be written.
+
+    x / 0 is inf or nan, x // 0 of whole numbers is 0.
 
     shared: the kernel is called from Python and from kernels with the same types, so that one form serves both.
     """
@@ -73,7 +77,7 @@ def cached_njit(shared: bool = False, **options: Any) -> Callable[[Any], Any]:
             _warn_once()
             return numba.njit(**{**options, "cache": False})(function)
         stored = _stored(kernel)
-        stored._source_stamp = (stored._source_stamp, _used_by(function))
+        stored._source_stamp = (stored._source_stamp, _used_by(function), OWN, repr(sorted(options.items())))
         _call_by_kernels(kernel, kernel if shared else numba.njit(**{**options, "cache": False, **INNER})(function))
         return kernel
 
@@ -158,7 +162,7 @@ def _with_memory(resolve: Any) -> Any:
     """Returns numba's BaseFunction.get_call_type with a memory, and a short way for numbers.
 
     It asks some thirty templates, each time anew, what type `a + b` has. Of numbers, those with lists of types know it.
-    Only answers about operators are remembered: those do not change, whatever the options of the kernel.
+    Only answers about operators are remembered: those of numbers do not change, whatever the options of the kernel.
     """
     known: dict[Any, Any] = {}
 
@@ -211,7 +215,7 @@ def _with_short_way(indexing: Any) -> Any:
         strides = [field("strides", k) for k in axes] if kind.layout == "A" else []
         places = [
             index
-            if isinstance(index, llvm.Constant) and index.constant >= 0
+            if type(index) is llvm.Constant and index.type == shape[0].type and index.constant >= 0
             else numba_arrays.fix_integer_index(context, builder, index_type, index, length)
             for index, index_type, length in zip(indices, index_types, shape, strict=True)
         ]
@@ -294,7 +298,7 @@ def _used_by(function: Any) -> str:
             value = stored._source_stamp
         elif isinstance(value, np.ndarray):
             value = value.tobytes()
-        elif not isinstance(value, bool | int | float | tuple):
+        elif not isinstance(value, bool | int | float | tuple | np.generic):
             continue
         used.update(f"{name} {value!r}\n".encode())
     return used.hexdigest()

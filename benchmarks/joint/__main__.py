@@ -5,7 +5,7 @@
 table2      the paper's Tables 2 and 3b: full, VAR1, VAR2, VAR3 and .2 of the preset paper and of the default, on
             friends-meet and on a recording; differences of variants, paired
 particles   friends-meet: accuracy and frames/s over N_x and N_z (--chart FILE.svg)
-ablation    friends-meet: scores without each departure from the paper that has a parameter, paired differences
+ablation    friends-meet: scores without each departure from the paper, paired differences
 
 One sequence of each scenario counts. Group scores are pooled over the frames of all sequences together; differences
 are of the means over sequences, with 95 % intervals. Detections are the points of the simulated detector; `.2` has

@@ -10,8 +10,8 @@ hidden       error of one of two people who walk together while nobody sees this
 recordings   error of one member of each labelled group in three recordings (--recordings) who is not detected for 2 s
              in every 6 s; positions err by 0.1 m
 groups       scores of people, groups and events on a suite, beside `blob`; groupings of the same tracks
-ablation     errors, HOTA, IDF1, group and pairwise F1 without each departure from the paper that has a parameter, and
-             differences to the defaults
+ablation     errors, HOTA, IDF1, group and pairwise F1 on a suite, and the error of a hidden partner, without each
+             departure from the paper; differences to the defaults
 
 The error is the mean, over true people and frames, of the distance to the track that an optimal assignment gives them,
 at most 2 m, which is also the cost of a missing track. Both filters have the same detections and the same seeds. The

@@ -14,15 +14,15 @@ along             mean error along the horizontal line of sight, positive away f
 The mean is over frames, and then over sequences. `group F1`, `merge F1`: of the catalogue; `extra`: number of reported
 merges and splits of a sequence above that of the true ones. 95 % intervals over sequences are Student's.
 
-`VARIANTS` switch decisions off. Those without a parameter replace code of the tracker. Differences are paired, over the
-same sequences.
+`VARIANTS` and `FROM_POINTS` switch decisions off. Those without a parameter replace code of the tracker. Differences
+are paired, over the same sequences.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -73,8 +73,8 @@ VARIANTS: Mapping[str, Variant] = {
 }
 FROM_POINTS: Mapping[str, Variant] = {
     "spread_weight": Variant({"spread_weight": 0.1}),
-    "splits": Variant({"split_time": 100.0}),
-    "split_time": Variant({"split_time": 0.0}),
+    "no splits": Variant({"split_time": 100.0}),
+    "splits at once": Variant({"split_time": 0.0}),
     "confirm_time": Variant({"confirm_time": 0.0}),
 }
 """Decisions that pictures of so few sequences cannot judge: from the simulated detector, on the suite standard."""
@@ -172,21 +172,25 @@ def scenes(args: argparse.Namespace) -> dict[str, dict[str, list[Row]]]:
     )  # fmt: skip
     rows = {f"{scene}, {name}": _cells(scene, made[scene][name]) for scene in SCENES for name in ("paper", "default")}
     table("Scenes of the paper: its preset, and the default", "scene", columns, rows)
-    _switched_off("from pictures", made, VARIANTS)
+    _switched_off("from pictures", made, VARIANTS, ("group F1", "MOTA", "ground, m", "3-D, middle", "extra"))
     made["points"] = {name: [] for name in ("default", *FROM_POINTS)}
     for entry in resolve("suite:standard"):
         for sequence in recordings(entry, args.seeds[:1], ()):
             for name, rows in made["points"].items():
                 rows.append(row_of(sequence, FROM_POINTS.get(name, Variant()), "file"))
-    _switched_off("from points", {"points": made["points"]}, FROM_POINTS)
+    _switched_off("from points", {"points": made["points"]}, FROM_POINTS, ("group F1", "MOTA", "extra"))
     return made
 
 
-def _switched_off(source: str, made: Mapping[str, Mapping[str, list[Row]]], names: Iterable[str]) -> None:
-    keys = {"group F1": "group_F1_hull", "MOTA": "group_MOTA", "ground, m": "ground", "3-D, middle": "middle",
-            "extra": "extra"}  # fmt: skip
-    off = {name: [_difference(made, name, key) for key in keys.values()] for name in names}
-    table(f"Each decision switched off, {source}: difference to the default", "decision", tuple(keys), off)
+KEYS = {"group F1": "group_F1_hull", "MOTA": "group_MOTA", "ground, m": "ground", "3-D, middle": "middle",
+        "extra": "extra"}  # fmt: skip
+
+
+def _switched_off(
+    source: str, made: Mapping[str, Mapping[str, list[Row]]], names: Iterable[str], columns: Sequence[str]
+) -> None:
+    off = {name: [_difference(made, name, KEYS[column]) for column in columns] for name in names}
+    table(f"Each decision switched off, {source}: difference to the default", "decision", columns, off)
 
 
 def _difference(made: Mapping[str, Mapping[str, list[Row]]], name: str, key: str) -> str:

@@ -66,7 +66,7 @@ def predict(state: Array, dt: float, q: Array) -> None:
 
 
 def fade_rates(state: Array, stay: float) -> None:
-    """Multiplies the rates of a bank by `stay`, 0 to 1, in place: without measurements they return to zero."""
+    """Multiplies the rates of a bank by `stay`, 0 to 1, and their (co)variances accordingly, in place."""
     state[RATE] *= stay
     state[COV] *= stay
     state[RATE_VAR] *= stay**2

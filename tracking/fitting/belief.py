@@ -92,7 +92,10 @@ def _fit_column(sample: PairSample, knots_of: Mapping[str, Array]) -> Array:
 
 
 def best_threshold(sample: PairSample, log_odds: Array) -> float:
-    """Returns the probability above which a pair is to count as together, for the greatest mean F1 of scenes' rows."""
+    """Returns the probability above which a pair counts as together, for the greatest mean F1 of scenes with mates.
+
+    Of equal ones it is the middle.
+    """
     place = (THRESHOLDS / (1 + np.exp(-log_odds))).astype(np.int64).clip(0, THRESHOLDS - 1)
     shape = (sample.scene[-1] + 1, THRESHOLDS)
     place += sample.scene * THRESHOLDS
@@ -100,7 +103,9 @@ def best_threshold(sample: PairSample, log_odds: Array) -> float:
     hits, told = (c[:, ::-1].cumsum(axis=1)[:, ::-1] for c in count)  # by scene: rows above k / THRESHOLDS
     mates = hits[:, :1]
     weight = np.bincount(sample.scene, sample.weight) * (mates[:, 0] > 0)
-    return float(np.argmax(weight @ (2 * hits / np.maximum(told + mates, 1)))) / THRESHOLDS
+    f1 = weight @ (2 * hits / np.maximum(told + mates, 1))
+    best = np.flatnonzero(f1 == f1.max())
+    return float(best[len(best) // 2]) / THRESHOLDS
 
 
 def _knots(values: Array) -> Array:

@@ -66,7 +66,7 @@ def belief_groups(
     """
     size = frames_per_step(fps)
     people = int(column.max(initial=0)) + 1
-    rows = np.ones(len(frame), bool) if measured is None else measured
+    rows = slice(None) if measured is None else measured
     places, times = step_positions(frame[rows], column[rows], pos[rows], length, people, fps)
     shape = (len(places), people)
     found = pair_beliefs(places, times, size / fps, belief)

@@ -28,8 +28,9 @@ LONGEST = 20.0  # s: longer times near each other tell no more.
 # Averaged over the pair's rows, with weights exp(-age / time). Unknown velocities leave nan out of the means.
 # velocity difference: of vectors, m/s. sideways, lengthwise: parts of the distance, m, across and along the mean
 # velocity of the two where that is at least 0.3 m/s, else the whole distance and nan. growth: of the distance, m/s.
-# turn: angle between the two velocities, rad, nan if one is slower than 0.3 m/s; walking difference: the velocity
-# difference, m/s, nan in the same rows, so that its means outlast a stop; one walks: 1 if just one is slower, else 0.
+# turn: angle between the two velocities, rad, nan if one is slower than 0.3 m/s. walking difference: the velocity
+# difference, m/s, nan where turn is, so that its means outlast a stop. one walks: 1 if exactly one of the two is slower
+# than 0.3 m/s, else 0.
 QUANTITIES = (
     "distance", "velocity difference", "sideways", "lengthwise", "growth", "turn", "walking difference", "one walks"
 )  # fmt: skip

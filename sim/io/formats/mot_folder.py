@@ -123,7 +123,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     alone = not is_present(gt)
     found = mot_text.read_detections(det, options.boxes, info.length, alone) if is_present(det) else None
     if found is None:
-        names = "box_scale min_score" + " person_class" * alone
+        names = "box_scale min_score person_class" if alone else "box_scale min_score"
         options.reject(path, "a recording without det/det.txt", "it has no detections", names)
     pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)

@@ -54,7 +54,7 @@ class RecordingOptions:
 
 def refuse_options(values: Mapping[str, Any], names: str, path: Path, kind: str, why: str) -> None:
     """Raises InputError if any of the options `names` ("camera fps") is given: `why` says why it has no effect."""
-    found = [name for name in names.split() if values[name] not in (None, False)]
+    found = [name for name in names.split() if values[name] is not None and values[name] is not False]
     given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
     if given:
         remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tests import reference_components as reference
-from tracking.filters import cell_list_kernels as cells
 from tracking.filters.components import Constraint, linked, partition, prefixes
 
 LINK = 1.5
@@ -72,26 +71,3 @@ def test_nobody_one_and_all_at_the_same_place() -> None:
     assert prefixes(np.ones((1, 2)), np.ones(1), 1, RULE).tolist() == [True]
     assert not partition(np.ones((50, 2)), np.ones(50), RULE).any()
     assert prefixes(np.ones((50, 2)), np.ones(50), 0, RULE).tolist() == [False] + 50 * [True]
-
-
-def scenes():
-    """Crowds; people on a line, at one place, on a lattice with many equal distances, and with one far away."""
-    draws = np.random.default_rng(0)
-    yield draws.uniform(0, 60, (300, 2))
-    yield draws.normal(0, 1, (50, 2))
-    yield np.column_stack([draws.uniform(0, 100, 80), np.zeros(80)])
-    yield np.zeros((30, 2))
-    yield np.stack(np.meshgrid(np.arange(9.0), np.arange(9.0)), axis=-1).reshape(-1, 2)
-    yield np.concatenate([draws.uniform(0, 20, (100, 2)), [[1e5, -1e5]]])
-    yield draws.uniform(0, 5, (cells.FEW, 2))
-    yield np.zeros((1, 2))
-
-
-@pytest.mark.parametrize("places", list(scenes()))
-def test_the_nearest_place_is_that_of_a_look_at_all(places):
-    found = np.empty(len(places), np.int64)
-    cells.nearest_places(places, len(places), found)
-    square = np.square(places[:, None] - places).sum(axis=2)
-    np.fill_diagonal(square, np.inf)
-    expected = square.argmin(axis=1) if len(places) > 1 else [-1]
-    assert found.tolist() == list(expected)

@@ -45,7 +45,7 @@ switches it off, one holds in the preset `paper`, too.
   first existence. Paper: a measurement in no gate. Why: people near others must start tracks.
 - hidden people: detected as far as no other in front covers them, and not at all for `hidden_time`. Paper: none. Why:
   misses come in rows.
-- rates of height and width, from boxes: return to zero. Paper: constant. Why: a missed person keeps its size.
+- rates of height and width, from boxes: return to zero. Paper: constant. Why: a missed person's size settles.
 - tracks on one body: merged. Paper: they compete (frame 357). Why: one body is one person.
 - report: boxes that are right with a probability of at least 0.5, and not leaving while missed. Paper: not stated.
   Why: fewer false positives.

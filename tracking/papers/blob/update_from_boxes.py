@@ -17,7 +17,7 @@ from tracking.papers.blob.existence import ScoreCalibration
 from tracking.papers.blob.track_management import LEAST_EXISTENCE, TrackedPeople
 from tracking.running import image_scale
 
-# s: time constant with which rates of height and width return to zero. Without it a missed person shrinks or grows.
+# s: time constant with which rates of height and width return to zero. Without it a missed person shrinks or grows on.
 SIZE_RATE_TIME = 1.0
 
 

@@ -51,7 +51,7 @@ class JointConfig(BackgroundSettings):
     partitions: int = param(50, (1, 500), "particles",
         "N_z, partitions under each particle", "int", online=False, tunable=False)
     variant: str = param("VAR1", ("full", "VAR1", "VAR2", "VAR3"), "",
-        "full: the paper; VAR1: groups move nobody; VAR2: and are uniform; VAR3: and have no validity",
+        "full: the paper; VAR1: groups move nobody; VAR2: and are uniform; VAR3: and p(Z | X) is 1",
         "categorical", tunable=False)
     individuals: str = param("filtered", ("filtered", "measured"), "",
         "measured: the individuals are the detections, known exactly (DEEPER-JIGT.2)", "categorical", tunable=False)
@@ -64,7 +64,7 @@ class JointConfig(BackgroundSettings):
     pixel_noise: float = param(0.15, (0.005, 2.0), "m",
         "from pixels: standard deviation of the centre of a blob, per axis (ours)", "log", sees="pixels")
     belief_rate: float = param(20.0, (0.0, 100.0), "1/s",
-        "log p(Z | X) is this times the sum of the beliefs of pairs, per second; 0: by the validity (ours)")
+        "log p(Z | X) is this times the beliefs of the pairs in one group, per second; 0: by the validity (ours)")
     belief_memory: float = param(0.2, (0.0, 2.0), "share",
         "of the belief's `stay` for people reported in one group, and of its `come` for others (ours)")
     confirm_time: float = param(0.3, (0.0, 3.0), "s",

@@ -14,7 +14,6 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
-from tracking.filters.cell_list_kernels import nearest_places
 from tracking.papers.joint.division_kernels import divide
 from tracking.papers.joint.partition_kernels import clusters, same_row
 
@@ -34,6 +33,17 @@ RATIO, SHARPNESS, SIZE_OF_ALL, SIZE_MEAN, SIZE_STD = range(5)
 all events, 0 if on Merge alone; its mean and standard deviation, people."""
 ORDER, EVENT, PARTS = range(3)
 """Slots of a person's uniforms: place of its group in the order of visits; event; parts of a split."""
+
+
+@njit(cache=True)
+def nearest_places(places: Array, count: int, nearest: Ints) -> None:
+    """Writes the nearest other one of `count` places to each, of equal ones the first; -1 without."""
+    for k in range(count):
+        nearest[k], least = -1, np.inf
+        for other in range(count):
+            far = (places[other, 0] - places[k, 0]) ** 2 + (places[other, 1] - places[k, 1]) ** 2
+            if other != k and far < least:
+                nearest[k], least = other, far
 
 
 @njit(cache=True)

@@ -173,11 +173,13 @@ def relate(
     """
     change = 1.0 - math.sqrt(1.0 - rules[RATE])
     for k in range(len(pairs)):
+        if math.isnan(odds[k]):
+            continue
         i, j = pairs[k, 0], pairs[k, 1]
         for p in range(len(pos)):
             # where both reconsider, j does so after i
             a = j if uniforms[p, j, 0] < change else i
-            if uniforms[p, a, 0] >= change or math.isnan(odds[k]):
+            if uniforms[p, a, 0] >= change:
                 continue
             dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
             du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]

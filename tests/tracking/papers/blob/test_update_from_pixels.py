@@ -146,6 +146,17 @@ def test_a_lost_frame_only_predicts():
     assert len(made[12].id) == 1
 
 
+def test_a_light_that_is_switched_starts_no_flood():
+    r = np.random.default_rng(1)
+    frames = [painted.picture([p], r) for p in walk(60, 180, 4, 16)]
+    for k in range(8, 16):
+        frames[k] = np.clip(frames[k].astype(float) * [0.55, 1.3, 1.6], 0, 255).astype(np.uint8)
+        frames[k].flags.writeable = False
+    known = []
+    track(frames, watch=lambda tracker, _: known.append(tracker.people.next_id))
+    assert known[-1] <= 4
+
+
 def test_a_confirmed_person_who_stands_is_not_learned_as_background(monkeypatch):
     stands = [[(120.0, 180.0, TALL)]] * 60
     monkeypatch.setattr("tracking.detect.background.FOREGROUND_SLOWER", 1.0)

@@ -8,7 +8,9 @@ import pytest
 from tests.reference_joint import all_partitions, label_of, validity
 from tracking.grouping.belief import default_belief
 from tracking.papers.joint import partition_kernels
-from tracking.papers.joint.distributions import stam_cumulated
+from tracking.papers.joint.config import SCALES as OWN_SCALES
+from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.distributions import FrameModel, stam_cumulated
 from tracking.papers.joint.report import histogram_partition
 from tracking.papers.joint.tracker import remembered
 
@@ -99,3 +101,22 @@ def test_pairs_of_a_group_gain_and_others_lose():
     apart = found[np.triu_indices(4, 1)]
     np.testing.assert_allclose(apart, [stay, come, 0, come, 0, 0])
     assert np.array_equal(found, found.T)
+
+
+def test_the_energy_is_of_beliefs_or_else_of_the_validity():
+    """Apart they have less than together where all pairs are believed and near; VAR3 has none."""
+    x = np.array([[[0.0, 0, 1, 0], [0.5, 0, 1, 0], [9.0, 9, 0, 0]]])
+    z = np.array([[[0, 0, 2], [0, 1, 2]]])  # the first two together, all alone
+    belief = np.array([[0, 1.5, -2], [1.5, 0, -1], [-2, -1, 0]])
+
+    def energy(**changes):
+        config = JointConfig(**changes)
+        return FrameModel(config, 0.2, 0.1, x[0, :, :2], belief, None, np.arange(3)).energy(x, z)[0]
+
+    np.testing.assert_allclose(energy(belief_rate=20.0), [20 * 0.2 * 1.5, 0])
+    by_validity = energy(belief_rate=0.0)
+    out = np.zeros((1, 2))
+    partition_kernels.validities(x, z, OWN_SCALES, out)
+    np.testing.assert_allclose(by_validity, -60 * 0.2 * out[0])
+    assert by_validity[0] > by_validity[1]
+    assert not energy(variant="VAR3").any()

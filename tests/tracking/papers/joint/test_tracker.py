@@ -120,7 +120,7 @@ def test_parting_people_split():
 def test_a_person_who_is_missed_goes_on_and_is_removed():
     points = walk([[0, 0]], [1.0, 0.0], 20)
     gone = [[]] * 15
-    tracks = stepped(Joint(JointConfig(coast_time=1.0)), points + gone)
+    tracks = stepped(Joint(), points + gone)
     assert [len(t.id) for t in tracks[-15:]] == [1] * 11 + [0] * 4
     assert tracks[29].pos[0, 0] == pytest.approx(2.9, abs=0.4)
 
@@ -129,7 +129,7 @@ def test_a_member_who_is_missed_stays_in_the_group():
     """Without a measurement nothing is known of a change of groups."""
     points = walk([[0, 0], [0, 0.7], [0, 1.4]], [1.2, 0.0], 40, noise=0.05)
     shown = [p if k < 25 else p[:2] for k, p in enumerate(points)]
-    tracks = stepped(Joint(JointConfig(coast_time=1.0)), shown)
+    tracks = stepped(Joint(), shown)
     for t in tracks[24:]:
         assert len(set(t.group.tolist())) == 1
         assert t.group[0] >= 0
