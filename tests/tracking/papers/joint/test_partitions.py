@@ -106,7 +106,7 @@ def test_pairs_of_a_group_gain_and_others_lose():
 def test_the_energy_is_of_beliefs_or_else_of_the_validity():
     """Apart they have less than together where all pairs are believed and near; VAR3 has none."""
     x = np.array([[[0.0, 0, 1, 0], [0.5, 0, 1, 0], [9.0, 9, 0, 0]]])
-    z = np.array([[[0, 0, 2], [0, 1, 2]]])  # the first two together, all alone
+    z = np.array([[[1, 1, 0], [0, 0, 0]]])  # the first two together, all alone
     belief = np.array([[0, 1.5, -2], [1.5, 0, -1], [-2, -1, 0]])
 
     def energy(**changes):
