@@ -58,8 +58,8 @@ def score_arrays(
         tracks: the table of the tracked people.
         fps: frames per second, 0.01 to 1000.
         px_per_m: pixels per metre, for boxes only; None takes the median height of the true boxes for 1.7 m.
-        similarity: compares people by "boxes", "ground" or "image"; None: by boxes if both have them, else by
-            positions.
+        similarity: compares people by "boxes", "ground" or "image"; None: on the ground if both have `pos`,
+            else by boxes.
         group_match: matches groups by "hull" or "members".
 
     Returns:
