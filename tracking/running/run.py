@@ -196,8 +196,8 @@ def track(
     """Tracks every frame of a sequence, and derives groups and events if the tracker names none.
 
     A UserWarning says that `grouping` has no effect, that the tracker's velocities are too far from its motion to
-    derive groups by the baseline rule, that most detections score too low to start a track, or that groups which the tracker began to name
-    only later were replaced by derived ones.
+    derive groups by the baseline rule, that most detections score too low to start a track, or that groups which the
+    tracker began to name only later were replaced by derived ones.
 
     Args:
         tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited

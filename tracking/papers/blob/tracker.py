@@ -30,8 +30,8 @@ switches it off, one holds in the preset `paper`, too.
 
 - input: also boxes, without θ. Paper: blobs. Why: detectors report boxes.
 - noises: in m at the person and per root second. Paper: no values. Why: any scale and frame rate.
-- first P: R and `speed_prior`, at rest; with "rho" one measurement after birth never confirms. Paper: not stated. Why: a
-  filter needs it.
+- first P: R and `speed_prior`, at rest; with "rho" one measurement after birth never confirms. Paper: not stated.
+  Why: a filter needs it.
 - deletion: also missed tracks outside the image. Paper: ρ. Why: they do not come back.
 - ρ of deletion, with "rho": tentative tracks at its value at birth or at `tentative_time`, confirmed ones 2 % early.
   Paper: one value. Why: false alarms end early.
