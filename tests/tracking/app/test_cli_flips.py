@@ -311,7 +311,7 @@ def test_a_parameter_changes_what_a_tracker_says(name, parameter):
     if isinstance(spec.default, tuple):
         ends = [tuple(2.0 * v for v in spec.default)]
     mode = {"management": "rho"} if spec.meaning.startswith("rho: ") else {}
-    others = [value for value in ends if value != spec.default and accepted(name, **mode, **{parameter: value})]
+    others = [value for value in ends if value != spec.default and accepted(name, **{**mode, parameter: value})]
     before, *after = ({**mode, parameter: value} for value in (spec.default, *others))
     assert any(
         answers(name, pictures, **now) != answers(name, pictures, **before)
