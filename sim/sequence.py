@@ -64,14 +64,9 @@ def simulate(
 
 
 def observe(
-    scenario: Scenario | ObservationSpec,
-    motion: Motion,
-    *,
-    people: Mapping[str, tuple[int, ...]] | None = None,
-    check: bool = True,
-    streams: Iterable[str] = (),
-    stride: int = 1,
-) -> Sequence:
+    scenario: Scenario | ObservationSpec, motion: Motion, *, people: Mapping[str, tuple[int, ...]] | None = None,
+    check: bool = True, streams: Iterable[str] = (), stride: int = 1,
+) -> Sequence:  # fmt: skip
     """Returns the sequence that a scenario's camera and sensor make of a motion. See `simulate`.
 
     people: person ids of each group that `sensor.hide` may name; None: those of the scenario that the motion was

@@ -15,7 +15,8 @@ from scenarios.errors import InputError
 from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, Stop, group_names
 from scenarios.schema.values import Distribution, Point, Value
 from sim.crowd.formation import to_world, walking
-from sim.elementary import dot, exp, length, unit
+from sim.crowd.navigation import wall_distances
+from sim.elementary import exp, length, unit
 from sim.rng import autoregression, draw, normals, rng, uniforms
 from sim.types import Array, Order, Scene
 
@@ -244,11 +245,8 @@ def is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
         others = np.concatenate(taken)
         if np.min(length(pos[:, None] - others[None])) < START_GAP:
             return False
-    for wall in scene.walls:
-        u = wall[1] - wall[0]
-        s = np.clip(dot(pos - wall[0], u) / dot(u, u), 0, 1)
-        if np.min(length(pos - wall[0] - s[:, None] * u)) < BODY_RADIUS:
-            return False
+    if any(wall_distances(pos, wall).min() < BODY_RADIUS for wall in scene.walls):
+        return False
     d = length(pos[:, None] - scene.pillars[None, :, :2]) - scene.pillars[None, :, 2]
     return bool((d >= BODY_RADIUS).all())
 

@@ -225,15 +225,9 @@ class Stored(TypedDict, total=False):
 
 
 def generate(
-    entries: Iterable[Entry | str],
-    seeds: range,
-    out: str | Path,
-    *,
-    set: Iterable[str] = (),
-    workers: WorkerOptions = ONE_WORKER,
-    progress: Progress | None = None,
-    **stored: Unpack[Stored],
-) -> Folders:
+    entries: Iterable[Entry | str], seeds: range, out: str | Path, *, set: Iterable[str] = (),
+    workers: WorkerOptions = ONE_WORKER, progress: Progress | None = None, **stored: Unpack[Stored],
+) -> Folders:  # fmt: skip
     """Simulates every entry with every seed, and stores each sequence as OUT/flockscope-<split>/<name>-s<seed>/.
 
     Stored sequences of the same scenario, seed, version and pictures are kept if all their files are intact. The lists

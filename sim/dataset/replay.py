@@ -166,14 +166,9 @@ WHOLE = Cut()
 
 
 def replay(
-    source: str | Path | Sequence,
-    camera: str | Path | ObservationSpec | None = None,
-    seed: int = 20_000,
-    *,
-    cut: Cut = WHOLE,
-    calibration: Camera | str | Path | None = None,
-    streams: Iterable[str] = ("left",),
-) -> Sequence:
+    source: str | Path | Sequence, camera: str | Path | ObservationSpec | None = None, seed: int = 20_000, *,
+    cut: Cut = WHOLE, calibration: Camera | str | Path | None = None, streams: Iterable[str] = ("left",),
+) -> Sequence:  # fmt: skip
     """Returns the labelled people of a recording as a simulated sequence: real motion, seen by our camera and sensor.
 
     The ground is moved so that the least x and y are 1 m, unless a simulated source has a scene, which is then kept.
@@ -207,14 +202,9 @@ def replay(
 
 
 def resolve_replay(
-    source: Sequence,
-    view: ObservationSpec,
-    seed: int,
-    *,
-    cut: Cut = WHOLE,
-    calibration: Camera | str | Path | None = None,
-    streams: Iterable[str] = (),
-) -> tuple[Sequence, ReplaySpec]:
+    source: Sequence, view: ObservationSpec, seed: int, *, cut: Cut = WHOLE,
+    calibration: Camera | str | Path | None = None, streams: Iterable[str] = (),
+) -> tuple[Sequence, ReplaySpec]:  # fmt: skip
     """Returns the sequence that `replay` returns, and the ReplaySpec that describes it.
 
     The latter, with all defaults, takes the place of the scenario in stored files and hashes.

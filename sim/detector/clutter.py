@@ -250,13 +250,8 @@ ACROSS, DOWN, HEIGHT, HEADING, SCORE_1, ORDER_1, DRAWS = 0, 1, 2, 3, 4, 5, 6  # 
 
 
 def false_alarms(
-    truth: Truth,
-    sensor: Sensor,
-    seed: int,
-    camera: Camera | None,
-    image_size: tuple[int, int] | None,
-    repeat: int = 0,
-) -> Readings:
+    truth: Truth, sensor: Sensor, seed: int, camera: Camera | None, image_size: tuple[int, int] | None, repeat: int = 0,
+) -> Readings:  # fmt: skip
     """Returns the false alarms of all frames 1 to truth.length as Readings; their number per frame is Poisson.
 
     With a camera, their feet are spread evenly over the part of the image that shows ground, and each is as large as a

@@ -47,14 +47,9 @@ PERSISTENCE_STEP = 0.1  # s: lag of which `sensor.persistence` is the correlatio
 
 
 def sense(
-    truth: Truth,
-    sensor: Sensor,
-    seed: int,
-    camera: Camera | None = None,
-    image_size: tuple[int, int] | None = None,
-    repeat: int = 0,
-    people: Mapping[str, tuple[int, ...]] | None = None,
-) -> list[Detections]:
+    truth: Truth, sensor: Sensor, seed: int, camera: Camera | None = None, image_size: tuple[int, int] | None = None,
+    repeat: int = 0, people: Mapping[str, tuple[int, ...]] | None = None,
+) -> list[Detections]:  # fmt: skip
     """Returns a list of truth.length Detections, for frames 1 on: what the simulated detector reports, false alarms
     included.
 

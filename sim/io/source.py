@@ -35,18 +35,11 @@ DEPTH = 3
 
 
 def open_source(
-    path: str | Path,
-    *,
-    fps: float | None = None,
-    px_per_m: float | None = None,
-    camera: Camera | str | Path | None = None,
-    images: bool = True,
-    background: str | None = None,
-    person_class: int | str | None = None,
-    box_scale: str | None = None,
-    min_score: float | None = None,
+    path: str | Path, *, fps: float | None = None, px_per_m: float | None = None,
+    camera: Camera | str | Path | None = None, images: bool = True, background: str | None = None,
+    person_class: int | str | None = None, box_scale: str | None = None, min_score: float | None = None,
     boxes: str | Path | None = None,
-) -> list[Sequence]:
+) -> list[Sequence]:  # fmt: skip
     """Opens a path that holds sequences or recordings, in any known format.
 
     Args:

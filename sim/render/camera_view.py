@@ -79,15 +79,9 @@ def trace_geometry(camera: Camera, scene: Scene) -> PixelGeometry:
 
 
 def paint_empty_scene(
-    camera: Camera,
-    scene: Scene,
-    light: Illumination,
-    texture: float,
-    plants: Foliage | None,
-    seed: int,
-    repeat: int = 0,
-    samples: int = 1,
-) -> EmptyScene:
+    camera: Camera, scene: Scene, light: Illumination, texture: float, plants: Foliage | None, seed: int,
+    repeat: int = 0, samples: int = 1,
+) -> EmptyScene:  # fmt: skip
     """Returns the empty scene under steady light, with unmoved plants.
 
     texture: contrast of the patterns, 0 to 1. samples: rays along each axis of a pixel. seed, repeat: name the random

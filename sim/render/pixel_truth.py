@@ -29,14 +29,9 @@ def empty_scene_disparities(left: CameraView, right: CameraView) -> Array:
 
 
 def frame_disparities(
-    empty: Array,
-    right: CameraView,
-    canvas: FrameCanvas,
-    ids: Ints,
-    people: DrawnPeople,
-    in_left: ProjectedPeople,
+    empty: Array, right: CameraView, canvas: FrameCanvas, ids: Ints, people: DrawnPeople, in_left: ProjectedPeople,
     in_right: ProjectedPeople,
-) -> Array:
+) -> Array:  # fmt: skip
     """Returns the disparities (H, W) px of a frame with people, at the left view's pixels.
 
     empty (H, W): those of the empty scene. canvas: the left view's, with people drawn. ids (H, W): the people it shows.

@@ -158,13 +158,9 @@ Progress = Callable[[int, int, str], None]
 
 
 def webdataset(
-    source: str | Path,
-    out: str | Path,
-    *,
-    shard_size: int = 10**9,
-    samples: str = "sequence",
+    source: str | Path, out: str | Path, *, shard_size: int = 10**9, samples: str = "sequence",
     progress: Progress | None = None,
-) -> dict[str, Any]:
+) -> dict[str, Any]:  # fmt: skip
     """Packs a generated dataset into OUT/shard-000000.tar, …, and writes OUT/index.json.
 
     Args:

@@ -30,16 +30,9 @@ from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, Ima
 
 
 def write_sequence(
-    folder: Path,
-    sequence: Sequence,
-    *,
-    scenario: str,
-    seed: int,
-    repeat: int = 0,
-    streams: Iterable[str] = (),
-    images: str = "jpg",
-    keep: Callable[[], bool] = lambda: False,
-) -> Path:
+    folder: Path, sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, streams: Iterable[str] = (),
+    images: str = "jpg", keep: Callable[[], bool] = lambda: False,
+) -> Path:  # fmt: skip
     """Writes a sequence as a folder, complete or not at all.
 
     Args:

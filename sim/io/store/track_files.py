@@ -313,15 +313,9 @@ def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
 
 
 def write_tracks(
-    folder: str | Path,
-    tracks: Iterable[Tracks],
-    *,
-    fps: float,
-    camera: Camera | None = None,
-    scene: Scene | None = None,
-    info: dict[str, Any] | None = None,
-    pairs: bytes | None = None,
-) -> Path:
+    folder: str | Path, tracks: Iterable[Tracks], *, fps: float, camera: Camera | None = None,
+    scene: Scene | None = None, info: dict[str, Any] | None = None, pairs: bytes | None = None,
+) -> Path:  # fmt: skip
     """Writes the tracks of consecutive frames of one tracker into a folder; run.json comes last.
 
     Args:
@@ -348,14 +342,9 @@ def write_tracks(
 
 
 def tracks_files(
-    tracks: Iterable[Tracks],
-    *,
-    fps: float,
-    camera: Camera | None = None,
-    scene: Scene | None = None,
-    info: dict[str, Any] | None = None,
-    pairs: bytes | None = None,
-) -> dict[str, bytes]:
+    tracks: Iterable[Tracks], *, fps: float, camera: Camera | None = None, scene: Scene | None = None,
+    info: dict[str, Any] | None = None, pairs: bytes | None = None,
+) -> dict[str, bytes]:  # fmt: skip
     """Returns the files of one tracker's tracks, as `write_tracks` writes them: content by name, run.json last."""
     every = list(tracks)
     rows, boxes = flatten(every), box_source(every, camera)
