@@ -80,8 +80,8 @@ class GroupState:
         return gone
 
     def go(
-        self, g: int, start: Array, via: list[Array], goal: Array, finish: str, speed: float, gather: Array | None =
-        None,
+        self, g: int, start: Array, via: list[Array], goal: Array, finish: str, speed: float,
+        gather: Array | None = None,
     ) -> None:  # fmt: skip
         """Sets the way of group g from start past the via points to goal, round walls and through doors.
 

@@ -28,7 +28,7 @@ from sim.arrays import no_ids
 from sim.io.export.places import Places, crossings, inside
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import refuse_foreign_file
-from sim.io.files.tables import FORMAT, KEY, json_text
+from sim.io.files.tables import parquet_bytes
 from sim.io.formats.labels import differentiate
 from sim.types import Array, GroupEvent, Groups, Ints, Tracks, Truth
 
@@ -194,7 +194,7 @@ def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[st
         # The first columns have the same names for runs and truths, in m and in px.
         _refuse_foreign(path, re.escape(",".join(table.column_names[:2]) + ",").encode() if form == "csv" else None)
     for path, table in found.items():
-        write_file(path, _csv(table) if form == "csv" else _parquet(table, facts))
+        write_file(path, _csv(table) if form == "csv" else parquet_bytes(table, facts))
     return list(found)
 
 
@@ -250,16 +250,6 @@ def _csv(table: pyarrow.Table) -> bytes:
     options = csv.WriteOptions(include_header=False, quoting_style="needed")
     csv.write_csv(pa.table(columns, names=table.column_names), sink, options)
     return (",".join(table.column_names) + "\n").encode() + bytes(sink.getvalue())
-
-
-def _parquet(table: pyarrow.Table, facts: Mapping[str, Any]) -> bytes:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    sink = pa.BufferOutputStream()
-    marked = table.replace_schema_metadata({KEY: json_text({"format": FORMAT, **facts}).encode()})
-    pq.write_table(marked, sink, compression="zstd", write_page_checksum=True)
-    return bytes(sink.getvalue())
 
 
 def _tables(rows: _Rows) -> TidyTables:

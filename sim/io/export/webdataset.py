@@ -29,7 +29,7 @@ from sim.io.source import sequence_folders, split_and_name
 from sim.io.store.seal import MANIFEST, read_manifest, read_whole_manifest
 from sim.io.store.sequence_folder import open_sequence
 from sim.streams import file_name
-from sim.types import Array, Detections, FrameTruth, Groups
+from sim.types import Detections, FrameTruth, Groups
 
 # streams with one picture per frame; a frame's sample holds those of them that are stored
 FRAME_STREAMS = ("left", "right", "disparity", "ids")
@@ -114,37 +114,36 @@ def frame_labels(folder: Path, manifest: dict[str, Any]) -> Iterator[bytes]:
         row: dict[str, Any] = {**about, "frame": frame.index, "t": frame.t}
         if truth is not None:
             here = truth.at(frame.index)
-            row |= {"people": list(_people(here)), "groups": _groups(here.groups)}
+            row |= {"people": _people(here), "groups": None if here.groups is None else _groups(here.groups)}
         if frame.detections is not None:
-            row["detections"] = list(_detections(frame.detections))
+            row["detections"] = _detections(frame.detections)
         yield tables.json_text(row).encode()
 
 
-def _people(truth: FrameTruth) -> Iterator[dict[str, Any]]:
-    assert truth.pos is not None, "simulated people have positions"
-    for k, (number, group) in enumerate(zip(truth.id.tolist(), truth.group.tolist(), strict=True)):
-        row = {"id": number, "group": group, "box": None if truth.box is None else _numbers(truth.box[k])}
-        row |= dict(zip(("x", "y"), _numbers(truth.pos[k]), strict=True))
-        if truth.vel is not None:
-            row |= dict(zip(("vx", "vy"), _numbers(truth.vel[k]), strict=True))
-        yield {**row, "visibility": tables.nan_to_none(float(truth.visibility[k]))}
+def _people(truth: FrameTruth) -> list[dict[str, Any]]:
+    columns: dict[str, Any] = {"id": truth.id, "group": truth.group, "box": truth.box}
+    for names, values in ((("x", "y"), truth.pos), (("vx", "vy"), truth.vel)):
+        if values is not None:
+            columns |= dict(zip(names, values.T, strict=True))
+    return _rows({**columns, "visibility": truth.visibility}, len(truth.id))
 
 
-def _groups(groups: Groups | None) -> list[dict[str, Any]] | None:
-    if groups is None:
-        return None
-    rows = zip(groups.id.tolist(), groups.members, groups.hull, strict=True)
-    return [{"id": number, "members": members.tolist(), "hull": hull.tolist()} for number, members, hull in rows]
+def _groups(groups: Groups) -> list[dict[str, Any]]:
+    return _rows({"id": groups.id, "members": groups.members, "hull": groups.hull}, len(groups.id))
 
 
-def _detections(found: Detections) -> Iterator[dict[str, Any]]:
-    for k, score in enumerate(found.score.tolist()):
-        row = {"score": score, "box": None if found.box is None else _numbers(found.box[k])}
-        yield {**row, "plane": found.plane, **dict(zip("xyz", _numbers(found.pos[k]), strict=False))}
+def _detections(found: Detections) -> list[dict[str, Any]]:
+    place = dict(zip("xyz", found.pos.T, strict=False))
+    planes = [found.plane] * len(found.score)
+    return _rows({"score": found.score, "box": found.box, "plane": planes, **place}, len(found.score))
 
 
-def _numbers(row: Array) -> list[float | None]:
-    return [tables.nan_to_none(value) for value in row.tolist()]
+def _rows(columns: dict[str, Any], count: int) -> list[dict[str, Any]]:
+    """Returns each row of some columns as a dict; a column that is None is unknown."""
+    return [
+        {name: None if values is None else tables.plain(values[k]) for name, values in columns.items()}
+        for k in range(count)
+    ]
 
 
 SAMPLES = ("sequence", "frame")

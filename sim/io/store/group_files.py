@@ -31,19 +31,9 @@ ORDER_KEYS = ("id", "kind", "fired", "time", "before", "after", "event")
 GroupId = Annotated[int, Field(strict=True, ge=-1, le=INTEGER)]
 
 
-def event_dict(event: GroupEvent) -> dict[str, Any]:
-    """Returns an event as a dict for JSON, with the fields of GroupEvent as keys."""
-    return {
-        "kind": event.kind, "start": int(event.start), "end": int(event.end),
-        "emitted": None if event.emitted is None else int(event.emitted),
-        "before": [int(g) for g in event.before], "after": [int(g) for g in event.after],
-        "members": [int(m) for m in event.members], "pos": [tables.nan_to_none(float(v)) for v in event.pos],
-    }  # fmt: skip
-
-
 def events_bytes(events: Iterable[GroupEvent]) -> bytes:
     """Returns the events.json of a truth, one event per line."""
-    return tables.json_list("events", map(event_dict, events))
+    return tables.json_list("events", map(tables.plain, events))
 
 
 class _Event(BaseModel):

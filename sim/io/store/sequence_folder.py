@@ -108,7 +108,7 @@ def sequence_files(
         "sequence": {
             "name": sequence.name, "fps": sequence.fps, "length": len(frames),
             "image_size": None if sequence.image_size is None else list(sequence.image_size),
-            "px_per_m": tables.nan_to_none(sequence.px_per_m),
+            "px_per_m": tables.plain(sequence.px_per_m),
         },
         "versions": versions(bool(pictures.streams)),
         "files": dict(sorted((seal.file_facts(files) | pictures.files).items())),

@@ -364,7 +364,7 @@ def tracks_files(
         files["groups.csv"] = group_files.groups_csv(groups, None, first)
     if pairs is not None:
         files[PAIRS] = pairs
-    events = [{**group_files.event_dict(e), "frame": t.index} for t in every for e in t.events]
+    events = [{**tables.plain(e), "frame": t.index} for t in every for e in t.events]
     files["events.json"] = tables.json_list("events", events)
     return {**files, RUN: sealed_run({**(info or {}), "boxes": boxes}, files)}
 

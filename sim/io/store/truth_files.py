@@ -61,7 +61,7 @@ def _table(truth: Truth) -> bytes:
     singles = ((name, unit, getattr(truth, name)) for name, unit in SINGLE)
     columns += [Column(name, array, unit) for name, unit, array in singles if array is not None]
     facts = {
-        "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": tables.nan_to_none(truth.px_per_m),
+        "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": tables.plain(truth.px_per_m),
         "labelled": None if truth.labelled is None else spans(truth.labelled),
     }  # fmt: skip
     return table_bytes(columns, facts)
