@@ -62,6 +62,11 @@ class Column:
     kind: type = np.float64  # number type of the arrays of a column of lists, by default float64; ignored otherwise
 
 
+def columns_of(names: Iterable[str], values: Array | None, unit: str) -> list[Column]:
+    """Returns the columns of an array (R, n) by n names; none if the array is None."""
+    return [] if values is None else [Column(name, values[:, k], unit) for k, name in enumerate(names)]
+
+
 @dataclass(frozen=True)
 class StoredTable:
     """A Parquet table of R rows as read from `file`."""

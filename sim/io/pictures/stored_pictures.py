@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError
 from sim import hashing, streams
 from sim.io.files import atomic
-from sim.io.files.tables import Column, StoredTable, read_table, table_bytes
+from sim.io.files.tables import Column, columns_of, read_table, table_bytes
 from sim.io.pictures import video_files
 from sim.io.pictures.picture_folder import require_size
 from sim.io.pictures.video_files import VideoWriter, write_video
@@ -170,14 +170,10 @@ def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
 
     box = np.concatenate([pixels.box.reshape(-1, 4) for pixels in known])
     columns = [
-        Column("frame", truth.frame),
-        Column("id", truth.id),
-        Column("visible_px", joined("visible_px"), "px²"),
-        Column("amodal_px", joined("amodal_px"), "px²"),
-        Column("visibility_px", joined("visibility")),
-        *(Column(name, box[:, k], "px") for k, name in enumerate(BOX)),
-        Column("blob", joined("blob")),
-    ]
+        Column("frame", truth.frame), Column("id", truth.id), Column("visible_px", joined("visible_px"), "px²"),
+        Column("amodal_px", joined("amodal_px"), "px²"), Column("visibility_px", joined("visibility")),
+        *columns_of(BOX, box, "px"), Column("blob", joined("blob")),
+    ]  # fmt: skip
     return table_bytes(columns, {"frames": len(known)})
 
 
@@ -245,16 +241,12 @@ class StoredPictures:
         """Returns (frame, picture) of the left camera for the frames `wanted` (from 1, ascending)."""
         return zip(wanted, self.all("left", self.manifest["sequence"]["length"], wanted), strict=True)
 
-    def table(self) -> StoredTable:
-        """Returns the table of visible pixels (`pixel_table`)."""
-        return read_table(self.folder / TABLE)
-
     def pixel_loader(self) -> Callable[[int], PixelTruth]:
         """Returns a function that maps a frame (from 1) to its PixelTruth; the stream ids is stored."""
 
         @cache
         def columns() -> tuple[Ints, Array, Array, Array, Ints]:
-            table = self.table()
+            table = read_table(self.folder / TABLE)
             counts = (table.floats("visible_px"), table.floats("amodal_px"))
             return table.ints("frame"), *counts, table.floats(*BOX), table.ints("blob")
 

@@ -23,7 +23,7 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, INTEGER
 from sim.io.files import tables
 from sim.io.files.numeric_text import read_numbers, read_text, whole_number
-from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, StoredTable, none_to_nan, validated
+from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, StoredTable, columns_of, none_to_nan, validated
 from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
@@ -61,13 +61,9 @@ class _Events(BaseModel):
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
     """Reads an events.json as pairs (event, frame whose tracks reported it, None if not stored)."""
     found = validated(path, tables.read_document(path), _Events, "correct the event").events
-    return [
-        (
-            GroupEvent(**e.model_dump(exclude={"frame", "pos"}), pos=(none_to_nan(e.pos[0]), none_to_nan(e.pos[1]))),
-            e.frame,
-        )
-        for e in found
-    ]
+    places = [(none_to_nan(e.pos[0]), none_to_nan(e.pos[1])) for e in found]
+    fields = [e.model_dump(exclude={"frame", "pos"}) for e in found]
+    return [(GroupEvent(**f, pos=pos), e.frame) for f, pos, e in zip(fields, places, found, strict=True)]
 
 
 def near_bytes(near: Near) -> bytes:
@@ -138,12 +134,11 @@ def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
         Column("frame", np.repeat(np.arange(first, first + len(frames), dtype=np.int64), counts)),
         Column("group", np.concatenate([np.zeros(0, np.int64), *ids])),
         Column("members", _lists([g.members for g in known], ids, np.zeros(0, np.int64)), "1", np.int64),
-        *(Column(a, pos[:, k], unit) for k, a in enumerate(axes)),
-        *(Column(f"v{a}", vel[:, k], f"{unit}/s") for k, a in enumerate(axes)),
-        *(Column(name, extent[:, k], f"{unit}^2") for k, name in enumerate(EXTENT)),
+        *columns_of(axes, pos, unit), *columns_of([f"v{a}" for a in axes], vel, f"{unit}/s"),
+        *columns_of(EXTENT, extent, f"{unit}^2"),
         Column("size", np.concatenate([np.zeros(0), *(g.size for g in known)]), "people"),
         Column("hull", _lists([g.hull for g in known], ids, np.zeros(0)), f"{unit}: x1, y1, x2, …"),
-    ]
+    ]  # fmt: skip
     missing = [first + k for k, g in enumerate(frames) if g is None]
     memberless = [first + k for k, g in enumerate(frames) if g is not None and len(g.members) < len(g.id)]
     facts = {"first": first, "frames": len(frames), "missing": missing, "memberless": memberless}
@@ -284,16 +279,8 @@ def _row(path: Path, line: int, row: dict[str, str], length: int) -> tuple[int, 
 
 def _from_rows(rows: list[_Row]) -> Groups:
     id, members, pos, size, hull = zip(*rows, strict=True)
-    n = len(rows)
-    return Groups(
-        np.array(id, np.int64),
-        members,
-        np.array(pos),
-        np.zeros((n, 2)),
-        np.full((n, 2, 2), np.nan),
-        np.array(size),
-        hull,
-    )
+    still, unknown = np.zeros((len(rows), 2)), np.full((len(rows), 2, 2), np.nan)
+    return Groups(np.array(id, np.int64), members, np.array(pos), still, unknown, np.array(size), hull)
 
 
 def _bad(path: Path, line: int, got: str, expected: str) -> InputError:
