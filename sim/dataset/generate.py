@@ -30,7 +30,7 @@ from sim.io.store import sequence_folder
 from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest
 from sim.streams import check_streams
 from sim.types import Camera, Sequence
-from sim.workers.start import WorkerOptions, start_workers
+from sim.workers.pool import WorkerOptions, start_workers
 
 MOST = 3  # differences that are named; the others are counted
 LONGEST = 40  # characters of a value

@@ -25,7 +25,8 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load_observation
-from scenarios.schema.scenario import ObservationSpec, ReplayOrigin, ReplaySpec
+from scenarios.schema.scenario import ObservationSpec
+from scenarios.schema.values import Model, NonNegative, Positive
 from sim.crowd.heading import facings, headings
 from sim.dataset.splits import is_real
 from sim.hashing import canonical_hash
@@ -147,6 +148,36 @@ def nearest_row(frame: Ints, id: Ints, people: Ints, rate: float, t: Array) -> I
         after = np.minimum(after, len(rows) - 1)
         out[:, column] = rows[np.where(np.abs(times[after] - t) < np.abs(t - times[before]), after, before)]
     return out
+
+
+class ReplayOrigin(Model):
+    """The recording whose motion a replay shows.
+
+    - kind, name: format ("biwi", "mot", …) and name of the recording. real: it shows real people, so nothing may be
+      tuned on it.
+    - people: the recording's ids of persons 1, 2, … of the replay, in this order.
+    - start, duration: the part that is replayed, s. shift: positions in the replay minus those in the recording, x, y,
+      m.
+    - smoothing: movements of the labels that are quicker than this are removed as jitter, s; 0: none.
+    - motion: SHA-256 of the recording's labelled positions, ids and groups.
+    """
+
+    kind: str
+    name: str
+    real: bool
+    people: tuple[int, ...]
+    start: NonNegative
+    duration: Positive
+    smoothing: NonNegative
+    shift: tuple[float, float]
+    motion: str
+
+
+class ReplaySpec(ObservationSpec):
+    """A replay with all defaults filled in, as stored in its scenario.toml."""
+
+    name: str
+    replay: ReplayOrigin
 
 
 MARGIN = 1.0  # m of ground around all positions

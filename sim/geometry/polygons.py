@@ -14,7 +14,7 @@ each is the furthest point) share an angle.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -262,18 +262,6 @@ def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
 
     pos (R, 2) m: the members of group 0, then those of group 1, …; count (G,): how many each has. None may be nan.
     """
-    return _hulls(pos, count, lambda members: _minkowski_sums(*_gift_wrap(members)))
-
-
-def position_hulls(pos: Array, count: Ints) -> list[Array]:
-    """Returns the hull (V, 2) of the positions of each group, counter-clockwise; a vertex may be repeated.
-
-    pos (R, 2), count (G,): as of `footprint_hulls`.
-    """
-    return _hulls(pos, count, lambda members: list(_gift_wrap(members)[0]))
-
-
-def _hulls(pos: Array, count: Ints, hulls_of: Callable[[Array], list[Array]]) -> list[Array]:
     hulls: list[Array] = [np.zeros((0, 2))] * len(count)
     first = np.cumsum(count) - count
     # Groups of equal size n together, up to GROUPS of them.
@@ -281,8 +269,8 @@ def _hulls(pos: Array, count: Ints, hulls_of: Callable[[Array], list[Array]]) ->
         every = np.flatnonzero(count == n)
         for low in range(0, len(every), GROUPS):
             groups = every[low : low + GROUPS]
-            members = pos[first[groups, None] + np.arange(n)]
-            for group, hull in zip(groups, hulls_of(members), strict=True):
+            sums = _minkowski_sums(*_gift_wrap(pos[first[groups, None] + np.arange(n)]))
+            for group, hull in zip(groups, sums, strict=True):
                 hulls[group] = hull
     return hulls
 

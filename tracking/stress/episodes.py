@@ -69,7 +69,7 @@ def contender(name: str, step_timeout: float | None = None) -> TunedTracker:
 @contextmanager
 def scene_player(workers: int = 1, cluster: str | None = None) -> Iterator[PlayScenes]:
     """Opens the workers for the time of the context and returns the function that plays scenes on them."""
-    from sim.workers.start import results_in_order
+    from sim.workers.pool import results_in_order
 
     with playing_workers(workers, cluster) as run:
         yield lambda scenes: results_in_order(run, play_scene, scenes)

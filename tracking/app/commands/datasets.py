@@ -19,7 +19,7 @@ from tracking.app.progress import ProgressMeter
 def generate(options: GenerateOptions) -> CommandResult:
     """Stores one sequence for every named scenario or suite entry and every seed, all seeds of an entry together."""
     from sim.dataset.generate import generate as make
-    from sim.workers.start import WorkerOptions
+    from sim.workers.pool import WorkerOptions
 
     option_parsing.output_folder(options.out)
     seeds = option_parsing.seeds(options.seeds)

@@ -206,7 +206,7 @@ def demo(options: DemoOptions) -> CommandResult:
     from sim.io.files.atomic import write_file
     from sim.io.files.own_files import refuse_foreign_file
     from sim.io.source import open_source
-    from sim.workers.start import WorkerOptions
+    from sim.workers.pool import WorkerOptions
 
     start, out, quick = time.monotonic(), options.out, options.quick
     refuse_foreign_file(option_parsing.output_folder(out) / "index.html")
@@ -252,7 +252,7 @@ def demo(options: DemoOptions) -> CommandResult:
 
 
 def _run(jobs: list[_TrackJob], workers: int) -> dict[_TrackJob, list[TrackingRun]]:
-    from sim.workers.start import results_in_order, start_workers
+    from sim.workers.pool import results_in_order, start_workers
 
     runs = {}
     with ProgressMeter("track", len(jobs)) as meter, start_workers(workers) as run:
