@@ -153,7 +153,10 @@ DRAWS = {
 }  # fmt: skip
 """Methods of numpy's generators that call the C library or may be contracted; `sim.rng` has their equals."""
 
-WITHOUT_ARITHMETIC = {"scipy.optimize.linear_sum_assignment", "scipy.sparse.csgraph.connected_components"}
+WITHOUT_ARITHMETIC = {
+    "scipy.optimize.linear_sum_assignment", "scipy.sparse.coo_array", "scipy.sparse.csgraph.connected_components",
+    "scipy.sparse.csgraph.dijkstra",
+}  # fmt: skip
 """Of scipy only what adds and compares."""
 
 
@@ -178,9 +181,7 @@ def by_processor(node: ast.AST) -> str | None:
         names = {f"{node.module}.{alias.name}" for alias in node.names}
         if node.module == "math" and not BY_PROCESSOR["math"].isdisjoint(alias.name for alias in node.names):
             return f"from math import {', '.join(alias.name for alias in node.names)}"
-        if node.module.split(".")[0] in ("scipy", "cv2") and not names <= WITHOUT_ARITHMETIC | {
-            "scipy.sparse.coo_array"
-        }:
+        if node.module.split(".")[0] in ("scipy", "cv2") and not names <= WITHOUT_ARITHMETIC:
             return ", ".join(names)
     return None
 
