@@ -326,8 +326,6 @@ class WebdatasetOptions:
     folder: Path = ARGUMENT("A generated sequence or dataset.", metavar="DIR")
     out: Path = OUT()
     shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
-    samples: Literal["sequence", "frame"] = option(
-        "A sample: a sequence with all its files, or a labelled frame.", "sequence")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -398,7 +398,7 @@ FLIPS = {
     "sheet {0}/mot --out {1}/sheet.png": {"fps": "--fps 5"},
     "validate {0}/data": {"folder": ("data", "tracks")},
     "export webdataset {0}/data --out {1}": {
-        "folder": ("{0}/data", ONE), "shard_size": "--shard-size 1kB", "samples": "--samples frame",
+        "folder": ("{0}/data", ONE), "shard_size": "--shard-size 1kB",
     },
     **{
         f"export {form} {{0}}/{source} --out {{1}}": flip

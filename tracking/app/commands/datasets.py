@@ -80,7 +80,7 @@ def export_webdataset(options: WebdatasetOptions) -> CommandResult:
     out = option_parsing.output_folder(options.out)
     size = size_of(options.shard_size)
     with ProgressMeter("export") as meter:
-        index = webdataset(options.folder, out, shard_size=size, samples=options.samples, progress=meter.update)
+        index = webdataset(options.folder, out, shard_size=size, progress=meter.update)
     shards = index["shards"]
     count, total = sum(len(s["sequences"]) for s in shards), sum(s["bytes"] for s in shards)
     packed = f"{counted(count, 'sequence')} in {counted(len(shards), 'shard')}"
