@@ -21,7 +21,7 @@ from sim.truth.merge_split_rules import (
     SPLIT_VELOCITY,
     separation,
 )
-from sim.truth.queue_detection import MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, detect_queues
+from sim.truth.queue_detection import MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED
 from sim.types import Array, Bools, GroupEvent, Ints, Motion, Order, States, Truth
 
 PATIENCE = 10.0  # s from the firing of an order until its rule has come true
@@ -42,34 +42,14 @@ WORDS = {
 def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
     """Returns for each order id the index in `truth.events` of the event that fulfils it.
 
-    Raises OrderError for the first order that no event fulfils, and for a queue that people left from both ends.
+    Raises OrderError for the first order that no event fulfils.
     """
     fulfilled = {}
     for order in truth.orders:
         if order.event is None:
             raise _unfulfilled(order, motion)
         fulfilled[order.id] = order.event
-        if order.kind == "queue":
-            _check_fifo(order, motion)
     return fulfilled
-
-
-def _check_fifo(order: Order, motion: Motion) -> None:
-    s = motion.states()
-    people = {p for part in order.before for p in part}
-    fired = _fired(order, s)
-    for queue in detect_queues(s.pos, s.vel, s.present, s.rate):
-        members = {p + 1 for p in queue.order}
-        ordered = len(people & members) >= min(QUEUE_PEOPLE, len(people)) and queue.first >= fired
-        if ordered and not queue.fifo:
-            raise OrderError(
-                file=f"scenario {motion.name}", place=f"event {order.id} (seed {motion.seed})",
-                got=f"a queue left by people {', '.join(str(p + 1) for p in queue.left)} in this order",
-                expected=f"first in, first out: {', '.join(str(p + 1) for p in queue.order)} or from the other end",
-                remedy="give the line more room, or let people come from behind it",
-            )  # fmt: skip
-        if ordered:
-            return
 
 
 def _fired(order: Order, s: States) -> int:
