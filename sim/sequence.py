@@ -18,19 +18,14 @@ from sim.scene.camera_placement import place_camera
 from sim.streams import check_streams
 from sim.truth.label import bodies, label
 from sim.truth.order_fulfilment import check_orders
+
+# isort: off
+# fmt: off
 from sim.types import (
-    BACKGROUNDS,
-    OWN_BACKGROUND,
-    Array,
-    Camera,
-    Detections,
-    Frame,
-    Image,
-    Motion,
-    PixelTruth,
-    Sequence,
-    Truth,
+    BACKGROUNDS, OWN_BACKGROUND, Array, Camera, Detections, Frame, Image, Motion, PixelTruth, Sequence, Truth,
 )
+# fmt: on
+# isort: on
 
 if TYPE_CHECKING:
     from scenarios.schema.scenario import ObservationSpec, Scenario

@@ -25,17 +25,14 @@ from scenarios.errors import InputError
 from scenarios.limits import REPEATS
 from scenarios.loading import toml_files
 from scenarios.loading.checks import check
+
+# isort: off
+# fmt: off
 from scenarios.loading.toml_files import (
-    CATALOGUE,
-    SUITES,
-    Table,
-    did_you_mean,
-    dump,
-    names,
-    parse,
-    suite_names,
-    toml_value,
+    CATALOGUE, SUITES, Table, did_you_mean, dump, names, parse, suite_names, toml_value,
 )
+# fmt: on
+# isort: on
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import ObservationSpec, Scenario
 from scenarios.schema.sensor import Sensor

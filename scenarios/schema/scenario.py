@@ -15,22 +15,15 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from scenarios.limits import FRAME_RATES, PEOPLE, PICTURE_SIZES, fits_picture
 from scenarios.schema.sensor import Sensor
+
+# isort: off
+# fmt: off
 from scenarios.schema.values import (
-    Distribution,
-    FixedPoint,
-    Model,
-    Name,
-    NonNegative,
-    Pattern,
-    Point,
-    Positive,
-    Share,
-    Side,
-    Value,
-    bounds,
-    problem,
+    Distribution, FixedPoint, Model, Name, NonNegative, Pattern, Point, Positive, Share, Side, Value, bounds, problem,
     within,
 )
+# fmt: on
+# isort: on
 
 Pixels = Annotated[float, within(0.0, 100.0, " px")]
 
@@ -67,7 +60,7 @@ class Light(Model):
     """
 
     sun_azimuth_deg: Value = Distribution(uniform=(-180, 180))
-    sun_elevation_deg: Value = Distribution(uniform=(35, 60))
+    sun_elevation_deg: Annotated[Value, within(0.1, 90.0, " degrees")] = Distribution(uniform=(35, 60))
     shadow: Share = 0.3
     penumbra: Annotated[float, within(0.0, 100.0, " m")] = 0.05
     drift: NonNegative = 0.0

@@ -36,11 +36,11 @@ MOST = 3  # differences that are named; the others are counted
 LONGEST = 40  # characters of a value
 
 
-def setting_differences(stored: Table, wanted: Table) -> str:
-    """Returns the settings that differ between two scenarios, as "camera.fps 10 → 5, duration 20 → 30"."""
+def differences(stored: Table, wanted: Table) -> str:
+    """Returns the entries that differ between two tables, as "camera.fps 10 → 5, duration 20 → 30"."""
     before, after = (dict(_flat("", table)) for table in (stored, wanted))
     keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
-    words = [f"{key} {_value(before, key)} → {_value(after, key)}" for key in keys[:MOST]]
+    words = [f"{key} {_word(before.get(key))} → {_word(after.get(key))}" for key in keys[:MOST]]
     return ", ".join(words + [f"{len(keys) - MOST} more"] * (len(keys) > MOST))
 
 
@@ -53,9 +53,10 @@ def _flat(prefix: str, value: Any) -> list[tuple[str, Any]]:
     return [(prefix, value)]
 
 
-def _value(settings: Table, key: str) -> str:
-    value = settings.get(key, "none")
-    return shortened(str(value).removesuffix(".0") if isinstance(value, float) else str(value), LONGEST)
+def _word(value: Any) -> str:
+    text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
+    text = text.removesuffix(".0") if isinstance(value, float) else text
+    return "none" if value is None or not text else shortened(text, LONGEST)
 
 
 MARKER_TIMEOUT = 5.0  # s that a shared file system may take to show one machine the file of another
@@ -125,16 +126,9 @@ def _differences(job: SequenceJob, manifest: dict[str, Any], different: dict[str
     settings = ""
     if "scenario_hash" in different:
         with suppress(InputError):
-            settings = setting_differences(parse(job.folder / "scenario.toml"), parse_toml(dump(job.entry.scenario)))
-    fields = {key: value for key, value in different.items() if key != "scenario_hash" or not settings}
-    return ", ".join(
-        [settings] * bool(settings) + [f"{k} {_word(manifest.get(k))} → {_word(v)}" for k, v in fields.items()]
-    )
-
-
-def _word(value: Any) -> str:
-    text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
-    return "none" if value is None or not text else text
+            settings = differences(parse(job.folder / "scenario.toml"), parse_toml(dump(job.entry.scenario)))
+    others = {key: value for key, value in different.items() if key != "scenario_hash" or not settings}
+    return ", ".join(filter(None, [settings, differences({key: manifest.get(key) for key in others}, others)]))
 
 
 def is_stored(job: SequenceJob) -> bool:

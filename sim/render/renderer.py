@@ -22,17 +22,15 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError
 from sim.render.camera_view import NODE_STEP, CameraView, blur_weights, noise_offsets, noise_pool
 from sim.render.canvas import UNIT, FrameCanvas
+
+# isort: off
+# fmt: off
 from sim.render.people import (
-    DrawnPeople,
-    PeopleShadows,
-    ProjectedPeople,
-    clothing_atlas,
-    people_of_frames,
-    people_shadows,
-    project_people,
-    sunlit_shares,
-    take_rows,
+    DrawnPeople, PeopleShadows, ProjectedPeople, clothing_atlas, people_of_frames, people_shadows, project_people,
+    sunlit_shares, take_rows,
 )
+# fmt: on
+# isort: on
 from sim.render.weather import Foliage, Illumination, draw_illumination, grow_plants
 from sim.scene import camera as cameras
 from sim.types import BACKGROUNDS, Array, Camera, Image, Ints, Motion, PixelTruth

@@ -16,17 +16,14 @@ from pydantic import BaseModel
 
 from scenarios.reading import is_present
 from sim.io.files import tables
+
+# isort: off
+# fmt: off
 from sim.io.files.tables import (
-    Column,
-    Count,
-    FrameNumber,
-    Rate,
-    Scale,
-    StoredTable,
-    columns_of,
-    read_table,
-    table_bytes,
+    Column, Count, FrameNumber, Rate, Scale, StoredTable, columns_of, read_table, table_bytes,
 )
+# fmt: on
+# isort: on
 from sim.io.store import group_files
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Detections, Groups, Ints, Scene, Truth
