@@ -17,7 +17,6 @@ from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
 from sim.io.files.numeric_text import read_number, read_text
-from sim.io.files.own_files import is_hidden
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.labels import labelled_sequence
@@ -78,37 +77,13 @@ def read_seqinfo(path: Path) -> SeqInfo:
     )
 
 
-def frame_rate(given: float | None, found: float | None, path: Path | None = None) -> float:
+def frame_rate(given: float | None, found: float | None = None) -> float:
     """Returns the frames per second: `given` (--fps), else `found` in the recording, else 25 with a warning."""
-    if given is not None:
-        return given
-    if found is None:
+    if given is None and found is None:
         # The text names no path, so that a command over many recordings prints it once.
         text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
-        if path is not None and (video := _video_beside(path)) is not None and video[1] != DEFAULT_FPS:
-            text = f"{path}: without a frame rate; taken at {DEFAULT_FPS:g} fps, but {video[0].name} beside it has "
-            text += f"{video[1]:g}: give --fps {video[1]:g}"
         warnings.warn(text, stacklevel=3)
-        return DEFAULT_FPS
-    return found
-
-
-def _video_beside(path: Path) -> tuple[Path, float] | None:
-    """Returns the video of the same name beside a text or folder, or the only one there, and its frames per second."""
-    from sim.io.formats import video
-
-    around = [path.parent, path] if path.is_dir() else [path.parent]
-    files = [p for folder in around for p in sorted(folder.iterdir()) if p.suffix.lower() in video.SUFFIXES]
-    found = [p for p in files if not is_hidden(p) and p.is_file()]
-    own = [p for p in found if p.stem == path.stem or p.parent == path] or (found if not path.is_dir() else [])
-    if len(own) != 1:
-        return None
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return own[0], float(f"{video.open_video(own[0]).fps:.5g}")
-    except InputError:
-        return None
+    return given or found or DEFAULT_FPS
 
 
 def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
@@ -118,7 +93,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     last frame of texts and pictures. The truth is read, and checked, when asked for.
     """
     info, images, background = _info(path), options.images, options.background
-    rate = frame_rate(options.fps, info.fps, path)
+    rate = frame_rate(options.fps, info.fps)
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     alone = not is_present(gt)
     found = mot_text.read_detections(det, options.boxes, info.length, alone) if is_present(det) else None
@@ -215,7 +190,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     The camera is not scaled.
     """
-    rate, of_boxes = frame_rate(options.fps, None, path), options.boxes
+    rate, of_boxes = frame_rate(options.fps), options.boxes
     table = read_table(path, boxless=True, box_scale=of_boxes.box_scale)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
