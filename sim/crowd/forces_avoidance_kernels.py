@@ -1,7 +1,7 @@
 """Forces that keep people, groups, walls and pillars apart, as numba kernels; numpy twins: tests/reference_steering.py.
 
 `avoid` is the entry. sim.crowd.forces names all columns, slots and units. Neighbours are found through a cell list once
-there are more than BRUTE (48) people. Only pairs that may act on each other go through the formulas.
+there are more than BRUTE (48) people.
 """
 
 from __future__ import annotations
@@ -153,46 +153,23 @@ def _cells(state, reach):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: ignore[no-untyped-def]
-    """Appends to found[m:] the people first … last - 1 that may act on person s; returns the new length."""
-    x, y, vx, vy = rows[X], rows[Y], rows[VX], rows[VY]
-    for t in range(first, last):
-        dx, dy = x[s] - x[t], y[s] - y[t]
-        wx, wy = vx[s] - vx[t], vy[s] - vy[t]
-        d2 = dx * dx + dy * dy
-        cross = dx * wy - dy * wx
-        root = (wx * wx + wy * wy) * radius * radius - cross * cross
-        found[m] = t
-        m += (d2 < reach) & ((d2 < touch) | ((dx * wx + dy * wy < 0.0) & (root > 1e-12)))
-    return m
-
-
-@njit(cache=True)
 def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
     """Adds the forces between people closer than Steering.person_range to out (N, 2), each pair once."""
-    n = len(state)
     order, start, nx = _cells(state, rules[PERSON_RANGE])
-    reach, radius = rules[PERSON_RANGE] * rules[PERSON_RANGE], 2.0 * rules[PERSON_RADIUS]
-    touch = max(rules[SEPARATION_RANGE], QUEUE_SEPARATION_RANGE, radius)
-    touch *= touch
-    rows = np.empty((4, n))
-    for s in range(n):
-        for k in range(4):
-            rows[k, s] = state[order[s], k]
-    found = np.empty(n + 1, np.int64)
+    reach = rules[PERSON_RANGE] * rules[PERSON_RANGE]
     for c in range(len(start) - 1):
         left, right = c % nx > 0, c % nx + 1 < nx
         above = c + nx < len(start) - 1
         for s in range(start[c], start[c + 1]):
-            m = _candidates(rows, s, s + 1, start[c + 1 + right], reach, touch, radius, found, 0)
-            if above:
-                first, last = start[c + nx - left], start[c + nx + right + 1]
-                m = _candidates(rows, s, first, last, reach, touch, radius, found, m)
             i = order[s]
-            for k in range(m):
-                j = order[found[k]]
-                dx, dy = state[i, X] - state[j, X], state[i, Y] - state[j, Y]
-                _pair(state, tag, i, j, dx, dy, dx * dx + dy * dy, rules, out)
+            for row in range(1 + above):  # the rest of this row of cells, then the cells above
+                first = start[c + nx - left] if row else s + 1
+                last = start[c + nx * row + right + 1]
+                for t in range(first, last):
+                    j = order[t]
+                    dx, dy = state[i, X] - state[j, X], state[i, Y] - state[j, Y]
+                    if dx * dx + dy * dy < reach:
+                        _pair(state, tag, i, j, dx, dy, dx * dx + dy * dy, rules, out)
 
 
 @njit(cache=True)

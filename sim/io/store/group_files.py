@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
 from collections.abc import Sequence as Series
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -27,13 +26,7 @@ from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, StoredTa
 from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
-ORDER_KEYS = ("id", "kind", "fired", "time", "before", "after", "event")
 GroupId = Annotated[int, Field(strict=True, ge=-1, le=INTEGER)]
-
-
-def events_bytes(events: Iterable[GroupEvent]) -> bytes:
-    """Returns the events.json of a truth, one event per line."""
-    return tables.json_list("events", map(tables.plain, events))
 
 
 class _Event(BaseModel):
@@ -66,12 +59,6 @@ def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
     return [(GroupEvent(**f, pos=pos), e.frame) for f, pos, e in zip(fields, places, found, strict=True)]
 
 
-def near_bytes(near: Near) -> bytes:
-    """Returns near.csv: start, end (frames from 1, inclusive), a, b (ids of strangers who satisfy the merge rule)."""
-    rows = zip(near.start, near.end, near.a, near.b, strict=True)
-    return "".join([NEAR_COLUMNS + "\n", *(f"{s},{e},{a},{b}\n" for s, e, a, b in rows)]).encode()
-
-
 def read_near(path: Path) -> Near:
     """Reads a near.csv."""
     header = read_text(path).partition("\n")[0]
@@ -85,11 +72,6 @@ def read_near(path: Path) -> Near:
     expected = f"frames from 1 to {FRAMES}, start not after end, and two ids from 0 on"
     rows.reject(wrong, expected, "restore it", "restore them")
     return Near(start, end, a, b)
-
-
-def script_bytes(orders: Iterable[Order]) -> bytes:
-    """Returns script.json, one order of the script per line."""
-    return tables.json_list("orders", ({key: getattr(o, key) for key in ORDER_KEYS} for o in orders))
 
 
 class _Order(BaseModel):
@@ -213,13 +195,11 @@ def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None
         here = None if ground is None else ground[k]
         px = None if image is None else image[k]
         pictured = {} if px is None else {int(g): wkt(h, 2) for g, h in zip(px.id, px.hull, strict=False)}
-        for row in _csv_rows(here if here is not None else Groups.none() if px is None else _placeless(px)):
+        if here is None:
+            here = Groups.none() if px is None else px.replace(pos=np.full_like(px.pos, np.nan), hull=())
+        for row in _csv_rows(here):
             writer.writerow([first + k, *row, *([pictured.get(row[0], "")] if image is not None else [])])
     return text.getvalue().encode()
-
-
-def _placeless(groups: Groups) -> Groups:
-    return groups.replace(pos=np.full_like(groups.pos, np.nan), hull=())
 
 
 def _csv_rows(groups: Groups) -> list[tuple[int, str, str, str, str, str]]:

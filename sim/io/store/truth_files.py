@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel
@@ -26,7 +26,7 @@ from sim.io.files.tables import (
 # isort: on
 from sim.io.store import group_files
 from sim.scene.terrain import height_at
-from sim.types import Array, Bools, Detections, Groups, Ints, Scene, Truth
+from sim.types import Array, Bools, Detections, Groups, Ints, Order, Scene, Truth
 
 BOX = ("box_left", "box_top", "box_width", "box_height")
 VISIBLE = ("visible_left", "visible_top", "visible_width", "visible_height")
@@ -35,7 +35,7 @@ SINGLE = (("z", "m"), ("heading", "rad"), ("height", "m"), ("truncation", "1"))
 
 def truth_files(truth: Truth) -> dict[str, bytes]:
     """Returns the files under gt/ of a truth, content by name: those for which it has values."""
-    files = {"gt/truth.parquet": _table(truth), "gt/script.json": group_files.script_bytes(truth.orders)}
+    files = {"gt/truth.parquet": _table(truth), "gt/script.json": tables.json_list("orders", map(_order, truth.orders))}
     if truth.box is not None:
         seen = has_box(truth.box)
         visibility = [f"1,1,{v:.3f}" for v in truth.visibility[seen].tolist()]
@@ -47,9 +47,11 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
     if truth.groups is not None or truth.groups_px is not None:
         files["gt/groups.csv"] = group_files.groups_csv(truth.groups, truth.groups_px)
     if truth.events is not None:
-        files["gt/events.json"] = group_files.events_bytes(truth.events)
+        files["gt/events.json"] = tables.json_list("events", map(tables.plain, truth.events))
     if truth.near is not None:
-        files["gt/near.csv"] = group_files.near_bytes(truth.near)
+        rows = zip(truth.near.start, truth.near.end, truth.near.a, truth.near.b, strict=True)
+        lines = [group_files.NEAR_COLUMNS, *(",".join(map(str, row)) for row in rows)]
+        files["gt/near.csv"] = "".join(f"{line}\n" for line in lines).encode()
     return files
 
 
@@ -67,6 +69,10 @@ def _table(truth: Truth) -> bytes:
         "labelled": None if truth.labelled is None else spans(truth.labelled),
     }  # fmt: skip
     return table_bytes(columns, facts)
+
+
+def _order(order: Order) -> dict[str, Any]:
+    return {key: getattr(order, key) for key in ("id", "kind", "fired", "time", "before", "after", "event")}
 
 
 def spans(flags: Bools) -> list[list[int]]:
