@@ -67,7 +67,7 @@ class ServiceQueue:
         k = 0
         for g in self.joined:
             k = self._give_slots(g, k, members, slots)
-        while self.coming and self._has_reached(self.coming[0], k, members, pos):
+        while self.coming and np.min(length(pos[members[self.coming[0]]] - self.slot(k))) < JOIN_RADIUS:
             self.joined.append(self.coming.pop(0))
             k = self._give_slots(self.joined[-1], k, members, slots)
         for g in self.coming:
@@ -81,9 +81,6 @@ class ServiceQueue:
             slots[column] = self.slot(k)
             k += 1
         return k
-
-    def _has_reached(self, g: int, k: int, members: dict[int, list[int]], pos: Array) -> bool:
-        return bool(np.min(length(pos[members[g]] - self.slot(k))) < JOIN_RADIUS)
 
     def _serve(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
         """Returns the group whose service ends by time t, in a list; begins the service of the next."""
