@@ -14,7 +14,7 @@ each is the furthest point) share an angle.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -99,10 +99,18 @@ def intersection_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -
     common = np.zeros(len(i))
     near = (a.box[i, :2] < b.box[j, 2:]).all(axis=1) & (b.box[j, :2] < a.box[i, 2:]).all(axis=1)
     possible = np.flatnonzero(near & (a.area[i] > 0) & (b.area[j] > 0))
-    for low in range(0, len(possible), CHUNK):
-        part = possible[low : low + CHUNK]
-        common[part] = _common_area(a.vertex[i[part]], b.vertex[j[part]])
+    common[possible] = _in_chunks(_common_area, a, b, i[possible], j[possible])
     return common
+
+
+def _in_chunks(
+    measure: Callable[[Array, Array], Array], a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints
+) -> Array:
+    measured = np.empty(len(i))
+    for low in range(0, len(i), CHUNK):
+        part = slice(low, low + CHUNK)
+        measured[part] = measure(a.vertex[i[part]], b.vertex[j[part]])
+    return measured
 
 
 def _common_area(a: Array, b: Array) -> Array:
@@ -179,11 +187,7 @@ def gap_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
     """Returns the distance (K,) between convex polygons a[i[k]] and b[j[k]], of which one has area; nan for an empty
     one.
     """
-    gap = np.empty(len(i))
-    for low in range(0, len(i), CHUNK):
-        part = slice(low, low + CHUNK)
-        gap[part] = _gap(a.vertex[i[part]], b.vertex[j[part]])
-    return gap
+    return _in_chunks(_gap, a, b, i, j)
 
 
 def edge_distance_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
@@ -192,11 +196,7 @@ def edge_distance_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) 
     It is the distance unless they overlap; nan where one has no vertices. Cheaper than `gap_pairs`; polygons need no
     area.
     """
-    least = np.empty(len(i))
-    for low in range(0, len(i), CHUNK):
-        part = slice(low, low + CHUNK)
-        least[part] = _edge_distance(a.vertex[i[part]], b.vertex[j[part]])
-    return least
+    return _in_chunks(_edge_distance, a, b, i, j)
 
 
 def _edge_distance(a: Array, b: Array) -> Array:
