@@ -307,7 +307,6 @@ class CocoOptions:
 
     folder: Path = ARGUMENT("A sequence or dataset with labelled boxes.", metavar="DIR")
     out: Path = FILE("File to write; for several splits FILE-train.json, FILE-val.json, …", metavar="FILE.json")
-    min_visibility: float = option("Leave out people who are less visible.", 0.0, low=0.0, high=1.0, metavar="V")
     person_class: str | None = PERSON_CLASS()
 
 

@@ -437,7 +437,6 @@ ELSEWHERE = {
     ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("view", "by"),  # report/test_in_browser.py
     ("view", "workers"),
-    ("coco", "min_visibility"),  # tests/sim/io/export/test_coco.py
     *((command, "person_class") for command in ("coco", "score", "track")),  # tests/sim/io/formats/test_mot_people.py
     *((command, "box_scale") for command in ("score", "track")),  # tests/sim/io/formats/test_box_columns.py
 }

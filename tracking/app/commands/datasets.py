@@ -59,7 +59,7 @@ def export_coco(options: CocoOptions) -> CommandResult:
     from sim.io.export.coco import coco
 
     out = option_parsing.output_file(options.out, ".json")
-    paths = coco(options.folder, out, options.min_visibility, person_class=options.person_class)
+    paths = coco(options.folder, out, person_class=options.person_class)
     root = options.folder if options.folder.is_dir() else options.folder.parent
     text = "\n".join([*map(str, paths), f"file names are relative to {root}"])
     return CommandResult({"file": paths[0] if len(paths) == 1 else None, "files": paths, "root": root}, text)
