@@ -62,16 +62,12 @@ def read_seqinfo(path: Path) -> SeqInfo:
         return value
 
     length, w, h = (number(k, 1, high) for k, high in (("seqLength", FRAMES), ("imWidth", SIDE), ("imHeight", SIDE)))
-    if w is not None and h is not None and not fits_picture(w, h):
-        got = f"{w:.0f}×{h:.0f} px"
+    size = None if w is None or h is None else (int(w), int(h))
+    if size is not None and not fits_picture(*size):
+        got = "{}×{} px".format(*size)
         raise InputError(file=path, place="imWidth, imHeight", got=got, expected=PICTURE_SIZES, remedy="correct them")
-    return SeqInfo(
-        section.get("name", path.parent.name),
-        number("frameRate", *FRAME_RATES, whole=False),
-        None if length is None else int(length),
-        None if w is None or h is None else (int(w), int(h)),
-        section.get("imdir", "img1"),
-    )
+    name, rate = section.get("name", path.parent.name), number("frameRate", *FRAME_RATES, whole=False)
+    return SeqInfo(name, rate, None if length is None else int(length), size, section.get("imdir", "img1"))
 
 
 def frame_rate(given: float | None, found: float | None = None) -> float:
