@@ -176,13 +176,6 @@ def iou_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
     return iou
 
 
-def iou_matrix(a: Sequence[Array], b: Sequence[Array]) -> Array:
-    """Returns the intersection over union (N, M) of convex polygons (V, 2), each of a with each of b."""
-    i, j = (g.ravel() for g in np.indices((len(a), len(b))))
-    width = max((len(p) for p in (*a, *b)), default=1)
-    return iou_pairs(pack(a, width), pack(b, width), i, j).reshape(len(a), len(b))
-
-
 def gap_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
     """Returns the distance (K,) between convex polygons a[i[k]] and b[j[k]], of which one has area; nan for an empty
     one.
@@ -222,12 +215,6 @@ def _distance_to_edges(points: Array, polygon: Array) -> Array:
     share = np.clip((ax * ex + ay * ey) / np.where(length2 > 0, length2, 1.0), 0.0, 1.0)
     dx, dy = ax - share * ex, ay - share * ey
     return np.asarray(np.sqrt((dx * dx + dy * dy).min(axis=(1, 2))))
-
-
-def polygon_gap(a: Array, b: Array) -> float:
-    """Returns the distance between two convex polygons, of which one has area; nan if one is empty."""
-    none = np.zeros(1, np.int64)
-    return float(gap_pairs(pack([a]), pack([b]), none, none)[0])
 
 
 def contains(polygon: Array, points: Array, dilate: float = 0.0) -> Bools:
