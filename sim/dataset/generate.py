@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -257,14 +257,10 @@ def generate(
         for entry in found
         for seed in seeds
     ]
-    with lock_folder(root):
-        remove_partials(root, folder, root / "seqmaps")
+    with _dataset(root, folder):
         for job in jobs:
             stored_manifest(job)
-        try:
-            errors = _run_jobs(jobs, workers, progress)
-        finally:
-            remove_partials(root, folder)
+        errors = _run_jobs(jobs, workers, progress)
         try:
             complete = write_seqmap(root, split)
         except FlockscopeError as error:
@@ -284,6 +280,17 @@ def generate(
     if errors:
         raise _summary(errors, len(jobs))
     return Folders((job.folder for job in made), unfulfilled)
+
+
+@contextmanager
+def _dataset(root: Path, folder: Path) -> Iterator[None]:
+    """Locks the folder of a dataset for the block, and removes what interrupted writers left there."""
+    with lock_folder(root):
+        remove_partials(root, folder, root / "seqmaps")
+        try:
+            yield
+        finally:
+            remove_partials(root, folder)
 
 
 def _run_jobs(jobs: list[SequenceJob], workers: WorkerOptions, progress: Progress | None) -> dict[str, FlockscopeError]:
@@ -359,8 +366,7 @@ def store_replays(
         )  # fmt: skip
     streams = check_streams(options.streams, options.images)
     made: list[Path] = []
-    with lock_folder(root):
-        remove_partials(root, folder, root / "seqmaps")
+    with _dataset(root, folder):
         try:
             for recording, seed in product(recordings, seeds):
                 sequence, form = resolve_replay(
@@ -372,6 +378,5 @@ def store_replays(
                 if progress is not None:
                     progress(len(made), len(recordings) * len(seeds), path.name)
         finally:
-            remove_partials(root, folder)
             write_seqmap(root, split)
     return made

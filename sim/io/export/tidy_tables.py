@@ -17,7 +17,6 @@ import re
 from collections.abc import Mapping
 from collections.abc import Sequence as Series
 from dataclasses import dataclass, fields
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -61,28 +60,12 @@ class TidyTable:
         """Returns the table as a pyarrow.Table, which polars reads with `polars.from_arrow`; nan becomes null."""
         import pyarrow as pa
 
-        ids = pa.list_(pa.int64())
-        arrays = {
-            name: pa.array(values, from_pandas=True)
-            if isinstance(values, np.ndarray)
-            else pa.array(values, pa.string() if name == "kind" else ids)
-            for name, values in self.columns.items()
-        }
-        return pa.table(arrays)
+        lists = {name: pa.list_(pa.int64()) for name, v in self.columns.items() if not isinstance(v, np.ndarray)}
+        kinds = dict.fromkeys(self.columns) | lists | {"kind": pa.string()}
+        return pa.table({name: pa.array(v, kinds[name], from_pandas=True) for name, v in self.columns.items()})
 
     def to_pandas(self) -> Any:
-        """Returns the table as a data frame of pandas.
-
-        Raises:
-            InputError: pandas is not installed.
-        """
-        try:
-            import_module("pandas")
-        except ImportError:
-            raise InputError(
-                place="to_pandas()", got="no pandas", expected="pandas installed",
-                remedy="pip install pandas, or use to_arrow()",
-            ) from None  # fmt: skip
+        """Returns the table as a data frame of pandas, which must be installed."""
         return self.to_arrow().to_pandas()
 
 
