@@ -90,7 +90,7 @@ def suites() -> str:
     """Returns the table of the suites that come with flockscope."""
     resolve = import_module("scenarios.loading.resolve")
     rows = [
-        f"| `{name}` | {len(resolve.resolve(f'suite:{name}'))} | {resolve.read_suite(resolve.find_suite(name)).about} |"
+        f"| `{name}` | {len(resolve.resolve(f'suite:{name}'))} | {resolve.read_suite(resolve.suite_file(name)).about} |"
         for name in resolve.suite_names()
     ]
     return table("suite", "entries", "what it is", rows=rows)

@@ -197,7 +197,9 @@ def suite_file(name: str) -> Path | None:
         return SUITES / f"{wanted}.toml"
     if name in names():
         return None
-    known, expected = names() + suite_names(), "a scenario, a suite or a *.toml file"
+    known, expected = suite_names(), "a suite's name or file"
+    if wanted == name:
+        known, expected = names() + known, "a scenario, a suite or a *.toml file"
     raise InputError(got=repr(wanted), expected=expected, remedy=did_you_mean(wanted, known))
 
 
