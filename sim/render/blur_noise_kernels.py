@@ -32,15 +32,28 @@ def _blur_five_lines(a, b, c, d, e, w, x, y, many, out):  # type: ignore[no-unty
 
 
 @njit(cache=True)
+# At MID_GREY the noise has the standard deviation of the pool: read + slope x is 1 there.
+def _with_noise(x, grain, read, slope):  # type: ignore[no-untyped-def]
+    """Returns the grey level of canvas value x with the noise grain * sqrt(read + slope x)."""
+    x = (x + np.float32(grain) * np.sqrt(read + slope * x)) * SCALE + HALF
+    x = x if x > LOW else LOW
+    return np.uint8(np.int32(x if x < HIGH else HIGH))
+
+
+@njit(cache=True)
 def _show_line(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-def]
-    """Sets out to the grey levels x + grain sqrt(read + slope x) of a line of canvas values times gain (many,) = x."""
-    # At MID_GREY the noise has the standard deviation of the pool: read + slope x is 1 there.
+    """Sets out to gain times a line of canvas values plus noise, as grey levels."""
     read, slope = ONE - shot, shot * GREY
     for i in range(many):
-        x = np.float32(line[i]) * gain[i]
-        x = (x + np.float32(grain[i]) * np.sqrt(read + slope * x)) * SCALE + HALF
-        x = x if x > LOW else LOW
-        out[i] = np.uint8(np.int32(x if x < HIGH else HIGH))
+        out[i] = _with_noise(np.float32(line[i]) * gain, grain[i], read, slope)
+
+
+@njit(cache=True)
+def _show_line_by_gains(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-def]
+    """Sets out to a line of canvas values times gain (many,) plus noise, as grey levels."""
+    read, slope = ONE - shot, shot * GREY
+    for i in range(many):
+        out[i] = _with_noise(np.float32(line[i]) * gain[i], grain[i], read, slope)
 
 
 @njit(cache=True)
@@ -122,10 +135,10 @@ def finish_image(canvas, empty, dirty, weights, nodes, step, noise, shot, offset
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     edge, wide, tile = _scratch(len(weights) // 2, width)
-    bright = np.full((TILE_H, 3 * width), nodes[0, 0], np.float32)
+    bright, uniform = np.empty((TILE_H, 3 * width), np.float32), nodes.size == 1
     for top in range(0, height, TILE_H):
         rows, marks = min(TILE_H, height - top), dirty[top // TILE_H]
-        for r in range(rows if nodes.size > 1 else 0):
+        for r in range(0 if uniform else rows):
             brightness_row(nodes, step, top + r, width, bright[r])
         last = 0
         while last < width:  # runs of tiles, dirty or clean
@@ -137,7 +150,12 @@ def finish_image(canvas, empty, dirty, weights, nodes, step, noise, shot, offset
                 _blur_block(canvas, top, left, rows, cols, weights, edge, wide, tile)
             for r in range(rows):
                 grain, to = noise[offsets[top + r] + 3 * left :], out[top + r, 3 * left :]
-                if drawn:
-                    _show_line(tile[r], bright[r, 3 * left :], grain, shot, 3 * cols, to)
+                line, gain, clean = tile[r], bright[r, 3 * left :], empty[top + r, 3 * left :]
+                if uniform and drawn:
+                    _show_line(line, nodes[0, 0], grain, shot, 3 * cols, to)
+                elif uniform:
+                    _show_line(clean, nodes[0, 0], grain, shot, 3 * cols, to)
+                elif drawn:
+                    _show_line_by_gains(line, gain, grain, shot, 3 * cols, to)
                 else:
-                    _show_line(empty[top + r, 3 * left :], bright[r, 3 * left :], grain, shot, 3 * cols, to)
+                    _show_line_by_gains(clean, gain, grain, shot, 3 * cols, to)
