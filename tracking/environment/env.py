@@ -22,7 +22,7 @@ from scenarios.errors import InputError, OrderError
 from scenarios.loading.toml_files import closest
 from sim.dataset.generate import LEFT_OUT
 from sim.dataset.splits import split_of
-from sim.types import DetectionMode, Image, Tracker
+from sim.types import DetectionMode, Tracker
 from tracking.config import Config
 from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, Source, SourceCache, SourceSpec, sources
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
@@ -34,7 +34,6 @@ from tracking.running.prepare import Params, config_of
 from tracking.running.tracker_registry import checked, config_class, find
 from tracking.scoring.people_comparison import Similarity
 
-METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 OBSERVATIONS = ("statistics", "parameters", "none")
 RESET_OPTIONS = ("scenario", "seed", "params")
 Observation = Literal["statistics", "parameters", "none"]
@@ -60,14 +59,12 @@ class TuningEnvOptions:
         '"statistics"; "parameters" adds the parameters in [-1, 1]; "none" is a single 0.', "statistics")
     cache: int = option("Bytes of sequences that are kept for later episodes.", DEFAULT_LIMIT, low=0)
     tracker_seed: int = option("Seed of trackers that use random numbers.", 0)
-    render_mode: str | None = option('"rgb_array" or None.', None)
     # fmt: on
 
     def __post_init__(self) -> None:
         _check_choice("observation", self.observation, OBSERVATIONS)
         _check_choice("detections", self.detections, (None, *get_args(DetectionMode)))
         _check_choice("similarity", self.similarity, (None, *get_args(Similarity)))
-        _check_choice("render_mode", self.render_mode, (None, *METADATA["render_modes"]))
 
 
 class TuningEnv(gymnasium.Env[Floats, Floats]):
@@ -77,8 +74,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
 
     State: sources, cache; config, rollout (the run, None before it) and score of the episode.
     """
-
-    metadata = METADATA
 
     @documented(TuningEnvOptions, positional=2)
     def __init__(self, tracker: AnyTracker, suite: SourceSpec | Source = "quick", **options: Any) -> None:
@@ -92,7 +87,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
         self.tracker_seed, self.decision_every = given.tracker_seed, given.decision_every
         self.similarity = given.similarity
-        self.render_mode, self.observation = given.render_mode, given.observation
+        self.observation = given.observation
         self.config_class = config_class(self.tracker, self.tracker.__name__)
         self.defaults = config_of(self.config_class, given.params)
         self.sources = sources(given.suite, given.seeds, given.set)
@@ -106,7 +101,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.action_space = Box(-1.0, 1.0, (len(self.space),), np.float32)
         self.left_out: dict[Source, str] = {}  # and why: scenes whose script does not come true
         self.source, self.base = self.sources[0], self.defaults
-        self.metadata = self._metadata(self.source.fps)
         self._clear_episode()
 
     @property
@@ -119,9 +113,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         """The name of each number of an observation: statistics, then (if chosen) parameters; "nothing" for "none"."""
         names = {"statistics": NAMES, "parameters": (*NAMES, *self.parameter_names), "none": ("nothing",)}
         return names[self.observation]
-
-    def _metadata(self, fps: float) -> dict[str, Any]:
-        return {**METADATA, "render_fps": max(round(fps / (self.decision_every or 1)), 1)}
 
     def _clear_episode(self) -> None:
         self.rollout: Rollout | None = None
@@ -160,7 +151,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.source, self.base = source, base
         self._clear_episode()
         self.rollout, self._observer = rollout, Observer(opened.sequence.fps)
-        self.metadata = self._metadata(opened.sequence.fps)
         return self._observe(), self._info()
 
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
@@ -227,15 +217,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
             self.config = tracker.config = before
             self.refused = str(error)
             return self._advance(upto)
-
-    def render(self) -> Image | None:
-        """Returns the last frame with detections and tracks, uint8 (H, W, 3) RGB; None without a render_mode."""
-        if self.render_mode is None:
-            return None
-        from tracking.environment.picture import episode_picture
-
-        opened = self.cache.open(self.source, streams_for(self.tracker, self.mode))
-        return episode_picture(opened, self.rollout, self.score)
 
     def close(self) -> None:
         """Ends the episode and replaces the cache of sources by an empty one. `reset` may follow."""

@@ -59,12 +59,6 @@ class Source:
         """True if the sequence is simulated from a scenario, False if it is stored or in memory."""
         return self.entry is not None
 
-    @property
-    def fps(self) -> float:
-        """Frames per second."""
-        camera = self.entry.scenario.camera if self.entry is not None else None
-        return self.open().fps if camera is None else camera.fps
-
     def open(self, streams: Iterable[str] = ()) -> Sequence:
         """Returns the sequence: simulated, read from its path, or as it is if it is in memory."""
         if self.sequence is not None:
