@@ -18,7 +18,7 @@ import hashlib
 import json
 import shlex
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
 from typing import Any
@@ -30,7 +30,7 @@ from sim.hashing import ENGINE
 from sim.types import Array, DetectionMode
 from tracking.environment.episode_cache import Source, sources
 from tracking.stress.axes import Axis
-from tracking.stress.curves import BreakingPoint, breaking_point, curve, falling
+from tracking.stress.curves import BreakingPoint, breaking_point, curve
 from tracking.stress.episodes import ORACLE, OracleTask, PlayScenes, Store
 from tracking.tuning.parallel_episodes import EpisodeTask
 from tracking.tuning.tuned_tracker import TunedTracker
@@ -211,17 +211,6 @@ class Sweep:
     def breaks(self) -> dict[str, BreakingPoint]:
         """Returns the breaking point of each tracker on the only axis."""
         return {name: breaking_point(self.way, self.scores(name), self.plan.share) for name in self.trackers}
-
-    def overtakings(self) -> Iterator[tuple[str, str, BreakingPoint]]:
-        """Yields pairs of trackers of which the first, better at the easy end, falls behind the second."""
-        every = {name: self.scores(name) for name in self.trackers}
-        for first in every:
-            for second in every:
-                ahead = curve(every[first])[0] > curve(every[second])[0]
-                if first != second and ahead:
-                    point = falling(self.way, every[first] - every[second])
-                    if np.isfinite(point.at):
-                        yield first, second, point
 
     def _refine(self) -> bool:
         """Adds a value or seeds where least is known; returns False if nothing is left to do."""
