@@ -285,8 +285,8 @@ class OverlayOptions:
     source: Path = SOURCE()
     tracks: Path | None = TRACKS()
     out: Path = FILE("Video to write; for several sequences, a folder.", metavar="FILE.mp4")
-    truth: Literal["beside", "over", "only"] | None = option(
-        "Draw the truth: beside the tracks, over the same picture, or only it. Without TRACKS always only it.", None)
+    truth: Literal["over"] | None = option(
+        "Draw the truth over the same picture. Without TRACKS it is drawn alone.", None)
     fps: float | None = FPS()
     px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
