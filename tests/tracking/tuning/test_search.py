@@ -158,7 +158,6 @@ def test_several_goals_give_a_front(tmp_path):
     found = tune(**given, out=tmp_path / "toy.toml")
     assert found.front
     assert found.pruned == 0
-    assert (tmp_path / "toy.front.svg").is_file()
     assert found.config == found.front[0].config
     assert ToyConfig.from_toml(tmp_path / "toy.front-1.toml").as_dict() == found.config.as_dict()
     for k, one in enumerate(found.front, 1):
