@@ -17,6 +17,7 @@ from sim.geometry.polygons import convex_hull
 from sim.io.store.track_files import upright_boxes
 from sim.io.store.truth_files import with_ground_height
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
+from tracking.drawing.canvas import box_corners
 
 BOX_MARGIN = 5.0  # px between members' boxes and the outline of their group.
 
@@ -180,11 +181,7 @@ def _box_hulls(group: Ints, box: Array) -> tuple[GroupMark, ...]:
     names = np.unique(group[group >= 0])
     box = box + BOX_MARGIN * np.array([-1, -1, 2, 2])
     found = [(int(g), box[(group == g) & np.isfinite(box[:, 0])]) for g in names]
-    return tuple(GroupMark(g, convex_hull(_all_corners(own))) for g, own in found if len(own) > 1)
-
-
-def _all_corners(box: Array) -> Array:
-    return np.concatenate([box[:, :2] + box[:, 2:] * np.array(c) for c in ((0, 0), (1, 0), (1, 1), (0, 1))])
+    return tuple(GroupMark(g, convex_hull(box_corners(own).reshape(-1, 2))) for g, own in found if len(own) > 1)
 
 
 def _in_picture(points: Array, plane: str, camera: Camera | None, scene: Scene | None) -> Array:

@@ -131,8 +131,7 @@ def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, bo
 
 def _outlines(canvas: Canvas, places: Array, boxes: Array | None) -> Array:
     if boxes is not None:
-        corners = [boxes[:, :2] + boxes[:, 2:] * np.array(c) for c in ((0, 0), (1, 0), (0, 1), (1, 1))]
-        return canvas.map(np.concatenate(corners))
+        return canvas.map(box_corners(boxes).reshape(-1, 2))
     turn = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     circle = max(FOOTPRINT * canvas.scale, 9) * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     return np.asarray((canvas.map(places)[:, None] + circle).reshape(-1, 2))

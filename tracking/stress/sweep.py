@@ -147,7 +147,11 @@ class Sweep:
         """Plays the episodes of the trackers and the oracle on these scenes that are not stored."""
         wanted = {(*scene.source.key, scene.values): scene for scene in scenes}
         self.scenes.update(wanted)
-        every = ((scene, self._missing(scene, (*trackers, ORACLE))) for scene in wanted.values())
+        known = self.store.known
+        every = (
+            (scene, [name for name in (*trackers, ORACLE) if self._key(name, scene) not in known])
+            for scene in wanted.values()
+        )
         jobs = [(scene, names) for scene, names in every if names]
         tasks = [tuple(self._task(name, scene.source) for name in names) for scene, names in jobs]
         for (scene, names), outcomes in zip(jobs, self.run_scenes(tasks), strict=True):
@@ -157,9 +161,6 @@ class Sweep:
                 self.store.add({"key": self._key(name, scene), **facts, "settings": settings, **asdict(outcome)})
                 if name != ORACLE:
                     self.report(" ".join([name, scene.source.name, *(f"{value:g}" for value in scene.values)]))
-
-    def _missing(self, scene: Scene, names: Sequence[str]) -> list[str]:
-        return [name for name in names if self._key(name, scene) not in self.store.known]
 
     def _task(self, name: str, source: Source) -> EpisodeTask | OracleTask:
         if name == ORACLE:
