@@ -224,23 +224,6 @@ class Config:
         """Returns the text of a TOML file from which `from_toml` reads an equal config."""
         return toml_text(self.tracker, self.as_dict())
 
-    @classmethod
-    def table(cls) -> str:
-        """Returns all parameters as a Markdown table for the docs: default, presets, range, unit, meaning."""
-        named = {name: cls.preset(name).as_dict() for name in presets(cls.tracker)}
-        head = ["parameter", "default", *(f"preset `{name}`" for name in named), "range", "unit", "meaning"]
-        rows = [head, ["---"] * len(head)]
-        for p in cls.params().values():
-            changed = [values[p.name] for values in named.values()]
-            cells = ["" if value == p.default else str(value) for value in changed]
-            rows.append([f"`{p.name}`", str(p.default), *cells, _range(p), p.unit, p.meaning])
-        return "\n".join("|---" * len(r) + "|" if r[0] == "---" else "| " + " | ".join(r) + " |" for r in rows) + "\n"
-
-
-def _range(p: Param) -> str:
-    span = ", ".join(f"`{c}`" for c in p.choices) if p.choices else f"{p.low:g} to {p.high:g}"
-    return span + (" (log)" if p.scale == "log" else "")
-
 
 def read_params(path: str | Path, tracker: str) -> dict[str, object]:
     """Returns the table [params] of a TOML file of this tracker, unchecked; {} if there is none."""
