@@ -11,7 +11,7 @@ from scenarios.schema.sensor import Sensor
 from sim.detector.box_noise import box_errors
 from sim.detector.sense import sense
 from sim.types import Array, Ints
-from tracking.fitting.detection_matching import MatchedRecording, match_detections
+from tracking.fitting.detection_matching import MatchedRecording, box_iou, match_detections
 from tracking.fitting.error_correlation import pairs_by_lag
 from tracking.fitting.false_alarms import alarm_tracks
 
@@ -74,10 +74,7 @@ def miss_runs(m: MatchedRecording) -> Ints:
 def _iou_and_errors(m: MatchedRecording) -> tuple[Array, Array]:
     assert m.truth.box is not None
     true, box = m.truth.box[m.hit], m.box[m.match[m.hit]]
-    low, high = np.maximum(true[:, :2], box[:, :2]), np.minimum(true[:, :2] + true[:, 2:], box[:, :2] + box[:, 2:])
-    inner = np.prod(np.clip(high - low, 0.0, None), axis=1)
-    area = true[:, 2] * true[:, 3] + box[:, 2] * box[:, 3]
-    return inner / (area - inner), box_errors(box, true)
+    return box_iou(true, box), box_errors(box, true)
 
 
 def _correlation(recordings: Sequence[MatchedRecording], e: Array, lag: float) -> float:
