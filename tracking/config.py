@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import dataclasses
 import os.path
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,11 +42,6 @@ class Param:
     online: bool = True  # it may change between two frames
     tunable: bool = True  # searches may change it
     sees: str = ""  # "pixels" or "points" if it has an effect only with these
-
-    @property
-    def ours(self) -> bool:
-        """True if the meaning says "ours": the parameter belongs to a departure from the tracker's paper."""
-        return re.search(r"\bours\b", self.meaning) is not None
 
     @property
     def expected(self) -> str:

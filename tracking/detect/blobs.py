@@ -50,20 +50,6 @@ class Blobs(Frozen):
     def __len__(self) -> int:
         return len(self.area)
 
-    def contour(self, row: int) -> Array:
-        """Returns the outer contour of blob `row` (from 0), (V, 2) x, y in px, through the centres of its edge
-        pixels."""
-        left, top, wide, high = self.box[row].astype(int)
-        part = (self.label[top : top + high, left : left + wide] == row + 1).astype(np.uint8)
-        outlines, _ = cv2.findContours(part, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-        longest = np.reshape(max(outlines, key=len), (-1, 2))
-        return np.asarray(longest + np.array([left + 0.5, top + 0.5]))
-
-    def hull(self, row: int) -> Array:
-        """Returns the convex hull of the contour of blob `row` (from 0), (V, 2) x, y in px, counter-clockwise where y
-        is up."""
-        return np.asarray(cv2.convexHull(self.contour(row).astype(np.float32), clockwise=False), float).reshape(-1, 2)
-
     def cut(self) -> Bools:
         """Returns flags (M,): True for each blob whose box touches an edge of the image or is at most 1 px away from
         it."""

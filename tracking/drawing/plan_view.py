@@ -104,12 +104,8 @@ def draw_trails(canvas: Canvas, truth: Truth, index: int, places: Array) -> None
         gaps = np.flatnonzero(np.diff(truth.frame[past][rows]) != 1)
         rows = rows[gaps[-1] + 1 :] if len(gaps) else rows
         if len(rows) > 1:
-            canvas.line(places[past][rows], _pale(colour(int(person))), 3)
-
-
-def _pale(ink: Colour) -> Colour:
-    b, g, r = (round(v + (255 - v) * 0.45) for v in ink)
-    return b, g, r
+            b, g, r = (round(v + (255 - v) * 0.45) for v in colour(int(person)))  # pale
+            canvas.line(places[past][rows], (b, g, r), 3)
 
 
 def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, boxes: Array | None) -> None:

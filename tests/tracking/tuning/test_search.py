@@ -16,9 +16,9 @@ from scenarios.errors import FlockscopeError, InputError
 from tests.processes import ROOT
 from tests.toy_tracker import Toy, ToyConfig
 from tests.tuning_toys import TOY, toy_plan, tune_arguments
-from tracking.tuning import tune
 from tracking.tuning.parallel_episodes import episode_player
 from tracking.tuning.sampler import AGAIN
+from tracking.tuning.search import tune
 from tracking.tuning.study import FINISHED, open_study, run_trials
 
 KILLED_AT = """
@@ -26,7 +26,7 @@ import os, signal, sys
 from pathlib import Path
 import tracking.tuning.parallel_episodes as work
 from tests.tuning_toys import toy_plan, tune_arguments
-from tracking.tuning import tune
+from tracking.tuning.search import tune
 played, attempt = 0, work._attempt
 def counted(*given):
     global played
