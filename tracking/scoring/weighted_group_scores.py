@@ -264,14 +264,14 @@ def _sums_of_groups(compared: GroupComparison, frames: Bools) -> FrameSums:
     i, j, frame = chosen.i[kept], chosen.j[kept], chosen.frame[kept]
     size, sums, every = len(frames), FrameSums(len(frames)), np.flatnonzero(frames)
     n, m, hits = (np.bincount(f, minlength=size)[every] for f in (true.rows.frame, est.rows.frame, frame))
+    distance = np.hypot(*(true.pos[i] - est.pos[j]).T)
+    sums.add_mean("MOTP", frame, distance)
+    sums.add_mean("MSE", frame, distance**2)
     for name, count in (("true", n), ("est", m), ("TP", hits)):
         sums.add(name, every, count)
     for name, good in zip(("right", "pure"), correct(compared, i, j), strict=True):
         sums.add(name, frame[good])
     sums.add("IDSW", switch_frames(frame, true.rows.id[i], est.rows.id[j]))
-    distance = np.hypot(*(true.pos[i] - est.pos[j]).T)
-    sums.add_mean("MOTP", frame, distance)
-    sums.add_mean("MSE", frame, distance**2)
     return sums
 
 
