@@ -45,8 +45,6 @@ GROUPING = partial(
     option, "What derives groups (default: belief), or a file of `tune grouping` or `fit grouping`.", None,
     metavar="rule|belief|FILE.toml")
 SEEDS = partial(option, "Seeds from A to B - 1, or one seed.", metavar="A:B")
-FIT_SEEDS = partial(option, "Seeds of the scenes to fit to.", "30000:30002", metavar="A:B")
-CHECK = partial(option, "Other seeds, to score the fit with.", None, metavar="A:B")
 Images = Literal["jpg", "png", "mp4"] | None
 Similarity = Literal["boxes", "ground", "image"] | None
 
@@ -287,8 +285,8 @@ class OverlayOptions:
     source: Path = SOURCE()
     tracks: Path | None = TRACKS()
     out: Path = FILE("Video to write; for several sequences, a folder.", metavar="FILE.mp4")
-    truth: Literal["beside", "over", "only"] | None = option(
-        "Draw the truth: beside the tracks, over the same picture, or only it. Without TRACKS always only it.", None)
+    truth: Literal["over"] | None = option(
+        "Draw the truth over the same picture. Without TRACKS it is drawn alone.", None)
     fps: float | None = FPS()
     px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
@@ -370,31 +368,9 @@ class FitGroupingOptions:
 
     names: list[str] = NAMES()
     out: Path = TOML("File to write, for --grouping.")
-    seeds: str = FIT_SEEDS()
+    seeds: str = option("Seeds of the scenes to fit to.", "30000:30002", metavar="A:B")
     events: list[str] = option(
         "Fit the log-odds of events to this scenario or suite. Can be given several times. Default: the NAMEs.", [],
         metavar="NAME", flag="--events")
-    check: str | None = CHECK()
-
-
-@dataclass(frozen=True, kw_only=True)
-class FitJointOptions:
-    """Learn the merges and splits of the tracker joint from simulated truth."""
-
-    names: list[str] = NAMES()
-    out: Path = TOML("File to write: parameters of joint, for --params.")
-    seeds: str = FIT_SEEDS()
-    check: str | None = CHECK()
-
-
-@dataclass(frozen=True, kw_only=True)
-class FitRelationalOptions:
-    """Learn the speed table and the relations of the tracker relational from simulated truth."""
-
-    names: list[str] = NAMES()
-    out: Path = TOML("File to write: parameters of relational, for --params.")
-    seeds: str = SEEDS(default="30000:30004")
-    observed: bool = option(
-        "Learn the speed table and the noise of positions from detections of successive frames, as the paper does; "
-        "no relations.", False)
+    check: str | None = option("Other seeds, to score the fit with.", None, metavar="A:B")
 # fmt: on

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import json
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, shortened
 from sim.io.files.atomic import write_file
@@ -53,11 +53,7 @@ class Outcome:
     traceback: str = ""  # of the failed tracker's own code, its last lines
 
 
-class PlayScenes(Protocol):
-    """A function that plays scenes."""
-
-    def __call__(self, scenes: Sequence[Tasks], /) -> Iterator[Sequence[Outcome]]:
-        """Yields the outcomes of the tasks of each scene, in order."""
+PlayScenes = Callable[[Sequence[Tasks]], Iterator[Sequence[Outcome]]]  # Yields the outcomes of each scene, in order.
 
 
 def contender(name: str, step_timeout: float | None = None) -> TunedTracker:

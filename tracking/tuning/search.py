@@ -93,6 +93,8 @@ class HeldOutEvaluator:
     def compared(self, config: Config) -> tuple[list[Comparison], list[str]]:
         """Returns the comparisons of the config with the defaults, suite by suite of the tests, and notes (texts)."""
         found, notes = list[Comparison](), list[str]()
+        keys = [goal.key for goal in self.plan.goals]
+        goals = [*self.plan.goals, *(Goal(key) for key in COMPARED_KEYS if key not in keys)]
         for name, sources in self.plan.tests.items():
             self.report(f"test on {name}")
             before = self._episodes(sources, self.plan.base, every_score=True)
@@ -102,13 +104,9 @@ class HeldOutEvaluator:
             if isinstance(after, FlockscopeError):
                 notes.append(f"{name}: cannot be played with the new parameters: {after.line()}")
                 continue
-            made = [compare_episodes(name, goal, before, after) for goal in self._compared_goals()]
+            made = [compare_episodes(name, goal, before, after) for goal in goals]
             found += [comparison for comparison in made if comparison is not None]
         return found, notes
-
-    def _compared_goals(self) -> list[Goal]:
-        keys = [goal.key for goal in self.plan.goals]
-        return [*self.plan.goals, *(Goal(key) for key in COMPARED_KEYS if key not in keys)]
 
     def _episodes(
         self, sources: Sequence[Source], config: Config, every_score: bool
@@ -160,7 +158,7 @@ RESULT_MARKS: Marks = {"settings": dict, "counts": dict, "taken_back": list}
 def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.trials, **options: Any) -> TuningResult:
     """Searches parameters on simulated scenes, and measures their gain on other scenes.
 
-    The same call resumes a search that was interrupted, if `out` or `storage` is given.
+    The same call resumes a search that was interrupted, if `out` is given.
 
     Args:
         tracker: A name, file.py:Class, module:Class, a class (then workers must be 1), or "grouping".
@@ -171,8 +169,8 @@ def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.
         The winner and its comparison with the defaults on the test scenes; with `out` written to files, too.
 
     Raises:
-        InputError: An option is unknown or wrong, options contradict each other, the study in the storage is about
-            another search, or Optuna is not installed.
+        InputError: An option is unknown or wrong, options contradict each other, the journal beside `out` is
+            about another search, or Optuna is not installed.
         WorkError: Workers are lost, or the tracker fails with its defaults.
     """
     given = {"tracker": tracker, "suite": suite, "trials": trials, **options}
@@ -186,10 +184,8 @@ def _search(options: TuneOptions) -> TuningResult:
     plan = search_plan(options)
     progress = options.progress or (lambda finished, trials, text: None)
     target = None if options.out is None else _checked_target(Path(options.out))
-    storage = options.storage if options.storage is not None or target is None else target.with_suffix(JOURNAL)
-    name = options.study or (target.stem if target is not None else "flockscope")
     with (
-        open_study(plan, storage, name) as study,
+        open_study(plan, None if target is None else target.with_suffix(JOURNAL)) as study,
         episode_player(plan.tracker, plan.detections, options.workers, options.cluster, options.similarity) as play,
     ):
         run_trials(study, play, progress)
@@ -292,7 +288,7 @@ def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report:
     comparisons, notes = evaluator.compared(config) if config != plan.base else ([], _why_defaults(candidates, goal))
     return TuningResult(
         plan, config, tuple(front), tuple(candidates), tuple(study.records()), importance, tuple(comparisons),
-        tuple(taken_back), (default.validation, values), tuple(notes), study.optuna.study_name,
+        tuple(taken_back), (default.validation, values), tuple(notes),
     )  # fmt: skip
 
 
