@@ -78,7 +78,7 @@ def _truth(folder: Path) -> None:
 
 
 def _study(folder: Path) -> None:
-    with open_study(study_plan(), folder / "study.journal") as study:
+    with open_study(study_plan(), folder / "study.journal", "damaged") as study:
         study.records()
         study.finished()
 

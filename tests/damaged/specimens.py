@@ -83,7 +83,7 @@ def _study(folder: Path) -> Path:
     from tracking.tuning.study import open_study
 
     folder.mkdir()
-    with open_study(study_plan(), folder / "study.journal") as study:
+    with open_study(study_plan(), folder / "study.journal", "damaged") as study:
         for value in (0.1, 0.2, 0.3):
             asked = study.ask()
             assert asked is not None

@@ -43,7 +43,10 @@ class TuneOptions:
         "Fixed values: gate=0.99 of the tracker, scenario.… and sensor.… of scenes.", (), metavar="K=V")
     only: Iterable[str] = option("Parameters to search; all tunable ones if absent.", (), metavar="A,B,…")
     out: str | Path | None = option(
-        "File for the parameters; figures, plots and the journal of trials lie beside it.", None, metavar="FILE.toml")
+        "File for the parameters; figures, plots and study lie beside it.", None, metavar="FILE.toml")
+    storage: str | Path | None = option(
+        "Journal file or Optuna URL of the study; beside --out if absent.", None, metavar="FILE|URL")
+    study: str | None = option("Name of the study in its storage; that of --out if absent.", None, metavar="NAME")
     workers: int = option("Processes that play episodes; results do not depend on it.", 1)
     cluster: str | None = option(
         "Scheduler of a dask cluster that plays the episodes.", None, metavar="tcp://HOST:PORT")

@@ -118,6 +118,7 @@ class TuningResult:
         taken_back: Names of parameters that the best trial changed and the winner does not.
         validation: Two tuples, of the defaults and of the winner: one value for each goal on the validation scenes.
         notes: Remarks for the reader.
+        study: Name of the study.
         left_out: A line for each scene whose script did not come true.
     """
 
@@ -131,6 +132,7 @@ class TuningResult:
     taken_back: tuple[str, ...] = ()
     validation: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     notes: tuple[str, ...] = ()
+    study: str = ""
     left_out: tuple[str, ...] = ()
 
     @property

@@ -158,7 +158,7 @@ RESULT_MARKS: Marks = {"settings": dict, "counts": dict, "taken_back": list}
 def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.trials, **options: Any) -> TuningResult:
     """Searches parameters on simulated scenes, and measures their gain on other scenes.
 
-    The same call resumes a search that was interrupted, if `out` is given.
+    The same call resumes a search that was interrupted, if `out` or `storage` is given.
 
     Args:
         tracker: A name, file.py:Class, module:Class, a class (then workers must be 1), or "grouping".
@@ -169,8 +169,8 @@ def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.
         The winner and its comparison with the defaults on the test scenes; with `out` written to files, too.
 
     Raises:
-        InputError: An option is unknown or wrong, options contradict each other, the journal beside `out` is
-            about another search, or Optuna is not installed.
+        InputError: An option is unknown or wrong, options contradict each other, the study in the storage is about
+            another search, or Optuna is not installed.
         WorkError: Workers are lost, or the tracker fails with its defaults.
     """
     given = {"tracker": tracker, "suite": suite, "trials": trials, **options}
@@ -184,8 +184,10 @@ def _search(options: TuneOptions) -> TuningResult:
     plan = search_plan(options)
     progress = options.progress or (lambda finished, trials, text: None)
     target = None if options.out is None else _checked_target(Path(options.out))
+    storage = options.storage if options.storage is not None or target is None else target.with_suffix(JOURNAL)
+    name = options.study or (target.stem if target is not None else "flockscope")
     with (
-        open_study(plan, None if target is None else target.with_suffix(JOURNAL)) as study,
+        open_study(plan, storage, name) as study,
         episode_player(plan.tracker, plan.detections, options.workers, options.cluster, options.similarity) as play,
     ):
         run_trials(study, play, progress)
@@ -288,7 +290,7 @@ def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report:
     comparisons, notes = evaluator.compared(config) if config != plan.base else ([], _why_defaults(candidates, goal))
     return TuningResult(
         plan, config, tuple(front), tuple(candidates), tuple(study.records()), importance, tuple(comparisons),
-        tuple(taken_back), (default.validation, values), tuple(notes),
+        tuple(taken_back), (default.validation, values), tuple(notes), study.optuna.study_name,
     )  # fmt: skip
 
 

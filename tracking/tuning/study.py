@@ -27,12 +27,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlparse
 
 import numpy as np
 import optuna
 from optuna.exceptions import UpdateFinishedTrialError
-from optuna.pruners import NopPruner
-from optuna.storages import JournalStorage
+from optuna.storages import BaseStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
@@ -53,7 +53,6 @@ from tracking.tuning.sampler import (
 )
 from tracking.tuning.search_plan import SearchPlan
 
-NAME = "flockscope"  # Of the study in its journal.
 SUFFIX = ".locks"  # What the name of the lock file adds to the name of the journal.
 CHOOSING, WRITING, FIRST_TRIAL = 0, 1, 2  # Bytes of the lock file.
 HEAD = b'{"op_code":'  # How every journal begins.
@@ -86,13 +85,21 @@ class TrialLocks:
         finally:
             self.release(byte)
 
+    def hold_trial(self, number: int) -> None:
+        """Locks trial `number` (from 0) for this process until `release_trial` or `close`."""
+        self.lock(FIRST_TRIAL + number)
+
+    def release_trial(self, number: int) -> None:
+        """Releases this process's lock on trial `number` (from 0); does nothing if it holds none."""
+        self.release(FIRST_TRIAL + number)
+
     def is_abandoned(self, number: int) -> bool:
         """Returns True if no other process holds the lock on trial `number` (from 0)."""
         try:
             self.lock(FIRST_TRIAL + number, wait=False)
         except OSError:
             return False
-        self.release(FIRST_TRIAL + number)
+        self.release_trial(number)
         return True
 
     def close(self) -> None:
@@ -147,11 +154,11 @@ class SearchStudy:
     A new study gets the defaults as its first trial. Without a journal file, `locks` is None.
     """
 
-    def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, path: Path | None) -> None:
+    def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, storage: object = None) -> None:
         self.plan, self.optuna, self._locks = plan, study, locks
         self._space = {p.name: distribution(p) for p in plan.space}
         with self._choosing():
-            _check_identity(plan, study, path)
+            _check_identity(plan, study, storage)
             if SETTINGS not in study.user_attrs:
                 study.set_user_attr(SETTINGS, plan.identity())
             if not study.get_trials(deepcopy=False):
@@ -165,18 +172,20 @@ class SearchStudy:
         """Returns the finished trials by number: complete, stopped early, or with impossible parameters."""
         return [t for t in self.trials() if t.state in FINISHED]
 
-    def ask(self) -> optuna.Trial | None:
-        """Returns the next trial to play, locked for this process; None if all that are planned were begun."""
+    def ask(self, retry_unfinished: bool = False) -> optuna.Trial | None:
+        """Returns the next trial to play, locked for this process."""
         with self._choosing():
             for t in self.trials():
-                if t.state == TrialState.RUNNING and self._locks is not None and self._locks.is_abandoned(t.number):
+                if t.state == TrialState.RUNNING and (
+                    retry_unfinished if self._locks is None else self._locks.is_abandoned(t.number)
+                ):
                     self._repeat(t)
             taken = [t for t in self.trials() if t.state in (*FINISHED, TrialState.RUNNING)]
             if len(taken) >= self.plan.options.trials:
                 return None
             trial = self.optuna.ask(self._space)
             if self._locks is not None:
-                self._locks.lock(FIRST_TRIAL + trial.number)
+                self._locks.hold_trial(trial.number)
             return trial
 
     def tell(self, trial: optuna.Trial, values: Sequence[float] | None) -> None:
@@ -184,7 +193,7 @@ class SearchStudy:
         state = TrialState.PRUNED if values is None else TrialState.COMPLETE
         self.optuna.tell(trial, values, state, skip_if_finished=True)
         if self._locks is not None:
-            self._locks.release(FIRST_TRIAL + trial.number)
+            self._locks.release_trial(trial.number)
 
     def place(self, trial: optuna.Trial) -> int:
         """Returns the place of a trial in the search, 0 for the defaults."""
@@ -220,6 +229,11 @@ class SearchStudy:
             warnings.simplefilter("ignore", UserWarning)
             return dict(get_param_importances(self.optuna, params=names, target=lambda t: sign * t.values[0]))
 
+    @property
+    def knows_running_trials(self) -> bool:
+        """True if it is known which running trials other processes still play."""
+        return self._locks is not None
+
     def _choosing(self) -> AbstractContextManager[None]:
         return nullcontext() if self._locks is None else self._locks.locked(CHOOSING)
 
@@ -233,33 +247,44 @@ class SearchStudy:
 
 
 @contextmanager
-def open_study(plan: SearchPlan, path: Path | None) -> Iterator[SearchStudy]:
-    """Opens or creates the study of a search for the time of the context; path: its journal, None: in memory."""
+def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Iterator[SearchStudy]:
+    """Opens or creates the study `name` for the time of the context, and yields it as a `SearchStudy`."""
     with quiet_optuna():
-        locks = None if path is None else TrialLocks(path.with_name(path.name + SUFFIX))
+        place = storage if storage is None or "://" in str(storage) else Path(storage)
+        locks = TrialLocks(place.with_name(place.name + SUFFIX)) if isinstance(place, Path) else None
         try:
-            yield SearchStudy(plan, _create(plan, path, locks), locks, path)
+            study = _create(plan, place, _optuna_storage(place, locks), name)
+            yield SearchStudy(plan, study, locks, storage)
         finally:
             if locks is not None:
                 locks.close()
 
 
-def _create(plan: SearchPlan, path: Path | None, locks: TrialLocks | None) -> optuna.Study:
-    several = len(plan.goals) > 1
-    pruner = NopPruner() if plan.options.prune == 0 or several else SignedRankPruner(plan.options.prune)
+def _create(plan: SearchPlan, place: str | Path | None, storage: BaseStorage | str | None, name: str) -> optuna.Study:
     try:
         return optuna.create_study(
-            storage=None if path is None or locks is None else JournalStorage(LockedJournal(path, locks)),
-            study_name=NAME, load_if_exists=True, sampler=HillClimbingSampler(plan), pruner=pruner,
-            directions=["maximize" if goal.higher else "minimize" for goal in plan.goals],
+            storage=storage, study_name=name, load_if_exists=True, sampler=HillClimbingSampler(plan),
+            pruner=_pruner(plan), directions=[_direction(goal) for goal in plan.goals],
         )  # fmt: skip
     except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         got = f"{type(error).__name__}: {error}".partition("\n")[0]
-        expected, remedy = "a journal that `flockscope tune` wrote", "choose another --out, or move the file away"
-        raise InputError(file=path, place="--out", got=got, expected=expected, remedy=remedy) from error
+        expected = "a storage that `flockscope tune` wrote"
+        raise InputError(
+            file=place, place="--storage", got=got, expected=expected, remedy="choose another --out or --storage"
+        ) from error
 
 
-def _check_identity(plan: SearchPlan, study: optuna.Study, path: Path | None) -> None:
+def _direction(goal: Goal) -> optuna.study.StudyDirection:
+    return optuna.study.StudyDirection.MAXIMIZE if goal.higher else optuna.study.StudyDirection.MINIMIZE
+
+
+def _pruner(plan: SearchPlan) -> optuna.pruners.BasePruner:
+    if plan.options.prune == 0 or len(plan.goals) > 1:
+        return optuna.pruners.NopPruner()
+    return SignedRankPruner(plan.options.prune)
+
+
+def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> None:
     mine, stored = plan.identity(), study.user_attrs.get(SETTINGS)
     if stored is None and not study.get_trials(deepcopy=False):
         return
@@ -268,10 +293,32 @@ def _check_identity(plan: SearchPlan, study: optuna.Study, path: Path | None) ->
     if different:
         key = different[0]
         raise InputError(
-            file=path, place="--out", got=f"another search: {', '.join(different)} differ",
+            file=storage, place=f"study {study.study_name}", got=f"another search: {', '.join(different)} differ",
             expected=f"{key} {stored.get(key)}, not {mine[key]}",
-            remedy="choose another --out, or repeat the command that began it",
+            remedy="choose another --out or --study, or repeat the command that began it",
         )  # fmt: skip
+
+
+def _optuna_storage(place: str | Path | None, locks: TrialLocks | None) -> BaseStorage | str | None:
+    from optuna.storages import GrpcStorageProxy, JournalStorage
+    from optuna.storages.journal import JournalRedisBackend
+
+    try:
+        if isinstance(place, Path):
+            assert locks is not None, "a journal file has locks"
+            return JournalStorage(LockedJournal(place, locks))
+        if place is not None and place.startswith("redis"):
+            return JournalStorage(JournalRedisBackend(place))
+        if place is not None and place.startswith("grpc://"):
+            url = urlparse(place)
+            return GrpcStorageProxy(host=url.hostname or "localhost", port=url.port or 13000)
+        return None if place is None else optuna.storages.RDBStorage(place)
+    except OSError:
+        raise
+    except Exception as error:
+        got = f"{type(error).__name__}: {error}".partition("\n")[0]
+        expected = "a journal file, or the URL of a storage that Optuna knows, with its driver installed"
+        raise InputError(file=place, place="--storage", got=got, expected=expected, remedy="check it") from error
 
 
 @contextmanager
@@ -294,15 +341,18 @@ LEAST_LOSS = 1e-12  # Least difference between the best value and the estimate o
 
 def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> None:
     """Plays trials until the study has as many finished ones as planned, by this process or by others."""
-    planned = study.plan.options.trials
-    while (finished := len(study.finished())) < planned:
-        progress(finished, planned, _best_so_far(study))
-        trial = study.ask()
+    retry_unfinished, planned = False, study.plan.options.trials
+    while True:
+        progress(len(study.finished()), planned, _best_so_far(study))
+        trial = study.ask(retry_unfinished)
         if trial is not None:
             _play_trial(study, trial, play)
+        elif len(study.finished()) >= planned:
+            return
+        elif study.knows_running_trials:
+            time.sleep(PAUSE)
         else:
-            time.sleep(PAUSE)  # other processes play the last trials
-    progress(finished, planned, _best_so_far(study))
+            retry_unfinished = True
 
 
 def _best_so_far(study: SearchStudy) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -36,13 +35,13 @@ def counted(*given):
     return attempt(*given)
 work._attempt = counted
 folder = Path(sys.argv[1])
-tune(**tune_arguments(folder), out=folder / "toy.toml")
+tune(**tune_arguments(folder), out=folder / sys.argv[3], storage=folder / "study.journal", study="toy")
 """
 
 
-def in_another_process(folder: Path, at: int) -> subprocess.Popen:
+def in_another_process(folder: Path, at: int, out: str = "toy.toml") -> subprocess.Popen:
     """The search, killed at its episode number `at`."""
-    line = [sys.executable, "-c", KILLED_AT, str(folder), str(at)]
+    line = [sys.executable, "-c", KILLED_AT, str(folder), str(at), out]
     return subprocess.Popen(line, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)})
 
 
@@ -99,24 +98,26 @@ def test_the_same_again_and_with_two_workers(found, tmp_path):
 def test_killed_and_gone_on(found, tmp_path, at):
     """SIGKILL in the first trial, in a later one; the journal's last line half-written; the same bytes in the end."""
     assert in_another_process(tmp_path, at).wait(120) == -signal.SIGKILL
-    journal = tmp_path / "toy.journal"
+    journal = tmp_path / "study.journal"
     with journal.open("ab") as file:
         file.write(b'{"op_code":5,"worker')
     assert not (tmp_path / "toy.toml").exists()
-    tune(**tune_arguments(tmp_path), out=tmp_path / "toy.toml")
+    tune(**tune_arguments(tmp_path), out=tmp_path / "toy.toml", storage=journal, study="toy")
     assert contents(tmp_path) == contents(found[1])
-    with open_study(toy_plan(tmp_path), journal) as study:
+    with open_study(toy_plan(tmp_path), journal, "toy") as study:
         assert len(study.finished()) == 12
         left = [t for t in study.trials() if t.state not in FINISHED]
         assert len(left) == 1
         assert [t.user_attrs[AGAIN] for t in study.trials() if AGAIN in t.user_attrs] == [left[0].number]
 
 
-def test_more_trials_go_on_where_it_ended(found, tmp_path):
-    folder = shutil.copytree(found[1], tmp_path / "copy")
-    more = tune(**tune_arguments(folder, trials=14, check=None), out=folder / "toy.toml")
+def test_more_trials_go_on_where_it_ended(found):
+    folder = found[1]
+    journal = (folder / "toy.journal").read_bytes()
+    more = tune(**tune_arguments(folder, trials=14, check=None), storage=folder / "toy.journal", study="toy")
     assert len(more.trials) == 14
     assert more.trials[:12] == found[0].trials
+    (folder / "toy.journal").write_bytes(journal)
 
 
 @pytest.mark.slow
@@ -124,7 +125,7 @@ def test_two_processes_share_a_journal(tmp_path):
     """The other one does all that this one is not at, and waits for it."""
     made = toy_plan(tmp_path)
     with (
-        open_study(made, tmp_path / "toy.journal") as study,
+        open_study(made, tmp_path / "study.journal", "toy") as study,
         episode_player(made.tracker, made.detections) as play,
     ):
         mine = study.ask()
@@ -149,7 +150,7 @@ OTHER_STUDIES = [
 def test_a_study_about_something_else_is_refused(found, change, word):
     folder = found[1]
     with pytest.raises(InputError, match=f"{word}.* differ"):
-        tune(**tune_arguments(folder, **change), out=folder / "toy.toml")
+        tune(**tune_arguments(folder, **change), storage=folder / "toy.journal", study="toy")
 
 
 def test_several_goals_give_a_front(tmp_path):

@@ -45,7 +45,7 @@ def test_every_default_can_be_tried(kind):
 
 
 def tried(folder, count: int, **more) -> list[dict]:
-    with open_study(toy_plan(folder, trials=count, **more), None) as study:
+    with open_study(toy_plan(folder, trials=count, **more), None, "x") as study:
         while (asked := study.ask()) is not None:
             possible = asked.params["forbidden"] <= 0.5
             study.tell(asked, [asked.params["reach"] - asked.params["skip"]] if possible else None)
@@ -59,7 +59,7 @@ def test_what_is_tried_follows_from_the_seed(tmp_path):
 
 def test_a_trial_moves_few_parameters_of_the_best(tmp_path):
     """The defaults, then three changes on the mean; every fourth trial later is TPE's and changes them all."""
-    with open_study(toy_plan(tmp_path, tracker="blob", trials=24), None) as study:
+    with open_study(toy_plan(tmp_path, tracker="blob", trials=24), None, "x") as study:
         while (asked := study.ask()) is not None:
             study.tell(asked, [0.5 if asked.number == 0 else 0.4])
         first, *others = (t.params for t in study.finished())
@@ -73,14 +73,14 @@ def test_a_trial_moves_few_parameters_of_the_best(tmp_path):
 def test_killed_between_two_lines(tmp_path):
     """However much of the journal was written: the study opens, and ends with as many trials as are wanted."""
     made = toy_plan(tmp_path, trials=2)
-    with open_study(made, tmp_path / "whole") as study:
+    with open_study(made, tmp_path / "whole", "x") as study:
         while (asked := study.ask()) is not None:
             study.tell(asked, [0.5])
     text = (tmp_path / "whole").read_bytes()
     for k in range(0, len(text), 397):
         path = tmp_path / f"cut-{k}"
         path.write_bytes(text[:k])
-        with open_study(made, path) as study:
+        with open_study(made, path, "x") as study:
             while (asked := study.ask()) is not None:
                 study.tell(asked, [0.5])
             told = study.records()
@@ -93,9 +93,9 @@ def test_killed_between_two_lines(tmp_path):
 def test_another_file_is_left_as_it_is(tmp_path, content):
     path = tmp_path / "precious"
     path.write_bytes(content)
-    with pytest.raises(InputError, match="no journal") as caught, open_study(toy_plan(tmp_path), path):
+    with pytest.raises(InputError, match="no journal") as caught, open_study(toy_plan(tmp_path), path, "x"):
         pass
-    assert "--out" in str(caught.value)
+    assert "--storage" in str(caught.value)
     assert path.read_bytes() == content
 
 
@@ -103,7 +103,7 @@ def test_a_lock_lives_as_long_as_its_process(tmp_path):
     path = tmp_path / "locks"
     hold = (
         "import sys; from pathlib import Path; from tracking.tuning.study import TrialLocks\n"
-        "locks = TrialLocks(Path(sys.argv[1])); locks.lock(9); print('held', flush=True); sys.stdin.read()"
+        "locks = TrialLocks(Path(sys.argv[1])); locks.hold_trial(7); print('held', flush=True); sys.stdin.read()"
     )
     other = subprocess.Popen(
         [sys.executable, "-c", hold, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
@@ -122,9 +122,9 @@ def test_a_lock_lives_as_long_as_its_process(tmp_path):
 @pytest.mark.parametrize("what", ["sources", "numpy"])
 def test_a_study_is_of_one_version(tmp_path, monkeypatch, what):
     made = toy_plan(tmp_path)
-    with open_study(made, tmp_path / "j") as study:
+    with open_study(made, tmp_path / "j", "x") as study:
         study.tell(study.ask(), [0.1])
     other = {**runtime(), what: "another"}
     monkeypatch.setattr("tracking.tuning.search_plan.runtime", lambda: other)
-    with pytest.raises(InputError, match="another search: versions differ"), open_study(made, tmp_path / "j"):
+    with pytest.raises(InputError, match="another search: versions differ"), open_study(made, tmp_path / "j", "x"):
         pass

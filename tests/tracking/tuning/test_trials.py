@@ -35,7 +35,7 @@ class Game:
 def played(tmp_path, game=None, **more):
     made = toy_plan(tmp_path, **{"seeds": range(12), "trials": 12, "only": ["skip"], **more})
     told = []
-    with open_study(made, None) as study:
+    with open_study(made, None, "x") as study:
         run_trials(study, game or Game(), lambda *now: told.append(now))
         return study.records(), told
 
@@ -105,9 +105,9 @@ def test_trackers_that_draw_do_so_by_the_source(tmp_path: Path) -> None:
 def test_errors_of_who_plays_say_nothing_of_the_parameters(tmp_path):
     """The search ends; going on plays the trial that was interrupted again, and finds what it would have found."""
     made = toy_plan(tmp_path, seeds=range(12), trials=6, only=["skip"])
-    with open_study(made, tmp_path / "j") as study, pytest.raises(WorkError, match="a worker that died"):
+    with open_study(made, tmp_path / "j", "x") as study, pytest.raises(WorkError, match="a worker that died"):
         run_trials(study, Game(dies=20), lambda *now: None)
-    with open_study(made, tmp_path / "j") as study:
+    with open_study(made, tmp_path / "j", "x") as study:
         begun = study.trials()
         assert [t.state.name for t in begun][-1] == "RUNNING"
         assert 0 < len(study.records()) < len(begun)
