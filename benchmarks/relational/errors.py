@@ -15,13 +15,13 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
+from tracking.fitting.relational import LABELS
 from tracking.papers.relational.config import ParticleConfig
 from tracking.running.prepare import prepare
 from tracking.running.tracker_registry import find
 from tracking.stats import mean_interval, paired
 
 FILTERS = ("particle", "relational")
-VISIBLE = ("sensor.detect_prob=1", "sensor.occlusion_power=0", "sensor.clutter_rate=0")
 DIFFERENCE = "relational − particle"
 PRESETS = {"paper": "paper", "default": None}
 HIDDEN = 0.2
@@ -76,8 +76,7 @@ def run(name: str, config: ParticleConfig, seed: int, sequence: Sequence) -> lis
 def particles(given: argparse.Namespace) -> None:
     """Prints a table for each scene: rows are numbers of particles, columns the errors of both filters."""
     panels = []
-    wanted = given.entry.split(",") if given.entry else ()
-    for entry in (e for e in resolve("suite:occlusion", VISIBLE) if not wanted or e.name in wanted):
+    for entry in (e for e in resolve("suite:occlusion", LABELS) if not given.entry or e.name in given.entry.split(",")):
         scenes = [simulate(entry.scenario, seed, 0, ()) for seed in given.seeds]
         print(f"\n{entry.name}: error per person and frame, m; seeds {given.seeds.start}:{given.seeds.stop}, "
               f"filter seeds {given.filter_seeds.start}:{given.filter_seeds.stop}")  # fmt: skip

@@ -32,6 +32,8 @@ COMMANDS: dict[str, tuple[Any, str]] = {
     "replay": (options.ReplayCommandOptions, "datasets:replay"),
     "fit sensor": (options.FitSensorOptions, "fit:fit_sensor"),
     "fit grouping": (options.FitGroupingOptions, "fit:fit_grouping"),
+    "fit joint": (options.FitJointOptions, "fit:fit_joint"),
+    "fit relational": (options.FitRelationalOptions, "fit:fit_relational"),
     "view": (options.ViewOptions, "view:view"),
     "sheet": (options.SheetOptions, "view:sheet"),
     "overlay": (options.OverlayOptions, "view:overlay"),

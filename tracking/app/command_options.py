@@ -45,6 +45,8 @@ GROUPING = partial(
     option, "What derives groups (default: belief), or a file of `tune grouping` or `fit grouping`.", None,
     metavar="rule|belief|FILE.toml")
 SEEDS = partial(option, "Seeds from A to B - 1, or one seed.", metavar="A:B")
+FIT_SEEDS = partial(option, "Seeds of the scenes to fit to.", "30000:30002", metavar="A:B")
+CHECK = partial(option, "Other seeds, to score the fit with.", None, metavar="A:B")
 Images = Literal["jpg", "png", "mp4"] | None
 Similarity = Literal["boxes", "ground", "image"] | None
 
@@ -368,9 +370,31 @@ class FitGroupingOptions:
 
     names: list[str] = NAMES()
     out: Path = TOML("File to write, for --grouping.")
-    seeds: str = option("Seeds of the scenes to fit to.", "30000:30002", metavar="A:B")
+    seeds: str = FIT_SEEDS()
     events: list[str] = option(
         "Fit the log-odds of events to this scenario or suite. Can be given several times. Default: the NAMEs.", [],
         metavar="NAME", flag="--events")
-    check: str | None = option("Other seeds, to score the fit with.", None, metavar="A:B")
+    check: str | None = CHECK()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitJointOptions:
+    """Learn the merges and splits of the tracker joint from simulated truth."""
+
+    names: list[str] = NAMES()
+    out: Path = TOML("File to write: parameters of joint, for --params.")
+    seeds: str = FIT_SEEDS()
+    check: str | None = CHECK()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitRelationalOptions:
+    """Learn the speed table and the relations of the tracker relational from simulated truth."""
+
+    names: list[str] = NAMES()
+    out: Path = TOML("File to write: parameters of relational, for --params.")
+    seeds: str = SEEDS(default="30000:30004")
+    observed: bool = option(
+        "Learn the speed table and the noise of positions from detections of successive frames, as the paper does; "
+        "no relations.", False)
 # fmt: on

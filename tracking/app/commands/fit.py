@@ -1,16 +1,19 @@
-"""`flockscope fit`: the errors of a detector, from recordings, and the belief of who belongs together."""
+"""`flockscope fit`: the errors of a detector, from recordings; and from simulated truth the belief of who belongs
+together, the events of `joint`, and the speed table and relations of `relational`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from scenarios.errors import printable
 from sim.types import Sequence as Recording
+from sim.types import Truth
 from tracking.app import option_parsing
-from tracking.app.command_options import FitGroupingOptions, FitSensorOptions
+from tracking.app.command_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.command_result import CommandResult
 
 # Seeds of the simulated detections whose statistics are shown beside the measured ones.
@@ -64,19 +67,87 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     from tracking.fitting.grouping_scenes import pair_scenes
 
     out = option_parsing.output_file(options.out, ".toml")
-    given = {"fitted": ("--seeds", options.seeds), "checked": ("--check", options.check)}
-    seeds = {key: option_parsing.seeds(text, option) for key, (option, text) in given.items() if text is not None}
+    seeds = _fit_and_check_seeds(options.seeds, options.check)
     samples = {key: sample_of(list(pair_scenes(options.names, numbers))) for key, numbers in seeds.items()}
     changes = sample_of(list(pair_scenes(options.events, seeds["fitted"]))) if options.events else None
     belief = fit_belief(samples["fitted"], changes)
     scores = {key: belief_scores(sample, belief.log_odds(sample.values)[:, 0]) for key, sample in samples.items()}
     asked = [f"--events {name}" for name in options.events]
     words = " ".join(["flockscope fit grouping", *options.names, f"--seeds {options.seeds}", *asked])
-    lines = [
+    lines = _score_lines(seeds, scores)
+    write_file(out, belief.toml_text("\n".join([words, *lines])).encode())
+    text = "\n".join([*lines, f"→ {out}: use it as --grouping {out}"])
+    return CommandResult({"file": out, **scores}, text)
+
+
+def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]]:
+    from scenarios.loading.resolve import resolve
+    from tracking.fitting.grouping_scenes import simulated
+
+    entries = [entry for name in names for entry in resolve(name)]
+    return ((seed, simulated(entry, seed)) for entry in entries for seed in seeds)
+
+
+def _fit_and_check_seeds(fitted: str, checked: str | None) -> dict[str, range]:
+    """Returns the seeds of --seeds under "fitted" and, if given, those of --check under "checked"."""
+    asked = {"fitted": ("--seeds", fitted), "checked": ("--check", checked)}
+    return {key: option_parsing.seeds(text, option) for key, (option, text) in asked.items() if text is not None}
+
+
+def _score_lines(seeds: Mapping[str, range], scores: Mapping[str, Mapping[str, float]]) -> list[str]:
+    return [
         f"{key}, seeds {numbers.start}:{numbers.stop}: "
         + ", ".join(f"{name} {value:.4g}" for name, value in scores[key].items())
         for key, numbers in seeds.items()
     ]
-    write_file(out, belief.toml_text("\n".join([words, *lines])).encode())
-    text = "\n".join([*lines, f"→ {out}: use it as --grouping {out}"])
-    return CommandResult({"file": out, **scores}, text)
+
+
+def fit_joint(options: FitJointOptions) -> CommandResult:
+    """Writes the fitted weights of the event classifier as a TOML file, with command and scores as comments."""
+    from sim.io.files.atomic import write_file
+    from tracking.fitting.joint_events import EventRows, event_rows, event_scores, fit_events
+    from tracking.papers.joint.config import EVENT_TIME
+
+    out = option_parsing.output_file(options.out, ".toml")
+    seeds = _fit_and_check_seeds(options.seeds, options.check)
+    rows = {
+        key: EventRows.joined(event_rows(truth, EVENT_TIME, seed) for seed, truth in _simulated(options.names, numbers))
+        for key, numbers in seeds.items()
+    }
+    params = fit_events(rows["fitted"])
+    scores = {key: event_scores(part, params) for key, part in rows.items()}
+    words = " ".join(["flockscope fit joint", *options.names, f"--seeds {options.seeds}"])
+    lines = _score_lines(seeds, scores)
+    body = [f"{name} = {value}" for name, value in params.items()]
+    text = "\n".join([*(f"# {line}" for line in (words, *lines)), 'tracker = "joint"', "", "[params]", *body, ""])
+    write_file(out, text.encode())
+    result = "\n".join([*lines, "", *body, "", f"→ {out}: use it as --params {out}"])
+    return CommandResult({"file": out, "params": params, **scores}, result)
+
+
+def fit_relational(options: FitRelationalOptions) -> CommandResult:
+    """Writes the fitted parameters of `relational` as a TOML file."""
+    from scenarios.loading.resolve import resolve
+    from sim.io.files.atomic import write_file
+    from sim.sequence import simulate
+    from tracking.fitting import relational
+    from tracking.papers.relational.config import RelationalConfig
+
+    out, seeds = option_parsing.output_file(options.out, ".toml"), option_parsing.seeds(options.seeds)
+    params: dict[str, float | list[float]]
+    if options.observed:
+        entries = [entry for name in options.names for entry in resolve(name, relational.LABELS)]
+        scenes = (simulate(entry.scenario, seed, entry.repeat, ()) for entry in entries for seed in seeds)
+        ends = relational.PAPER_ENDS
+        params = {"speed_ends": list(ends), **relational.fit_observed(scenes, ends)}
+    else:
+        truths = (truth for _, truth in _simulated(options.names, seeds))
+        params = relational.fit_relational(truths, RelationalConfig().speed_ends)
+    config = RelationalConfig.from_dict(dict(params), out)
+    write_file(out, config.to_toml().encode())
+    width, body = max(map(len, params)), config.as_dict()
+    lines = [
+        f"{name:<{width}}  {np.round(np.array(body[name]), 4)}  {RelationalConfig.known(name).unit}" for name in params
+    ]
+    lines += ["", f"→ {out}: use it as --params {out}"]
+    return CommandResult({"file": out, "params": params}, "\n".join(lines))
