@@ -1,14 +1,17 @@
 """Boxes of a detector in a file of their own, put on the pictures of a video or of another sequence.
 
 The file is a MOT text (det.txt), a table whose first line names its columns, or the JSON of COCO results: a list of
-objects with image_id (the frame, from 1), category_id, bbox [left, top, width, height] and score.
+objects with image_id (the frame, from 1), category_id, bbox [left, top, width, height] and score. A table may have
+times in place of frames: each belongs to the nearest frame.
 """
 
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +27,8 @@ from sim.io.formats.options import NO_OPTIONS, BoxOptions
 from sim.types import Array, Frame, Ints, Sequence
 
 COLUMNS = "frame (image_id), -1, left, top, width, height, score, class (category_id)"
+SAME = 1e-3  # s: boxes of one picture have times that differ by at most this.
+HALF = 0.5 + 1e-6  # frames: a time belongs to a frame that is so near; times may be rounded.
 OUTSIDE = 1.1  # Boxes that end farther right or lower than this share of the picture are of another picture size.
 
 
@@ -35,7 +40,8 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     if path.suffix.lower() == ".json":
         table = table_of_rows(_coco_results(path), box_scale=options.box_scale)
     else:
-        table = read_table(path, boxless=True, box_scale=options.box_scale)
+        frames_at = partial(_frames_at, path, sequence)
+        table = read_table(path, boxless=True, box_scale=options.box_scale, frames_at=frames_at)
     mot_text.require_classes(table, options.person_class)
     found = mot_text.detections_of_table(table, options)
     if not len(found.frame):
@@ -69,6 +75,29 @@ def _frames_of_pictures(number: Ints, sequence: Sequence) -> Ints:
     before, rest = np.divmod(number - origin, step)
     like_files = number.max() > (sequence.length or np.inf) and not rest.any() and before.min() >= 0
     return before + 1 if like_files else number
+
+
+def _frames_at(path: Path, sequence: Sequence, seconds: Array) -> Ints:
+    """Returns the frames (N,) from 1 of times (N,): the nearest within half a frame, 0 if none or of a nearer time."""
+    times = np.array([frame.t for frame in sequence.without_pictures()])
+    k = np.searchsorted((times[1:] + times[:-1]) / 2, seconds)
+    away = np.abs(seconds - times[k])
+    # Pictures that the detector saw between two frames would give a person two boxes in one frame.
+    order = np.lexsort((seconds, away, k))
+    frames, first = np.unique(k[order], return_index=True)
+    nearest = seconds[order[first]][np.searchsorted(frames, k)]
+    near = away <= HALF / sequence.fps
+    fits = near & (np.abs(seconds - nearest) <= SAME)
+    out = f"{(~fits).sum()} of {len(fits)} boxes have times of no frame, or of one that has nearer ones"
+    if len(near) and near.mean() < 0.5:
+        raise InputError(
+            file=path, place="times", got=f"{seconds.min():g} to {seconds.max():g} s: {out}",
+            expected=f"times of {len(times)} frames, {times[0]:g} to {times[-1]:g} s",
+            remedy="give seconds since the first frame, and the recording's --fps",
+        )  # fmt: skip
+    if not fits.all():
+        warnings.warn(f"{path}: {out}, and are left out", stacklevel=2)
+    return np.where(fits, k + 1, 0)
 
 
 def _check_size(path: Path, box: Array, size: tuple[int, int]) -> None:

@@ -118,6 +118,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 # meaning of a column, and the names it may have
 NAMES = {
     "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_index"),
+    "time": ("t", "t_s", "time", "time_s", "timestamp"),
     "id": ("id", "track_id", "trackid", "person_id", "ped_id", "target_id"),
     "score": ("score", "conf", "confidence"),
     "class": ("class", "class_id", "cls", "category", "category_id", "object_category"),
@@ -139,9 +140,11 @@ WORD_NAMES = ("label", "name", "class_name")
 
 PEOPLE = ("person", "pedestrian")  # words for the class of people
 
+FramesAt = Callable[[Column], Ints]  # frames (N,) from 1 of times (N,), s; 0: of no frame
 
 EXPECTED = (
-    "frame and a box (x,y,w,h, left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), or frame,id,x,y in m (x_cm,y_cm in cm)"
+    "frame (or, for --boxes, t in s) and a box (x,y,w,h, left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), "
+    "or frame,id,x,y in m (x_cm,y_cm in cm)"
 )
 
 
@@ -157,7 +160,7 @@ def column_names(path: Path) -> list[str] | None:
     return cells if any(cells) and not line.startswith("#") and not any(map(is_number_text, cells)) else None
 
 
-def read_named(path: Path, names: list[str]) -> tuple[NumericTable, Ints | None]:
+def read_named(path: Path, names: list[str], frames_at: FramesAt | None = None) -> tuple[NumericTable, Ints | None]:
     """Reads a text with named columns as 8 or 10 columns of a MOTChallenge text, or as 4: frame, id, x, y in m.
 
     frames_at: frames of times, if a column of times may stand in place of one of frames; rows of no frame are left out.
@@ -169,6 +172,8 @@ def read_named(path: Path, names: list[str]) -> tuple[NumericTable, Ints | None]
         if words and name in NAMES["class"]:
             continue
         meaning = next((key for key, some in NAMES.items() if name in some), None)
+        if meaning == "time" and (frames_at is None or not set(NAMES["frame"]).isdisjoint(names)):
+            continue
         if meaning in found:
             _refuse(path, names)
         if meaning is not None:
@@ -180,6 +185,12 @@ def read_named(path: Path, names: list[str]) -> tuple[NumericTable, Ints | None]
         rows = replace(rows, values=np.column_stack([rows.values, code]), classes=tuple(classes.tolist()))
         found["class"] = word_column
         use.append(word_column)
+    if "time" in found and frames_at is not None:
+        found["frame"] = found.pop("time")
+        k = use.index(found["frame"])
+        numbers = frames_at(rows.values[:, k])
+        rows.values[:, k] = numbers
+        rows = replace(rows, values=rows.values[numbers > 0], line=rows.line[numbers > 0])
 
     def column(name: str, default: float = -1.0) -> Column:
         return rows.values[:, use.index(found[name])] if name in found else np.full(len(rows.line), default)
@@ -262,16 +273,17 @@ class MotTable:
 
 
 def read_table(
-    path: Path, *, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None
-) -> MotTable:
+    path: Path, *, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None,
+    frames_at: FramesAt | None = None,
+) -> MotTable:  # fmt: skip
     """Reads a MOTChallenge text of 6 to 10 columns, or of 4: frame, id, x, y in m.
 
     length: the last frame allowed. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors that make the
-    boxes pixels. Rows stay in the order of the file.
+    boxes pixels. frames_at: as `read_named` takes it. Rows stay in the order of the file.
     """
     named = column_names(path)
     if named is not None:
-        rows, group = read_named(path, named)
+        rows, group = read_named(path, named, frames_at)
         return table_of_rows(rows, length, boxless, box_scale, group)
     rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS, layout=LAYOUT)
     reject_missing_ids(rows)

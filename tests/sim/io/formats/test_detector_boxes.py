@@ -1,6 +1,7 @@
 """Boxes of a detector beside a video: both forms give the same tracks, and what does not fit is refused."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scenarios.errors import InputError
 from sim.io.formats.detector_boxes import with_boxes
 from sim.io.formats.options import BoxOptions
 from sim.io.source import open_source
+from sim.types import Frame
 from tests.recordings import mot_folder
 from tests.small_videos import picture, write_video
 from tracking.app.cli import run
@@ -67,6 +69,51 @@ def test_tracks_of_boxes_on_a_video(tmp_path, video, capsys):
     assert run([*command, "--detections", "image", "--out", str(tmp_path / "b")]) == 2
 
 
+def timed(path, times, name="t"):
+    rows = [f"{t},{x},{y},{w},{h}" for t, (_, x, y, w, h, _) in zip(times, ROWS, strict=True)]
+    path.write_text("\n".join([f"{name},left,top,width,height", *rows]))
+    return path
+
+
+@pytest.mark.parametrize("name", ["t", "time", "timestamp"])
+def test_times_belong_to_the_nearest_frame(tmp_path, plain, name):
+    times = [frame.t + off / plain.fps for frame, off in zip(plain, [0.4, -0.4] * 6, strict=True)]
+    for frame in with_boxes(plain, timed(tmp_path / "det.csv", times, name)):
+        assert frame.detections.box.tolist() == [list(ROWS[frame.index - 1][1:5])]
+
+
+def test_times_of_frames_at_a_varying_rate(tmp_path, plain):
+    times = (np.arange(12) + np.arange(12) ** 2 / 8) / plain.fps
+    varying = replace(plain, bare=lambda: (Frame(k, t) for k, t in enumerate(times, 1)))
+    for frame in with_boxes(varying, timed(tmp_path / "det.csv", times)):
+        assert frame.detections.box.tolist() == [list(ROWS[frame.index - 1][1:5])]
+
+
+def test_times_of_no_frame_are_left_out(tmp_path, plain):
+    step = 1 / plain.fps
+    # before and after the video, and a second picture of frame 5
+    times = [-step, *(k * step for k in range(1, 10)), 4.3 * step, 20 * step]
+    with pytest.warns(UserWarning, match="3 of 12 boxes have times of no frame, or of one that has nearer"):
+        found = with_boxes(plain, timed(tmp_path / "det.csv", times))
+    assert [len(frame.detections.box) for frame in found] == [0, *[1] * 9, 0, 0]
+    with pytest.raises(InputError, match=r"\d+ of 12 boxes have times of no frame.* expected times of 12 frames"):
+        with_boxes(plain, timed(tmp_path / "det.csv", np.arange(12) * 1000 * step))  # milliseconds
+
+
+def test_of_more_pictures_than_frames_the_nearest_count(tmp_path, plain):
+    with pytest.warns(UserWarning, match="8 of 12 boxes have times of no frame, or of one that has nearer"):
+        found = with_boxes(plain, timed(tmp_path / "det.csv", np.arange(12) / 4 / plain.fps))
+    assert sum(len(frame.detections.box) for frame in found) == 4
+
+
+def test_frames_are_used_if_there_are_times_too(tmp_path, plain):
+    path = tmp_path / "det.csv"
+    path.write_text("t,frame,left,top,width,height\n99,3,10,20,12,30\n")
+    with pytest.warns(UserWarning, match="not used: t"):
+        found = with_boxes(plain, path)
+    assert [len(frame.detections.box) for frame in found] == [0, 0, 1, *[0] * 9]
+
+
 @pytest.mark.filterwarnings("ignore:.*are taken as frames")
 @pytest.mark.parametrize("numbers", [(1, 2, 3), (4, 10, 16)])
 def test_boxes_may_be_numbered_like_the_pictures(tmp_path, numbers):
@@ -86,7 +133,7 @@ MISFITS = [
     ("det.json", results([(1e300, *ROWS[0][1:])]), "result 1: .* a whole number"),
     ("det.json", results([("1.jpg", *ROWS[0][1:])]), 'result 1: got {"image_id": "1.jpg"'),
     ("det.json", results([(k, x / 320, y / 240, w / 320, h / 240, s) for k, x, y, w, h, s in ROWS]), "expected pixels"),
-    ("det.json", "[]", "no box"), ("det.txt", "", "no box"),
+    ("det.json", "[]", "no box"), ("det.txt", "", "no box"), ("det.csv", "t,left,top,width,height\n", "no box"),
     ("det.json", "[" * 100_000, "deeper nesting"),
     ("det.json", '[{"image_id": NaN}]', "NaN, which is no number of JSON"),
     ("det.json", "{}", "no list"),
