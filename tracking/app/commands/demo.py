@@ -9,7 +9,8 @@ import math
 import os
 import re
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from html import escape
 from itertools import zip_longest
@@ -17,7 +18,7 @@ from pathlib import Path
 
 from scenarios.errors import printable
 from sim.io.files.own_files import GENERATOR, output_path
-from sim.types import DetectionMode, Sequence
+from sim.types import Array, DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
@@ -211,9 +212,9 @@ def demo(options: DemoOptions) -> CommandResult:
     start, out, quick = time.monotonic(), options.out, options.quick
     refuse_foreign_file(option_parsing.output_folder(out) / "index.html")
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
-    workers = os.cpu_count() or 1
-    with ProgressMeter("generate") as meter:
-        count = WorkerOptions(1 if quick else workers)
+    workers = 1 if quick else os.cpu_count() or 1
+    with ProgressMeter("generate") as meter, _compiled_meanwhile() if quick else nullcontext():
+        count = WorkerOptions(workers)
         folders = generate(names, seeds, out / "data", workers=count, progress=meter.update, streams=())
         settings = QUICK_PIXEL_SETTINGS if quick else ()
         (rendered,) = generate(
@@ -249,6 +250,64 @@ def demo(options: DemoOptions) -> CommandResult:
     text += [f"{time.monotonic() - start:.0f} s; open this page:", str(page.resolve())]
     data = {section.title: summary(section.rows) for section in sections}
     return CommandResult({"sequences": len(sequences), "scores": data, "page": page}, "\n".join(text))
+
+
+@contextmanager
+def _compiled_meanwhile() -> Iterator[None]:
+    """Compiles the kernels of QUICK_TRACKERS in another process, which the end of the block waits for."""
+    from sim.workers.pool import WorkerProcess
+
+    worker = WorkerProcess()
+    try:
+        # One processor would take longer: a second process imports everything again.
+        if (os.cpu_count() or 1) > 1:
+            worker.send(_compile, _made_up_people)
+        yield
+        worker.receive()
+    finally:
+        worker.terminate()
+        worker.join()
+
+
+def _compile(make: Callable[[], Sequence]) -> None:
+    for tracker, mode in zip(QUICK_TRACKERS, ("image", "file"), strict=True):
+        TrackerSetup(tracker, detections=mode).run(make())
+
+
+def _made_up_people() -> Sequence:
+    """Returns pictures and points of two people side by side and one apart, all that a tracker needs to call its
+    kernels, with the types of simulated sequences."""
+    import numpy as np
+
+    from sim.scene.camera import camera_rotation, project, px_per_m_at_centre
+    from sim.types import Camera, Detections, Frame, Image
+
+    wide, high, fps = 320, 240, 5.0
+    position, rotation = np.array([0.0, -10.0, 6.0]), camera_rotation(0.6, 0.0)
+    camera = Camera("pinhole", (wide, high), (250.0, 250.0), (wide / 2, high / 2), position, rotation)
+    r = np.random.default_rng(0)
+    ground = r.integers(90, 170, (high, wide, 1))
+    walks = [np.array([[x - 3.0, 0.0], [x - 2.75, 0.0], [3.0 - x, 2.0]]) for x in np.linspace(0.0, 5.0, 16)]
+
+    def picture(people: Iterable[Array] = ()) -> Image:
+        image = ground + r.normal(0.0, 2.0, (high, wide, 3))
+        for x, y in people:
+            (u, foot), (_, head) = project(camera, np.array([[x, y, 0.0], [x, y, 1.75]]))[0]
+            half = 0.13 * (foot - head)
+            image[int(head) : int(foot), int(u - half) : int(u + half)] = 20, 20, 150
+        made: Image = image.clip(0, 255).astype(np.uint8)
+        made.setflags(write=False)
+        return made
+
+    def frames() -> Iterator[Frame]:
+        for k, pos in enumerate(walks):
+            yield Frame(k + 1, k / fps, picture(pos), None, Detections(k + 1, k / fps, "ground", pos))
+
+    return Sequence(
+        "made-up", fps, len(walks), frames, image_size=camera.image, camera=camera, has_images=True,
+        has_detections=True, px_per_m=px_per_m_at_centre(camera),
+        load_background=lambda: np.stack([picture() for _ in range(12)]),
+    )  # fmt: skip
 
 
 def _run(jobs: list[_TrackJob], workers: int) -> dict[_TrackJob, list[TrackingRun]]:
