@@ -189,7 +189,7 @@ QUICK_SCENES, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
 QUICK_TRACKERS = ("blob", "group-pda")  # one that reports people, one that reports groups
 PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)  # The scene that is rendered and tracked from its pictures.
 
-QUICK_PIXEL_SETTINGS = ("camera.fps=5",)  # What --quick changes in that scene.
+QUICK_PIXEL_SETTINGS = ("camera.fps=5", "camera.image=[480,360]")  # What --quick changes in that scene.
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,27 +213,28 @@ def demo(options: DemoOptions) -> CommandResult:
     refuse_foreign_file(option_parsing.output_folder(out) / "index.html")
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     workers = 1 if quick else os.cpu_count() or 1
-    with ProgressMeter("generate") as meter, _compiled_meanwhile() if quick else nullcontext():
-        count = WorkerOptions(workers)
-        folders = generate(names, seeds, out / "data", workers=count, progress=meter.update, streams=())
-        settings = QUICK_PIXEL_SETTINGS if quick else ()
-        (rendered,) = generate(
-            [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
-        )  # fmt: skip
-    sequences = [open_source(folder)[0] for folder in folders]
-    trackers = QUICK_TRACKERS if quick else tracker_registry.names()
-    of_pixels = QUICK_TRACKERS[:1] if quick else [n for n in trackers if "pixels" in tracker_registry.find(n).needs]
-    image_jobs = [
-        _TrackJob(name, "image", [rendered], out / "tracks" / f"{name}-image", _pictures(out) / f"{name}.mp4")
-        for name in of_pixels
-    ]
-    half = len(trackers) // 2
-    file_jobs = [
-        _TrackJob(name, "file", folders, out / "tracks" / name) for name in (*trackers[half:], *trackers[:half])
-    ]
-    # Neighbours are of different trackers: two that run at once need not compile the same.
-    jobs = [job for two in zip_longest(image_jobs, file_jobs) for job in two if job is not None]
-    runs = _run(jobs, workers)
+    with _compiled_ahead() if quick else nullcontext(_tracked) as tracked:
+        with ProgressMeter("generate") as meter:
+            count = WorkerOptions(workers)
+            folders = generate(names, seeds, out / "data", workers=count, progress=meter.update, streams=())
+            settings = QUICK_PIXEL_SETTINGS if quick else ()
+            (rendered,) = generate(
+                [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
+            )  # fmt: skip
+        sequences = [open_source(folder)[0] for folder in folders]
+        trackers = QUICK_TRACKERS if quick else tracker_registry.names()
+        of_pixels = QUICK_TRACKERS[:1] if quick else [n for n in trackers if "pixels" in tracker_registry.find(n).needs]
+        image_jobs = [
+            _TrackJob(name, "image", [rendered], out / "tracks" / f"{name}-image", _pictures(out) / f"{name}.mp4")
+            for name in of_pixels
+        ]
+        half = len(trackers) // 2
+        file_jobs = [
+            _TrackJob(name, "file", folders, out / "tracks" / name) for name in (*trackers[half:], *trackers[:half])
+        ]
+        # Neighbours are of different trackers: two that run at once need not compile the same.
+        jobs = [job for two in zip_longest(image_jobs, file_jobs) for job in two if job is not None]
+        runs = _run(jobs, workers, tracked)
     from_points, from_pixels = (
         {j.tracker: runs[j] for j in jobs if j.detections == mode} for mode in ("file", "image")
     )
@@ -253,25 +254,33 @@ def demo(options: DemoOptions) -> CommandResult:
 
 
 @contextmanager
-def _compiled_meanwhile() -> Iterator[None]:
-    """Compiles the kernels of QUICK_TRACKERS in another process, which the end of the block waits for."""
+def _compiled_ahead() -> Iterator[Callable[[_TrackJob], list[TrackingRun]]]:
+    """Compiles the kernels of QUICK_TRACKERS in another process; yields `_tracked`, which waits for those that it
+    needs."""
     from sim.workers.pool import WorkerProcess
 
     worker = WorkerProcess()
+    # With one processor it would only take longer: the process imports everything again.
+    compiling = list(QUICK_TRACKERS) if (os.cpu_count() or 1) > 1 else []
+
+    def tracked(job: _TrackJob) -> list[TrackingRun]:
+        while job.tracker in compiling:
+            del compiling[0]
+            worker.receive()
+        return _tracked(job)
+
     try:
-        # One processor would take longer: a second process imports everything again.
-        if (os.cpu_count() or 1) > 1:
-            worker.send(_compile, _made_up_people)
-        yield
-        worker.receive()
+        for tracker in compiling:
+            worker.send(_compile, tracker)
+        yield tracked
     finally:
         worker.terminate()
         worker.join()
 
 
-def _compile(make: Callable[[], Sequence]) -> None:
-    for tracker, mode in zip(QUICK_TRACKERS, ("image", "file"), strict=True):
-        TrackerSetup(tracker, detections=mode).run(make())
+def _compile(tracker: str) -> None:
+    pixels = "pixels" in tracker_registry.find(tracker).needs
+    TrackerSetup(tracker, detections="image" if pixels else "file").run(_made_up_people())
 
 
 def _made_up_people() -> Sequence:
@@ -310,12 +319,14 @@ def _made_up_people() -> Sequence:
     )  # fmt: skip
 
 
-def _run(jobs: list[_TrackJob], workers: int) -> dict[_TrackJob, list[TrackingRun]]:
+def _run(
+    jobs: list[_TrackJob], workers: int, tracked: Callable[[_TrackJob], list[TrackingRun]]
+) -> dict[_TrackJob, list[TrackingRun]]:
     from sim.workers.start import results_in_order, start_workers
 
     runs = {}
     with ProgressMeter("track", len(jobs)) as meter, start_workers(workers) as run:
-        for job, found in zip(jobs, results_in_order(run, _tracked, jobs), strict=True):
+        for job, found in zip(jobs, results_in_order(run, tracked, jobs), strict=True):
             runs[job] = found
             meter.step(f"{job.tracker}{' from pixels' if job.overlay else ''}")
     return runs
