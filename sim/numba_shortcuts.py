@@ -1,7 +1,7 @@
-"""Makes numba compile faster: code that only kernels call, types of sums of numbers, elements of arrays.
+"""Makes numba compile faster: code that only kernels call, types of sums, elements of arrays.
 
 What kernels call has no wrapper for calls from Python, and LLVM optimises it within its callers only; so with numba's
-own functions, such as np.empty. numba's answers to what type `a + b` of numbers has are remembered. `a[i, j]` needs
+own functions, such as np.empty. numba's answers to what type `a + b` has are remembered. `a[i, j]` needs
 fewer instructions than numba's. Results are the same to the last bit. The changes hold for the whole process. All
 names of numba's inside are looked up before the first change: if one is missing, the import fails and numba stays as it
 was.
@@ -13,7 +13,7 @@ from collections.abc import Callable
 from functools import partial, wraps
 from typing import Any
 
-from numba.core import cgutils, codegen, compiler, types
+from numba.core import cgutils, codegen, compiler, targetconfig, types
 from numba.core.typing import templates
 from numba.np import arrayobj
 
@@ -22,6 +22,7 @@ KernelCompiler: Any = compiler.Compiler
 function_type: Any = types.BaseFunction
 overload_template: Any = templates._OverloadFunctionTemplate
 array_module: Any = arrayobj
+compilation_flags: Any = targetconfig.ConfigStack
 numba_codegen: Any = codegen
 Constant: Any = numba_codegen.llvmir.Constant
 unliteral: Any = types.unliteral
@@ -63,14 +64,14 @@ def _of_inner_code(decorator: Any) -> Any:
 
 
 def _with_memory(resolve: Any) -> Any:
-    """Returns numba's BaseFunction.get_call_type, with a memory of operators on numbers.
+    """Returns numba's BaseFunction.get_call_type, with a memory for operators.
 
     It asks some thirty templates, each time anew, what type `a + b` has. Of numbers, those with lists of types know it.
-    These answers do not depend on the options of the kernel; those of other templates may.
+    Answers about others may depend on the options of the kernel, and are remembered for each choice of them.
     """
     known: dict[Any, Any] = {}
 
-    def answer(self: Any, context: Any, args: Any) -> Any:
+    def of_numbers(self: Any, context: Any, args: Any) -> Any:
         plain = tuple(unliteral(a) for a in args)
         if all(isinstance(a, types.Number | types.Boolean) for a in plain):
             for template in (t(context) for t in self.templates if issubclass(t, templates.ConcreteTemplate)):
@@ -83,11 +84,14 @@ def _with_memory(resolve: Any) -> Any:
     def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
         if kws or getattr(self.typing_key, "__module__", "") != "_operator":
             return resolve(self, context, args, kws)
-        call = self, context, tuple(args)
+        call: Any = self, context, tuple(args)
         if call not in known:
-            known[call] = answer(self, context, args)
+            known[call] = of_numbers(self, context, args)
         if known[call] is None:
-            return resolve(self, context, args, kws)
+            call = *call, compilation_flags.top_or_none()
+            if call not in known:
+                signature = resolve(self, context, args, kws)
+                known[call] = signature, self._impl_keys[signature.args]
         signature, implementation = known[call]
         self._impl_keys[signature.args] = implementation
         return signature
