@@ -55,7 +55,8 @@ Similarity = Literal["boxes", "ground", "image"] | None
 class DemoOptions:
     """Generate scenes, track them, score the tracks and write a page with the results."""
 
-    quick: bool = option("Only the short scenes of the suite quick, one seed and two trackers, of pixels one.", False)
+    quick: bool = option(
+        "A quick look: the suite quick with one seed, two trackers, and one scene with small pictures.", False)
     out: Path = OUT(default=Path("flockscope-demo"))
 
 
@@ -92,7 +93,8 @@ class TrackOptions:
     tracker: str = ARGUMENT("Name of a tracker, or file.py:Class, or module:Class.", metavar="TRACKER")
     source: Path = SOURCE()
     out: Path = OUT()
-    params: str | None = option("The tracker's parameters: a file, or paper.", None, metavar="FILE.toml|PRESET")
+    params: str | None = option(
+        "The tracker's parameters: a file, or a preset such as paper.", None, metavar="FILE.toml|PRESET")
     settings: list[str] = SET()
     detections: Literal["image", "truth", "file"] | None = option(
         "Detections that the tracker gets. Default: the first of image, file, truth that it and the source allow.",
@@ -199,7 +201,7 @@ class MinimizeOptions:
     confirm: int = option("Number of other seeds on which most must fail, too.", 5, low=0, metavar="N")
     episodes: int | None = option("Stop after so many episodes.", None, low=1, metavar="N")
     minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
-    workers: int = WORKERS()
+    workers: int = option("Processes that play episodes.", 1, low=1)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -256,7 +256,7 @@ def require_optuna(place: str) -> None:
     try:
         import optuna  # noqa: F401
     except ImportError:
-        remedy = 'install the extra: pip install "flockscope[tune]"'
+        remedy = 'in the folder of the sources: pip install -c constraints.txt -e ".[tune]"'
         raise InputError(place=place, got="no optuna", expected="the package optuna", remedy=remedy) from None
 
 

@@ -88,10 +88,14 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     info, images, background = _info(path), options.images, options.background
     rate = frame_rate(options.fps, info.fps)
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
-    alone = not is_present(gt)
-    found = mot_text.read_detections(det, options.boxes, info.length, alone) if is_present(det) else None
-    if found is None:
-        names = "box_scale min_score person_class" if alone else "box_scale min_score"
+    found, of_boxes = None, options.box_options
+    if is_present(det):
+        table = read_table(det, length=info.length, boxless=True, box_scale=of_boxes.box_scale)
+        if not is_present(gt):  # else --class may be of the labels
+            mot_text.require_classes(table, of_boxes.person_class)
+        found = mot_text.detections_of_table(table, of_boxes)
+    else:
+        names = "box_scale min_score" if is_present(gt) else "box_scale min_score person_class"
         options.reject(path, "a recording without det/det.txt", "it has no detections", names)
     pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
@@ -126,7 +130,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         return pictures.read(wanted, seen if images else pictures.first_size())
 
     def truth() -> Truth:
-        return mot_text.read_truth(gt, info.name, rate, length, options.scale, options.boxes.person_class)
+        return mot_text.read_truth(gt, info.name, rate, length, options.scale, of_boxes.person_class)
 
     shown: dict[str, Any] = {} if choice is None else {"background": str(choice)}
     if pictures.numbering is not None:
@@ -138,7 +142,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         px_per_m=options.scale, has_images=images and bool(pictures.files),
         has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
-        source={"kind": "mot", "path": str(path), **options.boxes.given(), **shown},
+        source={"kind": "mot", "path": str(path), **of_boxes.given(), **shown},
     )  # fmt: skip
 
 
@@ -183,7 +187,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     The camera is not scaled.
     """
-    rate, of_boxes = frame_rate(options.fps), options.boxes
+    rate, of_boxes = frame_rate(options.fps), options.box_options
     table = read_table(path, boxless=True, box_scale=of_boxes.box_scale)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
