@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from sim.compiler import njit
-from sim.types import Array, Ints
+from sim.types import Array
 
 EXACT_BITS = 12
 """Largest number of rows or columns, whichever is less, of an exact sum; above it sums are propagated."""

@@ -139,7 +139,7 @@ def free_detections(W: Array, miss: Array) -> Array:
     sparse_sum(W, miss, np.ones(W.shape[1]), m)
     alone = np.maximum(1 - m.sum(axis=1), np.finfo(float).tiny) / miss
     free = np.divide(m, W * alone[:, None], out=np.ones(W.shape), where=W > 0)
-    return np.minimum(free, 1.0, out=free)
+    return np.asarray(np.minimum(free, 1.0))
 
 
 def add_partner_factors(particles: ParticleSet, missed: Bools, logs: Array) -> None:

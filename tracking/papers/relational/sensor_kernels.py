@@ -1,4 +1,4 @@
-"""Kernels of tracking.papers.relational.sensor: which detections are near whom, and the sums of each particle."""
+"""Kernels of tracking.papers.relational.sensor: densities of detections, and the sums of each particle."""
 
 from __future__ import annotations
 

@@ -2,8 +2,8 @@
 
 Arrays are over P particles and K people. The relation "walking together" is kept for the pairs only that walk together
 in some particle, so that the cost is that of the neighbours: pairs (N, 2) are people i < j, in order of j, then i, and
-related (N, P) says in which particles. The groups of a particle are the connected components of its related pairs. Who moves how,
-and how relations change, is in `transition_kernels`.
+related (N, P) says in which particles. The groups of a particle are the connected components of its related pairs.
+`transition_kernels` moves people and changes relations.
 """
 
 from __future__ import annotations
