@@ -51,7 +51,9 @@ def nearest_places(places: Array, count: int, nearest: Ints) -> None:
 def moments_of(state: Array, cluster: Ints, count: int, out: Array) -> None:
     """Writes the moments (G, 9) of the clusters of people: state (K, 4), cluster (K,), count G."""
     n = len(cluster)
-    out[:count] = 0.0
+    for g in range(count):
+        for c in range(SIZE + 1):
+            out[g, c] = 0.0
     for k in range(n):
         g = cluster[k]
         out[g, SIZE] += 1

@@ -211,10 +211,9 @@ def uniform_partitions(cumulated: Array, uniforms: Array, label: Ints) -> None:
 
 @njit(cache=True)
 def head_votes(label: Ints, weights: Array, out: Array) -> None:
-    """Writes the weighted histogram of Fig. 3 summed over i, (K, K): weight of partitions in which k's cluster has head
+    """Adds to `out` the weighted histogram of Fig. 3 summed over i, (K, K): weight of partitions in which k's cluster has head
     g. A person alone is the head of the own cluster (ours: nobody votes for group 0)."""
     particles, partitions, n = label.shape
-    out[:] = 0.0
     for i in range(particles):
         for j in range(partitions):
             for k in range(n):

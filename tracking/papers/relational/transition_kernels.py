@@ -199,8 +199,9 @@ def join(
                     i, label[p, new] = g, g
                     while i >= 0:
                         if count + 3 > len(found):
-                            longer = np.empty(2 * len(found), np.int64)
-                            longer[:count] = found[:count]
+                            longer = np.empty(2 * count, np.int64)
+                            for r in range(count):  # a copy of a slice takes a second to compile
+                                longer[r] = found[r]
                             found = longer
                         found[count], found[count + 1], found[count + 2] = m, i, p
                         i, count = following[i], count + 3
