@@ -211,8 +211,8 @@ def uniform_partitions(cumulated: Array, uniforms: Array, label: Ints) -> None:
 
 @njit(cache=True)
 def head_votes(label: Ints, weights: Array, out: Array) -> None:
-    """Adds the weighted histogram of Fig. 3 summed over i to `out` (K, K): weight of partitions in which k's cluster has
-    head g. A person alone is the head of the own cluster (ours: nobody votes for group 0)."""
+    """Adds the weighted histogram of Fig. 3 summed over i to `out`, (K, K): weight of partitions in which k has the
+    cluster of head g. A person alone is the head of the own cluster (ours: nobody votes for group 0)."""
     particles, partitions, n = label.shape
     for i in range(particles):
         for j in range(partitions):
