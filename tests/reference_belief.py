@@ -19,7 +19,7 @@ def evidence(pos, time, seconds):
         vel = {p: chord(pos, time, t, p, seconds) for p in seen[t]}
         for a, b in combinations(seen[t], 2):
             if np.hypot(*(pos[t, b] - pos[t, a])) < 4.0:
-                past.setdefault((a, b), []).append((t, instant(pos[t], vel, a, b)))
+                past.setdefault((a, b), []).append((t, instant(pos[t], vel, a, b) | others(pos[t], vel, a, b)))
                 row = {
                     f"{name}, {time:g} s": mean(past[a, b], name, t, time, seconds)
                     for name in past[a, b][0][1]
@@ -55,6 +55,18 @@ def instant(pos, vel, a, b):
         "growth": apart @ (vel[b] - vel[a]) / max(distance, 0.1), "turn": turn, "walking difference": walking,
         "one walks": one,
     }  # fmt: skip
+
+
+def others(pos, vel, a, b):
+    """vel: of those who are seen, by person."""
+    third = [p for p in vel if p not in (a, b)]
+    nearer = [sum(np.hypot(*(pos[p] - pos[x])) < np.hypot(*(pos[b] - pos[a])) for p in third) for x in (a, b)]
+    common = [
+        p
+        for p in third
+        if all(np.hypot(*(pos[p] - pos[x])) < 1.5 and np.hypot(*(vel[p] - vel[x])) < 0.7 for x in (a, b))
+    ]
+    return {"nearer others": sum(nearer) / 2, "common neighbours": float(len(common))}
 
 
 def mean(rows, name, t, time, seconds):

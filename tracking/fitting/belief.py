@@ -20,7 +20,7 @@ from sim.compiler import njit
 from sim.types import Array, Bools, Ints
 from tracking.fitting.grouping_scenes import PairScene
 from tracking.grouping.belief import Belief, Table
-from tracking.grouping.pair_evidence import NAMES
+from tracking.grouping.pair_evidence import NAMES, NEAR, OTHERS
 
 KNOTS = 6  # Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %.
 # Weights of the penalties: of curvature, and of squared log-odds.
@@ -64,8 +64,7 @@ def fit_belief(now: PairSample, events: PairSample | None = None, used: Sequence
     """
     knots_of = {name: _knots(now.values[:, NAMES.index(name)]) for name in used}
     knots_of = {name: at for name, at in knots_of.items() if len(at) > 1}
-    first = _fit_column(now, knots_of)
-    columns = np.stack([first, first if events is None else _fit_column(events, knots_of)])
+    columns = np.stack([_fit_column(now, knots_of, OTHERS), _fit_column(events or now, knots_of, NEAR)])
     cuts = np.cumsum([len(knots) for knots in knots_of.values()])
     *heights, bias = np.split(columns, cuts, axis=1)
     tables = tuple(Table(*row) for row in zip(knots_of, knots_of.values(), heights, strict=True))
@@ -73,10 +72,11 @@ def fit_belief(now: PairSample, events: PairSample | None = None, used: Sequence
     return replace(belief, threshold=best_threshold(now, belief.log_odds(now.values)[:, 0]))
 
 
-def _fit_column(sample: PairSample, knots_of: Mapping[str, Array]) -> Array:
-    """Returns the log-odds at all knots, and the bias as the last number."""
-    at = list(knots_of.values())
-    place, part = _places(sample.values[:, [NAMES.index(name) for name in knots_of]], at)
+def _fit_column(sample: PairSample, knots_of: Mapping[str, Array], left_out: tuple[str, ...]) -> Array:
+    """Returns the log-odds at all knots, 0 at those of left out quantities, and the bias as the last number."""
+    kept = {name: at for name, at in knots_of.items() if not name.startswith(left_out)}
+    at = list(kept.values())
+    place, part = _places(sample.values[:, [NAMES.index(name) for name in kept]], at)
     curves = _curvature(at)
     bends = curves.T @ curves
 
@@ -88,7 +88,11 @@ def _fit_column(sample: PairSample, knots_of: Mapping[str, Array]) -> Array:
 
     start = np.append(np.zeros(sum(map(len, at))), -2.0)
     options = {"maxiter": STEPS, "maxcor": 20}
-    return np.asarray(minimize(objective, start, jac=True, method="L-BFGS-B", options=options).x)
+    found = minimize(objective, start, jac=True, method="L-BFGS-B", options=options).x
+    fitted = np.repeat([name in kept for name in knots_of], [len(at) for at in knots_of.values()])
+    column = np.zeros(len(fitted) + 1)
+    column[np.append(fitted, True)] = found
+    return column
 
 
 def best_threshold(sample: PairSample, log_odds: Array) -> float:

@@ -56,7 +56,7 @@ class Belief:
     # stay, come: log-odds added for pairs that were in one group a step before, and taken from all others: groups
     # of events change the later the greater they are
     stay: float = 7.0
-    come: float = 1.0
+    come: float = 1.2
     memory: float = 1.0  # (s): a missed member stays so long in the group
     arrival: float = 1.0  # (s): people who were together so soon after a first frame arrived together: no merge
 

@@ -53,12 +53,12 @@ class PairBelief:
         new = np.arange(n) >= old
         self.log_odds[new[:, None] | new] = UNSEEN
         i, j = self._pairs(state[:, :2])
-        i, j = i[new[j]], j[new[j]]
-        if len(i):
+        fresh = np.flatnonzero(new[j])
+        if len(fresh):
             # new people have no past: the evidence of this moment stands for all times
-            fresh = ExponentialMeans(len(i), self.seconds)
-            now = instant_evidence(state[:, :2], state[:, 2:], i, j)
-            self._judge(i, j, fresh.add(np.zeros(len(i), np.int64), np.arange(len(i)), now))
+            means = ExponentialMeans(len(fresh), self.seconds)
+            now = instant_evidence(state[:, :2], state[:, 2:], i, j)[fresh]
+            self._judge(i[fresh], j[fresh], means.add(np.zeros(len(fresh), np.int64), np.arange(len(fresh)), now))
 
     def keep(self, rows: Bools) -> None:
         """Remove all people but those where `rows` (K,) is True."""

@@ -4,8 +4,9 @@
 the quantities of `QUANTITIES` averaged over the past (`TIMES`), and `NEAR`. Nothing looks ahead. Only positions are
 used: velocities are chords of positions over 0.8 s. Lengths are in m.
 
-What other people do is no evidence, nor when and where people were first seen: it tells who belongs together in
-simulated scenes, and misleads in others.
+When and where people were first seen is no evidence, nor how many are around: it tells who belongs together in
+simulated scenes, and misleads in others. What the nearest others do (`OTHERS`) is evidence for events only: it misleads
+about who is together now. For how long two have been near (`NEAR`) is none for events: who has just met has no past.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.truth.merge_split_rules import close_pairs
+from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_VELOCITY, close_pairs
 from sim.types import Array, Bools, Ints
 
 STEP = 0.4  # s: longest step, unless one frame lasts longer.
@@ -30,9 +31,12 @@ LONGEST = 20.0  # s: longer times near each other tell no more.
 # velocity of the two where that is at least 0.3 m/s, else the whole distance and nan. growth: of the distance, m/s.
 # turn: angle between the two velocities, rad, nan if one is slower than 0.3 m/s. walking difference: the velocity
 # difference, m/s, nan where turn is, so that its means outlast a stop. one walks: 1 if exactly one of the two is slower
-# than 0.3 m/s, else 0.
+# than 0.3 m/s, else 0. nearer others: how many other people are nearer to the one than the other is, mean of both.
+# common neighbours: third people less than 1.5 m from both, of velocities less than 0.7 m/s apart.
+OTHERS = ("nearer others", "common neighbours")
 QUANTITIES = (
-    "distance", "velocity difference", "sideways", "lengthwise", "growth", "turn", "walking difference", "one walks"
+    "distance", "velocity difference", "sideways", "lengthwise", "growth", "turn", "walking difference", "one walks",
+    *OTHERS,
 )  # fmt: skip
 NEAR = ("time near",)  # Not averaged: the time of the pair's rows so far, s.
 # Names of the columns of `PairRows.values`.
@@ -108,7 +112,10 @@ def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
 
 
 def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints) -> Array:
-    """Returns the `QUANTITIES` (R, 8) of each pair of rows i, j (R,); pos, vel (N, 2): m, m/s, by person and step."""
+    """Returns the `QUANTITIES` (R, 10) of all pairs of rows i, j (R,) within 4 m in their steps.
+
+    pos, vel (N, 2): m, m/s, by person and step.
+    """
     apart, change, mean = pos[j] - pos[i], vel[j] - vel[i], (vel[i] + vel[j]) / 2
     distance, differ, pace = (np.hypot(*x.T) for x in (apart, change, mean))
     walks = pace >= STANDING  # False where nan
@@ -124,7 +131,27 @@ def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints) -> Array:
         (apart * change).sum(axis=1) / np.maximum(distance, TOUCHING),
         np.where(both, np.arccos(np.clip(cosine, -1.0, 1.0)), np.nan),
         np.where(both, differ, np.nan), np.where(np.isfinite(differ), first != second, np.nan),
+        _nearer(i, j, distance), _common(i, j, (distance < MERGE_DISTANCE) & (differ < SPLIT_VELOCITY)),
     ])  # fmt: skip
+
+
+def _nearer(i: Ints, j: Ints, distance: Array) -> Array:
+    """Returns how many other rows are nearer to the one of a pair than the other is, mean of both, (R,)."""
+    centre, far = np.concatenate([i, j]), np.concatenate([distance, distance])
+    order = np.lexsort((far, centre))
+    rank = np.empty(len(order))
+    rank[order] = np.arange(len(order)) - np.searchsorted(centre[order], centre[order])
+    return np.asarray((rank[: len(i)] + rank[len(i) :]) / 2)
+
+
+def _common(i: Ints, j: Ints, linked: Bools) -> Array:
+    """Returns how many third rows are linked with both of a pair, (R,)."""
+    from scipy.sparse import coo_array
+
+    low, rows = int(i.min(initial=0)), int(max(i.max(initial=-1), j.max(initial=-1))) + 1
+    near = np.concatenate([i[linked], j[linked]]) - low, np.concatenate([j[linked], i[linked]]) - low
+    link = coo_array((np.ones(len(near[0])), near), (rows - low, rows - low)).tocsr()
+    return np.asarray((link @ link)[i - low, j - low]).ravel()
 
 
 def _portions(step: Ints) -> Iterator[slice]:
@@ -138,7 +165,7 @@ def _portions(step: Ints) -> Iterator[slice]:
 class ExponentialMeans:
     """Means of the quantities of pairs over their rows so far, weighted by exp(-age / time), for each of the `TIMES`.
 
-    total, weight (K, 8, 3): sums by pair, quantity and time. last (K,): step of a pair's last row; rows (K,): how many.
+    total, weight (K, 10, 3): sums by pair, quantity and time. last (K,): step of a pair's last row; rows (K,): number.
     """
 
     def __init__(self, pairs: int, seconds: float) -> None:
