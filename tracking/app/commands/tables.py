@@ -8,8 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from sim.io.export.places import Places, parse_places
-from sim.io.export.tidy_tables import NOWHERE, Form, TidyTables, run_tables, truth_tables, write_tables
+from sim.io.export.tidy_tables import (
+    NOWHERE,
+    Form,
+    Places,
+    TidyTables,
+    parse_places,
+    run_tables,
+    truth_tables,
+    write_tables,
+)
 from sim.io.files.own_files import output_paths
 from sim.io.formats.mot_folder import frame_rate
 from sim.io.formats.options import refuse_options
