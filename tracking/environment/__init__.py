@@ -1,7 +1,8 @@
 """The Gymnasium environment, its observations, and the episodes that searches play.
 
-The environment `flockscope/Tuning-v0` is registered without an import of Gymnasium, which is slow. If Gymnasium is imported already, the environment is registered at once. Else an import hook registers it as soon as
-somebody imports Gymnasium.
+The environment `flockscope/Tuning-v0` is registered without an import of Gymnasium, which is slow. If Gymnasium is
+imported already, the environment is registered at once. Else an import hook registers it as soon as somebody imports
+Gymnasium.
 """
 
 from __future__ import annotations
