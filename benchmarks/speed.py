@@ -52,7 +52,7 @@ from tracking.detect.person_size import PersonSize
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.link_rule import LinkRule, find_links
 from tracking.grouping.merge_split_events import TrackedMotion
-from tracking.papers.blob import new_people
+from tracking.papers.blob import person_template
 from tracking.papers.blob.update_from_pixels import PixelUpdater
 from tracking.running.prepare import PreparedTracker, prepare
 from tracking.running.tracks_check import ReportHistory
@@ -86,7 +86,7 @@ TRACKING: Parts = {
     "clean, find": [(blobs, "clean"), (blobs, "find")],
     "associate": [(PixelUpdater, "_associate")],
     "split": [(PixelUpdater, "_measure_by_templates")],
-    "newcomers": [(new_people, "find_new_people")],
+    "newcomers": [(person_template, "find_new_people")],
     "person size": [(PersonSize, "learn"), (PixelUpdater, "_lone_people"), (PixelUpdater, "_relax_sizes")],
     "adapt": [(Background, "adapt"), (PixelUpdater, "_protected")],
 }

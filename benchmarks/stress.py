@@ -46,8 +46,7 @@ from tracking.oracle import oracle
 from tracking.running.tracker_registry import find
 from tracking.scoring.evaluation import Scorer, people_scores
 from tracking.stress import failures, minimize
-from tracking.stress.axes import AXES, Axis
-from tracking.stress.curves import breaking_point, crossing, curve
+from tracking.stress.axes import AXES, Axis, breaking_point, crossing, curve
 from tracking.stress.episodes import OracleTask, Outcome, Store, Tasks
 from tracking.stress.reductions import difficulties
 from tracking.stress.search import Failure, search, worst

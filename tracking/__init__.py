@@ -3,14 +3,14 @@
 `tracking.track(tracker, sequence)` returns a run's tracks, `tracking.group(sequence)` the groups of labelled people,
 `tracking.evaluate(truth, tracks)` the scores of either, `tracking.compare(sequences, runs)` a ranking of several runs,
 and `tracking.tune(tracker, suite)` searches parameters. Each is imported when it is first used.
-`import tracking` also registers the Gymnasium environment (tracking.environment.registration).
+`import tracking` also registers the Gymnasium environment (tracking.environment).
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from tracking.environment.registration import register_when_imported
+from tracking.environment import register_when_imported
 
 if TYPE_CHECKING:
     from tracking.comparison import compare

@@ -25,7 +25,7 @@ from scenarios.errors import FlockscopeError, InputError, WorkError, printable, 
 from tracking.app import command_result
 from tracking.app.command_result import INTERRUPTED, CommandResult, print_error, print_interrupted
 from tracking.keyword_options import signature_parameter
-from tracking.running.interrupts import recorded_interrupts
+from tracking.running.user_code import recorded_interrupts
 
 HELP = {"-h", "--help", "--version"}
 LONGEST_WARNING = 400  # Characters of a warning that are shown at most.

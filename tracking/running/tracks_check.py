@@ -49,17 +49,13 @@ def _filled(tracks: Tracks) -> Tracks:
         tracks = tracks.replace(score=np.ones(len(tracks.id)))
     if not np.size(tracks.seen) and np.ndim(tracks.id) == 1:
         tracks = tracks.replace(seen=tracks.measured)
-    if isinstance(tracks.events, tuple) and any(map(_has_open_frames, tracks.events)):
+    if isinstance(tracks.events, tuple) and tracks.events:
         tracks = tracks.replace(events=tuple(_with_frames(e, tracks.index) for e in tracks.events))
     return tracks
 
 
-def _has_open_frames(event: Any) -> bool:
-    return isinstance(event, GroupEvent) and (event.emitted is None or event.end is None)
-
-
 def _with_frames(event: Any, index: int) -> Any:
-    if not _has_open_frames(event):
+    if not isinstance(event, GroupEvent) or (event.emitted is not None and event.end is not None):
         return event
     emitted = index if event.emitted is None else event.emitted
     return replace(event, emitted=emitted, end=index if event.end is None else event.end)

@@ -125,5 +125,5 @@ def test_what_is_no_address(address: str) -> None:
 
 def test_without_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"flockscope\[cluster\]"), start_workers(1, "tcp://127.0.0.1:1"):
+    with pytest.raises(InputError, match=r'-e "\.\[cluster\]"'), start_workers(1, "tcp://127.0.0.1:1"):
         pass

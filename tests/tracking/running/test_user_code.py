@@ -13,8 +13,8 @@ from sim.types import Detections, Frame, Sequence
 from tests.tracking.running.test_run import Stranger
 from tracking.app.cli import run
 from tracking.config import Config, param
-from tracking.running.interrupts import recorded_interrupts
 from tracking.running.run import track
+from tracking.running.user_code import recorded_interrupts
 
 ABRUPT = [SystemExit(0), SystemExit("done"), GeneratorExit(), BaseException("what"), StopIteration(), ValueError("no")]
 

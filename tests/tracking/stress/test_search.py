@@ -101,5 +101,5 @@ def test_another_sampler_and_no_axes(tmp_path: Path) -> None:
 
 def test_without_optuna(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "optuna", None)
-    with pytest.raises(InputError, match=r"--search.*\.\[tune\]"):
+    with pytest.raises(InputError, match=r'--search.*-e "\.\[tune\]"'):
         search(sweep(tmp_path, []), 8)

@@ -11,8 +11,7 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from tracking.environment.episode_cache import Source
-from tracking.stress.axes import AXES, parse_axes, parse_axis
-from tracking.stress.curves import NEVER, breaking_point, crossing
+from tracking.stress.axes import AXES, NEVER, breaking_point, crossing, parse_axes, parse_axis
 from tracking.stress.episodes import Outcome, Store, Tasks
 from tracking.stress.sweep import Plan, Sweep
 from tracking.tuning.parallel_episodes import EpisodeTask

@@ -189,7 +189,7 @@ def test_an_error_of_the_defaults_is_raised(tmp_path):
 
 def test_without_optuna_one_line_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "optuna", None)
-    with pytest.raises(InputError, match=r'pip install .*"\.\[tune\]"'):
+    with pytest.raises(InputError, match=r'pip install .* -e "\.\[tune\]"'):
         tune(**tune_arguments(tmp_path))
 
 

@@ -98,10 +98,9 @@ def _ranking(table: RankingTable, sections: list[ResultSection], root: Path) -> 
     keys = shown_columns(entries, table.key)
     rows = []
     for e in entries:
-        own = {"mean": e["mean"], "low": e["low"], "high": e["high"]}
         name = escape(e["run"])
-        cells = [name if e["first"] else f"<em>{name}</em>", rank_words(e), _interval(table.key, own)]
-        rows.append(_cells("td", [*cells, *(number(k, e[k], mean=True) for k in keys)]))
+        cells = [name if e["first"] else f"<em>{name}</em>", rank_words(e), _interval(table.key, e)]
+        rows.append(_cells([*cells, *(number(k, e[k], mean=True) for k in keys)]))
     head = "<tr><th>tracker</th><th>rank</th>" + "".join(map(_heading, [table.key, *keys])) + "</tr>"
     body = f'<div class="wide"><table><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table></div>'
     compared = table.compared
@@ -157,13 +156,13 @@ def _score_table(section: ResultSection, root: Path) -> str:
     rows = []
     for row, page, name in zip(section.rows, section.pages, section.names, strict=True):
         link = f'<a href="{escape(_link(page, root))}">{escape(name)}</a>'
-        rows.append(_cells("td", [link, *(number(key, row.scores[key]) for key in keys)]))
+        rows.append(_cells([link, *(number(key, row.scores[key]) for key in keys)]))
     head = "<tr><th>sequence</th>" + "".join(map(_heading, keys)) + "</tr>"
     foot = ""
     if len({row.sequence for row in section.rows}) > 1:
         means = summary(section.rows)
         ends = [_interval(key, means[key]) for key in keys]
-        foot = f"<tfoot>{_cells('td', ['mean<br><small>95 % interval</small>', *ends])}</tfoot>"
+        foot = f"<tfoot>{_cells(['mean<br><small>95 % interval</small>', *ends])}</tfoot>"
     table = f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody>{foot}</table>"
     return f'<div class="wide">{table}</div>'
 
@@ -179,8 +178,8 @@ def _interval(key: str, mean: dict[str, float]) -> str:
     return f"{number(key, mean['mean'], mean=True)}<br><small>{low} to {high}</small>"
 
 
-def _cells(tag: str, cells: list[str]) -> str:
-    return "<tr>" + "".join(f"<{tag}>{cell}</{tag}>" for cell in cells) + "</tr>"
+def _cells(cells: list[str]) -> str:
+    return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
 SCENES = ("merge", "split", "cross", "queue", "party", "mixed")

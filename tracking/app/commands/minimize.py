@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError, counted, printable
+from scenarios.loading.resolve import load, names, resolve
 from scenarios.loading.toml_files import dump, toml_value
 from scenarios.schema.scenario import Scenario
 from sim.io.files.atomic import write_file
@@ -18,6 +19,7 @@ from tracking.app.command_options import MinimizeOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import new_table, number
 from tracking.app.progress import ProgressMeter
+from tracking.running.tracker_registry import find, located
 from tracking.stress.failures import CRASH, EpisodeOf, Outcome, Subject, parse_failure, play_episode
 from tracking.stress.minimize import Search
 from tracking.stress.reductions import OBSTACLES, difficulties, table_of
@@ -74,9 +76,7 @@ def minimize(options: MinimizeOptions) -> CommandResult:
 
 
 def _scene_and_subject(options: MinimizeOptions) -> tuple[Scene, Subject]:
-    from scenarios.loading.resolve import names
     from sim.io.store.seal import is_run
-    from tracking.running.tracker_registry import find, located
 
     source, run = Path(options.source), options.run
     stored = source.is_dir() and options.source not in names()  # as elsewhere, a name of the catalogue counts first
@@ -98,8 +98,6 @@ def _scene_and_subject(options: MinimizeOptions) -> tuple[Scene, Subject]:
 
 
 def _named_scene(options: MinimizeOptions) -> Scene:
-    from scenarios.loading.resolve import resolve
-
     entries = resolve(options.source)
     if len(entries) > 1:
         raise InputError(
@@ -110,7 +108,6 @@ def _named_scene(options: MinimizeOptions) -> Scene:
 
 
 def _stored_scene(folder: Path, seed: int | None) -> Scene:
-    from scenarios.loading.resolve import load
     from sim.io.store.seal import is_sequence, read_manifest
 
     expected = "one generated sequence, a scenario, or tracks of one"
@@ -148,7 +145,6 @@ def _tracked(source: Path, path: Path) -> Subject:
     from sim.types import BACKGROUNDS, OWN_BACKGROUND
     from tracking.app.stored_tracks import find_tracks, match_tracks
     from tracking.grouping.grouping_choice import default_grouping
-    from tracking.running.tracker_registry import find, located
 
     if not source.is_dir():
         got, remedy = f"a run beside {source}", "give the sequence that was tracked"
@@ -175,8 +171,6 @@ def _tracked(source: Path, path: Path) -> Subject:
 
 def _write(out: Path, search: Search, scene: Scene) -> Scenario:
     """Writes the smallest scene as a scenario file, and returns it as it is read again."""
-    from scenarios.loading.resolve import load
-
     about = f"{scene.scenario.name} made small: {search.subject.name} has {search.failure.text}"
     small = search.smallest.model_copy(update={"about": about})
     lines = "".join(f"# {line}\n" for line in _commands(search, out, scene.seed, small))
@@ -188,7 +182,6 @@ def _commands(search: Search, out: Path, seed: int, small: Scenario) -> list[str
     """Returns the commands that generate the scene and track it."""
     from sim.dataset.splits import split_of
     from tracking.environment.episodes import streams_for
-    from tracking.running.tracker_registry import find
 
     subject, data = search.subject, f"{out.stem}-data"
     streams = [s for s in streams_for(subject.tracker, subject.detections) if s != "background"]

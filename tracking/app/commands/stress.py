@@ -20,8 +20,7 @@ from tracking.app.commands.score_tables import checked_key, new_table, with_titl
 from tracking.app.progress import ProgressMeter
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval
-from tracking.stress.axes import parse_axes
-from tracking.stress.curves import BreakingPoint
+from tracking.stress.axes import BreakingPoint, parse_axes
 from tracking.stress.episodes import ORACLE, Store, contender, scene_player
 from tracking.stress.search import Failure, search, worst
 from tracking.stress.sweep import Plan, Sweep, generate_command

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from sim.io.export.places import Places, parse_places
-from sim.io.export.tidy_tables import NOWHERE, Form, TidyTables, run_tables, truth_tables, write_tables
+from sim.io.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
 from sim.io.files.own_files import output_paths
 from sim.io.formats.mot_folder import frame_rate
 from sim.io.formats.options import refuse_options
@@ -36,15 +35,15 @@ def export_parquet(options: ParquetOptions) -> CommandResult:
 
 def export_trajnet(options: TrajnetOptions) -> CommandResult:
     """Writes the people of every run or sequence as TrajNet++."""
-    return _export(options, "trajnet")
+    return _export(options, "trajnet", {})
 
 
 def export_pedpy(options: PedpyOptions) -> CommandResult:
     """Writes the people of every run or sequence as a text of PedPy and JuPedSim."""
-    return _export(options, "pedpy")
+    return _export(options, "pedpy", {})
 
 
-def _export(options: TrajnetOptions, form: Form, places: Places = NOWHERE) -> CommandResult:
+def _export(options: TrajnetOptions, form: Form, places: Places) -> CommandResult:
     option_parsing.output_folder(options.out)
     path = options.source
     own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)

@@ -20,8 +20,10 @@ from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.app.stored_tracks import run_folders
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
+from tracking.running.detection_mode import choose_mode
 from tracking.running.run import TrackingRun, input_summary
 from tracking.running.time_limit import TimeLimited
+from tracking.running.tracker_registry import find
 
 # What --json repeats of each run.json.
 ROW_KEYS = (
@@ -56,7 +58,6 @@ def track(options: TrackOptions) -> CommandResult:
     """Tracks every sequence of the source and stores the tracks; returns a line for each run."""
     from sim.io.files.atomic import lock_folder
     from sim.io.store.seal import reject_foreign
-    from tracking.running.tracker_registry import find
 
     setup = _setup(options)
     option_parsing.output_folder(options.out)
@@ -129,8 +130,6 @@ def _setup(options: TrackOptions) -> TrackerSetup:
 
 
 def _config(tracker: str, params: str | None, settings: list[str]) -> Config | None:
-    from tracking.running.tracker_registry import find
-
     kind: type[Config] | None = getattr(find(tracker), "config_class", None)
     if kind is not None:
         config = kind() if params is None else kind.load(params)
@@ -148,8 +147,6 @@ def _config(tracker: str, params: str | None, settings: list[str]) -> Config | N
 def _check_modes(
     setup: TrackerSetup, needs: tuple[str, ...], sequences: list[Sequence], background: str | None
 ) -> None:
-    from tracking.running.detection_mode import choose_mode
-
     modes = [choose_mode(needs, sequence, setup.detections) for sequence in sequences]
     if background is not None and "image" not in modes:
         got, expected = f"--detections {modes[0]}", "a tracker that works on pictures"

@@ -85,11 +85,9 @@ def _or(value: float, other: float) -> float:
 
 
 def _curves(curves: Curves, by: str) -> Any:
-    backwards = curves.values[0] > curves.values[-1]
-    ends = (curves.values[0], curves.values[-1])
     plot = _figure(380, x_axis_label=f"{curves.axis}: {curves.about}" if curves.about else curves.axis, y_axis_label=by)
-    plot.x_range.start, plot.x_range.end = ends
-    plot.x_range.flipped = backwards
+    plot.x_range.start, plot.x_range.end = first, last = curves.values[0], curves.values[-1]
+    plot.x_range.flipped = first > last
     items = []
     for k, one in enumerate(curves.curves):
         data = {"x": curves.values, "mean": one.mean, "low": one.low, "high": one.high}

@@ -33,7 +33,7 @@ def check_packages() -> None:
     except ImportError as error:
         raise InputError(
             place="report.html", got=f"no package {error.name}", expected="the extra report",
-            remedy="pip install 'flockscope[report]'",
+            remedy='in the folder of the sources: pip install -c constraints.txt -e ".[report]"',
         ) from None  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Kernels of tracking.papers.blob.new_people: first guesses of places, and the number of templates that explains most.
+"""Kernels of new people in person_template: first guesses of places, and the number of templates that explains most.
 
 Templates (K, 4) are upright ellipses x (middle), foot (lower edge), h, w, px. foreground (H, W) bool; cover (H, W)
 int16: the number of templates over each pixel, plus EXPLAINED = 1000 where a blob of one person explains it. A

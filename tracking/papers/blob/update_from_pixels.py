@@ -5,7 +5,7 @@ Order of a frame, with the paper's sections:
     classify, clean, find blobs                                               secs. 3.2, 3.3 (detect.foreground)
     blobs of one person's size: gate, associate, update with the ellipse      secs. 4.2 to 4.4, eqs 3 to 10
     other foreground: split among the tracks expected there, by templates     ours (person_template)
-    foreground that no track explains, as large as a person: new tracks       ours (new_people)
+    foreground that no track explains, as large as a person: new tracks       ours (person_template)
     axes return towards those of a person at the track's place                ours (track_management)
     looks: the colours of people, where nobody hides them, are learned        ours (person_look_kernels)
     rho: confirm, delete, start tracks                                        secs. 4.5, 5 (track_management)
@@ -29,7 +29,7 @@ from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground, Segmented
 from tracking.detect.person_size import KEPT, PersonSize
 from tracking.filters import kalman
-from tracking.papers.blob import box_geometry, new_people, person_look_kernels, person_template_kernels
+from tracking.papers.blob import box_geometry, person_look_kernels, person_template, person_template_kernels
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 from tracking.papers.blob.track_management import TrackedEllipses
@@ -185,7 +185,7 @@ class PixelUpdater:
             scene.mark_explained(found.label, columns)
             for confirmed in (True, False):
                 made = made.joined(self._measure_by_templates(scene, seen.image, expected, made.rows, confirmed))
-            entered = box_geometry.centred(new_people.find_new_people(scene, self.size, ENTRY_SUPPORT))
+            entered = box_geometry.centred(person_template.find_new_people(scene, self.size, ENTRY_SUPPORT))
             unexplained = np.concatenate([unexplained, self._person_ellipses(entered)])
         d2, log_det = people.directed_innovations(made.z, made.angle_var)
         each = np.arange(len(made.rows))

@@ -19,7 +19,7 @@ from tracking.filters.person_streams import NOBODY, Keys, PersonStreams
 from tracking.papers.joint import group_events_kernels, partition_kernels
 from tracking.papers.joint.config import ALPHA, SCALES, VALIDITY_RATE, JointConfig
 from tracking.papers.joint.decentralised_filter import log_sum
-from tracking.papers.joint.individuals_kernels import CROSS, PLACE, RATE, group_dynamics, own_dynamics
+from tracking.papers.joint.group_events_kernels import CROSS, PLACE, RATE, group_dynamics, own_dynamics
 
 
 def process_noise(place: float, velocity: float, dt: float) -> Array:

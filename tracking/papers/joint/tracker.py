@@ -6,7 +6,7 @@ particles of X, N_z partitions under each. The steps of a frame, with the number
 
     4  X' ~ pi(X' | X, y)              composite proposal                     before eq. 3   distributions
          alpha of N(A x, Sigma), the rest pi_det
-    5  q = qbar p(X' | X, Z)           groups move individuals                eq. 5          individuals_kernels
+    5  q = qbar p(X' | X, Z)           groups move individuals                eq. 5          group_events_kernels
          N(x + B g, Sigma) for each person, g the mean of the group
     6  resample Z by q                                                                       decentralised_filter
     7  Z' ~ pi(Z' | X', X, Z)          Merge, Split, None of each group       eqs 6, 7       group_events_kernels

@@ -156,7 +156,7 @@ def join(
     """Writes the groups label (P, K) of M new people, the last slots, and returns their relations: three numbers for
     each, the new person, the other one, the particle.
 
-    Arguments as of `transition.join`; some (S,): who is near the new people, ends (M,): where each one's end in it.
+    Arguments as of `particle_set.join`; some (S,): who is near the new people, ends (M,): where each one's end in it.
     """
     particles, n, _ = pos.shape
     old = n - len(points)

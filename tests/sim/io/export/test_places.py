@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.export.places import crossings, inside, parse_places
-from sim.io.export.tidy_tables import run_tables
+from sim.io.export.tidy_tables import crossings, inside, parse_places, run_tables
 from tests.sim.io.export.test_tidy_tables import rows, walk
 
 DOOR = np.array([[0.0, 0.0], [2.0, 0.0]])  # who looks from its first to its second corner has +y on the left

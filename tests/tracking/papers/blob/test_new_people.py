@@ -7,7 +7,7 @@ import pytest
 
 from tests import reference_templates as slow
 from tracking.detect import blobs
-from tracking.papers.blob import new_people, person_template_kernels
+from tracking.papers.blob import person_template, person_template_kernels
 from tracking.papers.blob.person_template import ExplainedForeground
 
 HIGH, WIDE = 90, 120
@@ -44,7 +44,7 @@ def region(seed):
 def test_guesses_are_the_slow_way(seed):
     mask, (h, w) = region(seed)
     found = blobs.find(mask, 20)
-    got = new_people._guesses(found, np.array([0]), np.array([6]), Fixed(h, w))[0]
+    got = person_template._guesses(found, np.array([0]), np.array([6]), Fixed(h, w))[0]
     assert np.array_equal(got, np.concatenate(slow.guesses(found.label == 1, 6, Fixed(h, w))))
 
 
@@ -54,7 +54,7 @@ def test_who_enters_is_the_slow_way(seed):
     guesses = slow.guesses(blobs.find(mask, 20).label == 1, 4, Fixed(h, w))
     cover, person = np.zeros(mask.shape, np.int16), float(np.pi / 4 * h * w)
     scene = ExplainedForeground(mask)
-    got = new_people._in_region(scene, np.concatenate(guesses), person, 0.4)
+    got = person_template._in_region(scene, np.concatenate(guesses), person, 0.4)
     assert len(got)
     assert np.array_equal(got, slow.enter(mask, cover, guesses, person, 0.4))
     assert np.array_equal(scene.cover, slow.painted(mask.shape, got))
@@ -65,7 +65,7 @@ def test_as_many_come_in_as_there_are(count):
     """Side by side, a head's width of each hidden behind the next."""
     true = np.array([[20.0 + 20 * k, 80.0 - 2 * (k % 2), 60.0, 24.0] for k in range(count)])
     scene = ExplainedForeground(mask_of(*true))
-    found = new_people.find_new_people(scene, Fixed(60.0, 24.0), 0.5)
+    found = person_template.find_new_people(scene, Fixed(60.0, 24.0), 0.5)
     assert len(found) == count
     assert np.abs(np.sort(found[:, 0]) - true[:, 0]).max() < 4
 
@@ -74,7 +74,7 @@ def test_what_is_explained_brings_nobody():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     scene = ExplainedForeground(mask_of(one[0]))
     person_template_kernels.paint_all(scene.cover, one, 1)
-    assert not len(new_people.find_new_people(scene, Fixed(60.0, 24.0), 0.5))
+    assert not len(person_template.find_new_people(scene, Fixed(60.0, 24.0), 0.5))
     closed = ExplainedForeground(mask_of(one[0]))
     closed.mark_explained(mask_of(one[0]).astype(np.int32), np.array([0]))
-    assert not len(new_people.find_new_people(closed, Fixed(60.0, 24.0), 0.5))
+    assert not len(person_template.find_new_people(closed, Fixed(60.0, 24.0), 0.5))
