@@ -20,12 +20,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.geometry.hull_kernels import convex_hulls
-from sim.types import Array, Bools, Ints
+from sim.scene.body import PERSON_HEIGHT
+from sim.scene.camera import to_ground
+from sim.types import Array, Bools, Camera, Ints
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
+HEAD_ERROR = 0.4  # m: about two standard deviations of the place below a head.
 FASTEST = 2.0  # m/s: nobody walks faster than this relative to a group (walking distance).
 
 
@@ -45,6 +48,18 @@ class PointClaims:
     d2: Array
     owner: Ints
     claimants: Ints
+
+
+def below_heads(points: Array, box: Array, camera: Camera) -> Array:
+    """Returns the points (M, 2), m on the ground, none of them more than HEAD_ERROR = 0.4 m further from the camera
+    than a person whose head is at the upper edge of the box (M, 4) px of the point.
+
+    Hidden feet displace a point away from the camera, and heads are rarely hidden (ours)."""
+    way = points - camera.position[:2]
+    head = to_ground(camera, box[:, :2] + box[:, 2:] * np.array([0.5, 0.0]), PERSON_HEIGHT)
+    most = np.hypot(*(head - camera.position[:2]).T) + HEAD_ERROR
+    excess = np.fmax(1 - most / np.maximum(np.hypot(*way.T), 1e-9), 0.0)  # 0 if the head shows no ground
+    return np.asarray(points - excess[:, None] * way)
 
 
 def search_regions(bank: GroupBank, scaled: ScaledParameters) -> Array:

@@ -22,8 +22,7 @@ from tracking.papers.group_pda.association_mass_kernels import (
     FREEZE_SHARE,
     GATE,
     GATE_FACTOR,
-    KEEP_EXTENT,
-    KEEP_SIZE,
+    KEEP,
     LEAST_WEIGHT,
     LINK,
     NEAREST,
@@ -282,10 +281,10 @@ def _adapt(beta: Array, total: float, people: Array, cov: Array, extent: Array, 
                 total_cov = n * cov[j, a] + rules[PRIOR_WEIGHT] * rules[PRIOR_XX + a]
                 target[a] += share * total_cov / (n + rules[PRIOR_WEIGHT]) / rules[GATE_FACTOR]
             count += share * n
-    keep = rules[KEEP_EXTENT] + (1 - rules[KEEP_EXTENT]) * (1 - total)
-    extent[0, 0] = keep * extent[0, 0] + (1 - rules[KEEP_EXTENT]) * target[0]
-    extent[0, 1] = keep * extent[0, 1] + (1 - rules[KEEP_EXTENT]) * target[1]
+    new = 1 - rules[KEEP]
+    keep = rules[KEEP] + new * (1 - total)
+    extent[0, 0] = keep * extent[0, 0] + new * target[0]
+    extent[0, 1] = keep * extent[0, 1] + new * target[1]
     extent[1, 0] = extent[0, 1]
-    extent[1, 1] = keep * extent[1, 1] + (1 - rules[KEEP_EXTENT]) * target[2]
-    keep = rules[KEEP_SIZE] + (1 - rules[KEEP_SIZE]) * (1 - total)
-    size[0] = keep * size[0] + (1 - rules[KEEP_SIZE]) * count
+    extent[1, 1] = keep * extent[1, 1] + new * target[2]
+    size[0] = keep * size[0] + new * count
