@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sim.scene.body import person_boxes
 from sim.truth.merge_split_rules import SPLIT_VELOCITY
 from sim.types import Array, Context, Tracks
 from tests.painted import ids
+from tests.reference_sense import pinhole
 from tests.tracking.papers.group_pda.test_tracker import FPS, GROUND, block, changes, events, noisy, sizes, track
+from tracking.papers.group_pda.association import below_heads
 from tracking.papers.group_pda.config import GroupPdaConfig
 
 
@@ -175,3 +178,9 @@ def test_a_hidden_member_does_not_end_a_group_of_two_parts() -> None:
     said = one_aside(0, 80, hidden=50)
     assert ids(said) == {1}
     assert not events(said, "leave", "split")
+
+
+def test_hidden_feet_are_put_below_the_head() -> None:
+    place, cut = np.array([[8.0, 4.0], [8.0, 5.0]]), np.array([[1, 1, 1, 1], [1, 1, 1, 0.4]])
+    box = cut * person_boxes(pinhole(), np.pad(place, ((0, 0), (0, 1))), np.zeros(2), np.full(2, 1.7))
+    assert below_heads(place + [0.0, 1.5], box, pinhole()) == pytest.approx(place + [[0, 1.5], [0, 0.1]], abs=0.1)
