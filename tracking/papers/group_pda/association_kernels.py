@@ -143,23 +143,17 @@ def associate(
                 mine, people, start, rules[LINK], rules[GATE], prior, rules[PRIOR_WEIGHT], rules[LEAST_WEIGHT]
             )[0]
             if rules[ASSOCIATION] != PREFIXES:
-                for j in range(len(feasible) - 1):
-                    feasible[j] = False
-        taken, some = 0, False
-        for j in range(len(feasible)):
-            some = some or feasible[j]
-        if some:
+                feasible[:-1] = False
+        taken = 0
+        if feasible.any():
             best = _estimate(
                 mine, people, ages, colour, start, feasible, region[g], x[g], P[g], extent[g], size[g : g + 1],
                 rest[g] or others > rules[FREEZE_SHARE] * size[g], rules,
             )  # fmt: skip
             if best >= 0:
                 state[g], taken = MEASURED, start + best
-        else:
-            sums = components(mine, people, rules[LINK])[1]
-            for c in range(len(sums)):
-                if sums[c, WEIGHT] >= rules[LEAST_WEIGHT]:
-                    state[g], taken = NULL, n
+        elif (components(mine, people, rules[LINK])[1][:, WEIGHT] >= rules[LEAST_WEIGHT]).any():
+            state[g], taken = NULL, n
         for k in range(taken):
             chosen[g, order[k]] = True
     return state, chosen
@@ -200,13 +194,9 @@ def _estimate(
     seen, mean_age = running_ages(weights, age, start)
     S = np.empty((len(people), 3))
     log_mass, beta = np.empty(len(people)), np.empty(len(people))
-    unit = 0.0
-    for k in range(len(weights)):
-        unit += weights[k]
-    unit /= len(weights)  # people that one point stands for: makes m_N a mass of numbers of points
+    unit = weights.sum() / len(weights)  # people that one point stands for: makes m_N a mass of numbers of points
     evidence = np.zeros(len(colour) - start + 1)
-    for k in range(start, len(colour)):
-        evidence[k - start + 1] = evidence[k - start] + colour[k]
+    evidence[1:] = np.cumsum(colour[start:])
     log_m_miss = log_miss(unit, start, region, size[0], rules)
     top = log_m_miss
     width = rules[COUNT_SD] ** 2 + (rules[COUNT_SHARE] * size[0]) ** 2  # sigma_n^2
@@ -225,9 +215,8 @@ def _estimate(
     for j in range(len(beta)):
         beta[j] = np.exp(log_mass[j] - top)
         total += beta[j]
-    miss = np.exp(log_m_miss - top)
-    total, best, matched = total + miss, 0, 0.0
-    miss /= total
+    total += np.exp(log_m_miss - top)
+    miss, best, matched = np.exp(log_m_miss - top) / total, 0, 0.0
     for j in range(len(beta)):
         beta[j] /= total
         matched += beta[j]
