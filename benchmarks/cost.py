@@ -38,7 +38,7 @@ from benchmarks.support.timing import machine_load
 from sim.dataset.generate import generate
 from sim.io.export.webdataset import webdataset
 from sim.io.source import open_source
-from sim.workers.start import start_workers
+from sim.workers.pool import start_workers
 from tests.errands import process
 from tests.loopback import Loopback, loopback
 

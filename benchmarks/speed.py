@@ -79,7 +79,7 @@ RENDERING: Parts = {
     "people": [(people_kernels, "draw_people")],
     "blur, light, noise": [(renderer.Renderer, "_finish")],
     "truth of pixels": [(renderer, "pixel_truth")],
-    "disparity": [(renderer, "frame_disparities")],
+    "disparity": [(renderer.Renderer, "_disparities")],
 }
 TRACKING: Parts = {
     "classify": [(Background, "classify")],

@@ -14,7 +14,7 @@ from pathlib import Path
 from benchmarks.support.options import add_seeds, new_parser, seeds_text
 from benchmarks.support.tables import head, row
 from sim.dataset.generate import generate
-from sim.workers.start import WorkerOptions
+from sim.workers.pool import WorkerOptions
 from tracking.app.command_options import ScoreOptions, TrackOptions
 from tracking.app.commands.score_ranking import rank_words, ranking, shown_columns
 from tracking.app.commands.score_tables import number

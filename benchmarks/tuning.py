@@ -35,8 +35,8 @@ from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import weighted_scorers
 from tracking.stats import block_intervals
-from tracking.tuning import tune
 from tracking.tuning.result import TuningResult, short
+from tracking.tuning.search import tune
 
 SUITE = Path(__file__).parent / "tuning_suites" / "boxes.toml"
 SCORE = "HOTA"

@@ -90,7 +90,7 @@ def suites() -> str:
     """Returns the table of the suites that come with flockscope."""
     resolve = import_module("scenarios.loading.resolve")
     rows = [
-        f"| `{name}` | {len(resolve.resolve(f'suite:{name}'))} | {resolve.read_suite(resolve.find_suite(name)).about} |"
+        f"| `{name}` | {len(resolve.resolve(f'suite:{name}'))} | {resolve.read_suite(resolve.suite_file(name)).about} |"
         for name in resolve.suite_names()
     ]
     return table("suite", "entries", "what it is", rows=rows)
@@ -98,12 +98,22 @@ def suites() -> str:
 
 def scores() -> str:
     """Returns the table of all scores."""
-    return import_module("tracking.scoring.catalogue").table()
+    found = [s for s in import_module("tracking.scoring.catalogue").ALL if not s.key.endswith("_core")]
+    rows = []
+    for s in found:
+        low, high = (f"{v:g}".replace("inf", "∞").replace("-", "−") for v in (s.low, s.high))
+        cells = (f"`{s.key}`", s.unit.replace("|", "or"), f"{low} to {high}", s.better, s.meaning, s.source)
+        rows.append(f"| {' | '.join(cells)} |")
+    return table("key", "unit", "range", "better", "meaning", "source", rows=rows)
 
 
 def observations() -> str:
     """Returns the table of the statistics that the environment observes."""
-    return import_module("tracking.environment.observation").table()
+    rows = [
+        f"| {k} | `{s.name}` | {'share' if s.half is None else f'{s.half:g} {s.unit}'.strip()} | {s.meaning} |"
+        for k, s in enumerate(import_module("tracking.environment.observation").STATISTICS)
+    ]
+    return table("", "statistic", "0.5 stands for", "meaning", rows=rows)
 
 
 def axes() -> str:
@@ -114,9 +124,20 @@ def axes() -> str:
 
 
 def parameters(config: str) -> str:
-    """Returns the table of the parameters of a config class, MODULE:CLASS."""
+    """Returns the table of the parameters of a config class, MODULE:CLASS: default, presets, range, unit, meaning."""
     module, _, name = config.partition(":")
-    return getattr(import_module(module), name).table()
+    kind = getattr(import_module(module), name)
+    names = import_module("tracking.config").presets(kind.tracker)
+    presets = {preset: kind.preset(preset).as_dict() for preset in names}
+    rows = []
+    for p in kind.params().values():
+        changed = [values[p.name] for values in presets.values()]
+        span = ", ".join(f"`{c}`" for c in p.choices) if p.choices else f"{p.low:g} to {p.high:g}"
+        span += " (log)" if p.scale == "log" else ""
+        given = ["" if value == p.default else str(value) for value in changed]
+        rows.append(f"| {' | '.join([f'`{p.name}`', str(p.default), *given, span, p.unit, p.meaning])} |")
+    named = (f"preset `{preset}`" for preset in presets)
+    return table("parameter", "default", *named, "range", "unit", "meaning", rows=rows)
 
 
 def constants(package: str) -> str:

@@ -88,12 +88,9 @@ def _inside(value: Any) -> list[Any]:
 
 
 KINDS = {
-    stat.S_IFIFO: "a FIFO",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
+    stat.S_IFIFO: "a FIFO", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
     stat.S_IFDIR: "a folder",
-}
+}  # fmt: skip
 
 
 def require_regular(path: Path, remedy: str = "check the path") -> int:

@@ -5,11 +5,8 @@ and numba then refuses to compile. The cache goes to a temporary folder of the u
 looks at the file of a kernel alone; here, a change of its options, of this module or of what it imports makes it
 compile anew, too.
 
-Seven things save compilation time. What other kernels call, numba's own functions included, is compiled without the
-wrappers for calls from Python, and LLVM optimises it within its callers only. Constants in such a call are no types of
-their own. numba's answers to what type `a + b` has are remembered. `a[i, j]` needs fewer instructions than numba's.
-Values of a tuple that was just made are not read back. What holds no variable is not searched for variables. Python
-collects no garbage meanwhile. Results are the same to the last bit. The changes of numba hold for the whole process.
+What other kernels call is compiled without the wrappers for calls from Python, and Python collects no garbage while
+kernels are compiled. `sim.numba_shortcuts` makes numba itself faster, or is left out where numba's inside is another.
 """
 
 from __future__ import annotations
@@ -22,31 +19,24 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable
-from functools import cache, partial, wraps
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
-from numba.core import cgutils, codegen, compiler, event, ir, targetconfig, types
-from numba.core.typing import templates
-from numba.np import arrayobj
+from numba.core import event, types
+
+try:
+    from sim.numba_shortcuts import INNER
+except (ImportError, AttributeError):  # numba has other parts inside: it compiles as usual
+    INNER: dict[str, Any] | None = None  # type: ignore[no-redef]
 
 config: Any = numba.config
 unliteral: Any = types.unliteral
 register: Any = event.register
-function_type: Any = types.BaseFunction
-overload: Any = templates._OverloadFunctionTemplate
-compilation_flags: Any = targetconfig.ConfigStack
-numba_arrays: Any = arrayobj
-numba_ir: Any = ir
-numba_codegen: Any = codegen
-numba_compiler: Any = compiler
-llvm: Any = numba_codegen.llvmir
-item_pointer: Any = cgutils.get_item_pointer2
-JITCodeLibrary: Any = codegen.JITCodeLibrary
-Compiler: Any = compiler.Compiler
-OWN = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+SOURCES = (Path(__file__), Path(__file__).with_name("numba_shortcuts.py"))
+OWN = (hashlib.sha256(b"".join(path.read_bytes() for path in SOURCES)).hexdigest(), INNER is None)
 NO_CACHE = (
     "kernels are compiled anew in every process: their cache has no place, because neither the installation nor the "
     "home folder nor the temporary folder can be written; set NUMBA_CACHE_DIR to a folder that can"
@@ -78,7 +68,9 @@ def cached_njit(shared: bool = False, **options: Any) -> Callable[[Any], Any]:
             return numba.njit(**{**options, "cache": False})(function)
         stored = _stored(kernel)
         stored._source_stamp = (stored._source_stamp, _used_by(function), OWN, repr(sorted(options.items())))
-        _call_by_kernels(kernel, kernel if shared else numba.njit(**{**options, "cache": False, **INNER})(function))
+        if INNER is not None:
+            inner = kernel if shared else numba.njit(**{**options, "cache": False, **INNER})(function)
+            _call_by_kernels(kernel, inner)
         return kernel
 
     return compiled
@@ -100,161 +92,6 @@ def _call_by_kernels(kernel: Any, inner: Any) -> None:
         return (own_overload if tuple(arguments) in kernel.overloads else inner.get_overload)(arguments)
 
     kernel.get_call_template, kernel.get_overload = get_call_template, get_overload
-
-
-class _InnerCode(JITCodeLibrary):  # type: ignore[misc]
-    """LLVM code that others link. It has no machine code, and is optimised in what links it."""
-
-    codegen = property(lambda self: self)
-
-    def set_env(self, name: str, env: Any) -> None:
-        """Does nothing: only the wrappers for calls from Python use env."""
-
-    def _optimize_functions(self, ll_module: Any) -> None:
-        ll_module.data_layout = self._codegen._data_layout
-
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._finalized = True
-
-
-class _InnerCompiler(Compiler):  # type: ignore[misc]
-    def define_pipelines(self) -> Any:
-        self.state.library = _InnerCode(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
-        return super().define_pipelines()
-
-
-INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": _InnerCompiler}
-_jit_of_overloads, _compile_internal = overload._get_jit_decorator, numba_compiler.compile_internal
-overload._get_jit_decorator = lambda self: partial(_jit_of_overloads(self), **INNER)  # such as np.empty
-
-
-def _for_all_callers(find: Any) -> Any:
-    """Returns numba's _get_impl, which compiles a function once for kernels with and without a wrapper for Python."""
-
-    @wraps(find)
-    def _get_impl(self: Any, args: Any, kws: Any) -> Any:
-        flags = compilation_flags.top_or_none()
-        if flags is None or flags.no_cpython_wrapper:
-            return find(self, args, kws)
-        flags = flags.copy()
-        flags.no_cpython_wrapper = True
-        with compilation_flags().enter(flags):
-            return find(self, args, kws)
-
-    return _get_impl
-
-
-overload._get_impl = _for_all_callers(overload._get_impl)
-
-
-def _compile_part(typing: Any, target: Any, library: Any, *rest: Any, **named: Any) -> Any:
-    return _compile_internal(typing, target, _InnerCode(target.codegen(), library.name), *rest, **named)
-
-
-numba_compiler.compile_internal = _compile_part
-
-
-def _with_memory(resolve: Any) -> Any:
-    """Returns numba's BaseFunction.get_call_type with a memory, and a short way for numbers.
-
-    It asks some thirty templates, each time anew, what type `a + b` has. Of numbers, those with lists of types know it.
-    Only answers about operators are remembered: those of numbers do not change, whatever the options of the kernel.
-    """
-    known: dict[Any, Any] = {}
-
-    def answer(self: Any, context: Any, args: Any, kws: Any) -> Any:
-        plain = tuple(unliteral(a) for a in args)
-        if all(isinstance(a, types.Number | types.Boolean) for a in plain):
-            for template in (t(context) for t in self.templates if issubclass(t, templates.ConcreteTemplate)):
-                signature = template.apply(plain, kws)
-                if signature is not None:
-                    return signature, template.get_impl_key(signature)
-        signature = resolve(self, context, args, kws)
-        return signature, self._impl_keys[signature.args]
-
-    @wraps(resolve)
-    def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
-        if getattr(self.typing_key, "__module__", "") != "_operator":
-            return resolve(self, context, args, kws)
-        call = self, context, tuple(args), tuple(dict(kws).items())
-        if call not in known:
-            known[call] = answer(self, context, args, kws)
-        signature, implementation = known[call]
-        self._impl_keys[signature.args] = implementation
-        return signature
-
-    return get_call_type
-
-
-function_type.get_call_type = _with_memory(function_type.get_call_type)
-
-
-def _with_short_way(indexing: Any) -> Any:
-    """Returns numba's basic_indexing with a short way to one element.
-
-    numba's own way takes each length of the array apart twice, and the steps that an array in rows does not need.
-    """
-
-    @wraps(indexing)
-    def basic_indexing(
-        context: Any, builder: Any, kind: Any, array: Any, index_types: Any, indices: Any, boundscheck: Any = None
-    ) -> Any:
-        if boundscheck or len(indices) != kind.ndim or not all(isinstance(t, types.Integer) for t in index_types):
-            return indexing(context, builder, kind, array, index_types, indices, boundscheck)
-        fields = array._getvalue()
-
-        def field(name: str, *axis: int) -> Any:
-            return builder.extract_value(fields, (array._datamodel.get_field_position(name), *axis))
-
-        axes = range(kind.ndim)
-        shape = [field("shape", k) for k in axes]
-        strides = [field("strides", k) for k in axes] if kind.layout == "A" else []
-        places = [
-            index
-            if type(index) is llvm.Constant and index.type == shape[0].type and index.constant >= 0
-            else numba_arrays.fix_integer_index(context, builder, index_type, index, length)
-            for index, index_type, length in zip(indices, index_types, shape, strict=True)
-        ]
-        return item_pointer(context, builder, field("data"), shape, strides, kind.layout, places), [], []
-
-    return basic_indexing
-
-
-def _of_insertions(extract: Any) -> Any:
-    """Returns llvmlite's extract_value, which makes no instruction if the value was inserted in the same function."""
-
-    @wraps(extract)
-    def extract_value(self: Any, whole: Any, place: Any, name: str = "") -> Any:
-        path, source = list(place) if isinstance(place, tuple | list) else [place], whole
-        while isinstance(source, llvm.instructions.InsertValue):
-            if list(source.indices) == path:
-                return source.value
-            if source.indices[0] == path[0]:
-                break
-            source = source.aggregate
-        return extract(self, whole, place, name)
-
-    return extract_value
-
-
-def _variables(find: Any) -> Any:
-    """Returns numba's Inst._rec_list_vars, which is asked most often for what holds no variable."""
-    without = {str, int, bool, type(None), numba_ir.Loc, type(len)}
-
-    @wraps(find)
-    def _rec_list_vars(self: Any, value: Any) -> Any:
-        return [] if value.__class__ in without else find(self, value)
-
-    return _rec_list_vars
-
-
-numba_ir.Inst._rec_list_vars = _variables(numba_ir.Inst._rec_list_vars)
-numba_arrays.basic_indexing = _with_short_way(numba_arrays.basic_indexing)
-llvm.IRBuilder.extract_value = _of_insertions(llvm.IRBuilder.extract_value)
 
 
 class _Compiling(event.Listener):

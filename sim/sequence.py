@@ -12,25 +12,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim.clock import check_stride, every_nth
-from sim.render.renderer import RenderedFrame, Renderer, make_renderer
+from sim.render.renderer import RenderedFrame, make_renderer
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.camera_placement import place_camera
 from sim.streams import check_streams
 from sim.truth.label import bodies, label
 from sim.truth.order_fulfilment import check_orders
+
+# isort: off
+# fmt: off
 from sim.types import (
-    BACKGROUNDS,
-    OWN_BACKGROUND,
-    Array,
-    Camera,
-    Detections,
-    Frame,
-    Image,
-    Motion,
-    PixelTruth,
-    Sequence,
-    Truth,
+    BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, Image, Motion, PixelTruth, Sequence, Truth,
 )
+# fmt: on
+# isort: on
 
 if TYPE_CHECKING:
     from scenarios.schema.scenario import ObservationSpec, Scenario
@@ -64,14 +59,9 @@ def simulate(
 
 
 def observe(
-    scenario: Scenario | ObservationSpec,
-    motion: Motion,
-    *,
-    people: Mapping[str, tuple[int, ...]] | None = None,
-    check: bool = True,
-    streams: Iterable[str] = (),
-    stride: int = 1,
-) -> Sequence:
+    scenario: Scenario | ObservationSpec, motion: Motion, *, people: Mapping[str, tuple[int, ...]] | None = None,
+    check: bool = True, streams: Iterable[str] = (), stride: int = 1,
+) -> Sequence:  # fmt: skip
     """Returns the sequence that a scenario's camera and sensor make of a motion. See `simulate`.
 
     people: person ids of each group that `sensor.hide` may name; None: those of the scenario that the motion was
@@ -80,7 +70,9 @@ def observe(
     check_stride(stride, motion.fps)
     camera = place_camera(scenario.camera, motion)
     wanted = frozenset(check_streams(streams, "png"))
-    renderer = _renderer(wanted, scenario, motion, camera)
+    renderer = make_renderer(motion, camera, scenario.light, scenario.picture) if wanted else None
+    if renderer is not None and not wanted.isdisjoint({"right", "disparity"}):
+        renderer.check_pair()
     left, right, disparity = ("left" in wanted, "right" in wanted, "disparity" in wanted)
     labels = left and not wanted.isdisjoint({"ids", "disparity"})
     kept = every_nth(motion, stride)
@@ -150,14 +142,3 @@ def observe(
         load_background=None if renderer is None else background, load_pixels=None if renderer is None else pixels,
         load_light=light,
     )  # fmt: skip
-
-
-def _renderer(
-    streams: frozenset[str], scenario: Scenario | ObservationSpec, motion: Motion, camera: Camera
-) -> Renderer | None:
-    if not streams:
-        return None
-    made = make_renderer(motion, camera, scenario.light, scenario.picture)
-    if not streams.isdisjoint({"right", "disparity"}):
-        made.check_pair()
-    return made

@@ -160,6 +160,20 @@ class Scene(Frozen):
     wall_height: float = 2.5
     pillar_height: float = 2.5
 
+    @classmethod
+    def of(cls, world: Any, walls: Any, doors: Any) -> Scene:
+        """Returns the scene of a table `world` with these fields; walls and doors (W, 2, 2) are given apart."""
+        return cls(
+            np.array(world.size, float), np.array(walls, float).reshape(-1, 2, 2),
+            np.array(world.pillars, float).reshape(-1, 3), np.array(doors, float).reshape(-1, 2, 2),
+            np.array(world.service, float).reshape(-1, 2),
+            tuple(
+                Stairs(np.array(s.foot, float), np.array(s.head, float), s.width, s.rise, int(s.steps), s.landing)
+                for s in world.stairs
+            ),
+            world.wall_height, world.pillar_height,
+        )  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera(Frozen):

@@ -113,7 +113,7 @@ def groups_without_people(groups, places):
 def group_scores(true, est, by):
     """The scores of groups, without HOTA's; true, est: lists of Group, frame by frame."""
     n_true = n_est = hits = switches = right = clean = found = overlapping = 0
-    distance, anywhere, size, extent, by_frame, last = [], [], [], [], [], {}
+    distance, last = [], {}
     for a, b in zip(true, est, strict=True):
         s = np.array([[similarity(p, q, by) for q in b] for p in a]).reshape(len(a), len(b))
         nearer = np.array([[1e-9 / (1 + np.linalg.norm(p.pos - q.pos)) for q in b] for p in a]).reshape(s.shape)
@@ -123,9 +123,6 @@ def group_scores(true, est, by):
         shapes = np.array([[polygon_iou(p.hull, q.hull) for q in b] for p in a]).reshape(s.shape)
         overlapping += len(best_matching(np.where(shapes >= 0.5, shapes + nearer, 0.0)))
         n_true, n_est, hits = n_true + len(a), n_est + len(b), hits + len(pairs)
-        apart = np.array([[np.linalg.norm(p.pos - q.pos) for q in b] for p in a]).reshape(s.shape)
-        anywhere += [apart[i, j] for i, j in best_matching(1000 - apart)]
-        by_frame.append(((len(b) - len(pairs)) / max(len(a), 1), (len(a) - len(pairs)) / max(len(a), 1)))
         for i, j in pairs:
             common = a[i].common(b[j])
             inside = common >= 0.6 * len(a[i].people)
@@ -134,36 +131,20 @@ def group_scores(true, est, by):
             switches += last.get(a[i].id, b[j].id) != b[j].id
             last[a[i].id] = b[j].id
             distance.append(np.linalg.norm(a[i].pos - b[j].pos))
-            size.append(abs(a[i].size - (b[j].size if np.isfinite(b[j].size) else len(b[j].people))))
-            extent.append(wasserstein(a[i], b[j]))
     misses, false = n_true - hits, n_est - hits
     return {
         "1-FP": ratio(n_true - false, n_true), "1-FN": ratio(n_true - misses, n_true),
-        "1-FP_frames": 1 - np.mean([f for f, _ in by_frame]), "1-FN_frames": 1 - np.mean([f for _, f in by_frame]),
         "GDSR": ratio(right, n_true), "GDSR2": ratio(clean, n_true),
-        "MOTP": mean(distance), "MOTP_ungated": mean(anywhere), "MSE": mean([d**2 for d in distance]),
+        "MOTP": mean(distance), "MSE": mean([d**2 for d in distance]),
         "MOTA": ratio(n_true - misses - false - switches, n_true),
         "IDSW": switches, "TP": hits, "FP": false, "FN": misses,
         "F1": ratio(2 * found, n_true + n_est), "precision": ratio(found, n_est), "recall": ratio(found, n_true),
         "F1_hull": ratio(2 * overlapping, n_true + n_est),
-        "size_error": mean(size), "extent_error": mean(extent),
     }  # fmt: skip
 
 
 def similarity(a, b, by):
     return a.jaccard(b) if by == "members" else polygon_iou(a.hull, b.hull)
-
-
-def root(a):
-    """The square root of a positive semidefinite matrix."""
-    values, vectors = np.linalg.eigh(a)
-    return vectors @ np.diag(np.sqrt(np.maximum(values, 0))) @ vectors.T
-
-
-def wasserstein(a, b):
-    between = root(root(a.extent) @ b.extent @ root(a.extent))
-    squared = np.sum((a.pos - b.pos) ** 2) + np.trace(a.extent + b.extent - 2 * between)
-    return np.sqrt(max(squared, 0.0))
 
 
 def pairwise_scores(true, est):

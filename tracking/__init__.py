@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tracking.comparison import compare
     from tracking.running.run import group, track
     from tracking.scoring import evaluate
-    from tracking.tuning import tune
+    from tracking.tuning.search import tune
 
 __all__ = ["compare", "evaluate", "group", "track", "tune"]
 
@@ -27,7 +27,7 @@ _HOME = {
     "evaluate": "tracking.scoring",
     "group": "tracking.running.run",
     "track": "tracking.running.run",
-    "tune": "tracking.tuning",
+    "tune": "tracking.tuning.search",
 }
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import dataclasses
 import os.path
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,11 +42,6 @@ class Param:
     online: bool = True  # it may change between two frames
     tunable: bool = True  # searches may change it
     sees: str = ""  # "pixels" or "points" if it has an effect only with these
-
-    @property
-    def ours(self) -> bool:
-        """True if the meaning says "ours": the parameter belongs to a departure from the tracker's paper."""
-        return re.search(r"\bours\b", self.meaning) is not None
 
     @property
     def expected(self) -> str:
@@ -223,23 +217,6 @@ class Config:
     def to_toml(self) -> str:
         """Returns the text of a TOML file from which `from_toml` reads an equal config."""
         return toml_text(self.tracker, self.as_dict())
-
-    @classmethod
-    def table(cls) -> str:
-        """Returns all parameters as a Markdown table for the docs: default, presets, range, unit, meaning."""
-        named = {name: cls.preset(name).as_dict() for name in presets(cls.tracker)}
-        head = ["parameter", "default", *(f"preset `{name}`" for name in named), "range", "unit", "meaning"]
-        rows = [head, ["---"] * len(head)]
-        for p in cls.params().values():
-            changed = [values[p.name] for values in named.values()]
-            cells = ["" if value == p.default else str(value) for value in changed]
-            rows.append([f"`{p.name}`", str(p.default), *cells, _range(p), p.unit, p.meaning])
-        return "\n".join("|---" * len(r) + "|" if r[0] == "---" else "| " + " | ".join(r) + " |" for r in rows) + "\n"
-
-
-def _range(p: Param) -> str:
-    span = ", ".join(f"`{c}`" for c in p.choices) if p.choices else f"{p.low:g} to {p.high:g}"
-    return span + (" (log)" if p.scale == "log" else "")
 
 
 def read_params(path: str | Path, tracker: str) -> dict[str, object]:

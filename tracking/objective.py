@@ -4,7 +4,7 @@
 
 The scores equal those of `tracking.scoring.evaluate`, by the same functions of tracking.scoring. The truth's side is
 prepared once. Only one step is replaced: of groups that must be derived from tracks, only the members are computed
-(`derived_members`), without hulls, ids and events.
+(`_derived_groups`), without hulls, ids and events.
 
 Also here: members of the groups that the default grouping derives from tracked people, without shapes, ids and events.
 
@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.types import Bools, Ints, Tracks, Truth
+from sim.types import Ints, Tracks, Truth
 from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import names_groups, with_groups
 from tracking.grouping.grouping_choice import groups_now
@@ -32,24 +32,6 @@ from tracking.scoring.people_comparison import Similarity, in_one_plane, people_
 from tracking.scoring.rows import FrameRows, find_rows
 from tracking.scoring.track_scores import weighted_hota
 from tracking.scoring.weighted_sums import unweighted
-
-
-def derived_members(tracks: Sequence[Tracks], fps: float, px_per_m: float, labelled: Bools) -> tuple[FrameRows, Ints]:
-    """Returns frame and id of the K members of groups of two or more in labelled frames, and their group (K,), from 0.
-
-    Both are sorted by group, groups by frame. labelled (length + 1,): bool by frame number.
-    """
-    table = tabulate(tracks, fps, px_per_m, default_belief().smooth)
-    # a label for each row, equal for members of one group in a frame, -1 alone
-    group = table.group if names_groups(tracks) else groups_now(table, fps, default_belief())
-    order = np.lexsort((group, table.frame))
-    order = order[(group[order] >= 0) & labelled[table.frame[order] + 1]]
-    frame, label = table.frame[order], group[order]
-    new = np.diff(frame, prepend=-1).astype(bool) | np.diff(label, prepend=-1).astype(bool)
-    number = np.cumsum(new) - 1
-    several = np.bincount(number, minlength=1)[number] > 1
-    order, new = order[several], new[several]
-    return FrameRows(table.frame[order] + 1, table.id[order]), np.cumsum(new) - 1
 
 
 class ObjectiveScorer:
@@ -103,15 +85,27 @@ def _tracked_members(sides: ComparedSides, tracks: Sequence[Tracks], px_per_m: f
     unscaled = sides.surface == "image" and not np.isfinite(px_per_m)
     if not (sides.groups_only or unscaled or (named and all(given))):
         if not (named and any(given)):
-            return _of_derived(sides, *derived_members(tracks, fps, px_per_m, sides.frames))
+            return _derived_groups(sides, tracks, px_per_m)
         sides = replace(sides, tracks=with_groups(tracks, fps, px_per_m))
     tracked = tracked_groups(sides)
     return (tracked.counted, tracked.person) if tracked.known else None
 
 
-def _of_derived(sides: ComparedSides, members: FrameRows, of: Ints) -> tuple[GroupRows, Ints]:
-    first = np.flatnonzero(np.diff(of, prepend=-1))
-    rows, none = FrameRows(members.frame[first], of[first]), np.zeros((0, 2))
-    groups = bare_groups(rows, np.full((len(rows), 2), np.nan), (none,) * len(rows))
-    member = find_rows(sides.est.rows, members)
+def _derived_groups(sides: ComparedSides, tracks: Sequence[Tracks], px_per_m: float) -> tuple[GroupRows, Ints]:
+    """Returns the groups of two or more that the default grouping derives, and the true person of each membership."""
+    fps = sides.truth.fps
+    table = tabulate(tracks, fps, px_per_m, default_belief().smooth)
+    # a label for each row, equal for members of one group in a frame, -1 alone
+    group = table.group if names_groups(tracks) else groups_now(table, fps, default_belief())
+    order = np.lexsort((group, table.frame))
+    order = order[(group[order] >= 0) & sides.frames[table.frame[order] + 1]]
+    frame, label = table.frame[order], group[order]
+    new = np.diff(frame, prepend=-1).astype(bool) | np.diff(label, prepend=-1).astype(bool)
+    number = np.cumsum(new) - 1
+    several = np.bincount(number, minlength=1)[number] > 1
+    order, new = order[several], new[several]
+    of, first = np.cumsum(new) - 1, np.flatnonzero(new)
+    rows = FrameRows(table.frame[order][first] + 1, of[first])
+    groups = bare_groups(rows, np.full((len(rows), 2), np.nan), (np.zeros((0, 2)),) * len(rows))
+    member = find_rows(sides.est.rows, FrameRows(table.frame[order] + 1, table.id[order]))
     return replace(groups, of=of, member=member), np.where(member >= 0, np.append(sides.mapping, -1)[member], -1)

@@ -65,9 +65,7 @@ def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Calla
         made[config] = build(config)
 
     config = decode(space, action, base, attempt)
-    if config not in made:
-        attempt(config)
-    return config, made[config]
+    return config, made[config] if config in made else build(config)
 
 
 def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config], object]) -> Config | None:

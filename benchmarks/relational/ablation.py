@@ -18,7 +18,7 @@ from benchmarks.support import tables
 from sim.types import Array, Ints, Sequence
 from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import with_groups, without_groups
-from tracking.papers.relational import sensor_kernels, tracker, transition_kernels
+from tracking.papers.relational import sensor, tracker, transition_kernels
 
 DEPARTURES = (
     "relation_evidence=state", "coupling_time=0", "common_noise=0", "relation_bias=40", "NO_SPREAD", "NO_FACTORS",
@@ -37,7 +37,7 @@ def _no_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
 
 
 SWITCHES: dict[str, Any] = {
-    "NO_FACTORS": lambda: patch.object(sensor_kernels, "partner_factors", lambda *arguments: None),
+    "NO_FACTORS": lambda: patch.object(sensor, "add_partner_factors", lambda *arguments: None),
     "NO_OCCLUDERS": lambda: patch.object(tracker, "BODY_RADIUS", 0.0),
     "NO_SPREAD": lambda: patch.object(transition_kernels, "pair_spread", _no_spread),
 }

@@ -12,7 +12,6 @@ The profile of a detector, made by `flockscope fit sensor`, is a file with a [se
 
 from __future__ import annotations
 
-import os.path
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -25,17 +24,14 @@ from scenarios.errors import InputError
 from scenarios.limits import REPEATS
 from scenarios.loading import toml_files
 from scenarios.loading.checks import check
+
+# isort: off
+# fmt: off
 from scenarios.loading.toml_files import (
-    CATALOGUE,
-    SUITES,
-    Table,
-    did_you_mean,
-    dump,
-    names,
-    parse,
-    suite_names,
-    toml_value,
+    CATALOGUE, SUITES, Table, did_you_mean, dump, names, parse, suite_names, toml_value,
 )
+# fmt: on
+# isort: on
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import ObservationSpec, Scenario
 from scenarios.schema.sensor import Sensor
@@ -67,11 +63,6 @@ def sensor_settings(path: str | Path) -> tuple[str, ...]:
 def sensor_table(path: str | Path) -> Table:
     """Returns the keys given in the file's [sensor] table with their values, without defaults."""
     path = Path(path)
-    if not os.path.exists(path):
-        raise InputError(
-            file=path, got="no such file", expected="a file with a [sensor] table",
-            remedy="check the path, or make one with `flockscope fit sensor`",
-        )  # fmt: skip
     table = parse(path)
     validate(table, path, model=SensorFile)
     given: Table = table["sensor"]
@@ -119,10 +110,6 @@ def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
 
 def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
     """Returns camera, sensor, light and picture of a TOML file (None: all defaults), with settings applied."""
-    if path is not None and not os.path.exists(path):
-        raise InputError(
-            file=path, got="no such file", expected="a TOML file with [camera]", remedy="check --camera"
-        )  # fmt: skip
     file = Path(path) if path is not None else ""
     table, places = toml_files.apply_settings({} if path is None else toml_files.parse(Path(path)), tuple(set), file)
     return validate(table, file, places, model=ObservationSpec)
@@ -149,15 +136,6 @@ class Suite(Model):
 
     about: str = ""  # what it is for
     entry: Annotated[tuple[SuiteEntry, ...], Field(min_length=1)]
-
-
-def find_suite(name: str) -> Path:
-    """Returns the file of a suite, by name in the catalogue or path."""
-    if name.endswith(".toml") and os.path.exists(name):
-        return Path(name)
-    if name in suite_names():
-        return SUITES / f"{name}.toml"
-    raise InputError(got=repr(name), expected="a suite's name or file", remedy=did_you_mean(name, suite_names()))
 
 
 def read_suite(path: Path) -> Suite:
@@ -211,17 +189,18 @@ def is_catalogued(name: str) -> bool:
 
 def suite_file(name: str) -> Path | None:
     """Returns the file of the suite that a name stands for, None for a scenario."""
-    if name.startswith("suite:"):
-        return find_suite(name.removeprefix("suite:"))
-    if name.endswith(".toml"):
-        path = toml_files.find(name)
-        return path if "entry" in toml_files.parse(path) else None
+    wanted = name.removeprefix("suite:")
+    if wanted.endswith(".toml"):
+        path = toml_files.find(wanted)
+        return path if wanted != name or "entry" in toml_files.parse(path) else None
+    if wanted in suite_names() and (wanted != name or name not in names()):
+        return SUITES / f"{wanted}.toml"
     if name in names():
         return None
-    if name in suite_names():
-        return find_suite(name)
-    known = names() + suite_names()
-    raise InputError(got=repr(name), expected="a scenario, a suite or a *.toml file", remedy=did_you_mean(name, known))
+    known, expected = suite_names(), "a suite's name or file"
+    if wanted == name:
+        known, expected = names() + known, "a scenario, a suite or a *.toml file"
+    raise InputError(got=repr(wanted), expected=expected, remedy=did_you_mean(wanted, known))
 
 
 def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:

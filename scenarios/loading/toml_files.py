@@ -124,15 +124,12 @@ def merge(below: Table, above: Table) -> Table:
 
 
 def _merge_value(key: str, below: Any, above: Any) -> Any:
-    if isinstance(below, dict) and isinstance(above, dict) and not _is_value(key, above):
-        return merge(below, above)
+    if isinstance(below, dict) and isinstance(above, dict):
+        whole = key == "when" or (bool(above) and above.keys() <= DISTRIBUTION_KEYS)
+        return above if whole else merge(below, above)
     if _has_ids(below) and _has_ids(above):
         return _merge_by_id(below, above)
     return above
-
-
-def _is_value(key: str, table: Table) -> bool:
-    return key == "when" or (bool(table) and table.keys() <= DISTRIBUTION_KEYS)
 
 
 def _has_ids(value: Any) -> bool:
@@ -262,8 +259,8 @@ def _put(table: Table, steps: list[str], value: Any, text: str, file: object) ->
 
 def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: object) -> tuple[int, list[str]]:
     """Returns the index in the array that the first steps name, by index or id, and the steps after them."""
-    if (index := _position(steps[0], len(rows))) is not None:
-        return index, steps[1:]
+    if re.fullmatch("[0-9]{1,9}", steps[0]) and int(steps[0]) < len(rows):
+        return int(steps[0]), steps[1:]
     ids = {str(row["id"]): k for k, row in reversed(list(enumerate(rows))) if isinstance(row, dict) and "id" in row}
     # Ids may have dots; the longest wins, and an existing index wins over an id.
     for n in range(len(steps), 0, -1):
@@ -277,10 +274,6 @@ def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: objec
     known = list(ids) or [str(k) for k in range(len(rows))]
     got, remedy = f"{steps[0]!r} in an array of {len(rows)}", did_you_mean(steps[0], known)
     raise InputError(file=file, place=place_of(text), got=got, expected=expected, remedy=remedy)
-
-
-def _position(step: str, length: int) -> int | None:
-    return int(step) if re.fullmatch("[0-9]{1,9}", step) and int(step) < length else None
 
 
 def _with_id(rows: list[Any], index: int, value: Any) -> Any:

@@ -9,9 +9,19 @@ bounds, both included. `sim.rng.draw` draws.
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Any, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetJsonSchemaHandler,
+    Tag,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from scenarios.limits import PICTURE_SIDE
@@ -44,6 +54,18 @@ class Model(BaseModel):
                 shown = key.encode("utf-8", "backslashreplace").decode()  # pydantic refuses lone surrogates
                 raise PydanticCustomError("unknown_key", "unknown", {"key": shown, "known": list(known.values())})
         return table
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Returns the JSON schema, with the meanings of the keys from the section Attributes of the docstring."""
+        reference = handler(core)
+        schema = handler.resolve_ref_schema(reference)
+        for kind in (kind for kind in reversed(cls.__mro__) if issubclass(kind, Model)):
+            meanings = (kind.__doc__ or "").partition("Attributes:")[2]
+            for name, words in re.findall(r"^ {8}(\w+): (.*?)(?=^ {4,8}\S|\Z)", meanings, re.DOTALL | re.MULTILINE):
+                key = cls.model_fields[name].alias or name
+                schema["properties"][key]["description"] = " ".join(words.split())
+        return reference
 
 
 class Distribution(Model):

@@ -8,57 +8,18 @@ from __future__ import annotations
 from math import sqrt
 
 from sim.compiler import njit
+
+# isort: off
+# fmt: off
 from sim.crowd.forces import (
-    ALIGNMENT,
-    AMPLITUDE,
-    AVOIDED,
-    AXIS_X,
-    AXIS_Y,
-    COHESION_TIME,
-    COS,
-    COUNT,
-    END,
-    FOOT_X,
-    FOOT_Y,
-    GATHER,
-    GATHER_RADIUS,
-    GROUP,
-    HASTE,
-    LENGTH,
-    MAX_OFF_PLACE,
-    MEAN_AHEAD,
-    MEAN_LEFT,
-    MEAN_VX,
-    MEAN_VY,
-    MEAN_X,
-    MEAN_Y,
-    MODE,
-    NARROW,
-    PASS,
-    PASS_RADIUS,
-    RADIUS,
-    RELAXATION,
-    SIN,
-    SLOW_TIME,
-    SLOWDOWN,
-    STAND,
-    STRAY_AHEAD,
-    STRAY_LEFT,
-    SWAY_X,
-    SWAY_Y,
-    TO_TARGET,
-    TURN_TIME,
-    VX,
-    VY,
-    WANDER_ALONG,
-    WANDER_LEFT,
-    WANTED_VX,
-    WANTED_VY,
-    WAYPOINT,
-    WIDTH,
-    X,
-    Y,
+    ALIGNMENT, AMPLITUDE, AVOIDED, AXIS_X, AXIS_Y, COHESION_TIME, COS, COUNT, END, FOOT_X, FOOT_Y, GATHER,
+    GATHER_RADIUS, GROUP, HASTE, LENGTH, MAX_OFF_PLACE, MEAN_AHEAD, MEAN_LEFT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y,
+    MODE, NARROW, PASS, PASS_RADIUS, RADIUS, RELAXATION, SIN, SLOW_TIME, SLOWDOWN, STAND, STRAY_AHEAD, STRAY_LEFT,
+    SWAY_X, SWAY_Y, TO_TARGET, TURN_TIME, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, WAYPOINT, WIDTH,
+    X, Y,
 )
+# fmt: on
+# isort: on
 from sim.elementary_kernels import atan2, cos, sin
 
 STRIDES = 0.807  # strides per s at 1 m/s: 0.0064 m of step per step/min (Sekiya & Nagasaki 1998)
@@ -90,9 +51,6 @@ def sway(wanted, gait, dt, out):  # type: ignore[no-untyped-def]
         out[i, X] += left_x * (gait[i, COS] - c) / dt
         out[i, Y] += left_y * (gait[i, COS] - c) / dt
 
-
-# fmt: on
-# isort: on
 
 TINY = 1e-9  # m
 TARGET_TIME = 0.7  # s: time in which a person reaches a place in a queue, speed permitting

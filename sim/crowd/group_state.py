@@ -80,15 +80,9 @@ class GroupState:
         return gone
 
     def go(
-        self,
-        g: int,
-        start: Array,
-        via: list[Array],
-        goal: Array,
-        finish: str,
-        speed: float,
+        self, g: int, start: Array, via: list[Array], goal: Array, finish: str, speed: float,
         gather: Array | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Sets the way of group g from start past the via points to goal, round walls and through doors.
 
         finish: "stand", "leave" or "walk" on. gather: first waypoint, where the group waits for all members.

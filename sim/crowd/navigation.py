@@ -10,7 +10,7 @@ import numpy as np
 
 from scenarios.schema.scenario import WorldSpec
 from sim.elementary import dot, length
-from sim.types import Array, Bools, Scene, Stairs
+from sim.types import Array, Bools, Scene
 
 BEHIND = 0.7  # m behind a door, where nobody touches the wall any more
 CLEARANCE = 0.6  # m kept from a wall's end on the way round it
@@ -24,7 +24,7 @@ def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Ar
     pieces = [np.asarray(w, dtype=float) for w in walls]
     openings = []
     for at, width in doors:
-        k = int(np.argmin([_distance(at, w) for w in pieces]))
+        k = int(np.argmin([wall_distances(at, w) for w in pieces]))
         wall = pieces.pop(k)
         far = float(length(wall[1] - wall[0]))
         along = (wall[1] - wall[0]) / far
@@ -41,26 +41,14 @@ def scene_of(world: WorldSpec) -> Scene:
     """Returns the world of a scenario as the arrays of a Scene, m."""
     walls = np.array(world.walls, dtype=float).reshape(-1, 2, 2)
     doors = [(np.array(d.at, dtype=float), d.width) for d in world.doors]
-    pieces, openings = cut_walls(walls, doors)
-    return Scene(
-        size=np.array(world.size, dtype=float),
-        walls=pieces,
-        pillars=np.array(world.pillars, dtype=float).reshape(-1, 3),
-        doors=openings,
-        service=np.array(world.service, dtype=float).reshape(-1, 2),
-        stairs=tuple(
-            Stairs(np.array(s.foot, float), np.array(s.head, float), s.width, s.rise, s.steps, s.landing)
-            for s in world.stairs
-        ),
-        wall_height=world.wall_height,
-        pillar_height=world.pillar_height,
-    )
+    return Scene.of(world, *cut_walls(walls, doors))
 
 
-def _distance(point: Array, wall: Array) -> float:
+def wall_distances(point: Array, wall: Array) -> Array:
+    """Returns the distances (...) m of points (..., 2) to a wall (2, 2)."""
     along = wall[1] - wall[0]
     s = np.clip(dot(point - wall[0], along) / max(float(dot(along, along)), 1e-12), 0, 1)
-    return float(length(point - wall[0] - s * along))
+    return length(point - wall[0] - s[..., None] * along)
 
 
 def blocked(a: Array, b: Array, walls: Array) -> Bools:
@@ -98,7 +86,7 @@ class Navigator:
         along = self.walls[:, 1] - self.walls[:, 0]
         along = along / length(along)[:, None]
         ends = np.concatenate([self.walls[:, 0] - CLEARANCE * along, self.walls[:, 1] + CLEARANCE * along])
-        free = [min(_distance(e, w) for w in self.closed) > 0.9 * CLEARANCE for e in ends]
+        free = [min(wall_distances(e, w) for w in self.closed) > 0.9 * CLEARANCE for e in ends]
         inside = ((ends >= 0) & (ends <= self.size)).all(axis=1)
         return np.asarray(ends[inside & np.array(free, dtype=bool)])
 
@@ -118,7 +106,7 @@ class Navigator:
         lengths[: n - 2, : n - 2] = self.edges
         lengths[: n - 2, n - 2 :] = self._lengths(self.nodes, ends)
         lengths[n - 2 :, : n - 2] = lengths[: n - 2, n - 2 :].T
-        path = _dijkstra(lengths, n - 2, n - 1)
+        path = _shortest(lengths, n - 2, n - 1)
         if path is None:
             return None
         way, narrow, here = [], [], start
@@ -138,16 +126,11 @@ class Navigator:
         return np.asarray(BEHIND * across * (1.0 if dot(across, way) > 0 else -1.0))
 
 
-def _dijkstra(lengths: Array, start: int, goal: int) -> list[int] | None:
+def _shortest(lengths: Array, start: int, goal: int) -> list[int] | None:
     """Returns the shortest path as node indices without the start; None if there is none."""
-    n = len(lengths)
-    far, before, done = np.full(n, np.inf), np.full(n, -1), np.zeros(n, dtype=bool)
-    far[start] = 0.0
-    for _ in range(n):
-        k = int(np.argmin(np.where(done, np.inf, far)))
-        done[k] = True
-        better = far[k] + lengths[k] < far
-        before[better], far[better] = k, (far[k] + lengths[k])[better]
+    from scipy.sparse.csgraph import dijkstra
+
+    far, before = dijkstra(lengths, indices=start, return_predecessors=True)
     if not np.isfinite(far[goal]):
         return None
     path = [goal]

@@ -64,26 +64,20 @@ class ServiceQueue:
         tail = sum(len(members[g]) for g in self.joined)
         self.coming.sort(key=lambda g: (float(np.min(length(pos[members[g]] - self.slot(tail)))), g))
         slots: dict[int, Array] = {}
-        k = 0
+
+        def give(g: int) -> None:
+            for column in members[g]:
+                slots[column] = self.slot(len(slots))
+
         for g in self.joined:
-            k = self._give_slots(g, k, members, slots)
-        while self.coming and self._has_reached(self.coming[0], k, members, pos):
+            give(g)
+        while self.coming and np.min(length(pos[members[self.coming[0]]] - self.slot(len(slots)))) < JOIN_RADIUS:
             self.joined.append(self.coming.pop(0))
-            k = self._give_slots(self.joined[-1], k, members, slots)
+            give(self.joined[-1])
         for g in self.coming:
             members[g].sort(key=lambda c: (float(length(pos[c] - self.head)), c))
-            k = self._give_slots(g, k, members, slots)
+            give(g)
         return slots, done
-
-    def _give_slots(self, g: int, k: int, members: dict[int, list[int]], slots: dict[int, Array]) -> int:
-        """Writes the places of a group's members from index k on; returns the next free index."""
-        for column in members[g]:
-            slots[column] = self.slot(k)
-            k += 1
-        return k
-
-    def _has_reached(self, g: int, k: int, members: dict[int, list[int]], pos: Array) -> bool:
-        return bool(np.min(length(pos[members[g]] - self.slot(k))) < JOIN_RADIUS)
 
     def _serve(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
         """Returns the group whose service ends by time t, in a list; begins the service of the next."""

@@ -15,7 +15,8 @@ from scenarios.errors import InputError
 from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, Stop, group_names
 from scenarios.schema.values import Distribution, Point, Value
 from sim.crowd.formation import to_world, walking
-from sim.elementary import dot, exp, length, unit
+from sim.crowd.navigation import wall_distances
+from sim.elementary import exp, length, unit
 from sim.rng import autoregression, draw, normals, rng, uniforms
 from sim.types import Array, Order, Scene
 
@@ -218,12 +219,11 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
         if together and is_free(group.pos, draws.scene, taken if group.enter == 0 else []):
             return
     raise InputError(
-        file=f"scenario {draws.scenario.name}",
-        place=f"group.{spec.id}.start (seed {draws.seed})",
+        file=f"scenario {draws.scenario.name}", place=f"group.{spec.id}.start (seed {draws.seed})",
         got="no free place" if drawn else "a place in a wall, a pillar or another group",
         expected=f"{len(group.members)} people {START_GAP} m clear of others and {BODY_RADIUS} m of walls",
         remedy="move the start, widen its distribution, or have fewer people",
-    )
+    )  # fmt: skip
 
 
 def scattered(n: int, scatter: Value, r: np.random.Generator) -> Array:
@@ -240,15 +240,10 @@ def _apart(pos: Array) -> bool:
 
 def is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
     """Returns True if pos (n, 2) are START_GAP clear of the taken places and BODY_RADIUS clear of walls and pillars."""
-    if taken:
-        others = np.concatenate(taken)
-        if np.min(length(pos[:, None] - others[None])) < START_GAP:
-            return False
-    for wall in scene.walls:
-        u = wall[1] - wall[0]
-        s = np.clip(dot(pos - wall[0], u) / dot(u, u), 0, 1)
-        if np.min(length(pos - wall[0] - s[:, None] * u)) < BODY_RADIUS:
-            return False
+    if taken and length(pos[:, None] - np.concatenate(taken)[None]).min() < START_GAP:
+        return False
+    if any(wall_distances(pos, wall).min() < BODY_RADIUS for wall in scene.walls):
+        return False
     d = length(pos[:, None] - scene.pillars[None, :, :2]) - scene.pillars[None, :, 2]
     return bool((d >= BODY_RADIUS).all())
 

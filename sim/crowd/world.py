@@ -176,11 +176,6 @@ class World:
             expected="finite motion", remedy="report the scenario and seed as a bug",
         )  # fmt: skip
 
-    def _read(self) -> Array:
-        self._read_buffer.clear()
-        pymunk.batch.get_space_bodies(self.space, READ, self._read_buffer)
-        return np.frombuffer(self._read_buffer.float_buf()).reshape(-1, 4)
-
     def _come_and_go(self, t: float, first: bool) -> None:
         """Removes people who leave at time t (s, negative in the warm-up), and adds groups that enter."""
         gone = self.groups.remove_leaving(self.columns)
@@ -205,16 +200,13 @@ class World:
         self._map_rows()
 
     def _way_back_is_free(self, group: EnteringGroup, heading: Array) -> bool:
-        if not group.walks:
-            return False
         back = group.pos - self.scenario.warmup * group.speed * heading
-        return not blocked(group.pos, back, self.scene.walls).any() and not len(self.scene.pillars)
+        free = not blocked(group.pos, back, self.scene.walls).any() and not len(self.scene.pillars)
+        return group.walks and free
 
     def _has_room(self, group: EnteringGroup) -> bool:
-        if not len(self.state):
-            return True
         d = length(group.pos[:, None] - self.state[None, :, :2])
-        return bool(d.min() > ENTRY_GAP * BODY_RADIUS)
+        return bool(d.min(initial=np.inf) > ENTRY_GAP * BODY_RADIUS)
 
     def _body(self, pos: Array, velocity: Array) -> pymunk.Body:
         body = pymunk.Body(1.0, float("inf"))
@@ -236,7 +228,9 @@ class World:
         self.columns = np.array([column[int(i)] for i in ids[:n]], dtype=np.int64)
         self.force = np.zeros((len(ids), 2))
         self._write_buffer.set_float_buf(self.force)
-        self.state = self._read()[:n]
+        self._read_buffer.clear()
+        pymunk.batch.get_space_bodies(self.space, READ, self._read_buffer)
+        self.state = np.frombuffer(self._read_buffer.float_buf()).reshape(-1, 4)[:n]
         self.people = PeopleArrays.empty(n)
         self.states[:], self.group_of[:] = np.nan, -1
         self._fill_people()

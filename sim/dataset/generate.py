@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
@@ -30,17 +30,17 @@ from sim.io.store import sequence_folder
 from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest
 from sim.streams import check_streams
 from sim.types import Camera, Sequence
-from sim.workers.start import WorkerOptions, start_workers
+from sim.workers.pool import WorkerOptions, start_workers
 
 MOST = 3  # differences that are named; the others are counted
 LONGEST = 40  # characters of a value
 
 
-def setting_differences(stored: Table, wanted: Table) -> str:
-    """Returns the settings that differ between two scenarios, as "camera.fps 10 → 5, duration 20 → 30"."""
+def differences(stored: Table, wanted: Table) -> str:
+    """Returns the entries that differ between two tables, as "camera.fps 10 → 5, duration 20 → 30"."""
     before, after = (dict(_flat("", table)) for table in (stored, wanted))
     keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
-    words = [f"{key} {_value(before, key)} → {_value(after, key)}" for key in keys[:MOST]]
+    words = [f"{key} {_word(before.get(key))} → {_word(after.get(key))}" for key in keys[:MOST]]
     return ", ".join(words + [f"{len(keys) - MOST} more"] * (len(keys) > MOST))
 
 
@@ -53,9 +53,10 @@ def _flat(prefix: str, value: Any) -> list[tuple[str, Any]]:
     return [(prefix, value)]
 
 
-def _value(settings: Table, key: str) -> str:
-    value = settings.get(key, "none")
-    return shortened(str(value).removesuffix(".0") if isinstance(value, float) else str(value), LONGEST)
+def _word(value: Any) -> str:
+    text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
+    text = text.removesuffix(".0") if isinstance(value, float) else text
+    return "none" if value is None or not text else shortened(text, LONGEST)
 
 
 MARKER_TIMEOUT = 5.0  # s that a shared file system may take to show one machine the file of another
@@ -125,16 +126,9 @@ def _differences(job: SequenceJob, manifest: dict[str, Any], different: dict[str
     settings = ""
     if "scenario_hash" in different:
         with suppress(InputError):
-            settings = setting_differences(parse(job.folder / "scenario.toml"), parse_toml(dump(job.entry.scenario)))
-    fields = {key: value for key, value in different.items() if key != "scenario_hash" or not settings}
-    return ", ".join(
-        [settings] * bool(settings) + [f"{k} {_word(manifest.get(k))} → {_word(v)}" for k, v in fields.items()]
-    )
-
-
-def _word(value: Any) -> str:
-    text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
-    return "none" if value is None or not text else text
+            settings = differences(parse(job.folder / "scenario.toml"), parse_toml(dump(job.entry.scenario)))
+    others = {key: value for key, value in different.items() if key != "scenario_hash" or not settings}
+    return ", ".join(filter(None, [settings, differences({key: manifest.get(key) for key in others}, others)]))
 
 
 def is_stored(job: SequenceJob) -> bool:
@@ -225,15 +219,9 @@ class Stored(TypedDict, total=False):
 
 
 def generate(
-    entries: Iterable[Entry | str],
-    seeds: range,
-    out: str | Path,
-    *,
-    set: Iterable[str] = (),
-    workers: WorkerOptions = ONE_WORKER,
-    progress: Progress | None = None,
-    **stored: Unpack[Stored],
-) -> Folders:
+    entries: Iterable[Entry | str], seeds: range, out: str | Path, *, set: Iterable[str] = (),
+    workers: WorkerOptions = ONE_WORKER, progress: Progress | None = None, **stored: Unpack[Stored],
+) -> Folders:  # fmt: skip
     """Simulates every entry with every seed, and stores each sequence as OUT/flockscope-<split>/<name>-s<seed>/.
 
     Stored sequences of the same scenario, seed, version and pictures are kept if all their files are intact. The lists
@@ -269,14 +257,10 @@ def generate(
         for entry in found
         for seed in seeds
     ]
-    with lock_folder(root):
-        remove_partials(root, folder, root / "seqmaps")
+    with _dataset(root, folder):
         for job in jobs:
             stored_manifest(job)
-        try:
-            errors = _run_jobs(jobs, workers, progress)
-        finally:
-            remove_partials(root, folder)
+        errors = _run_jobs(jobs, workers, progress)
         try:
             complete = write_seqmap(root, split)
         except FlockscopeError as error:
@@ -296,6 +280,17 @@ def generate(
     if errors:
         raise _summary(errors, len(jobs))
     return Folders((job.folder for job in made), unfulfilled)
+
+
+@contextmanager
+def _dataset(root: Path, folder: Path) -> Iterator[None]:
+    """Locks the folder of a dataset for the block, and removes what interrupted writers left there."""
+    with lock_folder(root):
+        remove_partials(root, folder, root / "seqmaps")
+        try:
+            yield
+        finally:
+            remove_partials(root, folder)
 
 
 def _run_jobs(jobs: list[SequenceJob], workers: WorkerOptions, progress: Progress | None) -> dict[str, FlockscopeError]:
@@ -371,8 +366,7 @@ def store_replays(
         )  # fmt: skip
     streams = check_streams(options.streams, options.images)
     made: list[Path] = []
-    with lock_folder(root):
-        remove_partials(root, folder, root / "seqmaps")
+    with _dataset(root, folder):
         try:
             for recording, seed in product(recordings, seeds):
                 sequence, form = resolve_replay(
@@ -384,6 +378,5 @@ def store_replays(
                 if progress is not None:
                     progress(len(made), len(recordings) * len(seeds), path.name)
         finally:
-            remove_partials(root, folder)
             write_seqmap(root, split)
     return made

@@ -25,7 +25,8 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load_observation
-from scenarios.schema.scenario import ObservationSpec, ReplayOrigin, ReplaySpec
+from scenarios.schema.scenario import ObservationSpec
+from scenarios.schema.values import Model, NonNegative, Positive
 from sim.crowd.heading import facings, headings
 from sim.dataset.splits import is_real
 from sim.hashing import canonical_hash
@@ -149,6 +150,36 @@ def nearest_row(frame: Ints, id: Ints, people: Ints, rate: float, t: Array) -> I
     return out
 
 
+class ReplayOrigin(Model):
+    """The recording whose motion a replay shows.
+
+    - kind, name: format ("biwi", "mot", …) and name of the recording. real: it shows real people, so nothing may be
+      tuned on it.
+    - people: the recording's ids of persons 1, 2, … of the replay, in this order.
+    - start, duration: the part that is replayed, s. shift: positions in the replay minus those in the recording, x, y,
+      m.
+    - smoothing: movements of the labels that are quicker than this are removed as jitter, s; 0: none.
+    - motion: SHA-256 of the recording's labelled positions, ids and groups.
+    """
+
+    kind: str
+    name: str
+    real: bool
+    people: tuple[int, ...]
+    start: NonNegative
+    duration: Positive
+    smoothing: NonNegative
+    shift: tuple[float, float]
+    motion: str
+
+
+class ReplaySpec(ObservationSpec):
+    """A replay with all defaults filled in, as stored in its scenario.toml."""
+
+    name: str
+    replay: ReplayOrigin
+
+
 MARGIN = 1.0  # m of ground around all positions
 LONGEST = 3600.0  # s, the longest duration of a scenario
 FLAT = ("caviar",)  # recordings whose image, divided by its scale, is taken as the ground without a calibration
@@ -166,14 +197,9 @@ WHOLE = Cut()
 
 
 def replay(
-    source: str | Path | Sequence,
-    camera: str | Path | ObservationSpec | None = None,
-    seed: int = 20_000,
-    *,
-    cut: Cut = WHOLE,
-    calibration: Camera | str | Path | None = None,
-    streams: Iterable[str] = ("left",),
-) -> Sequence:
+    source: str | Path | Sequence, camera: str | Path | ObservationSpec | None = None, seed: int = 20_000, *,
+    cut: Cut = WHOLE, calibration: Camera | str | Path | None = None, streams: Iterable[str] = ("left",),
+) -> Sequence:  # fmt: skip
     """Returns the labelled people of a recording as a simulated sequence: real motion, seen by our camera and sensor.
 
     The ground is moved so that the least x and y are 1 m, unless a simulated source has a scene, which is then kept.
@@ -207,14 +233,9 @@ def replay(
 
 
 def resolve_replay(
-    source: Sequence,
-    view: ObservationSpec,
-    seed: int,
-    *,
-    cut: Cut = WHOLE,
-    calibration: Camera | str | Path | None = None,
-    streams: Iterable[str] = (),
-) -> tuple[Sequence, ReplaySpec]:
+    source: Sequence, view: ObservationSpec, seed: int, *, cut: Cut = WHOLE,
+    calibration: Camera | str | Path | None = None, streams: Iterable[str] = (),
+) -> tuple[Sequence, ReplaySpec]:  # fmt: skip
     """Returns the sequence that `replay` returns, and the ReplaySpec that describes it.
 
     The latter, with all defaults, takes the place of the scenario in stored files and hashes.

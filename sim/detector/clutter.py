@@ -16,8 +16,7 @@ higher rate adds alarms and keeps the earlier ones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -40,26 +39,18 @@ SITE_SPREAD = 0.03  # standard deviation of positions round the sites `at`, as a
 AlarmRows = tuple[Ints, Array, Array]
 
 
-@dataclass(frozen=True)
-class Births:
-    """All B false alarms of a sequence that live in at least one frame, sorted by time of birth.
+class Birth(NamedTuple):
+    """A false alarm of a sequence that lives in at least one frame."""
 
-    frame (B,)        first frame in which the alarm lives, from 1 on
-    age (B,)          time from its birth to that frame, s
-    name (B, 2)       tick of birth and number among the alarms born at this tick, from 0: names its random streams
-    at_birth (B, 9)   uniforms in (0, 1] that draw: LIFE (number of frames), AT_PERSON (whether it goes with a person),
-                      SITE (which of the given sites), X, Y (place), TALL (height), ASPECT (width over height), VX, VY
-                      (velocity)
-    in_frames         B arrays (L, 7) of uniforms, one row for each of the L frames that the alarm lives: columns SHOWN
-                      (whether it is reported), errors of the left, top, right and lower edge, SCORE, ORDER (place in
-                      the frame's list)
-    """
-
-    frame: Ints
-    age: Array
-    name: Ints
+    frame: int  # first frame in which it lives, from 1 on
+    age: float  # time from its birth to that frame, s
+    name: tuple[int, int]  # tick of birth, and number among those born at this tick, from 0: names its random streams
+    # (9,) uniforms in (0, 1] that draw: LIFE (number of frames), AT_PERSON (whether it goes with a person), SITE (which
+    # of the given sites), X, Y (place), TALL (height), ASPECT (width over height), VX, VY (velocity)
     at_birth: Array
-    in_frames: list[Array]
+    # (L, 7) uniforms, one row for each of the L frames that it lives: columns SHOWN (whether it is reported), errors of
+    # the left, top, right and lower edge, SCORE, ORDER (place in the frame's list)
+    in_frames: Array
 
 
 def persistent_false_alarms(
@@ -80,7 +71,7 @@ def persistent_false_alarms(
     assert model is not None
     ground = VisibleGround(truth, camera, size)
     born = _draw_births(model, sensor.clutter_rate, truth, seed, repeat)
-    parts = [_one_alarm(model, ground, born, k, seed, repeat) for k in range(len(born.frame))]
+    parts = [_one_alarm(model, ground, birth, seed, repeat) for birth in born]
     frame = np.concatenate([np.zeros(0, np.int64), *(p[0] for p in parts)])
     rows = np.concatenate([np.zeros((0, 6)), *(p[1] for p in parts)])
     u = np.concatenate([np.zeros((0, FRAME_DRAWS)), *(p[2] for p in parts)])
@@ -96,8 +87,8 @@ def persistent_false_alarms(
     return Readings(frame, pos, None if truth.box is None else box, false_scores(u[:, SCORE], sensor), u[:, ORDER])
 
 
-def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repeat: int) -> Births:
-    """Returns all alarms of a sequence, with the uniforms that draw them, as Births.
+def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repeat: int) -> list[Birth]:
+    """Returns all alarms of a sequence, with the uniforms that draw them, sorted by time of birth.
 
     The first tick starts with the stationary number of living alarms, as if some had begun earlier. truth: gives the
     frame rate and the number of frames. rate: mean number of alarms reported per frame. An alarm's life has the mean
@@ -114,27 +105,20 @@ def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repea
     number = poisson_quantiles(alive * (1.0 - q), u)
     number[:1] = poisson_quantiles(alive, u[:1])
     born = []
-    for start in np.flatnonzero(number):
+    for start in np.flatnonzero(number).tolist():
         for nth in range(number[start]):
-            stream = rng(seed, "clutter", 1, int(start), nth, repeat=repeat)
+            stream = rng(seed, "clutter", 1, start, nth, repeat=repeat)
             at_birth = uniforms(stream, BIRTH_DRAWS)
             life = 1 + int(log(at_birth[LIFE]) / log(q)) if q else 1
-            first, end = np.searchsorted(step, (start, start + life))
+            first, end = np.searchsorted(step, (start, start + life)).tolist()
             if first < end:
-                in_frames = uniforms(stream, (int(end - first), FRAME_DRAWS))
-                name = int(start), nth
-                born.append((int(first) + 1, (step[first] - start) / per_s, name, at_birth, in_frames))
-    return Births(
-        np.array([b[0] for b in born], np.int64),
-        np.array([b[1] for b in born]),
-        np.array([b[2] for b in born], np.int64).reshape(-1, 2),
-        np.array([b[3] for b in born]).reshape(-1, BIRTH_DRAWS),
-        [b[4] for b in born],
-    )
+                age, in_frames = (step[first] - start) / per_s, uniforms(stream, (end - first, FRAME_DRAWS))
+                born.append(Birth(first + 1, age, (start, nth), at_birth, in_frames))
+    return born
 
 
-def _one_alarm(model: FalseAlarms, ground: VisibleGround, born: Births, k: int, seed: int, repeat: int) -> AlarmRows:
-    """Returns row k of `born`, one alarm, as its frames (L,), rows (L, 6) and uniforms in those frames (L, 7).
+def _one_alarm(model: FalseAlarms, ground: VisibleGround, birth: Birth, seed: int, repeat: int) -> AlarmRows:
+    """Returns one alarm as its frames (L,), rows (L, 6) and uniforms in those frames (L, 7).
 
     Frames count from 1. Rows are left, top, width, height in px of the box, then x, y in m of the point. Columns of the
     uniforms: SHOWN (whether it is reported), four edges, SCORE, ORDER. With probability `model.near` the alarm goes
@@ -142,32 +126,31 @@ def _one_alarm(model: FalseAlarms, ground: VisibleGround, born: Births, k: int, 
     people in that frame, it is on its own. `model.jitter`: standard deviation of the random error of each edge in each
     frame, in box heights. seed, repeat: name the random streams.
     """
-    start, at_birth, in_frames = int(born.frame[k]), born.at_birth[k], born.in_frames[k]
+    start, age, name, at_birth, in_frames = birth
     frame = start + np.arange(len(in_frames))
     n = normals(at_birth)
     here = ground.truth.rows(start)
     if at_birth[AT_PERSON] < model.near and here.stop > here.start:
-        id = _draw_person(ground.truth.id[here], seed, born.name[k], repeat)
+        id = _draw_person(ground.truth.id[here], seed, name, repeat)
         row, present = _rows_of_person(ground.truth, id, frame)
         frame, in_frames = frame[present], in_frames[present]
         box, pos = _boxes_at_person(model, ground, row, n)
     else:
-        age = born.age[k] + np.arange(len(in_frames)) / ground.truth.fps
-        box, pos = _boxes_alone(model, ground, age, at_birth, n)
+        ages = age + np.arange(len(in_frames)) / ground.truth.fps
+        box, pos = _boxes_alone(model, ground, ages, at_birth, n)
     if model.jitter:
         box = move_edges(box, model.jitter * box[:, 3:] * normals(in_frames[:, EDGES]))
     return frame, np.concatenate([box, pos], axis=1), in_frames
 
 
-def _draw_person(ids: Ints, seed: int, name: Ints, repeat: int) -> int:
+def _draw_person(ids: Ints, seed: int, name: tuple[int, int], repeat: int) -> int:
     """Returns the id of the person with whom an alarm goes: the one of `ids` with the highest random draw.
 
-    name (2,): of the alarm, as in Births. Each draw has a random stream of its own, named by seed, repeat (number of
+    name: of the alarm, as in Birth. Each draw has a random stream of its own, named by seed, repeat (number of
     the suite entry's copy), the alarm and the person's id. One person more therefore changes few alarms. Raises
     ValueError if `ids` is empty, or for a negative seed or id.
     """
-    tick, nth = name.tolist()
-    draws = [rng(seed, "clutter", 2, tick, nth, int(id), repeat=repeat).random() for id in ids]
+    draws = [rng(seed, "clutter", 2, *name, int(id), repeat=repeat).random() for id in ids]
     return int(ids[int(np.argmax(draws))])
 
 
@@ -188,7 +171,7 @@ def _rows_of_person(truth: Truth, id: int, frame: Ints) -> tuple[Ints, Bools]:
 def _boxes_at_person(model: FalseAlarms, ground: VisibleGround, row: Ints, n: Array) -> tuple[Array, Array]:
     """Returns boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm beside a person.
 
-    row (L,): the person's rows of the truth. n (9,): standard normals, columns as `at_birth` of Births. `model` gives
+    row (L,): the person's rows of the truth. n (9,): standard normals, columns as `at_birth` of Birth. `model` gives
     pairs (mean, standard deviation): across and foot, the shift of the middle to the right and of the lower edge
     downwards, in the person's box heights; near_height, the logarithm of height over the person's height. Boxes are 0
     if the truth has none. The points are at the middle of the lower edges, for a camera of kind "top" at the middle of
@@ -214,7 +197,7 @@ def _boxes_alone(
     """Returns boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm that stands or drifts
     alone.
 
-    age (L,): time since its birth in each frame, s. at_birth (9,): its uniforms, columns as `at_birth` of Births; n
+    age (L,): time since its birth in each frame, s. at_birth (9,): its uniforms, columns as `at_birth` of Birth; n
     (9,): the same as standard normals. It starts near one of the sites `model.at` (shares of width and height of
     the ground part of the image), with a standard deviation of 0.03 and inside that part; without sites, anywhere
     on it. It moves with constant velocity, drawn with standard deviation `model.drift` (box heights per s) per
@@ -250,13 +233,8 @@ ACROSS, DOWN, HEIGHT, HEADING, SCORE_1, ORDER_1, DRAWS = 0, 1, 2, 3, 4, 5, 6  # 
 
 
 def false_alarms(
-    truth: Truth,
-    sensor: Sensor,
-    seed: int,
-    camera: Camera | None,
-    image_size: tuple[int, int] | None,
-    repeat: int = 0,
-) -> Readings:
+    truth: Truth, sensor: Sensor, seed: int, camera: Camera | None, image_size: tuple[int, int] | None, repeat: int = 0,
+) -> Readings:  # fmt: skip
     """Returns the false alarms of all frames 1 to truth.length as Readings; their number per frame is Poisson.
 
     With a camera, their feet are spread evenly over the part of the image that shows ground, and each is as large as a

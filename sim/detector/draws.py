@@ -48,12 +48,10 @@ def interpolated_quantiles(curve: tuple[float, ...], u: Array) -> Array:
     """Returns the quantiles (N,) at u (N,), 0 to 1, of a distribution given by evenly spaced quantiles, linear between
     them.
 
-    curve: the quantiles from u = 0 to u = 1, at least one number, in ascending order; a single one is the result for
-    every u. u outside 0 to 1 gives the first or last of them. Raises ValueError for an empty curve.
+    curve: the quantiles from u = 0 to u = 1, at least two numbers, in ascending order. u outside 0 to 1 gives the first
+    or last of them.
     """
     values = np.array(curve)
-    if len(values) == 1:
-        return np.full(len(u), values[0])
     place = np.clip(u, 0.0, 1.0) * (len(values) - 1)
     k = np.minimum(place.astype(np.int64), len(values) - 2)
     return np.asarray(values[k] + (place - k) * (values[k + 1] - values[k]))

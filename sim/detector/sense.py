@@ -47,14 +47,9 @@ PERSISTENCE_STEP = 0.1  # s: lag of which `sensor.persistence` is the correlatio
 
 
 def sense(
-    truth: Truth,
-    sensor: Sensor,
-    seed: int,
-    camera: Camera | None = None,
-    image_size: tuple[int, int] | None = None,
-    repeat: int = 0,
-    people: Mapping[str, tuple[int, ...]] | None = None,
-) -> list[Detections]:
+    truth: Truth, sensor: Sensor, seed: int, camera: Camera | None = None, image_size: tuple[int, int] | None = None,
+    repeat: int = 0, people: Mapping[str, tuple[int, ...]] | None = None,
+) -> list[Detections]:  # fmt: skip
     """Returns a list of truth.length Detections, for frames 1 on: what the simulated detector reports, false alarms
     included.
 
@@ -179,24 +174,14 @@ def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = 
     0.
     """
     visible = truth.visibility
-    p = sensor.detect_prob * _visibility_factor(visible, sensor)
+    curve = sensor.by_visibility
+    factor = power(visible, sensor.occlusion_power) if curve is None else interpolated_quantiles(curve, visible)
+    p = sensor.detect_prob * factor
     if sensor.small_px and truth.box is not None:
         from_above = camera is not None and camera.kind == "top"
         size = truth.box[:, 2:].max(axis=1) / SHOULDER_SHARE if from_above else truth.box[:, 3]
         p = p * np.minimum(1.0, np.nan_to_num(size) / (2 * sensor.small_px))
     return np.asarray(np.where(visible >= sensor.min_visibility, p, 0.0))
-
-
-def _visibility_factor(visible: Array, sensor: Sensor) -> Array:
-    """Returns the factor (R,), 0 to 1, by which the visibilities `visible` (R,), 0 to 1, lower the probability of
-    detection.
-
-    It is visibility^occlusion_power. If `sensor.by_visibility` is given, it is that curve instead: values at evenly
-    spaced visibilities from 0 to 1, linear between them.
-    """
-    if sensor.by_visibility is None:
-        return np.asarray(power(visible, sensor.occlusion_power))
-    return interpolated_quantiles(sensor.by_visibility, visible)
 
 
 def _artificially_hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tuple[int, ...]]) -> Bools:

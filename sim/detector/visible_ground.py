@@ -45,7 +45,10 @@ class VisibleGround:
             self.limits = 0.5 * float(truth.box[:, 3].min()), 1.5 * float(truth.box[:, 3].max())
             self.low, self.high = foot.min(axis=0), foot.max(axis=0)
             if size is not None:
-                self.low, self.high = np.array([0.0, _furthest_labelled_row(self.line, float(size[1]))]), np.array(size)
+                # The row at which people have SMALLEST of the height of people at the middle row of the image.
+                (a, b), rows = self.line, float(size[1])
+                top = np.clip((SMALLEST * (a + b * rows / 2) - a) / b, 0.0, rows / 2) if b > 1e-6 else 0.0
+                self.low, self.high = np.array([0.0, top]), np.array(size)
 
     def image_point(self, x: float, y: float) -> tuple[float, float]:
         """Returns the image point (u, v) px at share x (0 to 1) of the width and share y of the height of the ground
@@ -115,16 +118,6 @@ def furthest_row(camera: Camera) -> float:
     at_middle = size[len(v) // 2] if np.isfinite(size[len(v) // 2]) else np.nanmax(size, initial=0.0)
     enough = np.flatnonzero(np.nan_to_num(size) >= SMALLEST * at_middle)
     return float(v[enough[0]]) if len(enough) else 0.0
-
-
-def _furthest_labelled_row(line: Array, rows: float) -> float:
-    """Returns the row (px) at which people have 0.25 of the height of people at the middle row of the image.
-
-    line (2,): a, b of the height a + b v at row v, see `height_line`. rows: height of the image in px. The result is
-    kept between 0 and rows / 2; it is 0 if heights do not grow downwards.
-    """
-    a, b = line
-    return float(np.clip((SMALLEST * (a + b * rows / 2) - a) / b, 0.0, rows / 2)) if b > 1e-6 else 0.0
 
 
 def height_line(foot: Array, height: Array) -> Array:

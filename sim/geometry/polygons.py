@@ -99,10 +99,18 @@ def intersection_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -
     common = np.zeros(len(i))
     near = (a.box[i, :2] < b.box[j, 2:]).all(axis=1) & (b.box[j, :2] < a.box[i, 2:]).all(axis=1)
     possible = np.flatnonzero(near & (a.area[i] > 0) & (b.area[j] > 0))
-    for low in range(0, len(possible), CHUNK):
-        part = possible[low : low + CHUNK]
-        common[part] = _common_area(a.vertex[i[part]], b.vertex[j[part]])
+    common[possible] = _in_chunks(_common_area, a, b, i[possible], j[possible])
     return common
+
+
+def _in_chunks(
+    measure: Callable[[Array, Array], Array], a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints
+) -> Array:
+    measured = np.empty(len(i))
+    for low in range(0, len(i), CHUNK):
+        part = slice(low, low + CHUNK)
+        measured[part] = measure(a.vertex[i[part]], b.vertex[j[part]])
+    return measured
 
 
 def _common_area(a: Array, b: Array) -> Array:
@@ -168,22 +176,11 @@ def iou_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
     return iou
 
 
-def iou_matrix(a: Sequence[Array], b: Sequence[Array]) -> Array:
-    """Returns the intersection over union (N, M) of convex polygons (V, 2), each of a with each of b."""
-    i, j = (g.ravel() for g in np.indices((len(a), len(b))))
-    width = max((len(p) for p in (*a, *b)), default=1)
-    return iou_pairs(pack(a, width), pack(b, width), i, j).reshape(len(a), len(b))
-
-
 def gap_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
     """Returns the distance (K,) between convex polygons a[i[k]] and b[j[k]], of which one has area; nan for an empty
     one.
     """
-    gap = np.empty(len(i))
-    for low in range(0, len(i), CHUNK):
-        part = slice(low, low + CHUNK)
-        gap[part] = _gap(a.vertex[i[part]], b.vertex[j[part]])
-    return gap
+    return _in_chunks(_gap, a, b, i, j)
 
 
 def edge_distance_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
@@ -192,11 +189,7 @@ def edge_distance_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) 
     It is the distance unless they overlap; nan where one has no vertices. Cheaper than `gap_pairs`; polygons need no
     area.
     """
-    least = np.empty(len(i))
-    for low in range(0, len(i), CHUNK):
-        part = slice(low, low + CHUNK)
-        least[part] = _edge_distance(a.vertex[i[part]], b.vertex[j[part]])
-    return least
+    return _in_chunks(_edge_distance, a, b, i, j)
 
 
 def _edge_distance(a: Array, b: Array) -> Array:
@@ -222,12 +215,6 @@ def _distance_to_edges(points: Array, polygon: Array) -> Array:
     share = np.clip((ax * ex + ay * ey) / np.where(length2 > 0, length2, 1.0), 0.0, 1.0)
     dx, dy = ax - share * ex, ay - share * ey
     return np.asarray(np.sqrt((dx * dx + dy * dy).min(axis=(1, 2))))
-
-
-def polygon_gap(a: Array, b: Array) -> float:
-    """Returns the distance between two convex polygons, of which one has area; nan if one is empty."""
-    none = np.zeros(1, np.int64)
-    return float(gap_pairs(pack([a]), pack([b]), none, none)[0])
 
 
 def contains(polygon: Array, points: Array, dilate: float = 0.0) -> Bools:
@@ -262,18 +249,6 @@ def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
 
     pos (R, 2) m: the members of group 0, then those of group 1, …; count (G,): how many each has. None may be nan.
     """
-    return _hulls(pos, count, lambda members: _minkowski_sums(*_gift_wrap(members)))
-
-
-def position_hulls(pos: Array, count: Ints) -> list[Array]:
-    """Returns the hull (V, 2) of the positions of each group, counter-clockwise; a vertex may be repeated.
-
-    pos (R, 2), count (G,): as of `footprint_hulls`.
-    """
-    return _hulls(pos, count, lambda members: list(_gift_wrap(members)[0]))
-
-
-def _hulls(pos: Array, count: Ints, hulls_of: Callable[[Array], list[Array]]) -> list[Array]:
     hulls: list[Array] = [np.zeros((0, 2))] * len(count)
     first = np.cumsum(count) - count
     # Groups of equal size n together, up to GROUPS of them.
@@ -281,8 +256,8 @@ def _hulls(pos: Array, count: Ints, hulls_of: Callable[[Array], list[Array]]) ->
         every = np.flatnonzero(count == n)
         for low in range(0, len(every), GROUPS):
             groups = every[low : low + GROUPS]
-            members = pos[first[groups, None] + np.arange(n)]
-            for group, hull in zip(groups, hulls_of(members), strict=True):
+            sums = _minkowski_sums(*_gift_wrap(pos[first[groups, None] + np.arange(n)]))
+            for group, hull in zip(groups, sums, strict=True):
                 hulls[group] = hull
     return hulls
 

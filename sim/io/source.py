@@ -35,18 +35,11 @@ DEPTH = 3
 
 
 def open_source(
-    path: str | Path,
-    *,
-    fps: float | None = None,
-    px_per_m: float | None = None,
-    camera: Camera | str | Path | None = None,
-    images: bool = True,
-    background: str | None = None,
-    person_class: int | str | None = None,
-    box_scale: str | None = None,
-    min_score: float | None = None,
+    path: str | Path, *, fps: float | None = None, px_per_m: float | None = None,
+    camera: Camera | str | Path | None = None, images: bool = True, background: str | None = None,
+    person_class: int | str | None = None, box_scale: str | None = None, min_score: float | None = None,
     boxes: str | Path | None = None,
-) -> list[Sequence]:
+) -> list[Sequence]:  # fmt: skip
     """Opens a path that holds sequences or recordings, in any known format.
 
     Args:
@@ -158,13 +151,13 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     suffix = path.suffix.lower()
     if suffix == ".xml":
         options.reject(
-            path, "a CAVIAR recording", "its truth is in the image, without pictures", "camera background boxes"
+            path, "a CAVIAR recording", "its truth is in the image, without pictures", "camera background box_options"
         )
         return caviar.open_file(path, options)
     if path.name == "obsmat.txt":
         return _open_folder(path.parent, options)
     if suffix in video.SUFFIXES:
-        options.reject(path, "a video without --boxes", "it has no boxes", "boxes")
+        options.reject(path, "a video without --boxes", "it has no boxes", "box_options")
         return video.open_video(path, options)
     if suffix not in (".txt", ".csv", people_texts.NDJSON):
         of_boxes = "if these are boxes: flockscope track TRACKER VIDEO --boxes FILE"
@@ -176,10 +169,10 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
         return mot_folder.open_text(path, options)
     if layout == "kitti":
         why = "its camera drives, and it has labels of people only"
-        options.reject(path, "a text of KITTI", why, "camera background boxes")
+        options.reject(path, "a text of KITTI", why, "camera background box_options")
     else:
         why = "it is in metres, without pictures"
-        options.reject(path, "a text of trajectories", why, "px_per_m camera background boxes")
+        options.reject(path, "a text of trajectories", why, "px_per_m camera background box_options")
     return people_texts.open_text(path, layout, options)
 
 
@@ -212,11 +205,11 @@ def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
         return _open_file(path, options)
     match _kind(path):
         case "generated":
-            options.reject(path, "a generated sequence", "it knows its own", "fps px_per_m camera boxes")
+            options.reject(path, "a generated sequence", "it knows its own", "fps px_per_m camera box_options")
             return sequence_folder.open_sequence(path, background=options.background)
         case "biwi":
             why = "it is in metres, without pictures"
-            options.reject(path, "a BIWI recording", why, "px_per_m camera background boxes")
+            options.reject(path, "a BIWI recording", why, "px_per_m camera background box_options")
             return biwi.open_folder(path, options)
         case _:
             return mot_folder.open_folder(path, options)

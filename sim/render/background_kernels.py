@@ -10,19 +10,14 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.render.texture_kernels import COS, SIN, contrast_kept, grain, plant_cover, slabs, value_noise
+
+# isort: off
+# fmt: off
 from sim.scene.raycast import (
-    GROUND,
-    HIT_INDEX,
-    HIT_KIND,
-    HIT_PLACE,
-    HIT_SLOTS,
-    NORMAL_X,
-    NOTHING,
-    PILLAR,
-    RISER,
-    TREAD,
-    WALL,
+    GROUND, HIT_INDEX, HIT_KIND, HIT_PLACE, HIT_SLOTS, NORMAL_X, NOTHING, PILLAR, RISER, TREAD, WALL,
 )
+# fmt: on
+# isort: on
 from sim.scene.raycast_kernels import at_pixel, first_hit
 
 GREY, GRASS, BRICK, STONE, STEP, SKY = range(6)  # rows of the palette

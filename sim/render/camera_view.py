@@ -30,7 +30,7 @@ from sim.render.canvas import MOST, TILE_H, TILE_W, UNIT, FrameCanvas
 from sim.render.weather import Foliage, Illumination, SampledField
 from sim.rng import rng
 from sim.scene.raycast import GROUND, NOTHING, PILLAR, WALL, PixelRays, Solids, pixel_rays, signed_scale, solids_of
-from sim.types import Array, Camera, Ints, Motion, Scene
+from sim.types import Array, Camera, Ints, Motion
 
 if TYPE_CHECKING:
     from scenarios.schema.scenario import Picture
@@ -64,54 +64,6 @@ class EmptyScene:
     # (H, W) share of direct sun in the pixel's light, 0 to 1; 0 for sky and where a solid thing hides the sun
     direct: Floats
     plants: Floats  # (H, W) share of the pixel that shows plants, 0 to 1
-
-
-def trace_geometry(camera: Camera, scene: Scene) -> PixelGeometry:
-    """Returns what the centre of each pixel shows of the empty scene."""
-    from sim.render.background_kernels import trace_pixels
-
-    width, height = camera.image
-    depth, place = np.empty((height, width), np.float32), np.empty((height, width, 3), np.float32)
-    kind = np.empty((height, width), np.uint8)
-    rays = pixel_rays(camera)
-    trace_pixels(rays.origin, rays.direction, solids_of(scene), depth, kind, place)
-    return PixelGeometry(depth, kind, place)
-
-
-def paint_empty_scene(
-    camera: Camera,
-    scene: Scene,
-    light: Illumination,
-    texture: float,
-    plants: Foliage | None,
-    seed: int,
-    repeat: int = 0,
-    samples: int = 1,
-) -> EmptyScene:
-    """Returns the empty scene under steady light, with unmoved plants.
-
-    texture: contrast of the patterns, 0 to 1. samples: rays along each axis of a pixel. seed, repeat: name the random
-    stream of colours, slabs and patterns.
-    """
-    from sim.render.background_kernels import paint_pixels
-
-    width, height = camera.image
-    colour, direct, green = np.empty((height, width, 3), np.float32), *np.empty((2, height, width), np.float32)
-    rays = pixel_rays(camera)
-    source = rng(seed, "texture", MATERIALS, repeat=repeat)
-    palette = (
-        PALETTE + SPREAD * source.normal(size=(len(PALETTE), 1)) + 0.3 * SPREAD * source.normal(size=(len(PALETTE), 3))
-    )
-    slab = float(source.choice(SLAB_WIDTHS))
-    key = int(source.integers(1 << 20))
-    # In the order of the slots CONTRAST, SLAB_WIDTH, PLANT_KEY, PLANT_LEVEL.
-    style = np.array([texture, slab, *((plants.key, plants.level) if plants else (0.0, np.inf))])
-    paint_pixels(
-        (rays.origin, rays.direction), samples, signed_scale(camera), light.sun, light.shadow, light.penumbra,
-        solids_of(scene), np.array(scene.size, dtype=float), style, np.clip(palette, 20, 240), key,
-        colour, direct, green,
-    )  # fmt: skip
-    return EmptyScene(colour, direct, green)
 
 
 POOL = 1 << 20
@@ -191,13 +143,33 @@ class CameraView:
     @cached_property
     def geometry(self) -> PixelGeometry:
         """What the centre of each pixel shows of the empty scene."""
-        return trace_geometry(self.camera, self.motion.scene)
+        from sim.render.background_kernels import trace_pixels
+
+        size = self.height, self.width
+        depth, kind, place = np.empty(size, np.float32), np.empty(size, np.uint8), np.empty((*size, 3), np.float32)
+        trace_pixels(self.rays.origin, self.rays.direction, self.solids, depth, kind, place)
+        return PixelGeometry(depth, kind, place)
 
     @cached_property
     def empty_scene(self) -> EmptyScene:
-        """The painted empty scene."""
-        m, p = self.motion, self.picture
-        return paint_empty_scene(self.camera, m.scene, self.light, p.texture, self.plants, m.seed, m.repeat, p.samples)
+        """The painted empty scene under steady light, with unmoved plants."""
+        from sim.render.background_kernels import paint_pixels
+
+        size, light, plants = (self.height, self.width), self.light, self.plants
+        colour, direct, green = np.empty((*size, 3), np.float32), *np.empty((2, *size), np.float32)
+        source = rng(self.motion.seed, "texture", MATERIALS, repeat=self.motion.repeat)
+        shades = source.normal(size=(len(PALETTE), 1)), 0.3 * SPREAD * source.normal(size=(len(PALETTE), 3))
+        palette = PALETTE + SPREAD * shades[0] + shades[1]
+        slab = float(source.choice(SLAB_WIDTHS))
+        key = int(source.integers(1 << 20))
+        # In the order of the slots CONTRAST, SLAB_WIDTH, PLANT_KEY, PLANT_LEVEL.
+        style = np.array([self.picture.texture, slab, *((plants.key, plants.level) if plants else (0.0, np.inf))])
+        paint_pixels(
+            (self.rays.origin, self.rays.direction), self.picture.samples, signed_scale(self.camera), light.sun,
+            light.shadow, light.penumbra, self.solids, np.array(self.motion.scene.size, dtype=float), style,
+            np.clip(palette, 20, 240), key, colour, direct, green,
+        )  # fmt: skip
+        return EmptyScene(colour, direct, green)
 
     @cached_property
     def empty_canvas(self) -> NDArray[np.int16]:

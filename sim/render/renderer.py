@@ -3,6 +3,11 @@
 A frame starts from the empty scene (`sim.render.camera_view`). Wind moves its plants, shadows darken it, and people are
 drawn over it by depth. The result is blurred, multiplied by the brightness of the moment, given noise and, if the
 scenario wants it, compressed as JPEG. The people of up to 16 consecutive frames are computed at once, which is faster.
+
+The disparity of a point is u_left - u_right = f B / depth: focal length f in px, baseline B and depth in m; nan where
+the right camera does not see the point. An id map (H, W) holds the id of the person that each pixel shows. From it
+follow each person's number of visible pixels, the box round them in px, and the number of the connected region of
+people (`types.PixelTruth`).
 """
 
 from __future__ import annotations
@@ -17,21 +22,18 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError
 from sim.render.camera_view import NODE_STEP, CameraView, blur_weights, noise_offsets, noise_pool
 from sim.render.canvas import UNIT, FrameCanvas
+
+# isort: off
+# fmt: off
 from sim.render.people import (
-    DrawnPeople,
-    PeopleShadows,
-    ProjectedPeople,
-    clothing_atlas,
-    people_of_frames,
-    people_shadows,
-    project_people,
-    sunlit_shares,
-    take_rows,
+    DrawnPeople, PeopleShadows, ProjectedPeople, clothing_atlas, people_of_frames, people_shadows, project_people,
+    sunlit_shares, take_rows,
 )
-from sim.render.pixel_truth import empty_scene_disparities, frame_disparities, pixel_truth
+# fmt: on
+# isort: on
 from sim.render.weather import Foliage, Illumination, draw_illumination, grow_plants
 from sim.scene import camera as cameras
-from sim.types import BACKGROUNDS, Array, Camera, Image, Motion, PixelTruth
+from sim.types import BACKGROUNDS, Array, Camera, Image, Ints, Motion, PixelTruth
 
 if TYPE_CHECKING:
     from scenarios.schema.scenario import Light, Picture
@@ -86,6 +88,22 @@ class FrameBatch:
         whole, rows = self._views[side], self._rows(index)
         shadows = None if whole.shadows is None else take_rows(whole.shadows, rows)
         return PeopleInView(take_rows(whole.projected, rows), shadows, whole.sunlit[rows])
+
+
+def pixel_truth(ids: Ints, bounds: Ints, id: Ints, amodal: Ints, disparity: Array | None) -> PixelTruth:
+    """Returns the PixelTruth of an id map (H, W): visible pixels, box and connected region of N people.
+
+    bounds (N, 4): outside which nobody is visible. id (N,). amodal (N,): pixels of the whole silhouettes.
+    """
+    from sim.render.pixel_truth_kernels import count_pixels
+
+    count, blob, edges = np.zeros(len(id), np.int64), np.empty(len(id), np.int64), np.empty((len(id), 4), np.int64)
+    row_of = np.zeros(int(id.max(initial=0)) + 1, np.int64)
+    row_of[id] = np.arange(len(id))
+    count_pixels(ids, bounds, id, row_of, count, edges, blob)
+    low, high = edges[:, 0::2].astype(float), edges[:, 1::2].astype(float)
+    box = np.where(count[:, None] > 0, np.concatenate([low, high - low], axis=1), np.nan)
+    return PixelTruth(ids, disparity, count.astype(float), amodal.astype(float), box, blob)
 
 
 LEFT, RIGHT, MISALIGNED = 0, 1, 2  # views; the last: the right camera as it is, if it is not as calibrated
@@ -170,8 +188,28 @@ class Renderer:
         return len(self._weights) // 2
 
     @cached_property
-    def _empty_disparities(self) -> NDArray[np.float64]:
-        return empty_scene_disparities(self.left_view, self.right_view)
+    def _empty_disparities(self) -> Array:
+        from sim.render.pixel_truth_kernels import empty_scene_disparities
+
+        left, right = self.left_view, self.right_view
+        scale = left.camera.focal_px[0] * float(np.linalg.norm(right.camera.position - left.camera.position))
+        out = np.empty((left.height, left.width))
+        empty_scene_disparities(left.geometry.depth, scale, right.rays.origin, right.rays.direction, left.solids, out)
+        return out
+
+    def _disparities(
+        self, canvas: FrameCanvas, ids: Ints, people: DrawnPeople, seen: ProjectedPeople, index: int
+    ) -> Array:
+        from sim.render.pixel_truth_kernels import add_people
+
+        right, out = self.right_view, self._empty_disparities.copy()
+        other = self._batch(index).in_view(right, RIGHT, index).projected
+        add_people(
+            canvas.depth, ids, seen.outlines.bounds, people.id, right.camera.focal_px[0] * right.camera.baseline,
+            other.start, other.step, other.outlines.middle, other.outlines.inverse, other.nearest_depth,
+            right.geometry.depth, right.rays.origin, right.rays.direction, right.solids, out,
+        )  # fmt: skip
+        return out
 
     def frame(self, index: int) -> Image:
         """Returns the image (H, W, 3) of frame `index`, from 1."""
@@ -247,10 +285,7 @@ class Renderer:
         image = self._finish(view, canvas, index, side) if shade else np.zeros((0, 0, 3), np.uint8)
         truth = None
         if label:
-            found = None
-            if disparity:
-                other = batch.in_view(self.right_view, RIGHT, index).projected
-                found = frame_disparities(self._empty_disparities, self.right_view, canvas, ids, people, here, other)
+            found = self._disparities(canvas, ids, people, here, index) if disparity else None
             truth = pixel_truth(ids, here.outlines.bounds, people.id, amodal, found)
         view.return_canvas(canvas)
         return image, truth

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenarios.errors import InputError
 from sim.rng import draw, rng
 from sim.scene.raycast import pixel_rays, signed_scale, solids_of
 from sim.types import Array, Camera, Scene
@@ -125,21 +124,15 @@ def draw_illumination(light: Light, seed: int, repeat: int = 0) -> Illumination:
     """Returns the light that a scenario's settings and this seed give."""
     source = rng(seed, "light", SUN, repeat=repeat)
     azimuth, elevation = (np.deg2rad(draw(v, source)) for v in (light.sun_azimuth_deg, light.sun_elevation_deg))
-    if not 0 < elevation <= np.pi / 2 + 1e-9:
-        raise _impossible("light.sun_elevation_deg", float(np.rad2deg(elevation)), "above 0, at most 90")
+    elevation = np.clip(elevation, np.deg2rad(0.1), np.pi / 2)  # one draw in a thousand may be beyond
     sun = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
     drift = uniform_drift(rng(seed, "light", DRIFT, repeat=repeat), light.drift, light.drift_time)
     sky = rng(seed, "light", CLOUD, repeat=repeat)
-    cloud = draw(light.cloud, sky)
-    if cloud < 0:
-        raise _impossible("light.cloud", cloud, "0 or more")
-    clouds = moving_pattern(sky, cloud, light.cloud_size, light.cloud_speed)
+    clouds = moving_pattern(sky, max(draw(light.cloud, sky), 0.0), light.cloud_size, light.cloud_speed)
     switches = []
     for k, switch in enumerate(light.switch):
         when = rng(seed, "light", SWITCH, k, repeat=repeat)
-        at, gain = draw(switch.at, when), draw(switch.gain, when)
-        if gain <= 0:
-            raise _impossible(f"light.switch[{k}].gain", gain, "above 0")
+        at, gain = draw(switch.at, when), max(draw(switch.gain, when), 1e-3)
         switches.append((at, at + switch.ramp, gain))
     return Illumination(sun, light.shadow, light.penumbra, drift, clouds, light.flicker, tuple(switches), seed, repeat)
 
@@ -148,10 +141,6 @@ def brightness(light: Light, seed: int, repeat: int, fps: float, length: int) ->
     """Returns the factor of brightness of the frames 1 … length, (length,), clouds and flicker left out."""
     steady = replace(draw_illumination(light, seed, repeat), flicker=0.0)
     return np.array([steady.gain(k / fps, 0) for k in range(length)])
-
-
-def _impossible(place: str, got: float, expected: str) -> InputError:
-    return InputError(place=place, got=f"{got:g}", expected=expected, remedy="correct it, or clip its distribution")
 
 
 SAMPLE_STEP = 4  # px between the samples that decide where plants grow
@@ -178,13 +167,8 @@ class Foliage:
 def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repeat: int = 0) -> Foliage | None:
     """Returns the plants of this seed; None if their share is 0, or no ground in view is near enough."""
     source = rng(seed, "wind", PLACE, repeat=repeat)
-    share = draw(picture.foliage, source)
-    if not 0 <= share <= 1:
-        raise InputError(
-            place="picture.foliage", got=f"{share:g}", expected="a share, 0 to 1",
-            remedy="correct it, or clip its distribution",
-        )  # fmt: skip
-    if share == 0:
+    share = min(draw(picture.foliage, source), 1.0)
+    if share <= 0:
         return None
     from sim.render.weather_kernels import sample_plants
 

@@ -100,22 +100,22 @@ def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
     return np.broadcast_to(camera.position, x.shape), turned(camera.rotation.T, x)
 
 
-def to_ground(camera: Camera, uv: Array, z: float = 0.0) -> Array:
-    """Returns the points (N, 2) m of the plane at height z (m) that are seen at uv (N, 2) px; nan where none is."""
+def to_ground(camera: Camera, uv: Array, z: float | Array = 0.0) -> Array:
+    """Returns the points (N, 2) m of height z (m, or (N,)) that are seen at uv (N, 2) px; nan where none is."""
     origin, direction = rays(camera, uv)
+    return np.asarray(origin[:, :2] + _reach(origin, direction, z)[:, None] * direction[:, :2])
+
+
+def _reach(origin: Array, direction: Array, z: float | Array) -> Array:
+    """Returns how far along each ray a point of height z lies, in lengths of its direction; nan where none does."""
     with np.errstate(divide="ignore", invalid="ignore"):
         s = (z - origin[:, 2]) / direction[:, 2]
-        s = np.where(np.isfinite(s) & (s > 0), s, np.nan)
-    return origin[:, :2] + s[:, None] * direction[:, :2]
+        return np.where(np.isfinite(s) & (s > 0), s, np.nan)
 
 
 def foot_points(box: Array, z: Array, camera: Camera) -> Array:
     """Returns the ground points (R, 2) m of people with boxes (R, 4) px, on ground of height z (R,) m."""
-    origin, direction = rays(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = (z - origin[:, 2]) / direction[:, 2]
-    s = np.where(np.isfinite(s) & (s > 0), s, np.nan)
-    return np.asarray(origin[:, :2] + s[:, None] * direction[:, :2])
+    return to_ground(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]), z)
 
 
 def standing_share(camera: Camera | None) -> float:
@@ -136,11 +136,8 @@ def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
     if camera.radial:
         bend = undistort_jacobian((np.asarray(uv, dtype=float) - camera.centre_px) / focal, camera.radial)
     step = product(np.swapaxes(bend / focal, 1, 2), camera.rotation[:2])  # dD/du, dD/dv as rows
-    with np.errstate(divide="ignore", invalid="ignore"):
-        s = (z - origin[:, 2]) / direction[:, 2]
-    down = np.where(np.isfinite(s) & (s > 0), direction[:, 2], np.nan)
-    s = (z - origin[:, 2]) / down
-    slope = direction[:, :2] / down[:, None]
+    s = _reach(origin, direction, z)
+    slope = direction[:, :2] / np.where(np.isfinite(s), direction[:, 2], np.nan)[:, None]
     dx = step[:, :, :2] - step[:, :, 2:] * slope[:, None]
     return np.asarray(np.swapaxes(s[:, None, None] * dx, 1, 2))
 

@@ -12,27 +12,15 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.elementary_kernels import atan2
+
+# isort: off
+# fmt: off
 from sim.scene.raycast import (
-    CENTRE_X,
-    CENTRE_Y,
-    GROUND,
-    HIT_INDEX,
-    HIT_KIND,
-    HIT_PLACE,
-    NORMAL_X,
-    NORMAL_Y,
-    NORMAL_Z,
-    NOTHING,
-    PILLAR,
-    RADIUS,
-    RISER,
-    TREAD,
-    WALL,
-    X1,
-    X2,
-    Y1,
-    Y2,
+    CENTRE_X, CENTRE_Y, GROUND, HIT_INDEX, HIT_KIND, HIT_PLACE, NORMAL_X, NORMAL_Y, NORMAL_Z, NOTHING, PILLAR, RADIUS,
+    RISER, TREAD, WALL, X1, X2, Y1, Y2,
 )
+# fmt: on
+# isort: on
 from sim.scene.terrain import AXIS_X, AXIS_Y, FOOT_X, FOOT_Y, HALF_WIDTH, LANDING, LENGTH, RISE, STEPS
 
 TINY = 1e-9

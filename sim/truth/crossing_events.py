@@ -14,16 +14,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from sim.elementary import atan2, cos, dot, length
-from sim.geometry.polygons import (
-    FOOTPRINT_RADIUS,
-    FOOTPRINT_SIDES,
-    edge_distance_pairs,
-    footprint_hulls,
-    gap_pairs,
-    pack,
-    position_hulls,
-)
+from sim.elementary import atan2, dot, length
+from sim.geometry.polygons import FOOTPRINT_RADIUS, footprint_hulls, gap_pairs, pack
 from sim.truth.merge_split_rules import close_pairs, frames_of, mean_of_present, runs, stretches
 from sim.types import Array, Bools, GroupEvent, Ints
 
@@ -114,17 +106,10 @@ def _within_reach(t: Ints, places: Array, count: Ints) -> tuple[Ints, Ints]:
     near = length(middle[i] - middle[j]) <= CROSS_GAP + radius[i] + radius[j]
     near &= (count[i] > 1) & (count[j] > 1)
     i, j = i[near], j[near]
-    # A footprint lies between its circumscribed and its inscribed disc. In most cases these two decide; only the cases
-    # between them need the hulls of the footprints.
-    bare = pack(position_hulls(places, count))
-    between = edge_distance_pairs(bare, bare, i, j)
-    close = between <= CROSS_GAP + 2 * FOOTPRINT_RADIUS * float(cos(np.pi / FOOTPRINT_SIDES))
-    overlap = (bare.box[i, :2] <= bare.box[j, 2:]).all(axis=1) & (bare.box[j, :2] <= bare.box[i, 2:]).all(axis=1)
-    doubt = np.flatnonzero(~close & ((between <= CROSS_GAP + 2 * FOOTPRINT_RADIUS) | overlap))
-    group, place = np.unique(np.concatenate([i[doubt], j[doubt]]), return_inverse=True)
+    group, place = np.unique(np.concatenate([i, j]), return_inverse=True)
     rows = np.isin(np.repeat(np.arange(len(count)), count), group)
     hulls = pack(footprint_hulls(places[rows], count[group]))
-    close[doubt] = gap_pairs(hulls, hulls, *np.split(place, 2)) <= CROSS_GAP
+    close = gap_pairs(hulls, hulls, *np.split(place, 2)) <= CROSS_GAP
     return i[close], j[close]
 
 

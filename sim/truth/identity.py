@@ -133,13 +133,9 @@ class Identities:
         return new
 
     def step(
-        self,
-        t: int,
-        people: PersonSet,
-        parts: Iterable[PersonSet],
-        entered: PersonSet = frozenset(),
+        self, t: int, people: PersonSet, parts: Iterable[PersonSet], entered: PersonSet = frozenset(),
         known: Members = NOBODY,
-    ) -> list[GroupChange]:
+    ) -> list[GroupChange]:  # fmt: skip
         """Takes the partition of time t, not before the last one, and returns what has changed since; at first all
         enter. known: as for `name`.
         """

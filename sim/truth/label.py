@@ -78,15 +78,12 @@ def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
     return np.asarray((project(camera, middle + step)[0] - project(camera, middle - step)[0]) / (2 * INSTANT))
 
 
-def bodies(motion: Motion, camera: Camera | None) -> Truth:
+def bodies(motion: Motion, camera: Camera | None, people: RecordedBodies | None = None) -> Truth:
     """Returns a Truth with positions, boxes and visibility of everybody in every frame, but without groups.
 
-    Without a camera, boxes are None and visibility is 1.
+    Without a camera, boxes are None and visibility is 1. people: None: `recorded_bodies(motion)`.
     """
-    return _bodies(motion, camera, recorded_bodies(motion))
-
-
-def _bodies(motion: Motion, camera: Camera | None, people: RecordedBodies) -> Truth:
+    people = recorded_bodies(motion) if people is None else people
     t, p = people.frame - 1, people.id - 1
     seen = None if camera is None else measure_visibility(
         camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes
@@ -107,7 +104,7 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     from sim.truth.merge_split_events import groups_and_events
 
     people = recorded_bodies(motion)
-    truth = _bodies(motion, camera, people)
+    truth = bodies(motion, camera, people)
     s = motion.states()
     found = groups_and_events(s.pos, s.vel, s.present, s.intent, s.rate)
     shown = FrameTicks.of(truth.length, motion.fps, s.rate, s.present)

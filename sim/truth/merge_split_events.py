@@ -99,7 +99,8 @@ class _RuleTimes:
         """Returns the parts after all joins and divisions that are due in frame t (from 0)."""
         while True:
             divided = [piece for part in parts for piece in self._divide(part, t)]
-            joined = _connected(divided, self._due_to_join(divided, t))
+            due = [pair for pair, frames in self._meant_to_join(divided, t) if _first(frames, t) == t]
+            joined = _connected(divided, due)
             if len(joined) == len(divided) == len(parts):
                 return parts
             parts = joined
@@ -122,9 +123,6 @@ class _RuleTimes:
         for some in meant.values():
             for (a, core_a), (b, core_b) in combinations(some, 2):
                 yield (a, b), self._onsets("merge", core_a, core_b, t)
-
-    def _due_to_join(self, parts: list[PersonSet], t: int) -> list[tuple[PersonSet, PersonSet]]:
-        return [pair for pair, frames in self._meant_to_join(parts, t) if _first(frames, t) == t]
 
     def _meant_to_divide(self, part: PersonSet, t: int) -> Iterator[tuple[PersonSet, PersonSet]]:
         return combinations(_by_intent(part, self.motion, t).values(), 2) if len(part) > 1 else iter(())

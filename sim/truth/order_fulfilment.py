@@ -21,8 +21,8 @@ from sim.truth.merge_split_rules import (
     SPLIT_VELOCITY,
     separation,
 )
-from sim.truth.queue_detection import MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, detect_queues
-from sim.types import Array, Bools, GroupEvent, Ints, Motion, Order, States, Truth
+from sim.truth.queue_detection import MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED
+from sim.types import GroupEvent, Ints, Motion, Order, States, Truth
 
 PATIENCE = 10.0  # s from the firing of an order until its rule has come true
 # s for which the rule of each kind of order must hold
@@ -42,34 +42,14 @@ WORDS = {
 def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
     """Returns for each order id the index in `truth.events` of the event that fulfils it.
 
-    Raises OrderError for the first order that no event fulfils, and for a queue that people left from both ends.
+    Raises OrderError for the first order that no event fulfils.
     """
     fulfilled = {}
     for order in truth.orders:
         if order.event is None:
             raise _unfulfilled(order, motion)
         fulfilled[order.id] = order.event
-        if order.kind == "queue":
-            _check_fifo(order, motion)
     return fulfilled
-
-
-def _check_fifo(order: Order, motion: Motion) -> None:
-    s = motion.states()
-    people = {p for part in order.before for p in part}
-    fired = _fired(order, s)
-    for queue in detect_queues(s.pos, s.vel, s.present, s.rate):
-        members = {p + 1 for p in queue.order}
-        ordered = len(people & members) >= min(QUEUE_PEOPLE, len(people)) and queue.first >= fired
-        if ordered and not queue.fifo:
-            raise OrderError(
-                file=f"scenario {motion.name}", place=f"event {order.id} (seed {motion.seed})",
-                got=f"a queue left by people {', '.join(str(p + 1) for p in queue.left)} in this order",
-                expected=f"first in, first out: {', '.join(str(p + 1) for p in queue.order)} or from the other end",
-                remedy="give the line more room, or let people come from behind it",
-            )  # fmt: skip
-        if ordered:
-            return
 
 
 def _fired(order: Order, s: States) -> int:
@@ -138,39 +118,17 @@ def _unfulfilled(order: Order, motion: Motion) -> OrderError:
 
 def closest(order: Order, s: States, window: slice) -> str:
     """Returns in words how close the people came to an order's rule within a window of ticks."""
-    pos, vel, present = s.pos[window], s.vel[window], s.present[window]
-    if not len(pos):
-        return "the recording had ended"
+    pos, vel = s.pos[window], s.vel[window]
     if order.kind == "queue":
         people = [p - 1 for part in order.before for p in part]
-        slow = present[:, people] & (length(np.nan_to_num(vel[:, people])) < WAITING_SPEED)
-        most, stretch = slow.sum(axis=1).max(initial=0), _longest(slow.sum(axis=1) >= QUEUE_PEOPLE) / s.rate
-        return (
-            f"at most {most} of {len(people)} people slower than {WAITING_SPEED:g} m/s at once, "
-            f"{QUEUE_PEOPLE} of them for {stretch:.1f} s at a stretch"
-        )
-    parts = order.before if order.kind == "merge" else order.after
-    columns = [np.array(part, dtype=np.int64) - 1 for part in parts]
-    gap, difference = _gaps(columns, pos, vel, widest=order.kind == "merge")
+        slow = s.present[window][:, people] & (length(np.nan_to_num(vel[:, people])) < WAITING_SPEED)
+        most = slow.sum(axis=1).max(initial=0)
+        return f"at most {most} of {len(people)} people slower than {WAITING_SPEED:g} m/s at once"
+    first, *others = (np.array(p, np.int64) - 1 for p in (order.before if order.kind == "merge" else order.after))
+    found = separation(pos, vel, first, np.concatenate(others))
+    gap = np.where(np.isfinite(found.distance), found.distance, np.nan)
     if not np.isfinite(gap).any():
         return "the parts were never there together"
-    k = int(np.nanargmin(gap) if order.kind == "merge" else np.nanargmax(gap))
-    word = "nearest" if order.kind == "merge" else "furthest"
-    return f"{word} {gap[k]:.2f} m, velocities then differing by {difference[k]:.2f} m/s"
-
-
-def _longest(holds: Bools) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(np.int8)))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
-
-
-def _gaps(columns: list[Ints], pos: Array, vel: Array, widest: bool) -> tuple[Array, Array]:
-    """Returns distances (T,) and velocity differences (T,) of the part furthest from (`widest`) or nearest to all
-    others.
-    """
-    rests = [np.concatenate([columns[0][:0], *columns[:k], *columns[k + 1 :]]) for k in range(len(columns))]
-    gaps = [separation(pos, vel, a, rest) for a, rest in zip(columns, rests, strict=True)]
-    gap, difference = np.array([g.distance for g in gaps]), np.array([g.velocity_difference for g in gaps])
-    gap[np.isinf(gap)] = -np.inf if widest else np.inf
-    worst = gap.argmax(axis=0) if widest else gap.argmin(axis=0), np.arange(len(pos))
-    return np.where(np.isfinite(gap[worst]), gap[worst], np.nan), difference[worst]
+    word, k = ("nearest", np.nanargmin(gap)) if order.kind == "merge" else ("furthest", np.nanargmax(gap))
+    difference = found.velocity_difference[k]
+    return f"the first part {word} {gap[k]:.2f} m from the others, velocities then differing by {difference:.2f} m/s"

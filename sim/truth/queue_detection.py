@@ -184,11 +184,7 @@ class DetectedQueue:
     # members from one end of the line to the other; either end may be the head. People who joined later are inserted
     # between those they stood between. Empty if nobody was in line for MEMBER_TIME (1 s).
     order: tuple[int, ...]
-    left: tuple[int, ...]  # members who left before the end, in the order of leaving; () if none
     middle: Vector  # x, y of the line's middle when it was first followed, m; this may be before frame `first`
-    # True if everyone who left did so from the same end of the line, or nobody left. A person may leave up to
-    # MEMBER_TIME before people nearer to that end.
-    fifo: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +212,6 @@ class _FollowedLine:
     three: int
     middle: Vector  # x, y of the line's middle in the frame in which following began, m
     seen: dict[int, int] = field(default_factory=dict)  # by person, number of moments (examined frames) in the line
-    gone: dict[int, _LineNow] = field(default_factory=dict)  # by person, the line in the last of these moments
     ranks: list[int] = field(default_factory=list)  # all people seen, in order along the line
     # sum over `moments` moments of the line's mean velocity along itself and to its left, m/s
     drift: Vector = (0.0, 0.0)
@@ -315,7 +310,7 @@ def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: in
     if long:
         # A line that was too short for too long before it became a queue starts anew.
         if now.t - f.three > bridge and f.three - f.since < hold:
-            f.since, f.seen, f.gone, f.ranks, f.drift, f.moments = now.t, {}, {}, [], (0.0, 0.0), 0
+            f.since, f.seen, f.ranks, f.drift, f.moments = now.t, {}, [], (0.0, 0.0), 0
         f.three = now.t
     f.now = now
     f.drift = (f.drift[0] + now.drift[0], f.drift[1] + now.drift[1])
@@ -336,7 +331,6 @@ def _same_order(before: _LineNow, now: _LineNow) -> bool:
 def _record_people(f: _FollowedLine) -> None:
     for k, p in enumerate(f.now.order):
         f.seen[p] = f.seen.get(p, 0) + 1
-        f.gone[p] = f.now
         # A new person comes behind all who stand before them in line.
         if p not in f.ranks:
             ahead = [f.ranks.index(q) for q in f.now.order[:k]]
@@ -349,16 +343,4 @@ def _finished(f: _FollowedLine, hold: int, stride: int, fps: float) -> list[Dete
     if f.three - f.since + stride < hold or (aside > SIDEWAYS_SPEED and aside > along):
         return []
     order = tuple(p for p in f.ranks if f.seen[p] * stride >= MEMBER_TIME * fps)
-    left = sorted((p for p in order if f.gone[p].t < f.now.t), key=lambda p: f.gone[p].t)
-    return [DetectedQueue(f.since, f.now.t, order, tuple(left), f.middle, _from_one_end(f, left, MEMBER_TIME * fps))]
-
-
-def _from_one_end(f: _FollowedLine, left: list[int], late: float) -> bool:
-    """Returns True if all people in `left` left the line from the same end, but for `late` frames."""
-
-    def stay(p: int, beyond: tuple[int, ...]) -> bool:
-        return any(f.gone[q].t > f.gone[p].t + late for q in beyond)
-
-    before = {p: f.gone[p].order.index(p) for p in left}
-    first = not any(stay(p, f.gone[p].order[: before[p]]) for p in left)
-    return first or not any(stay(p, f.gone[p].order[before[p] + 1 :]) for p in left)
+    return [DetectedQueue(f.since, f.now.t, order, f.middle)]

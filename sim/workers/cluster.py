@@ -79,7 +79,7 @@ def _connect(address: str) -> Any:
     except ImportError:
         raise InputError(
             place="--cluster", got="no dask.distributed here", expected="the extra [cluster]",
-            remedy="pip install 'flockscope[cluster]'",
+            remedy='in the folder of the sources: pip install -c constraints.txt -e ".[cluster]"',
         ) from None  # fmt: skip
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # our errors say the same in one line
     try:

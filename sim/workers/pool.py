@@ -4,6 +4,10 @@ A process is spawned when it gets its first item, and again after its death. It 
 ignores Ctrl-C (its parent handles it), and exits when its parent does. Functions, items and results pass through a pipe
 as pickles. The item of a dead process is run again, until three processes have died of it; then it is an error
 (WorkError) or gets a substitute result.
+
+Starts the workers that a command asks for: this process, local processes, or a dask cluster.
+
+All three are used in the same way, as a function that runs another function over items.
 """
 
 from __future__ import annotations
@@ -13,12 +17,12 @@ import pickle
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
-from scenarios.errors import WorkError
+from scenarios.errors import InputError, WorkError
 
 # environment variables that are set to 1 in every worker: a worker computes in one thread
 THREAD_VARIABLES = tuple(f"{name}_NUM_THREADS" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA"))
@@ -248,3 +252,62 @@ def _run_items(
         for process, _ in busy.values():
             process.terminate()
             process.join()
+
+
+@dataclass(frozen=True)
+class WorkerOptions:
+    """Which workers to use."""
+
+    # number of workers, 1 or more (checked by `start_workers`); 1 without a cluster means this process. With a cluster
+    # it is the least number of items under way.
+    count: int = 1
+    cluster: str | None = None  # address of a dask scheduler ("tcp://HOST:PORT"), None for local workers
+
+
+def start_workers(workers: int = 1, cluster: str | None = None) -> AbstractContextManager[RunItems]:
+    """Starts workers, yields a function that runs a function over items (RunItems), and ends them.
+
+    Args:
+        workers: Number of processes; 1 is this process. With a cluster the least number of items under way.
+        cluster: Address of a dask scheduler ("tcp://HOST:PORT"), None for this machine.
+
+    Raises:
+        InputError: `workers` is below 1.
+    """
+    if workers < 1:
+        raise InputError(place="workers", got=workers, expected="1 or more", remedy="correct --workers")
+    if cluster is not None:
+        from sim.workers.cluster import cluster_workers
+
+        return cluster_workers(cluster, workers)
+    return process_pool(workers) if workers > 1 else this_process()
+
+
+def results_in_order(run: RunItems, function: Callable[[T], R], items: Sequence[T]) -> Generator[R, None, None]:
+    """Yields function(item) in the order of `items`, which are distinct objects."""
+    wanted, found = True, dict[int, R]()
+    arriving = run(function, (item for item in items if wanted))
+    try:
+        for item in items:
+            while id(item) not in found:
+                done, result = next(arriving)
+                found[id(done)] = result
+            yield found.pop(id(item))
+    finally:
+        wanted = False
+        # Items under way are waited for; no further one is started.
+        for _ in arriving:
+            pass
+
+
+@contextmanager
+def this_process() -> Iterator[RunItems]:
+    """Yields a RunItems that calls the function in this process, one item after another."""
+
+    def run(
+        function: Callable[[T], R], items: Iterable[T], *, ahead: int = 0, on_loss: Any = None
+    ) -> Iterator[tuple[T, R]]:
+        for item in items:
+            yield item, function(item)
+
+    yield run

@@ -53,8 +53,9 @@ def _run(package: Path, words: list[str], **env: str) -> subprocess.CompletedPro
     return subprocess.run(command, env=environment, cwd=package, capture_output=True, text=True, check=False)
 
 
-def test_the_home_takes_the_cache_of_a_read_only_package(package, tmp_path):
-    done = _run(package, ["-c", KERNEL], HOME=str(tmp_path / "home"))
+@pytest.mark.parametrize("numba", ["import numba", "import numba.core.codegen as c; del c.JITCodeLibrary"])
+def test_the_home_takes_the_cache_of_a_read_only_package_with_any_numba(numba, package, tmp_path):
+    done = _run(package, ["-c", numba + KERNEL], HOME=str(tmp_path / "home"))
     assert done.stdout.startswith(f"4 {tmp_path}/home/.cache/numba/"), done.stderr
 
 

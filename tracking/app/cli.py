@@ -46,7 +46,10 @@ COMMANDS: dict[str, tuple[Any, str]] = {
     "export kitti": (options.KittiOptions, "datasets:export_kitti"),
     "export webdataset": (options.WebdatasetOptions, "datasets:export_webdataset"),
 }
-GROUPS = {"export": "Convert a dataset, or tracks, to another format.", "fit": "Fit a model to recordings."}
+GROUPS = {
+    "export": "Convert a dataset, or tracks, to another format.",
+    "fit": "Fit a model to recordings or simulated scenes.",
+}
 
 app = typer.Typer(
     add_completion=False,

@@ -55,7 +55,8 @@ Similarity = Literal["boxes", "ground", "image"] | None
 class DemoOptions:
     """Generate scenes, track them, score the tracks and write a page with the results."""
 
-    quick: bool = option("Only the short scenes of the suite quick, one seed and two trackers, of pixels one.", False)
+    quick: bool = option(
+        "A quick look: the suite quick with one seed, two trackers, and one scene with small pictures.", False)
     out: Path = OUT(default=Path("flockscope-demo"))
 
 
@@ -92,7 +93,8 @@ class TrackOptions:
     tracker: str = ARGUMENT("Name of a tracker, or file.py:Class, or module:Class.", metavar="TRACKER")
     source: Path = SOURCE()
     out: Path = OUT()
-    params: str | None = option("The tracker's parameters: a file, or paper.", None, metavar="FILE.toml|PRESET")
+    params: str | None = option(
+        "The tracker's parameters: a file, or a preset such as paper.", None, metavar="FILE.toml|PRESET")
     settings: list[str] = SET()
     detections: Literal["image", "truth", "file"] | None = option(
         "Detections that the tracker gets. Default: the first of image, file, truth that it and the source allow.",
@@ -199,7 +201,7 @@ class MinimizeOptions:
     confirm: int = option("Number of other seeds on which most must fail, too.", 5, low=0, metavar="N")
     episodes: int | None = option("Stop after so many episodes.", None, low=1, metavar="N")
     minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
-    workers: int = WORKERS()
+    workers: int = option("Processes that play episodes.", 1, low=1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -287,8 +289,8 @@ class OverlayOptions:
     source: Path = SOURCE()
     tracks: Path | None = TRACKS()
     out: Path = FILE("Video to write; for several sequences, a folder.", metavar="FILE.mp4")
-    truth: Literal["beside", "over", "only"] | None = option(
-        "Draw the truth: beside the tracks, over the same picture, or only it. Without TRACKS always only it.", None)
+    truth: Literal["over"] | None = option(
+        "Draw the truth over the same picture. Without TRACKS it is drawn alone.", None)
     fps: float | None = FPS()
     px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
@@ -307,7 +309,6 @@ class CocoOptions:
 
     folder: Path = ARGUMENT("A sequence or dataset with labelled boxes.", metavar="DIR")
     out: Path = FILE("File to write; for several splits FILE-train.json, FILE-val.json, …", metavar="FILE.json")
-    min_visibility: float = option("Leave out people who are less visible.", 0.0, low=0.0, high=1.0, metavar="V")
     person_class: str | None = PERSON_CLASS()
 
 
@@ -326,8 +327,6 @@ class WebdatasetOptions:
     folder: Path = ARGUMENT("A generated sequence or dataset.", metavar="DIR")
     out: Path = OUT()
     shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
-    samples: Literal["sequence", "frame"] = option(
-        "A sample: a sequence with all its files, or a labelled frame.", "sequence")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,6 +55,11 @@ def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, s
         )
     subject, dot, rest = key.strip().partition(".")
     if not dot or subject not in SUBJECTS:
+        if dot and default == "tracker" and "scenario" in subjects:
+            raise InputError(
+                place=f"--set {text}", got=repr(key), expected="a parameter of the tracker, sensor.… or scenario.…",
+                remedy=f"write --set scenario.{text}",
+            )  # fmt: skip
         subject, rest = default, key.strip()
     if subject not in subjects:
         raise InputError(

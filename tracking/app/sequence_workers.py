@@ -79,7 +79,7 @@ def over_sequences(
     workers: int,
 ) -> Iterator[R]:
     """Yields function(sequence, job) for each sequence and its job, in order."""
-    from sim.workers.start import results_in_order, start_workers
+    from sim.workers.pool import results_in_order, start_workers
 
     workers = min(workers, len(sequences))
     if workers <= 1:

@@ -62,16 +62,9 @@ def _one_channel(seen: Floats, mean: Floats) -> float | None:
     for _ in range(2):
         if np.count_nonzero(usable) < FEWEST:
             return None
-        factor = _median(seen[usable] / mean[usable])
+        factor = float(np.median(seen[usable] / mean[usable]))
         usable = (factor * mean > DARKEST) & (factor * mean < BRIGHTEST) & (mean > DARKEST)
     return factor
-
-
-def _median(values: Floats) -> float:
-    half = len(values) // 2
-    middle = np.partition(values, half)
-    above = middle[half]
-    return float(above if len(values) % 2 else (middle[:half].max() + above) / 2)
 
 
 def frame_gains(sample: Image) -> Floats:

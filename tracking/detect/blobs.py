@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from sim.arrays import Frozen
 from sim.types import Array, Bools, Image
-from tracking.detect import blobs_kernels as kernels
 
 Labels = NDArray[np.int32]
 # Windows of the three operations, m. Opening removes narrower parts of the foreground, closing fills narrower gaps.
@@ -50,20 +49,6 @@ class Blobs(Frozen):
 
     def __len__(self) -> int:
         return len(self.area)
-
-    def contour(self, row: int) -> Array:
-        """Returns the outer contour of blob `row` (from 0), (V, 2) x, y in px, through the centres of its edge
-        pixels."""
-        left, top, wide, high = self.box[row].astype(int)
-        part = (self.label[top : top + high, left : left + wide] == row + 1).astype(np.uint8)
-        outlines, _ = cv2.findContours(part, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-        longest = np.reshape(max(outlines, key=len), (-1, 2))
-        return np.asarray(longest + np.array([left + 0.5, top + 0.5]))
-
-    def hull(self, row: int) -> Array:
-        """Returns the convex hull of the contour of blob `row` (from 0), (V, 2) x, y in px, counter-clockwise where y
-        is up."""
-        return np.asarray(cv2.convexHull(self.contour(row).astype(np.float32), clockwise=False), float).reshape(-1, 2)
 
     def cut(self) -> Bools:
         """Returns flags (M,): True for each blob whose box touches an edge of the image or is at most 1 px away from
@@ -99,25 +84,25 @@ def disc(size: int) -> Image:
 def find(mask: Bools, min_area: float) -> Blobs:
     """Returns the connected regions (8 neighbours) of a foreground mask (H, W) bool that have at least `min_area`
     pixels."""
-    runs = kernels.runs(mask)
-    region, count = kernels.connect(runs)
-    area, corners = kernels.extents(runs, region, count)
-    order = np.argsort(-area, kind="stable")
-    order = order[area[order] >= max(min_area, 1.0)]
-    rank = np.full(count, -1)
+    count, every, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    pixels = np.flatnonzero(mask)
+    region = every.ravel()[pixels] - 1
+    first = np.unique(region, return_index=True)[1]
+    order = np.lexsort((first, -stats[1:, cv2.CC_STAT_AREA]))  # of equal regions that of the first pixel comes first
+    order = order[stats[1 + order, cv2.CC_STAT_AREA] >= max(min_area, 1.0)]
+    rank = np.full(count - 1, -1)
     rank[order] = np.arange(len(order))
-    region, area, corners = rank[region], area[order], corners[order]
+    row = rank[region]
+    pixels, row = pixels[row >= 0], row[row >= 0]
     label = np.zeros(mask.shape, np.int32)
-    kernels.write_labels(runs, region, label)
-    n = area.astype(float)
-    ellipse, angle_var = ellipses(n, *_moments(*kernels.moments(runs, region, area)))
-    box = np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], 1).astype(float)
-    return Blobs(box, n, ellipse, angle_var, label)
-
-
-def _moments(centre: Array, spread: Array) -> tuple[Array, Array]:
-    xx, xy, yy = spread.T
-    return centre + 0.5, np.stack([xx + 1 / 12, xy, xy, yy + 1 / 12], axis=-1).reshape(-1, 2, 2)
+    label.ravel()[pixels] = row + 1
+    n, (v, u) = stats[1 + order, cv2.CC_STAT_AREA].astype(float), np.divmod(pixels, mask.shape[1])
+    centre = np.stack([np.bincount(row, x, len(n)) for x in (u, v)], axis=1) / n[:, None]
+    x, y = u - centre[row, 0], v - centre[row, 1]
+    xx, xy, yy = (np.bincount(row, product, len(n)) / n for product in (x * x, x * y, y * y))
+    cov = np.stack([xx + 1 / 12, xy, xy, yy + 1 / 12], axis=-1).reshape(-1, 2, 2)
+    ellipse, angle_var = ellipses(n, centre + 0.5, cov)
+    return Blobs(stats[1 + order, : cv2.CC_STAT_AREA].astype(float), n, ellipse, angle_var, label)
 
 
 def ellipses(n: Array, centre: Array, cov: Array) -> tuple[Array, Array]:

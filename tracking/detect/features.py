@@ -42,9 +42,7 @@ class SpacePoints:
     """M measured points in space.
 
     id (M,): the same number in each frame in which a point is measured. pos (M, 3): world x, y, z, m; cov (M, 3, 3):
-    covariance of a measured position. vel (M, 3): m/s; vel_cov (M, 3, 3): covariance of a measured velocity. lag (M,):
-    s from the mean time of the places that a velocity is the slope of to now; position and velocity have the
-    covariance lag vel_cov. It is 0 if the velocity is not measured.
+    covariance of a measured position. vel (M, 3): m/s; vel_cov (M, 3, 3): covariance of a measured velocity.
     """
 
     id: Ints
@@ -52,22 +50,19 @@ class SpacePoints:
     cov: Array
     vel: Array
     vel_cov: Array
-    lag: Array
 
     def __len__(self) -> int:
         return len(self.pos)
 
     def at(self, rows: Ints | Bools) -> SpacePoints:
         """Returns the points of some rows: indices, or flags (M,)."""
-        return SpacePoints(
-            self.id[rows], self.pos[rows], self.cov[rows], self.vel[rows], self.vel_cov[rows], self.lag[rows]
-        )
+        return SpacePoints(self.id[rows], self.pos[rows], self.cov[rows], self.vel[rows], self.vel_cov[rows])
 
     @classmethod
     def none(cls) -> SpacePoints:
         """Returns M = 0 points."""
         two, three = np.zeros((0, 3)), np.zeros((0, 3, 3))
-        return cls(no_ids(), two, three, two, three, np.zeros(0))
+        return cls(no_ids(), two, three, two, three)
 
 
 class Features:
@@ -171,15 +166,14 @@ class Features:
         world, known = self.world[old], known[old]
         pos = world[:, -1]
         cov = point_covariances(self.camera, pos, var)
-        vel, spread, lag = slopes(world, known, np.arange(frames) / self.fps)
-        return SpacePoints(self.id[old], pos, cov, vel, cov / spread[:, None, None], lag)
+        vel, spread = slopes(world, known, np.arange(frames) / self.fps)
+        return SpacePoints(self.id[old], pos, cov, vel, cov / spread[:, None, None])
 
 
-def slopes(points: Array, known: Bools, times: Array) -> tuple[Array, Array, Array]:
-    """Returns the velocities (M, 3) of least squares of M points over K frames, sum (t - mean t)^2 (M,), s^2, and the
-    last time less mean t (M,), s."""
+def slopes(points: Array, known: Bools, times: Array) -> tuple[Array, Array]:
+    """Returns the velocities (M, 3) of least squares of M points over K frames, and sum (t - mean t)^2 (M,), s^2."""
     mean = known @ times / np.maximum(known.sum(1), 1)
     t = np.where(known, times - mean[:, None], 0.0)
     spread = np.square(t).sum(1)
     slope = np.einsum("mk,mkd->md", t, np.where(known[..., None], points, 0.0)) / spread[:, None]
-    return slope, spread, times[-1] - mean
+    return slope, spread

@@ -24,7 +24,6 @@ import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT, person_boxes
 from sim.types import Array, Bools, Camera, Context
-from tracking.detect import person_size_kernels as kernels
 
 WIDTH = 0.42  # m, of the silhouette seen from the side, mean over headings
 SHOULDERS, DEPTH = 0.459, 0.272  # m, from straight above, where shoulders hide the arms: across and along the heading
@@ -138,7 +137,7 @@ class PersonSize:
         if self.axes_above is not None:
             return np.tile(self.axes_above, (len(foot), 1))
         if self.table is not None:
-            return kernels.look_up(self.table, (foot - self.low) / STEP)
+            return look_up(self.table, (foot - self.low) / STEP)
         height = self.line[0] + self.line[1] * foot[:, 1]
         return np.stack([height, SLIM * height], 1)
 
@@ -191,6 +190,20 @@ class PersonSize:
         wide, _ = _densest(ratio[agreed, 1], weight[agreed], NARROWER_SHARE)
         most = FACTORS[1] if self.table is None else np.array([FACTORS[1][0], WIDEST])
         self.agreed, self.factor = int(agreed.sum()), np.clip([tall, wide], FACTORS[0], most)
+
+
+def look_up(table: Array, at: Array) -> Array:
+    """Returns bilinearly interpolated values (N, C) of a table (C, V, U) at N points; V and U must be at least 2.
+
+    at (N, 2): u, v in grid steps from the table's first node. A coordinate outside the table is moved to its edge; a
+    nan coordinate counts as 0. A nan among the four nodes round a point gives nan.
+    """
+    x, y = np.clip(np.nan_to_num(at, nan=0.0), 0.0, np.array(table.shape[:0:-1]) - 1.001).T
+    u, v = x.astype(int), y.astype(int)
+    a, b = x - u, y - v
+    low = table[:, v, u] * (1 - a) + table[:, v, u + 1] * a
+    high = table[:, v + 1, u] * (1 - a) + table[:, v + 1, u + 1] * a
+    return np.asarray((low * (1 - b) + high * b).T)
 
 
 def upright(place: Array, angle: Array) -> Array:

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.types import Array, Bools, Image
-from tracking.detect.blobs_kernels import runs
 from tracking.detect.subtraction_stereo_kernels import block_match, filtered_pair, left_right, reach
 
 MULTIPLE = 16  # Numbers of disparities are multiples of it, as those of OpenCV's matcher.
@@ -55,6 +54,16 @@ class SubtractionStereo:
         block_match(own, needed, half, LEAST_UNIQUE, filters, sad, found, cost)
         left_right(own, found, cost)
         return found
+
+
+def runs(mask: Bools) -> NDArray[np.int32]:
+    """Returns row, first column and last column + 1 of each run of True pixels in a row of a mask, (R, 3), in order."""
+    high, wide = mask.shape
+    padded = np.zeros(1 + high * (wide + 1), bool)  # False before the first row and after each
+    padded[1:].reshape(high, wide + 1)[:, :wide] = mask
+    edges = np.flatnonzero(padded[1:] != padded[:-1])
+    row, first = np.divmod(edges[::2], wide + 1)
+    return np.column_stack([row, first, edges[1::2] - row * (wide + 1)]).astype(np.int32)
 
 
 def sampled(disparity: Disparities, uv: Array | Disparities, half: int) -> Array:

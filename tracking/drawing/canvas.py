@@ -102,9 +102,8 @@ def fixed_point(points: Array) -> np.ndarray:
 
 
 def box_corners(box: Array) -> Array:
-    """Returns the corners (4, 2) of a box (4,), clockwise from the upper left one where y grows downwards."""
-    x, y, w, h = box
-    return np.array([[x, y], [x + w, y], [x + w, y + h], [x, y + h]])
+    """Returns the corners (…, 4, 2) of boxes (…, 4), clockwise from the upper left one where y grows downwards."""
+    return np.asarray(box[..., None, :2] + box[..., None, 2:] * np.array([[0, 0], [1, 0], [1, 1], [0, 1]]))
 
 
 def ascii_only(words: str) -> str:

@@ -63,8 +63,9 @@ def paint_layer(canvas: Canvas, layer: Layer, index: int, fps: float, style: Lay
             canvas.line(points, colour(identity), 2)
     for k, identity in enumerate(marks.id.tolist()):
         ink = PLAIN_INK if style.plain else colour(identity)
-        if not style.plain and np.isfinite(marks.ellipse[k]).all():
-            _paint_ellipse(canvas, marks.ellipse[k], ink)
+        ring = marks.ellipse[k]
+        if not style.plain and np.isfinite(ring).all() and _fits(canvas, ring):
+            canvas.line(ring, ink, 1, closed=True)
         if np.isfinite(marks.box[k]).all():
             _paint_box(canvas, marks.box[k], ink, style, dashed=bool(marks.hidden[k]))
         elif np.isfinite(marks.at[k]).all():
@@ -119,11 +120,6 @@ def _paint_dashes(canvas: Canvas, a: Array, b: Array, ink: Colour) -> None:
     for k in range(count):
         ends = a + (b - a) * np.array([[k / count], [(k + 0.5) / count]])
         canvas.line(ends, ink, 1)
-
-
-def _paint_ellipse(canvas: Canvas, ring: Array, ink: Colour) -> None:
-    if _fits(canvas, ring):
-        canvas.line(ring, ink, 1, closed=True)
 
 
 def _paint_ids(canvas: Canvas, layer: Layer, index: int) -> None:

@@ -1,8 +1,7 @@
-"""What to draw over a picture or plan: a layer holds boxes, trails, ellipses, groups and events of truth or of one
+"""What to draw over a picture: a layer holds boxes, trails, ellipses, groups and events of truth or of one
 tracker.
 
-Layers are computed from `Truth` or `Tracks` here, in drawing coordinates (px over a picture, m on a plan);
-`layer_painting` draws them."""
+Layers are computed from `Truth` or `Tracks` here, in px; `layer_painting` draws them."""
 
 from __future__ import annotations
 
@@ -18,6 +17,7 @@ from sim.geometry.polygons import convex_hull
 from sim.io.store.track_files import upright_boxes
 from sim.io.store.truth_files import with_ground_height
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
+from tracking.drawing.canvas import box_corners
 
 BOX_MARGIN = 5.0  # px between members' boxes and the outline of their group.
 
@@ -37,7 +37,7 @@ NO_POINTS = np.zeros((0, 2))
 
 @dataclass(frozen=True, eq=False)
 class GroupMark:
-    """One group in one frame, in drawing coordinates (px over a picture, m on a plan).
+    """One group in one frame, in px.
 
     id: of the group. hull: (V, 2) polygon round the members. The other fields are known only of a group that is tracked
     as a whole. extent: (32, 2), points of the ellipse that holds 99 % of the group by the covariance of its members.
@@ -54,8 +54,7 @@ class GroupMark:
 
 @dataclass(frozen=True, eq=False)
 class FrameMarks:
-    """What is drawn of one layer in one frame: N people, or N groups if `whole_groups`, in drawing coordinates (px, or
-    m on a plan).
+    """What is drawn of one layer in one frame: N people, or N groups if `whole_groups`, in px.
 
     id: (N,) of people or groups. box: (N, 4) left, top, width, height. at: (N, 2) x, y, the point that trails follow.
     ellipse: (N, 32, 2), points of the ellipse that holds the position with 95 % probability. Rows of these three are
@@ -133,11 +132,6 @@ def layer_of_tracks(tracks: SequenceOf[Tracks], camera: Camera | None, scene: Sc
     return Layer("tracked", "T", frames, _emitted(tracks))
 
 
-def plan_layer_of_tracks(tracks: SequenceOf[Tracks]) -> Layer:
-    """Returns the layer of one tracker's output on a plan, in m; boxes are nan."""
-    return Layer("tracked", "T", {t.index: _marks_on_plan(t) for t in tracks}, _emitted(tracks))
-
-
 def _emitted(tracks: SequenceOf[Tracks]) -> tuple[tuple[int, GroupEvent], ...]:
     return tuple((e.start if e.emitted is None else e.emitted, e) for t in tracks for e in t.events)
 
@@ -160,17 +154,6 @@ def _whole_groups_in_picture(t: Tracks, to_picture: Callable[[Array], Array]) ->
     at = np.array([g.motion[0] if len(g.motion) else [np.nan, np.nan] for g in groups]).reshape(n, 2)
     no_box, no_ellipse = np.full((n, 4), np.nan), np.full((n, len(UNIT_CIRCLE), 2), np.nan)
     return FrameMarks(t.id, no_box, at, no_ellipse, np.zeros(n, bool), groups, whole_groups=True)
-
-
-def _marks_on_plan(t: Tracks) -> FrameMarks:
-    n, groups, at = len(t.id), t.groups or Groups.none(), t.pos[:, :2]
-    if t.unit == "group":
-        marks = _whole_groups(t, _on_plan)
-    else:
-        hulls = groups.hull or tuple(NO_POINTS for _ in groups.id)
-        marks = tuple(GroupMark(g, hull) for g, hull in zip(groups.id.tolist(), hulls, strict=True))
-    no_box, ellipses = np.full((n, 4), np.nan), _ellipses(t, _on_plan)
-    return FrameMarks(t.id, no_box, at, ellipses, np.zeros(n, bool), marks, t.unit == "group")
 
 
 def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[GroupMark, ...]:
@@ -198,11 +181,7 @@ def _box_hulls(group: Ints, box: Array) -> tuple[GroupMark, ...]:
     names = np.unique(group[group >= 0])
     box = box + BOX_MARGIN * np.array([-1, -1, 2, 2])
     found = [(int(g), box[(group == g) & np.isfinite(box[:, 0])]) for g in names]
-    return tuple(GroupMark(g, convex_hull(_all_corners(own))) for g, own in found if len(own) > 1)
-
-
-def _all_corners(box: Array) -> Array:
-    return np.concatenate([box[:, :2] + box[:, 2:] * np.array(c) for c in ((0, 0), (1, 0), (1, 1), (0, 1))])
+    return tuple(GroupMark(g, convex_hull(box_corners(own).reshape(-1, 2))) for g, own in found if len(own) > 1)
 
 
 def _in_picture(points: Array, plane: str, camera: Camera | None, scene: Scene | None) -> Array:
@@ -215,10 +194,6 @@ def _in_picture(points: Array, plane: str, camera: Camera | None, scene: Scene |
 
     uv, depth = project(camera, with_ground_height(points, scene))
     return uv if (depth > 0).all() and np.isfinite(uv).all() else NO_POINTS
-
-
-def _on_plan(points: Array) -> Array:
-    return points[:, :2]
 
 
 def _ellipses(t: Tracks, to_drawing: Callable[[Array], Array]) -> Array:

@@ -104,12 +104,8 @@ def draw_trails(canvas: Canvas, truth: Truth, index: int, places: Array) -> None
         gaps = np.flatnonzero(np.diff(truth.frame[past][rows]) != 1)
         rows = rows[gaps[-1] + 1 :] if len(gaps) else rows
         if len(rows) > 1:
-            canvas.line(places[past][rows], _pale(colour(int(person))), 3)
-
-
-def _pale(ink: Colour) -> Colour:
-    b, g, r = (round(v + (255 - v) * 0.45) for v in ink)
-    return b, g, r
+            b, g, r = (round(v + (255 - v) * 0.45) for v in colour(int(person)))  # pale
+            canvas.line(places[past][rows], (b, g, r), 3)
 
 
 def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, boxes: Array | None) -> None:
@@ -131,8 +127,7 @@ def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, bo
 
 def _outlines(canvas: Canvas, places: Array, boxes: Array | None) -> Array:
     if boxes is not None:
-        corners = [boxes[:, :2] + boxes[:, 2:] * np.array(c) for c in ((0, 0), (1, 0), (0, 1), (1, 1))]
-        return canvas.map(np.concatenate(corners))
+        return canvas.map(box_corners(boxes).reshape(-1, 2))
     turn = np.linspace(0, 2 * np.pi, 16, endpoint=False)
     circle = max(FOOTPRINT * canvas.scale, 9) * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     return np.asarray((canvas.map(places)[:, None] + circle).reshape(-1, 2))

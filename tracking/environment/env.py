@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, cast, get_args
+from typing import Any, cast, get_args
 
 import gymnasium
 import numpy as np
@@ -22,22 +22,19 @@ from scenarios.errors import InputError, OrderError
 from scenarios.loading.toml_files import closest
 from sim.dataset.generate import LEFT_OUT
 from sim.dataset.splits import split_of
-from sim.types import DetectionMode, Image, Tracker
+from sim.types import DetectionMode, Tracker
 from tracking.config import Config
 from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, Source, SourceCache, SourceSpec, sources
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
 from tracking.keyword_options import documented, from_keywords, option
-from tracking.parameter_space import Space, decode, decode_and_build, encode, space_of
+from tracking.parameter_space import Space, decode, decode_and_build, space_of
 from tracking.running.detection_mode import choose_mode
 from tracking.running.prepare import Params, config_of
 from tracking.running.tracker_registry import checked, config_class, find
 from tracking.scoring.people_comparison import Similarity
 
-METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
-OBSERVATIONS = ("statistics", "parameters", "none")
 RESET_OPTIONS = ("scenario", "seed", "params")
-Observation = Literal["statistics", "parameters", "none"]
 Floats = NDArray[np.float32]
 
 
@@ -56,29 +53,22 @@ class TuningEnvOptions:
         'How people are compared: "ground", "image" or "boxes"; None: by the data.', None)
     params: Params = option("Parameters that an episode begins with; the tracker's defaults if None.", None)
     decision_every: int | None = option("Frames between two actions; None: one action per episode.", None)
-    observation: Observation = option(
-        '"statistics"; "parameters" adds the parameters in [-1, 1]; "none" is a single 0.', "statistics")
     cache: int = option("Bytes of sequences that are kept for later episodes.", DEFAULT_LIMIT, low=0)
     tracker_seed: int = option("Seed of trackers that use random numbers.", 0)
-    render_mode: str | None = option('"rgb_array" or None.', None)
     # fmt: on
 
     def __post_init__(self) -> None:
-        _check_choice("observation", self.observation, OBSERVATIONS)
         _check_choice("detections", self.detections, (None, *get_args(DetectionMode)))
         _check_choice("similarity", self.similarity, (None, *get_args(Similarity)))
-        _check_choice("render_mode", self.render_mode, (None, *METADATA["render_modes"]))
 
 
 class TuningEnv(gymnasium.Env[Floats, Floats]):
     """One episode is one run of a tracker: an action sets its parameters, the reward is the gain in score.
 
-    An action is float32 (P,) in [-1, 1], an observation float32 (K,): statistics in [0, 1] and parameters in [-1, 1].
+    An action is float32 (P,) in [-1, 1], an observation float32 (K,): statistics in [0, 1].
 
     State: sources, cache; config, rollout (the run, None before it) and score of the episode.
     """
-
-    metadata = METADATA
 
     @documented(TuningEnvOptions, positional=2)
     def __init__(self, tracker: AnyTracker, suite: SourceSpec | Source = "quick", **options: Any) -> None:
@@ -92,7 +82,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
         self.tracker_seed, self.decision_every = given.tracker_seed, given.decision_every
         self.similarity = given.similarity
-        self.render_mode, self.observation = given.render_mode, given.observation
         self.config_class = config_class(self.tracker, self.tracker.__name__)
         self.defaults = config_of(self.config_class, given.params)
         self.sources = sources(given.suite, given.seeds, given.set)
@@ -100,28 +89,16 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.mode = _detection_mode(self.tracker, self.sources, given.detections)
         self.space: Space = _action_parameters(self.config_class, self.mode, given.decision_every)
         self.cache = SourceCache(given.cache)
-        lowest = np.r_[np.zeros(len(NAMES)), -np.ones(len(self.space))].astype(np.float32)
-        size = {"statistics": len(NAMES), "parameters": len(lowest), "none": 1}[given.observation]
-        self.observation_space = Box(lowest[:size], np.ones(size, np.float32))
+        self.observation_space = Box(0.0, 1.0, (len(NAMES),), np.float32)
         self.action_space = Box(-1.0, 1.0, (len(self.space),), np.float32)
         self.left_out: dict[Source, str] = {}  # and why: scenes whose script does not come true
         self.source, self.base = self.sources[0], self.defaults
-        self.metadata = self._metadata(self.source.fps)
         self._clear_episode()
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
         """The name of the parameter that each of the P numbers of an action sets, in order."""
         return tuple(p.name for p in self.space)
-
-    @property
-    def observation_names(self) -> tuple[str, ...]:
-        """The name of each number of an observation: statistics, then (if chosen) parameters; "nothing" for "none"."""
-        names = {"statistics": NAMES, "parameters": (*NAMES, *self.parameter_names), "none": ("nothing",)}
-        return names[self.observation]
-
-    def _metadata(self, fps: float) -> dict[str, Any]:
-        return {**METADATA, "render_fps": max(round(fps / (self.decision_every or 1)), 1)}
 
     def _clear_episode(self) -> None:
         self.rollout: Rollout | None = None
@@ -160,7 +137,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.source, self.base = source, base
         self._clear_episode()
         self.rollout, self._observer = rollout, Observer(opened.sequence.fps)
-        self.metadata = self._metadata(opened.sequence.fps)
         return self._observe(), self._info()
 
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
@@ -206,9 +182,8 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     def _advance(self, upto: int | None) -> bool:
         assert self.rollout is not None
         for frame, tracks in self.rollout.advance(upto):
-            if self.observation != "none":
-                assert self._observer is not None
-                self._observer.add(frame, tracks)
+            assert self._observer is not None
+            self._observer.add(frame, tracks)
         done = len(self.rollout.tracks)
         return done == self.rollout.length or upto is None or done < upto
 
@@ -227,15 +202,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
             self.config = tracker.config = before
             self.refused = str(error)
             return self._advance(upto)
-
-    def render(self) -> Image | None:
-        """Returns the last frame with detections and tracks, uint8 (H, W, 3) RGB; None without a render_mode."""
-        if self.render_mode is None:
-            return None
-        from tracking.environment.picture import episode_picture
-
-        opened = self.cache.open(self.source, streams_for(self.tracker, self.mode))
-        return episode_picture(opened, self.rollout, self.score)
 
     def close(self) -> None:
         """Ends the episode and replaces the cache of sources by an empty one. `reset` may follow."""
@@ -267,14 +233,9 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return fitting[int(self.np_random.integers(len(fitting)))]
 
     def _observe(self) -> Floats:
-        if self.observation == "none":
-            return np.zeros(1, np.float32)
         assert self._observer is not None
         scale = float("nan") if self.rollout is None else self.rollout.prepared.px_per_m(self.rollout.tracks)
-        statistics = self._observer.statistics(scale)
-        if self.observation == "statistics":
-            return statistics
-        return np.concatenate([statistics, encode(self.space, self.config).astype(np.float32)])
+        return self._observer.statistics(scale)
 
     def _info(self) -> dict[str, Any]:
         return {

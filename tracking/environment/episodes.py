@@ -94,8 +94,7 @@ def play(
 class Rollout:
     """An episode that is played frame by frame; the arguments are those of `play`.
 
-    State: the prepared tracker; tracks, one `Tracks` per frame so far; last, the last frame, None before the first;
-    seconds spent on tracking and scoring.
+    State: the prepared tracker; tracks, one `Tracks` per frame so far; seconds spent on tracking and scoring.
     """
 
     def __init__(
@@ -121,7 +120,6 @@ class Rollout:
         self.seconds_tracking += time.perf_counter() - start
         self._frames: Iterator[Frame] | None = None
         self._next: Frame | None = None
-        self.last: Frame | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         # An iterator that draws or reads pictures cannot be copied: a copy begins one at its own next frame.
@@ -154,7 +152,7 @@ class Rollout:
             tracks = self.prepared.step(frame)
             self.seconds_tracking += time.perf_counter() - start
             self.tracks.append(tracks)
-            self._next, self.last = None, frame
+            self._next = None
             yield frame, tracks
 
     def episode(self, every_score: bool = False) -> Episode:

@@ -109,12 +109,3 @@ def _group_values(tracks: list[Tracks], per_minute: float) -> dict[str, float]:
 def squashed(statistic: Statistic, value: float) -> float:
     """Returns the value of a statistic mapped to [0, 1]: a share as it is, another value x as x / (x + half)."""
     return value if statistic.half is None else value / (value + statistic.half)
-
-
-def table() -> str:
-    """Returns the statistics as the Markdown table of docs/reference/environment.md."""
-    lines = [
-        f"| {k} | `{s.name}` | {'share' if s.half is None else f'{s.half:g} {s.unit}'.strip()} | {s.meaning} |"
-        for k, s in enumerate(STATISTICS)
-    ]
-    return "\n".join(["| | statistic | 0.5 stands for | meaning |", "|---|---|---|---|", *lines, ""])

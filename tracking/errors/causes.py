@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.types import Array, Bools, Ints, Truth
+from sim.types import Array, Bools, Ints
 from tracking.errors.groups import GroupError
 from tracking.errors.people import NOBODY, MatchedPeople, PersonError
 
@@ -97,21 +97,6 @@ class Facts:
         """Returns the row of a person in a frame, -1 if not there."""
         found = self.rows(frame)[self.id[self.rows(frame)] == id]
         return int(found[0]) if len(found) else NOBODY
-
-
-def facts(
-    truth: Truth, kept: Bools, pos: Array, metre: float, detected: Bools | None, light: Array | None,
-    alarms: tuple[Ints, Array],
-) -> Facts:  # fmt: skip
-    """Returns the facts of the rows `kept` of a truth; pos (R, 2): where they are compared."""
-
-    def of(values: Array | None) -> Array | None:
-        return None if values is None else values[kept]
-
-    return Facts(
-        truth.frame[kept], truth.id[kept], pos, metre, of(truth.vel), truth.visibility[kept], of(truth.truncation),
-        of(truth.box), detected, light, truth.fps, alarms,
-    )  # fmt: skip
 
 
 def cause_of_person(error: PersonError, of: Facts) -> Cause:

@@ -17,7 +17,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.types import Array, Bools, Sequence, Tracks
 from tracking.comparison import scorer_of
-from tracking.errors.causes import Cause, Facts, cause_of_ghost, cause_of_group, cause_of_person, facts
+from tracking.errors.causes import Cause, Facts, cause_of_ghost, cause_of_group, cause_of_person
 from tracking.errors.groups import LINEAGE, GroupError, Memberships, group_errors, wrong_lineages
 from tracking.errors.people import PersonError, matched_people, person_errors
 from tracking.errors.repairs import SHOWN, ComparedPeople, ComparedRun, scores
@@ -246,5 +246,9 @@ def _facts(sequence: Sequence, compared: MatchedSides, seen: MatchedSides | None
         detected, false = find_rows(rows, sides.true.rows) >= 0, find_rows(sides.true.rows, rows) < 0
         alarms = rows.frame[false], _positions(seen)[1][false]
     light = sequence.load_light() if pixels and sequence.load_light is not None else None
-    kept = sides.inside[sides.truth.frame]
-    return facts(sides.truth, kept, _positions(compared)[0], _metre(compared), detected, light, alarms)
+    truth, kept = sides.truth, sides.inside[sides.truth.frame]
+    vel, truncation, box = (None if a is None else a[kept] for a in (truth.vel, truth.truncation, truth.box))
+    return Facts(
+        truth.frame[kept], truth.id[kept], _positions(compared)[0], _metre(compared), vel, truth.visibility[kept],
+        truncation, box, detected, light, truth.fps, alarms,
+    )  # fmt: skip

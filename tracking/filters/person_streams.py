@@ -51,8 +51,9 @@ class PersonStreams:
 
     def normals(self, role: int, key: Keys, rows: int, columns: int) -> Array:
         """Returns standard normal numbers, (rows, K, columns), of this frame; key (K,)."""
-        out = np.empty((rows, len(key), columns))
-        person_streams_kernels.fill_normals(self._begin(role), key, out)
+        uniforms = self.uniforms(role, key, rows, columns)
+        out = np.empty_like(uniforms)
+        person_streams_kernels.to_normals(uniforms.ravel(), out.ravel())
         return out
 
     def _begin(self, role: int) -> Keys:

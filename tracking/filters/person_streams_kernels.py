@@ -47,36 +47,24 @@ def fill_uniforms(begin: Any, key: Any, out: Array) -> None:
     values = bits.view(np.float64)
     for k in range(people):
         # floats in [1, 2) are made from bits alone, without a division
-        _fill_bits(mixed(begin[0] ^ key[k]), bits)
+        at = mixed(begin[0] ^ key[k])
+        for n in range(len(bits)):
+            bits[n] = (mixed(at + np.uint64(n + 1) * GOLDEN) >> SHIFTS[3]) | ONE_TO_TWO
         for a in range(rows):
             for c in range(columns):
                 out[a, k, c] = values[a * columns + c] - 1.0
 
 
 @njit(cache=True)
-def fill_normals(begin: Any, key: Any, out: Array) -> None:
-    """Writes standard normal numbers into out (A, K, C); arguments as of fill_uniforms."""
-    rows, people, columns = out.shape
-    bits, normals = np.empty(rows * columns, np.uint64), np.empty(rows * columns)
-    values = bits.view(np.float64)
-    for k in range(people):
-        _fill_bits(mixed(begin[0] ^ key[k]), bits)
-        for n in range(len(bits)):  # no branch, so that it is computed for several numbers at once
-            centred = (values[n] - 1.5) + HALF_STEP
-            values[n] = centred
-            normals[n] = centred * _ratio(CENTRE_TOP, CENTRE_BELOW, 0.180625 - centred * centred)
-        for n in range(len(bits)):
-            if abs(values[n]) > 0.425:
-                normals[n] = _tail(values[n])
-        for a in range(rows):
-            for c in range(columns):
-                out[a, k, c] = normals[a * columns + c]
-
-
-@njit(cache=True)
-def _fill_bits(at, bits):  # type: ignore[no-untyped-def]
-    for n in range(len(bits)):
-        bits[n] = (mixed(at + np.uint64(n + 1) * GOLDEN) >> SHIFTS[3]) | ONE_TO_TWO
+def to_normals(uniforms: Array, normals: Array) -> None:
+    """Writes into normals (N,) the standard normal numbers whose quantiles are the uniform numbers (N,) of a stream."""
+    for n in range(len(uniforms)):  # no branch, so that it is computed for several numbers at once
+        centred = (uniforms[n] - 0.5) + HALF_STEP
+        normals[n] = centred * _ratio(CENTRE_TOP, CENTRE_BELOW, 0.180625 - centred * centred)
+    for n in range(len(uniforms)):
+        centred = (uniforms[n] - 0.5) + HALF_STEP
+        if abs(centred) > 0.425:
+            normals[n] = _tail(centred)
 
 
 @njit(cache=True)

@@ -147,7 +147,8 @@ def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) ->
         r = truth.rows(index)
         low, high = np.searchsorted(frame, (index, index + 1))
         if r.stop > r.start and high > low:
-            cost = 1.0 - np.maximum(box_iou(whole[r], box[low:high]), box_iou(part[r], box[low:high]))
+            here = box[low:high]
+            cost = 1.0 - np.maximum(box_iou(whole[r, None], here), box_iou(part[r, None], here))
             i, j = optimal(cost, 1.0 - GATE)
             rows.append(i + r.start)
             columns.append(j + low)
@@ -155,17 +156,16 @@ def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) ->
 
 
 def box_iou(a: Array, b: Array) -> Array:
-    """Returns the IoU (N, M) of boxes a (N, 4) and b (M, 4); 0 where one is nan."""
+    """Returns the IoU (…) of boxes a (…, 4) and b (…, 4), which are broadcast; 0 where one is nan."""
     inner = box_intersections(a, b)
-    area = (a[:, 2] * a[:, 3])[:, None] + (b[:, 2] * b[:, 3])[None]
-    return np.nan_to_num(inner / (area - inner))
+    return np.nan_to_num(inner / (a[..., 2] * a[..., 3] + b[..., 2] * b[..., 3] - inner))
 
 
 def box_intersections(a: Array, b: Array) -> Array:
-    """Returns the common areas (N, M) of boxes a (N, 4) and b (M, 4); nan where a box is nan."""
-    low = np.maximum(a[:, None, :2], b[None, :, :2])
-    high = np.minimum(a[:, None, :2] + a[:, None, 2:], b[None, :, :2] + b[None, :, 2:])
-    return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=2))
+    """Returns the common areas (…) of boxes a (…, 4) and b (…, 4), which are broadcast; nan where a box is nan."""
+    low = np.maximum(a[..., :2], b[..., :2])
+    high = np.minimum(a[..., :2] + a[..., 2:], b[..., :2] + b[..., 2:])
+    return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=-1))
 
 
 def _covered(frame: Ints, box: Array, out_frame: Ints, out_box: Array) -> Bools:
@@ -174,7 +174,7 @@ def _covered(frame: Ints, box: Array, out_frame: Ints, out_box: Array) -> Bools:
     for index in np.unique(out_frame):
         here, there = np.flatnonzero(frame == index), out_frame == index
         if len(here):
-            covered[here] = (box_iou(box[here], out_box[there]) >= IGNORED).any(axis=1)
+            covered[here] = (box_iou(box[here, None], out_box[there]) >= IGNORED).any(axis=1)
     return covered
 
 

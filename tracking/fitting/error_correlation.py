@@ -53,8 +53,7 @@ def pairs_by_lag(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
 
 def correlations(truth: Truth, z: Array, keep: Bools) -> Correlations:
     """Returns the correlations over time of errors z (R, D) of variance 1, pooled; keep (R,): the rows used."""
-    rows = [(lag, float((z[i] * z[j]).mean()), len(i)) for lag, i, j in pairs_by_lag(truth, keep)]
-    return _table(rows)
+    return _table([(lag, float((z[i] * z[j]).mean()), len(i)) for lag, i, j in pairs_by_lag(truth, keep)])
 
 
 def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Correlations:

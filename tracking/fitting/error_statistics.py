@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from scenarios.schema.sensor import Sensor
 from sim.detector.box_noise import box_errors
 from sim.detector.sense import sense
 from sim.types import Array, Ints
-from tracking.fitting.detection_matching import MatchedRecording, match_detections
+from tracking.fitting.detection_matching import MatchedRecording, box_iou, match_detections
 from tracking.fitting.error_correlation import pairs_by_lag
 from tracking.fitting.false_alarms import alarm_tracks
 
@@ -28,31 +29,33 @@ def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]
     """Returns 26 statistics of a detector's errors by name, all recordings pooled; nan where nothing was observed."""
     hit = np.concatenate([m.hit for m in recordings])
     visibility = np.concatenate([m.truth.visibility for m in recordings])
-    found: dict[str, float] = {"missed": _mean(~hit)}
+    found: dict[str, float] = {"missed": _known(np.mean, ~hit)}
     for low, high in zip(VISIBILITIES, (*VISIBILITIES[1:], 1.01), strict=True):
         here = (visibility >= low) & (visibility < high)
-        found[f"missed, visibility {low:g}-{min(high, 1):g}"] = _mean(~hit[here])
+        found[f"missed, visibility {low:g}-{min(high, 1):g}"] = _known(np.mean, ~hit[here])
     runs = np.concatenate([miss_runs(m) / m.truth.fps for m in recordings])
-    found["misses: mean run, s"] = _mean(runs)
+    found["misses: mean run, s"] = _known(np.mean, runs)
     found["misses in runs over 1 s"] = float(runs[runs > 1.0].sum() / runs.sum()) if len(runs) else float("nan")
     frames = sum(m.truth.length for m in recordings)
     alarms = [track for m in recordings for track in alarm_tracks(m)]
     seen = np.array([len(a.rows) for a in alarms], dtype=float)
     found["false alarms per frame"] = float(seen.sum()) / frames if frames else float("nan")
-    found["false alarms: at people"] = _weighted(np.array([a.person >= 0 for a in alarms]), seen)
-    found["false alarms: mean stay, s"] = _mean(
-        np.array([(np.ptp(a.frame) + 1) / a.recording.truth.fps for a in alarms])
+    found["false alarms: at people"] = _known(np.average, np.array([a.person >= 0 for a in alarms]), None, seen)
+    found["false alarms: mean stay, s"] = _known(
+        np.mean, np.array([(np.ptp(a.frame) + 1) / a.recording.truth.fps for a in alarms])
     )
     overlap, errors = zip(*(_iou_and_errors(m) for m in recordings), strict=True)
     for q in (0.1, 0.5, 0.9):
-        found[f"overlap, {q:.0%} quantile"] = _quantile(np.concatenate(overlap), q)
+        found[f"overlap, {q:.0%} quantile"] = _known(np.quantile, np.concatenate(overlap), q)
     e = np.concatenate(errors)
     for k, name in enumerate(("across", "foot", "top", "log width")):
-        found[f"error {name}: mean"], found[f"error {name}: sd"] = _mean(e[:, k]), _sd(e[:, k])
+        found[f"error {name}: mean"], found[f"error {name}: sd"] = _known(np.mean, e[:, k]), _known(np.std, e[:, k])
     for lag in LAGS:
         found[f"error correlation after {lag:g} s"] = _correlation(recordings, e, lag)
-    found["score of true, median"] = _quantile(np.concatenate([m.score[m.match[m.hit]] for m in recordings]), 0.5)
-    found["score of false, median"] = _quantile(np.concatenate([m.score[m.false] for m in recordings]), 0.5)
+    found["score of true, median"] = _known(
+        np.quantile, np.concatenate([m.score[m.match[m.hit]] for m in recordings]), 0.5
+    )
+    found["score of false, median"] = _known(np.quantile, np.concatenate([m.score[m.false] for m in recordings]), 0.5)
     return found
 
 
@@ -71,10 +74,7 @@ def miss_runs(m: MatchedRecording) -> Ints:
 def _iou_and_errors(m: MatchedRecording) -> tuple[Array, Array]:
     assert m.truth.box is not None
     true, box = m.truth.box[m.hit], m.box[m.match[m.hit]]
-    low, high = np.maximum(true[:, :2], box[:, :2]), np.minimum(true[:, :2] + true[:, 2:], box[:, :2] + box[:, 2:])
-    inner = np.prod(np.clip(high - low, 0.0, None), axis=1)
-    area = true[:, 2] * true[:, 3] + box[:, 2] * box[:, 3]
-    return inner / (area - inner), box_errors(box, true)
+    return box_iou(true, box), box_errors(box, true)
 
 
 def _correlation(recordings: Sequence[MatchedRecording], e: Array, lag: float) -> float:
@@ -93,17 +93,5 @@ def _correlation(recordings: Sequence[MatchedRecording], e: Array, lag: float) -
     return total / count if count else float("nan")
 
 
-def _mean(a: Array) -> float:
-    return float(np.mean(a)) if len(a) else float("nan")
-
-
-def _sd(a: Array) -> float:
-    return float(np.std(a)) if len(a) else float("nan")
-
-
-def _quantile(a: Array, q: float) -> float:
-    return float(np.quantile(a, q)) if len(a) else float("nan")
-
-
-def _weighted(a: Array, w: Array) -> float:
-    return float(a @ w / w.sum()) if w.sum() else float("nan")
+def _known(statistic: Callable[..., Any], a: Array, *more: Any) -> float:
+    return float(statistic(a, *more)) if len(a) else float("nan")

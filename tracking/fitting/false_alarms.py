@@ -74,7 +74,7 @@ def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
     for index in np.unique(m.frame[m.false]).tolist():
         open_ = [rows for rows in found if m.frame[rows[-1]] >= index - pause]
         here = np.flatnonzero(m.false & (m.frame == index))
-        iou = box_iou(m.box[[rows[-1] for rows in open_]], m.box[here]) if open_ else np.zeros((0, len(here)))
+        iou = box_iou(m.box[[rows[-1] for rows in open_], None], m.box[here]) if open_ else np.zeros((0, len(here)))
         used_tracks: set[int] = set()
         used: set[int] = set()
         for flat in np.argsort(-iou, axis=None, kind="stable"):
@@ -95,10 +95,10 @@ def _person_of_alarm(m: MatchedRecording, rows: list[int]) -> int:
     covered = []
     for row in rows:
         r = m.truth.rows(int(m.frame[row]))
-        box, people = m.box[row : row + 1], m.truth.box[r]
-        on = box_intersections(box, people)[0] / (box[0, 2] * box[0, 3])
+        box, people = m.box[row], m.truth.box[r]
+        on = box_intersections(box, people) / (box[2] * box[3])
         covered.append(float(on.sum()))
-        away = (box[0, :2] + box[0, 2:] * [0.5, 1.0] - people[:, :2] - people[:, 2:] * [0.5, 1.0]) / people[:, 3:]
+        away = (box[:2] + box[2:] * [0.5, 1.0] - people[:, :2] - people[:, 2:] * [0.5, 1.0]) / people[:, 3:]
         for k in np.flatnonzero(on > 0):
             id = int(m.truth.id[r][k])
             share[id] = share.get(id, 0.0) + float(on[k])

@@ -1,5 +1,5 @@
-"""Boxes of a calibrated camera, tracked in the image, as people on the ground: `standing` moves the tracks to where the
-boxes stand, and `completed` derives groups and events there.
+"""Boxes that are tracked in the image, as people on the ground: `standing` moves the tracks to where the boxes stand,
+and `completed` derives groups and events there. The ground is that of the camera, or of the boxes (`ground_of_boxes`).
 
 Distances between people are those of the ground, in m, and not px divided by one scale for near and far people. Boxes
 from pixels are never moved, as the foot of a blob is no person's.
@@ -17,9 +17,11 @@ from sim.scene.camera import foot_points
 from sim.scene.terrain import height_at
 from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks
+from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 from tracking.grouping.grouped_tracks import names_groups, with_groups, with_velocities
 from tracking.grouping.grouping_choice import Grouping
 
+FLATTENED = 0.4  # k of `as_measured`.
 CLIMB = 8  # Steps in which the height of the ground below a foot point is found.
 
 
@@ -38,6 +40,28 @@ def can_stand(tracks: Sequence[Tracks], camera: Camera | None, pixels: bool) -> 
     return plane_of_run(tracks) == "image" and camera is not None and boxed(tracks) and not pixels
 
 
+def ground_below(tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, pixels: bool) -> Ground:
+    """Returns the ground to which tracks in the image can be moved, by the camera, else by the first boxes."""
+    if plane_of_run(tracks) != "image" or pixels or not boxed(tracks):
+        return Ground()
+    return ground_of_boxes(tracks, px_per_m) if camera is None else Ground(camera)
+
+
+def as_measured(pos: Array, camera: Camera) -> Array:
+    """Returns ground points (N, 2), m, right and ahead of the camera, with depths shortened where they are uncertain.
+
+    A foot that is misplaced by e m in the image of a pinhole camera of height C is misplaced by e y / C at the depth y.
+    So a length dy in depth becomes dy / sqrt(1 + (k y / C)^2): as it is seen from far above, and from far away as it is
+    seen in the picture.
+    """
+    if camera.kind == "top":
+        return pos
+    ahead = camera.rotation[2, :2] / np.hypot(*camera.rotation[2, :2])
+    along, side = (pos - camera.position[:2]) @ ahead, (pos - camera.position[:2]) @ camera.rotation[0, :2]
+    reach = camera.position[2] / FLATTENED
+    return np.column_stack([side, reach * np.arcsinh(along / reach)])
+
+
 def completed(
     tracks: Sequence[Tracks],
     fps: float,
@@ -48,10 +72,17 @@ def completed(
     scene: Scene | None,
     pixels: bool,
 ) -> tuple[Tracks, ...]:
-    """Returns the tracks with groups and events, as `with_groups`, or from where boxes stand on the ground."""
-    if camera is None or not can_stand(tracks, camera, pixels) or all(t.derived for t in tracks):
+    """Returns the tracks with groups and events, as `with_groups`, or from where boxes stand on the ground.
+
+    Without a camera the ground is that of the boxes, if they tell it.
+    """
+    if all(t.derived for t in tracks):
+        return tuple(tracks)
+    camera = ground_below(tracks, camera, px_per_m, pixels).camera
+    if camera is None:
         return with_groups(tracks, fps, px_per_m, rule)
-    grouped = with_groups(standing(tracks, camera, scene), fps, 1.0, rule)
+    feet = [t.replace(pos=as_measured(t.pos, camera)) for t in standing(tracks, camera, scene)]
+    grouped = with_groups(feet, fps, 1.0, rule)
     named = names_groups(tracks)
     return tuple(_grouped_as(t, g, named) for t, g in zip(with_velocities(tracks, fps), grouped, strict=True))
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -87,7 +87,7 @@ def _facts(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, be
     """Returns what run.json tells of tracks, whoever made them: of the sequence, plane, boxes, scale and causality."""
     from sim.io.store.track_files import box_source
 
-    begins = None if begins is None else max(begins, scale.frames)
+    begins = None if begins is None else max(begins, scale.frames, scale.ground_frames)
     return {
         "sequence": sequence.name,
         "plane": tracks[0].plane if len(tracks) else None,
@@ -217,7 +217,7 @@ def track(
             fulfilled (mode "truth").
     """
     from sim.compiler import clock
-    from tracking.grouping.foot_points import can_stand, completed
+    from tracking.grouping.foot_points import completed, ground_below
     from tracking.grouping.grouped_tracks import late_groups, names_groups
     from tracking.grouping.plausibility import velocity_warning
 
@@ -235,6 +235,7 @@ def track(
     whole = clock() - begun
     scale, pixels = prepared.scale(reported), prepared.mode == "image"
     camera, scene = prepared.context.camera, prepared.context.scene
+    ground = ground_below(reported, camera, scale.px_per_m, pixels)
     tracks = completed(reported, sequence.fps, scale.px_per_m, rule, camera=camera, scene=scene, pixels=pixels)
     named = names_groups(reported)
     if named and chosen is not None:
@@ -249,9 +250,10 @@ def track(
                 stacklevel=2,
             )
         fault = velocity_warning(prepared.name, reported, sequence.fps, scale.px_per_m, rule)
-        if fault is not None and not can_stand(reported, camera, pixels):  # on the ground no velocity is reported
+        if fault is not None and ground.camera is None:  # on the ground no velocity is reported
             warnings.warn(fault, UserWarning, stacklevel=2)
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
+    scale = replace(scale, ground_frames=ground.frames)
     info = run_info(prepared, tracks, seed, sensor or {}, scale, speeds)
     return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
 
@@ -271,7 +273,7 @@ def group(
             is unknown or not above 0, or labels or the file of the grouping cannot be read.
         WorkError: An order of a simulated script was not fulfilled.
     """
-    from tracking.grouping.foot_points import can_stand, completed
+    from tracking.grouping.foot_points import completed, ground_below
     from tracking.grouping.grouped_tracks import without_groups
     from tracking.grouping.known_people import known_people
     from tracking.grouping.plausibility import implausible, velocity_warning
@@ -289,12 +291,13 @@ def group(
         raise InputError(file=file, got=got, expected="metres, or a scale", remedy=remedy)
     camera, pixels = sequence.camera, run is not None and run.info.get("detections") == "image"
     tracks = completed(people, sequence.fps, scale.px_per_m, rule, camera=camera, scene=sequence.scene, pixels=pixels)
-    stands = can_stand(people, camera, pixels)  # then no velocity is used
+    ground = ground_below(people, camera, scale.px_per_m, pixels)
+    stands = ground.camera is not None  # then no velocity is used
     fault = None if stands else velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule)
     odd = implausible(sequence.name, people, sequence.fps, scale.px_per_m)
     for text in (*odd, *([] if fault is None else [fault])):
         warnings.warn(text, UserWarning, stacklevel=2)
-    info = known_people_info(sequence, tracks, scale)
+    info = known_people_info(sequence, tracks, replace(scale, ground_frames=ground.frames))
     if run is not None:
         info = {**run.info, **{key: info[key] for key in OF_TRACKS}}
     return TrackingRun(tracks, {**info, "grouping": rule.as_dict()})

@@ -1,6 +1,6 @@
 """The catalogue of scores: key, unit, range, which direction is better, meaning and source of every score.
 
-`python -m tracking.scoring.catalogue` prints the table of docs/reference/metrics.md.
+docs/reference/metrics.md has the table.
 """
 
 from __future__ import annotations
@@ -57,23 +57,3 @@ def _read() -> tuple[Score, ...]:
 
 ALL = _read()
 CATALOGUE = MappingProxyType({score.key: score for score in ALL})  # Every score by key, in display order.
-
-
-def table() -> str:
-    """Returns the catalogue as a Markdown table, one line per score, without core scores."""
-    lines = ["| key | unit | range | better | meaning | source |", "| --- | --- | --- | --- | --- | --- |"]
-    for score in ALL:
-        if score.family != CORE:
-            unit = score.unit.replace("|", "or")
-            cells = (f"`{score.key}`", unit, _range(score), score.better, score.meaning, score.source)
-            lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def _range(score: Score) -> str:
-    low, high = (f"{v:g}".replace("inf", "∞").replace("-", "−") for v in (score.low, score.high))
-    return f"{low} to {high}"
-
-
-if __name__ == "__main__":
-    print(table())

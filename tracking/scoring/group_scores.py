@@ -122,30 +122,6 @@ class GroupComparison:
     shared: SharedMembers  # numbers of their common people
     pairs: Pairs  # all candidate pairs
     chosen: Pairs  # the one-to-one matching of all pairs
-    # (G,): distance (m or px) of each true group to the group matched by distance alone, nan if it has none
-    nearest: Array
-
-
-def compare_groups(true: GroupRows, est: GroupRows, shared: SharedMembers, pairs: Pairs) -> GroupComparison:
-    """Returns both sides' groups with the matchings of candidate pairs, from `hull_pairs` or `member_pairs`."""
-    chosen = matched_groups(true.pos, est.pos, pairs)
-    return GroupComparison(true, est, shared, pairs, chosen, nearest_distances(true, est))
-
-
-def nearest_distances(true: GroupRows, est: GroupRows) -> Array:
-    """Returns the distance of each true group to the one matched with it by distance alone, (G,), nan without."""
-
-    def distance(i: Ints, j: Ints) -> tuple[Ints, Array]:
-        d = np.hypot(*(true.pos[i] - est.pos[j]).T)
-        known = np.flatnonzero(np.isfinite(d))
-        return known, d[known]
-
-    pairs = compare(true.rows, est.rows, distance)
-    far = 2 * float(pairs.s.max(initial=0.0)) + 1  # makes one more pair worth more than any saved distance
-    kept = match(pairs.frame, pairs.i, pairs.j, far * len(true) - pairs.s) if len(pairs.s) else np.zeros(0, bool)
-    out = np.full(len(true), np.nan)
-    out[pairs.i[kept]] = pairs.s[kept]
-    return out
 
 
 def correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]:
@@ -167,8 +143,3 @@ def switch_frames(frame: Ints, true: Ints, est: Ints) -> Ints:
 def f1(hits: int, n_true: int, n_est: int) -> float:
     """Returns 2 hits / (n_true + n_est), nan if both are 0; hits: matches, n_true, n_est: number on each side."""
     return 2 * hits / (n_true + n_est) if n_true + n_est else float("nan")
-
-
-def sizes(groups: GroupRows) -> Array:
-    """Returns the number of people in each of G groups, (G,) float: reported size, or if nan the number of members."""
-    return np.where(np.isfinite(groups.size), groups.size, groups.count)

@@ -53,11 +53,9 @@ class GroupRows:
 
     rows: FrameRows  # frame number and id of each group row
     pos: Array  # (G, 2): centre x, y. nan unknown.
-    size: Array  # (G,): number of people as reported, nan unknown
-    extent: Array  # (G, 2, 2): covariance of the members' positions, nan unknown
     hull: tuple[Array, ...]  # G convex polygons (V, 2) round the members, counter-clockwise; (0, 2) unknown
     # of (K,), member (K,): membership k says that the person in row member[k] (-1: not among the people) belongs to the
-    # group in row of[k]. pos, extent and hull are in m on the ground (extent m²), in px in the image (extent px²).
+    # group in row of[k]. pos and hull are in m on the ground, in px in the image.
     of: Ints
     member: Ints
 
@@ -73,7 +71,7 @@ class GroupRows:
         """Returns the groups where the mask (G,) is true, with their memberships, `of` renumbered."""
         place, kept = np.cumsum(mask) - 1, mask[self.of]
         return GroupRows(
-            self.rows.keep(mask), self.pos[mask], self.size[mask], self.extent[mask],
+            self.rows.keep(mask), self.pos[mask],
             tuple(h for h, k in zip(self.hull, mask.tolist(), strict=True) if k),
             place[self.of[kept]], self.member[kept],
         )  # fmt: skip
@@ -111,8 +109,6 @@ def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> Gro
     return GroupRows(
         rows,
         np.concatenate([np.zeros((0, 2)), *(g.pos[:, :2] for g in groups)]),
-        np.concatenate([np.zeros(0), *(g.size for g in groups)]),
-        np.concatenate([np.zeros((0, 2, 2)), *(g.extent for g in groups)]),
         tuple(h for g in groups for h in hulls_of(g)),
         of,
         member,
@@ -156,9 +152,9 @@ def hulls_of(groups: Groups) -> tuple[Array, ...]:
 
 
 def bare_groups(rows: FrameRows, pos: Array, hull: tuple[Array, ...]) -> GroupRows:
-    """Returns groups with centre and hull only: no members, size 0, extent 0."""
-    n, nobody = len(rows), np.zeros(0, np.int64)
-    return GroupRows(rows, pos, np.zeros(n), np.zeros((n, 2, 2)), hull, nobody, nobody)
+    """Returns groups with centre and hull only: no members."""
+    nobody = np.zeros(0, np.int64)
+    return GroupRows(rows, pos, hull, nobody, nobody)
 
 
 def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> GroupRows:

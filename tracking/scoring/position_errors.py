@@ -1,4 +1,4 @@
-"""Errors of positions, velocities and group extents: RMSE of mapped people, GOSPA, Wasserstein distance of extents.
+"""Errors of positions and velocities: RMSE of mapped people, GOSPA.
 
 RMSE, the root mean square error, counts only people of the tracker that are mapped (matched one to one) to true people.
 It rewards a tracker that drops difficult people. So read it together with GOSPA.
@@ -89,20 +89,3 @@ def gospa_parts(pairs: Pairs, cutoff: float, power: float = POWER) -> Array:
     near = np.bincount(frame[chosen], weights=cost[chosen], minlength=end)
     half = cutoff**power / 2
     return np.column_stack([near, half * (n - hits), half * (m - hits)])
-
-
-def gaussian_wasserstein(pos: Array, extent: Array, other_pos: Array, other_extent: Array) -> Array:
-    """Returns the 2-Wasserstein distances (K,) of K pairs of Gaussians in the plane (Givens & Shortt 1984).
-
-        d^2 = |m1 - m2|^2 + tr(S1 + S2 - 2 (S1^1/2 S2 S1^1/2)^1/2)
-    with means m (K, 2) and covariances S (K, 2, 2).
-    """
-    # tr M^1/2 = (tr M + 2 (det M)^1/2)^1/2 of a symmetric 2 x 2 matrix M >= 0; here M = S1^1/2 S2 S1^1/2
-    inner = np.einsum("kab,kba->k", extent, other_extent)
-    det = np.maximum(_det(extent), 0) * np.maximum(_det(other_extent), 0)
-    shape = np.trace(extent + other_extent, axis1=1, axis2=2) - 2 * np.sqrt(np.maximum(inner + 2 * np.sqrt(det), 0))
-    return np.asarray(np.sqrt(np.square(pos - other_pos).sum(axis=1) + np.maximum(shape, 0)))
-
-
-def _det(m: Array) -> Array:
-    return np.asarray(m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] * m[:, 1, 0])

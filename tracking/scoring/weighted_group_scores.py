@@ -43,7 +43,6 @@ from tracking.scoring.group_scores import (
     GroupComparison,
     GroupMatch,
     SharedMembers,
-    compare_groups,
     correct,
     group_of_person,
     groups_found,
@@ -51,11 +50,9 @@ from tracking.scoring.group_scores import (
     matched_groups,
     member_pairs,
     shared_members,
-    sizes,
     switch_frames,
 )
 from tracking.scoring.people_and_groups import GroupRows, PersonRows, TrueGroups
-from tracking.scoring.position_errors import gaussian_wasserstein
 from tracking.scoring.rows import FrameRows
 from tracking.scoring.track_scores import weighted_hota
 from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, mean_of_known, ratio
@@ -179,7 +176,7 @@ def weighted_groups_and_events(sides: ComparedSides, true: TrueGroups, by: Group
         overlapping = matched_groups(groups.pos, est.pos, hulls, FOUND).frame
         parts.append(_renamed(_detection(groups, est, overlapping, sides.frames), {"F1": "group_F1_hull"}))
     if pairs is not None:
-        compared = compare_groups(groups, est, shared, pairs)
+        compared = GroupComparison(groups, est, shared, pairs, matched_groups(groups.pos, est.pos, pairs))
         for frames, end in ((sides.frames, ""), (core, "_core")):
             parts.append(_renamed(weighted_groups(compared, frames), None, end))
     if sides.truth.events is not None:
@@ -250,11 +247,9 @@ def weighted_groups(compared: GroupComparison, frames: Bools) -> WeightedScores:
         return {
             "1-FP": ratio(n - false, n),
             "1-FN": ratio(n - misses, n),
-            "1-FP_frames": 1 - ratio(s["false share"], s["frames"]),
-            "1-FN_frames": 1 - ratio(s["missed share"], s["frames"]),
             "GDSR": ratio(s["right"], n),
             "GDSR2": ratio(s["pure"], n),
-            **{key: mean(s, key) for key in ("MOTP", "MSE", "MOTP_ungated", "size_error", "extent_error")},
+            "MOTP": mean(s, "MOTP"), "MSE": mean(s, "MSE"),
             "MOTA": ratio(n - misses - false - s["IDSW"], n),
             "IDSW": s["IDSW"], "TP": hits, "FP": false, "FN": misses,
             **({key: np.where(nothing, np.nan, v) for key, v in hota(weights).items()} if groups else {}),
@@ -269,21 +264,14 @@ def _sums_of_groups(compared: GroupComparison, frames: Bools) -> FrameSums:
     i, j, frame = chosen.i[kept], chosen.j[kept], chosen.frame[kept]
     size, sums, every = len(frames), FrameSums(len(frames)), np.flatnonzero(frames)
     n, m, hits = (np.bincount(f, minlength=size)[every] for f in (true.rows.frame, est.rows.frame, frame))
-    for name, count in (("frames", np.ones_like(n)), ("true", n), ("est", m), ("TP", hits)):
-        sums.add(name, every, count)
-    sums.add("false share", every, (m - hits) / np.maximum(n, 1))
-    sums.add("missed share", every, (n - hits) / np.maximum(n, 1))
-    for name, good in zip(("right", "pure"), correct(compared, i, j), strict=True):
-        sums.add(name, frame[good])
-    sums.add("IDSW", switch_frames(frame, true.rows.id[i], est.rows.id[j]))
     distance = np.hypot(*(true.pos[i] - est.pos[j]).T)
     sums.add_mean("MOTP", frame, distance)
     sums.add_mean("MSE", frame, distance**2)
-    counted = frames[true.rows.frame]
-    sums.add_mean("MOTP_ungated", true.rows.frame[counted], compared.nearest[counted])
-    sums.add_mean("size_error", frame, np.abs(sizes(true)[i] - sizes(est)[j]))
-    extent = gaussian_wasserstein(true.pos[i], true.extent[i], est.pos[j], est.extent[j])
-    sums.add_mean("extent_error", frame, extent)
+    for name, count in (("true", n), ("est", m), ("TP", hits)):
+        sums.add(name, every, count)
+    for name, good in zip(("right", "pure"), correct(compared, i, j), strict=True):
+        sums.add(name, frame[good])
+    sums.add("IDSW", switch_frames(frame, true.rows.id[i], est.rows.id[j]))
     return sums
 
 
@@ -307,15 +295,11 @@ def weighted_events(matched: Sequence[MatchedEvents], fps: float, size: int) -> 
             }  # fmt: skip
         for name in ("F1", "precision", "recall"):
             out[f"event_{name}"] = mean_of_known(np.column_stack([out[f"{kind}_{name}"] for kind in HEADLINE]))
-        late, known, right, matched_lineage, with_lineage = (
+        late, known, right, with_lineage = (
             np.sum([s[f"{kind} {what}"] for kind in HEADLINE], axis=0)
-            for what in ("latency", "latency known", "right", "matched lineage", "lineage")
+            for what in ("latency", "latency known", "right", "lineage")
         )
-        return out | {
-            "event_latency": ratio(late, known),
-            "lineage_accuracy": ratio(right, with_lineage),
-            "lineage_accuracy_found": ratio(right, matched_lineage),
-        }
+        return out | {"event_latency": ratio(late, known), "lineage_accuracy": ratio(right, with_lineage)}
 
     return score
 
@@ -330,6 +314,4 @@ def _add_events(sums: FrameSums, events: MatchedEvents, fps: float) -> None:
     late = [np.nan if b.emitted is None else (b.emitted - a.start) / fps for a, b in pairs]
     sums.add_mean(f"{kind} latency", start, np.array(late, float))
     sums.add(f"{kind} lineage", np.array([a.start for a in events.true if a.has_lineage], np.int64))
-    judged = [(a, b) for a, b in pairs if a.has_lineage]
-    sums.add(f"{kind} matched lineage", np.array([a.start for a, _ in judged], np.int64))
-    sums.add(f"{kind} right", np.array([a.start for a, b in judged if same_lineage(a, b)], np.int64))
+    sums.add(f"{kind} right", np.array([a.start for a, b in pairs if same_lineage(a, b)], np.int64))

@@ -1,9 +1,9 @@
 """Curves of a score over an axis, and breaking points with their intervals.
 
 Scores are paired: P scenes (scenario and seed), each played at the same values of the axis with the same random
-numbers. The *height* of a scene is its score less a share of its score at the easy end, or less the other tracker's
-score. Its mean over scenes has a 95 % interval at each value, Student's. Between values all three are linear, and the
-first value, from easy to hard, at which one falls to 0 is:
+numbers. The *height* of a scene is its score less a share of its score at the easy end. Its mean over scenes has a
+95 % interval at each value, Student's. Between values all three are linear, and the first value, from easy to hard, at
+which one falls to 0 is:
 
     of the mean            the breaking point
     of the lower end       the low end of its interval: the first value at which the curve may have broken
@@ -58,15 +58,12 @@ def crossing(way: Array, height: Array) -> float:
 def breaking_point(way: Array, scores: Array, share: float) -> BreakingPoint:
     """Returns where the curve of scores (P, V) at `way` (V,), ascending from 0, falls to a share of its easy value."""
     easy = scores[:, :1]
-    return falling(way, scores - share * easy) if curve(easy) > 0 else BreakingPoint(NEVER, NEVER, NEVER)
-
-
-def falling(way: Array, heights: Array) -> BreakingPoint:
-    """Returns where the mean of heights (P, V) falls to 0."""
-    at, low, high = (crossing(way, end) for end in mean_interval(heights))
+    if not curve(easy) > 0:
+        return BreakingPoint(NEVER, NEVER, NEVER)
+    at, low, high = (crossing(way, end) for end in mean_interval(scores - share * easy))
     if not np.isfinite(at):
         return BreakingPoint(at, low, high)
-    if len(heights) == 1:
+    if len(scores) == 1:
         return BreakingPoint(at, float(way[0]), NEVER)
     k = int(np.clip(np.searchsorted(way, at), 1, len(way) - 1))
     return BreakingPoint(at, min(low, float(way[k - 1])), max(high, float(way[k])))

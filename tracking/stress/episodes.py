@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import json
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, shortened
 from sim.io.files.atomic import write_file
@@ -53,11 +53,7 @@ class Outcome:
     traceback: str = ""  # of the failed tracker's own code, its last lines
 
 
-class PlayScenes(Protocol):
-    """A function that plays scenes."""
-
-    def __call__(self, scenes: Sequence[Tasks], /) -> Iterator[Sequence[Outcome]]:
-        """Yields the outcomes of the tasks of each scene, in order."""
+PlayScenes = Callable[[Sequence[Tasks]], Iterator[Sequence[Outcome]]]  # Yields the outcomes of each scene, in order.
 
 
 def contender(name: str, step_timeout: float | None = None) -> TunedTracker:
@@ -69,7 +65,7 @@ def contender(name: str, step_timeout: float | None = None) -> TunedTracker:
 @contextmanager
 def scene_player(workers: int = 1, cluster: str | None = None) -> Iterator[PlayScenes]:
     """Opens the workers for the time of the context and returns the function that plays scenes on them."""
-    from sim.workers.start import results_in_order
+    from sim.workers.pool import results_in_order
 
     with playing_workers(workers, cluster) as run:
         yield lambda scenes: results_in_order(run, play_scene, scenes)

@@ -22,7 +22,6 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from scenarios.errors import WorkError, counted
 from scenarios.loading.toml_files import dump
@@ -38,11 +37,8 @@ def _most(seeds: int) -> int:
     return seeds - seeds // ALLOWED
 
 
-class PlayEpisodes(Protocol):
-    """A function that plays episodes."""
-
-    def __call__(self, episodes: Sequence[EpisodeOf], /) -> Generator[Outcome]:
-        """Yields one outcome for each episode, in order, when it is asked for; may be closed before the end."""
+# Yields one outcome for each episode, in order, when it is asked for; may be closed before the end.
+PlayEpisodes = Callable[[Sequence[EpisodeOf]], Generator[Outcome]]
 
 
 class BudgetSpentError(Exception):

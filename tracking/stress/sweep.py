@@ -18,7 +18,7 @@ import hashlib
 import json
 import shlex
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import product
 from typing import Any
@@ -30,7 +30,7 @@ from sim.hashing import ENGINE
 from sim.types import Array, DetectionMode
 from tracking.environment.episode_cache import Source, sources
 from tracking.stress.axes import Axis
-from tracking.stress.curves import BreakingPoint, breaking_point, curve, falling
+from tracking.stress.curves import BreakingPoint, breaking_point, curve
 from tracking.stress.episodes import ORACLE, OracleTask, PlayScenes, Store
 from tracking.tuning.parallel_episodes import EpisodeTask
 from tracking.tuning.tuned_tracker import TunedTracker
@@ -147,7 +147,11 @@ class Sweep:
         """Plays the episodes of the trackers and the oracle on these scenes that are not stored."""
         wanted = {(*scene.source.key, scene.values): scene for scene in scenes}
         self.scenes.update(wanted)
-        every = ((scene, self._missing(scene, (*trackers, ORACLE))) for scene in wanted.values())
+        known = self.store.known
+        every = (
+            (scene, [name for name in (*trackers, ORACLE) if self._key(name, scene) not in known])
+            for scene in wanted.values()
+        )
         jobs = [(scene, names) for scene, names in every if names]
         tasks = [tuple(self._task(name, scene.source) for name in names) for scene, names in jobs]
         for (scene, names), outcomes in zip(jobs, self.run_scenes(tasks), strict=True):
@@ -157,9 +161,6 @@ class Sweep:
                 self.store.add({"key": self._key(name, scene), **facts, "settings": settings, **asdict(outcome)})
                 if name != ORACLE:
                     self.report(" ".join([name, scene.source.name, *(f"{value:g}" for value in scene.values)]))
-
-    def _missing(self, scene: Scene, names: Sequence[str]) -> list[str]:
-        return [name for name in names if self._key(name, scene) not in self.store.known]
 
     def _task(self, name: str, source: Source) -> EpisodeTask | OracleTask:
         if name == ORACLE:
@@ -211,17 +212,6 @@ class Sweep:
     def breaks(self) -> dict[str, BreakingPoint]:
         """Returns the breaking point of each tracker on the only axis."""
         return {name: breaking_point(self.way, self.scores(name), self.plan.share) for name in self.trackers}
-
-    def overtakings(self) -> Iterator[tuple[str, str, BreakingPoint]]:
-        """Yields pairs of trackers of which the first, better at the easy end, falls behind the second."""
-        every = {name: self.scores(name) for name in self.trackers}
-        for first in every:
-            for second in every:
-                ahead = curve(every[first])[0] > curve(every[second])[0]
-                if first != second and ahead:
-                    point = falling(self.way, every[first] - every[second])
-                    if np.isfinite(point.at):
-                        yield first, second, point
 
     def _refine(self) -> bool:
         """Adds a value or seeds where least is known; returns False if nothing is left to do."""

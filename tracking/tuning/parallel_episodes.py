@@ -50,7 +50,7 @@ def episode_player(
     similarity: Similarity | None = None,
 ) -> Iterator[PlayEpisodes]:
     """Opens the workers for the time of the context and returns the function play(sources, values, every_score)."""
-    from sim.workers.start import results_in_order
+    from sim.workers.pool import results_in_order
 
     if isinstance(tracker.tracker, type) and (workers > 1 or cluster):
         remedy = "give file.py:Class or module:Class, or one worker"
@@ -69,7 +69,7 @@ def episode_player(
 @contextmanager
 def playing_workers(workers: int = 1, cluster: str | None = None) -> Iterator[RunItems]:
     """Opens workers for episodes for the time of the context; then this process forgets what it kept for them."""
-    from sim.workers.start import start_workers
+    from sim.workers.pool import start_workers
 
     with start_workers(workers, cluster) as run:
         try:

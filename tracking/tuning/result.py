@@ -2,7 +2,7 @@
 
 No file holds a time, a host or a folder: the same search writes the same bytes.
 
-The plots, by matplotlib, are the history of the trials, the importance of the parameters, and the Pareto front.
+The plots, by matplotlib, are the history of the trials and the importance of the parameters.
 Optuna's own plots show pruned estimates and training values as if they were results.
 """
 
@@ -67,21 +67,6 @@ def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: C
         axes.bar_label(bars, [f"{' → '.join(e)} {units[n]}" for e, n in zip(ends, names, strict=True)], padding=4)
     axes.set_yticks(range(len(ranked)), ranked)
     axes.set_xlim(right=1.4 * max(importance.values()))
-    return _svg(figure, axes)
-
-
-def pareto_plot(plan: SearchPlan, candidates: Sequence[Candidate], front: Sequence[Candidate]) -> str:
-    """Returns as SVG the candidates by the first two goals."""
-    one, two = plan.goals[:2]
-    figure, axes = _figure(f"{_title(plan)}: {one.key} and {two.key}")
-    for some, ink, words in ((front, ORANGE, "Pareto front"), (candidates, BLUE, "dominated")):
-        points = sorted(c.validation[:2] for c in some if some is front or c not in front)
-        axes.plot(
-            *zip(*points, strict=True) if points else ([], []), "o-" if some is front else "o", color=ink, label=words
-        )
-    for c in candidates:
-        axes.annotate("defaults" if c.config == plan.base else f"trial {c.trial}", c.validation[:2])
-    axes.set(xlabel=f"{one.key}, validation scenes", ylabel=two.key)
     return _svg(figure, axes)
 
 
@@ -260,12 +245,10 @@ class TuningResult:
         return [target, *(target.with_suffix(suffix) for suffix in files)]
 
     def plots(self) -> dict[str, str]:
-        """Returns the plots as SVG text by file suffix: ".history.svg", ".importance.svg", ".front.svg"."""
+        """Returns the plots as SVG text by file suffix: ".history.svg", ".importance.svg"."""
         plots = {".history.svg": history_plot(self.plan, self.trials)}
         if any(self.importance.values()):
             plots[".importance.svg"] = importance_plot(self.plan, self.importance, self.config)
-        if len(self.plan.goals) > 1:
-            plots[".front.svg"] = pareto_plot(self.plan, self.candidates, self.front)
         return plots
 
 

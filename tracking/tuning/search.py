@@ -93,6 +93,8 @@ class HeldOutEvaluator:
     def compared(self, config: Config) -> tuple[list[Comparison], list[str]]:
         """Returns the comparisons of the config with the defaults, suite by suite of the tests, and notes (texts)."""
         found, notes = list[Comparison](), list[str]()
+        keys = [goal.key for goal in self.plan.goals]
+        goals = [*self.plan.goals, *(Goal(key) for key in COMPARED_KEYS if key not in keys)]
         for name, sources in self.plan.tests.items():
             self.report(f"test on {name}")
             before = self._episodes(sources, self.plan.base, every_score=True)
@@ -102,13 +104,9 @@ class HeldOutEvaluator:
             if isinstance(after, FlockscopeError):
                 notes.append(f"{name}: cannot be played with the new parameters: {after.line()}")
                 continue
-            made = [compare_episodes(name, goal, before, after) for goal in self._compared_goals()]
+            made = [compare_episodes(name, goal, before, after) for goal in goals]
             found += [comparison for comparison in made if comparison is not None]
         return found, notes
-
-    def _compared_goals(self) -> list[Goal]:
-        keys = [goal.key for goal in self.plan.goals]
-        return [*self.plan.goals, *(Goal(key) for key in COMPARED_KEYS if key not in keys)]
 
     def _episodes(
         self, sources: Sequence[Source], config: Config, every_score: bool
@@ -258,7 +256,7 @@ def require_optuna(place: str) -> None:
     try:
         import optuna  # noqa: F401
     except ImportError:
-        remedy = 'install the extra: pip install "flockscope[tune]"'
+        remedy = 'in the folder of the sources: pip install -c constraints.txt -e ".[tune]"'
         raise InputError(place=place, got="no optuna", expected="the package optuna", remedy=remedy) from None
 
 

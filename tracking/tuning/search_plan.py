@@ -25,6 +25,7 @@ from sim.hashing import runtime
 from sim.types import DetectionMode
 from tracking.config import Config, Param, Value
 from tracking.environment.episodes import Source, sources
+from tracking.parameter_space import space_of
 from tracking.tuning.comparison import FAST_KEYS, SPEED, Goal, goals_of
 from tracking.tuning.options import Scenes, TuneOptions
 from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
@@ -249,15 +250,15 @@ def _count_check_scenes(suite: Sequence[str], check: str | None) -> int:
 
 def _space(base: Config, settings: Sequence[str], only: tuple[str, ...], mode: DetectionMode) -> tuple[Param, ...]:
     fixed = {setting.removeprefix("tracker.").partition("=")[0].strip() for setting in settings}
-    unused = "points" if mode == "image" else "pixels"
+    useful = space_of(type(base), mode)
     for name in only:
         param = base.known(name, "--only")
         reason = "set" if name in fixed else "not tunable" if not param.tunable else ""
-        reason = reason or (f"about {unused} alone" if param.sees == unused else "")
+        reason = reason or ("without effect with these detections" if param not in useful else "")
         if reason:
             got, expected = f"{name}, which is {reason}", "parameters to search"
             raise InputError(place="--only", got=got, expected=expected, remedy="remove it")
-    found = tuple(p for p in base.space() if p.name in only or not (only or p.name in fixed or p.sees == unused))
+    found = tuple(p for p in useful if p.name in only or not (only or p.name in fixed))
     if not found:
         got = "all of them set" if fixed else f"{type(base).__name__}, which declares none"
         raise InputError(place="tracker", got=got, expected="parameters to search", remedy="leave one free")

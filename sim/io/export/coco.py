@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import is_number
 from sim import hashing
 from sim.dataset.splits import split_of
 from sim.io.files.atomic import write_file
@@ -33,9 +32,7 @@ PERSON = {"id": 1, "name": "person", "supercategory": "person"}
 SPLITS = ("train", "training", "val", "valid", "validation", "test", "testing", "fit", "demo")
 
 
-def coco(
-    source: str | Path, out: str | Path, min_visibility: float = 0.0, *, person_class: int | str | None = None
-) -> list[Path]:
+def coco(source: str | Path, out: str | Path, *, person_class: int | str | None = None) -> list[Path]:
     """Writes the sequences of a source that have labelled boxes as COCO files.
 
     Each frame is an image, each sequence a video, both numbered from 1. Annotations have bbox [left, top, width,
@@ -46,7 +43,6 @@ def coco(
         source: A dataset or recording.
         out: The JSON file, replaced if it exists. If there are several splits (by seed, or by the recordings' folders),
             each has a file of its own: `coco-train.json`, `coco-val.json` for `coco.json`.
-        min_visibility: People who are less visible, 0 to 1, are left out.
         person_class: Classes of people, as `open_source` takes them.
 
     Returns:
@@ -56,10 +52,6 @@ def coco(
         InputError: No sequence has labelled boxes, two have one name, an argument is wrong, or a split's file is of
             another program.
     """
-    if not is_number(min_visibility, 0, 1):
-        raise InputError(
-            place="--min-visibility", got=min_visibility, expected="a number from 0 to 1", remedy="correct it"
-        )
     source, out = Path(source), Path(out)
     sequences = [
         s for s in open_source(source, person_class=person_class) if s.truth is not None and s.truth.box is not None
@@ -79,7 +71,7 @@ def coco(
         if path != out:
             refuse_foreign_file(path)
     for path, some in zip(paths, splits.values(), strict=True):
-        write_file(path, _document(some, root, path, min_visibility).encode())
+        write_file(path, _document(some, root, path).encode())
     return paths
 
 
@@ -91,7 +83,7 @@ def _split(sequence: Sequence, root: Path) -> str:
     return next((part.lower() for part in reversed(inside) if part.lower() in SPLITS), "other")
 
 
-def _document(sequences: list[Sequence], root: Path, path: Path, min_visibility: float) -> str:
+def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
     info: dict[str, Any] = {"description": GENERATOR, "version": "1"}
     if all(s.source.get("kind") == "generated" for s in sequences):
         folders = [Path(s.source["path"]) for s in sequences]
@@ -105,7 +97,7 @@ def _document(sequences: list[Sequence], root: Path, path: Path, min_visibility:
         for index, row in _images(sequence, root):
             images.append(json_text({"id": len(images) + 1, **row, "video_id": k, "frame": index}))
             shared = {"image_id": len(images), "video_id": k, "category_id": 1}
-            for found in _annotations(sequence, index, min_visibility):
+            for found in _annotations(sequence, index):
                 annotations.append(json_text({"id": len(annotations) + 1, **shared, **found}))
     lists = {"videos": videos, "images": images, "annotations": annotations}
     blocks = [f'"{name}": [\n' + ",\n".join(rows) + "\n]" for name, rows in lists.items()]
@@ -151,13 +143,13 @@ def _picture_files(sequence: Sequence) -> dict[int, Path]:
     return {index: folder / file_name("left", images, index) for index in range(1, (sequence.length or 0) + 1)}
 
 
-def _annotations(sequence: Sequence, index: int, min_visibility: float) -> Iterator[dict[str, Any]]:
+def _annotations(sequence: Sequence, index: int) -> Iterator[dict[str, Any]]:
     (truth, boxes), size = _truth(sequence), tuple(_size(sequence).values())
     counts: dict[int, list[int]] | None = None
     for row in range(*truth.rows(index).indices(len(boxes))):
         box = [round(v, 2) for v in boxes[row].tolist()]
         left, top, right, bottom = _inside(boxes[row], size)
-        if not (right > left and bottom > top and truth.visibility[row] >= min_visibility):  # also for nan
+        if not (right > left and bottom > top):  # also for nan
             continue
         person, area = int(truth.id[row]), round(box[2] * box[3], 2)
         segmentation: Any = [[left, top, right, top, right, bottom, left, bottom]]

@@ -13,11 +13,9 @@ Tr_velo_to_cam (3 x 4) map it to the left camera, Tr_imu_to_velo (3 x 4) and R0_
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from sim.io.files.atomic import write_file
@@ -61,11 +59,8 @@ def calibration(camera: Camera) -> str:
     pose = np.column_stack([camera.rotation, -camera.rotation @ camera.position])
     lines = {"P0": left, "P1": right, "P2": left, "P3": right, "R0_rect": np.eye(3), "Tr_velo_to_cam": pose}
     lines |= {"Tr_imu_to_velo": np.eye(3, 4), "Tr": pose}
-    return "".join(_line(name, matrix) for name, matrix in lines.items())
-
-
-def _line(name: str, matrix: NDArray[Any]) -> str:
-    return f"{name}: {' '.join(f'{v:.12e}' for v in matrix.ravel().tolist())}\n"
+    cells = {name: " ".join(f"{v:.12e}" for v in matrix.ravel().tolist()) for name, matrix in lines.items()}
+    return "".join(f"{name}: {numbers}\n" for name, numbers in cells.items())
 
 
 def _export(folder: Path, target: Path) -> None:

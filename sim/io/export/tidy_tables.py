@@ -17,7 +17,6 @@ import re
 from collections.abc import Mapping
 from collections.abc import Sequence as Series
 from dataclasses import dataclass, fields
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -28,7 +27,7 @@ from sim.arrays import no_ids
 from sim.io.export.places import Places, crossings, inside
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import refuse_foreign_file
-from sim.io.files.tables import FORMAT, KEY, json_text
+from sim.io.files.tables import parquet_bytes
 from sim.io.formats.labels import differentiate
 from sim.types import Array, GroupEvent, Groups, Ints, Tracks, Truth
 
@@ -61,28 +60,12 @@ class TidyTable:
         """Returns the table as a pyarrow.Table, which polars reads with `polars.from_arrow`; nan becomes null."""
         import pyarrow as pa
 
-        ids = pa.list_(pa.int64())
-        arrays = {
-            name: pa.array(values, from_pandas=True)
-            if isinstance(values, np.ndarray)
-            else pa.array(values, pa.string() if name == "kind" else ids)
-            for name, values in self.columns.items()
-        }
-        return pa.table(arrays)
+        lists = {name: pa.list_(pa.int64()) for name, v in self.columns.items() if not isinstance(v, np.ndarray)}
+        kinds = dict.fromkeys(self.columns) | lists | {"kind": pa.string()}
+        return pa.table({name: pa.array(v, kinds[name], from_pandas=True) for name, v in self.columns.items()})
 
     def to_pandas(self) -> Any:
-        """Returns the table as a data frame of pandas.
-
-        Raises:
-            InputError: pandas is not installed.
-        """
-        try:
-            import_module("pandas")
-        except ImportError:
-            raise InputError(
-                place="to_pandas()", got="no pandas", expected="pandas installed",
-                remedy="pip install pandas, or use to_arrow()",
-            ) from None  # fmt: skip
+        """Returns the table as a data frame of pandas, which must be installed."""
         return self.to_arrow().to_pandas()
 
 
@@ -194,7 +177,7 @@ def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[st
         # The first columns have the same names for runs and truths, in m and in px.
         _refuse_foreign(path, re.escape(",".join(table.column_names[:2]) + ",").encode() if form == "csv" else None)
     for path, table in found.items():
-        write_file(path, _csv(table) if form == "csv" else _parquet(table, facts))
+        write_file(path, _csv(table) if form == "csv" else parquet_bytes(table, facts))
     return list(found)
 
 
@@ -250,16 +233,6 @@ def _csv(table: pyarrow.Table) -> bytes:
     options = csv.WriteOptions(include_header=False, quoting_style="needed")
     csv.write_csv(pa.table(columns, names=table.column_names), sink, options)
     return (",".join(table.column_names) + "\n").encode() + bytes(sink.getvalue())
-
-
-def _parquet(table: pyarrow.Table, facts: Mapping[str, Any]) -> bytes:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    sink = pa.BufferOutputStream()
-    marked = table.replace_schema_metadata({KEY: json_text({"format": FORMAT, **facts}).encode()})
-    pq.write_table(marked, sink, compression="zstd", write_page_checksum=True)
-    return bytes(sink.getvalue())
 
 
 def _tables(rows: _Rows) -> TidyTables:

@@ -1,9 +1,8 @@
 """WebDataset export: packs stored sequences into tar shards that the library webdataset streams.
 
-A sample is a whole sequence (all its files, hence its content hash), or one frame with its labels; all files of a
-sample share a key and stand next to each other. The same dataset gives the same bytes: members are sorted by sequence
-and have no times or owners. A shard appears complete or not at all, with a .json beside it that describes it.
-index.json, written last, lists all shards.
+A sample is a whole sequence: all its files, hence its content hash. They share a key and stand next to each other. The
+same dataset gives the same bytes: members are sorted by sequence and have no times or owners. A shard appears complete
+or not at all, with a .json beside it that describes it. index.json, written last, lists all shards.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import io
 import re
 import tarfile
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -26,13 +25,7 @@ from sim.io.files.atomic import lock_folder, new_file, remove_partials, write_fi
 from sim.io.files.own_files import Marks, refuse_foreign_file
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
-from sim.io.store.seal import MANIFEST, read_manifest, read_whole_manifest
-from sim.io.store.sequence_folder import open_sequence
-from sim.streams import file_name
-from sim.types import Array, Detections, FrameTruth, Groups
-
-# streams with one picture per frame; a frame's sample holds those of them that are stored
-FRAME_STREAMS = ("left", "right", "disparity", "ids")
+from sim.io.store.seal import MANIFEST, read_whole_manifest
 
 BLOCK = 512  # bytes: a tar holds whole blocks
 
@@ -45,109 +38,36 @@ class SequenceItem:
     """A stored sequence to pack."""
 
     folder: Path  # where it is stored
-    bytes: int  # what its members add to a tar
-    content: str  # its content hash, which names truth, detections and pixels
-    manifest: str  # the hash of its manifest
-    # file type of its pictures ("jpg", "png" or "mp4"), None without pictures or with 16-bit streams only
-    images: str | None
+    manifest: dict[str, Any]  # the content of its manifest.json
 
     @property
     def name(self) -> str:
         """The name <split>/<sequence>."""
         return split_and_name(self.folder)
 
-    @property
-    def key(self) -> str:
-        """The name as a sample's key; webdataset ends a key at its first dot."""
-        return self.name.replace(".", "%2E")
+    def members(self) -> Iterator[Member]:
+        """Yields the members of the tar: all files, the manifest first."""
+        key = self.name.replace(".", "%2E")  # webdataset ends a key at its first dot
+        stored, path = StoredPictures(self.folder, self.manifest), self.folder / MANIFEST
+        yield f"{key}.{MANIFEST}", path.stat().st_size, path.read_bytes
+        for name, facts in self.manifest["files"].items():
+            yield f"{key}.{name.replace('/', '.')}", facts["bytes"], partial(stored.body, name)
 
-
-def read_item(folder: Path, samples: str) -> SequenceItem:
-    """Returns the item of a stored sequence. samples: "sequence" or "frame"."""
-    manifest = read_whole_manifest(folder)
-    item = SequenceItem(folder, 0, manifest["content_hash"], manifest["sha256"], manifest.get("images"))
-    return replace(item, bytes=sum(_tar_bytes(name, size) for name, size, _ in tar_members(item, samples)))
-
-
-def _tar_bytes(name: str, size: int) -> int:
-    letters = len(name.encode())
-    # A name of more than 100 bytes is a member of its own.
-    longer = BLOCK + _whole(letters + 1) if letters > tarfile.LENGTH_NAME else 0
-    return longer + BLOCK + _whole(size)
+    def tar_bytes(self) -> int:
+        """Returns how many bytes the members add to a tar."""
+        total = 0
+        for name, size, _ in self.members():
+            letters = len(name.encode())
+            # A name of more than 100 bytes is a member of its own.
+            total += BLOCK + _whole(letters + 1) if letters > tarfile.LENGTH_NAME else 0
+            total += BLOCK + _whole(size)
+        return total
 
 
 def _whole(size: int) -> int:
     return -(-size // BLOCK) * BLOCK
 
 
-def tar_members(item: SequenceItem, samples: str) -> Iterator[Member]:
-    """Yields the members of a stored sequence, in the order of packing.
-
-    All files, the manifest first; or, for samples "frame", the labels and then the pictures of each frame.
-    """
-    manifest = read_manifest(item.folder)
-    stored = StoredPictures(item.folder, manifest)
-    if samples == "sequence":
-        path = item.folder / MANIFEST
-        yield f"{item.key}.{MANIFEST}", path.stat().st_size, path.read_bytes
-        for name, facts in manifest["files"].items():
-            yield f"{item.key}.{name.replace('/', '.')}", facts["bytes"], partial(stored.body, name)
-        return
-    streams = [stream for stream in stored.streams if stream in FRAME_STREAMS]
-    for index, body in enumerate(frame_labels(item.folder, manifest), 1):
-        yield f"{item.key}/{index:06d}.json", len(body), partial(bytes, body)
-        for stream in streams:
-            name = file_name(stream, stored.images, index)
-            size = manifest["files"][name]["bytes"]
-            yield f"{item.key}/{index:06d}.{stream}{Path(name).suffix}", size, partial(stored.body, name)
-
-
-def frame_labels(folder: Path, manifest: dict[str, Any]) -> Iterator[bytes]:
-    """Yields the JSON labels of each frame of a stored sequence, from frame 1; unknown values are null.
-
-    Keys: sequence, fps, image_size, frame, t, and, where stored, people, groups and detections.
-    """
-    sequence = open_sequence(folder)
-    truth = sequence.truth
-    about = {"sequence": sequence.name, "fps": sequence.fps, "image_size": manifest["sequence"]["image_size"]}
-    for frame in sequence.without_pictures():
-        row: dict[str, Any] = {**about, "frame": frame.index, "t": frame.t}
-        if truth is not None:
-            here = truth.at(frame.index)
-            row |= {"people": list(_people(here)), "groups": _groups(here.groups)}
-        if frame.detections is not None:
-            row["detections"] = list(_detections(frame.detections))
-        yield tables.json_text(row).encode()
-
-
-def _people(truth: FrameTruth) -> Iterator[dict[str, Any]]:
-    assert truth.pos is not None, "simulated people have positions"
-    for k, (number, group) in enumerate(zip(truth.id.tolist(), truth.group.tolist(), strict=True)):
-        row = {"id": number, "group": group, "box": None if truth.box is None else _numbers(truth.box[k])}
-        row |= dict(zip(("x", "y"), _numbers(truth.pos[k]), strict=True))
-        if truth.vel is not None:
-            row |= dict(zip(("vx", "vy"), _numbers(truth.vel[k]), strict=True))
-        yield {**row, "visibility": tables.nan_to_none(float(truth.visibility[k]))}
-
-
-def _groups(groups: Groups | None) -> list[dict[str, Any]] | None:
-    if groups is None:
-        return None
-    rows = zip(groups.id.tolist(), groups.members, groups.hull, strict=True)
-    return [{"id": number, "members": members.tolist(), "hull": hull.tolist()} for number, members, hull in rows]
-
-
-def _detections(found: Detections) -> Iterator[dict[str, Any]]:
-    for k, score in enumerate(found.score.tolist()):
-        row = {"score": score, "box": None if found.box is None else _numbers(found.box[k])}
-        yield {**row, "plane": found.plane, **dict(zip("xyz", _numbers(found.pos[k]), strict=False))}
-
-
-def _numbers(row: Array) -> list[float | None]:
-    return [tables.nan_to_none(value) for value in row.tolist()]
-
-
-SAMPLES = ("sequence", "frame")
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
 RECORD = tarfile.RECORDSIZE
 INDEX = "index.json"
@@ -158,12 +78,7 @@ Progress = Callable[[int, int, str], None]
 
 
 def webdataset(
-    source: str | Path,
-    out: str | Path,
-    *,
-    shard_size: int = 10**9,
-    samples: str = "sequence",
-    progress: Progress | None = None,
+    source: str | Path, out: str | Path, *, shard_size: int = 10**9, progress: Progress | None = None
 ) -> dict[str, Any]:
     """Packs a generated dataset into OUT/shard-000000.tar, …, and writes OUT/index.json.
 
@@ -171,25 +86,22 @@ def webdataset(
         source: A generated sequence or dataset.
         out: The folder. Complete shards of an earlier run are kept.
         shard_size: Bytes that a shard may have. A sequence is never divided, so a shard of one sequence may be larger.
-        samples: "sequence" (all files of a sequence) or "frame" (one frame's labels and pictures).
         progress: Called as progress(shards done, shards in all, name of the last one) after each shard.
 
     Returns:
-        The index: format, samples, content_hash, and shards, the content of the .json beside each shard.
+        The index: format, content_hash, and shards, the content of the .json beside each shard.
     """
-    items, root = _items(Path(source), samples), Path(out)
-    shards = list(_shards(items, shard_size))
+    root, shards = Path(out), list(_shards(_items(Path(source)), shard_size))
     with lock_folder(root):
         remove_partials(root)
-        plan = [_facts(samples, number, some) for number, some in enumerate(shards)]
+        plan = [_facts(number, some) for number, some in enumerate(shards)]
         _reject_other_shards(root, plan)
         for number, (facts, some) in enumerate(zip(plan, shards, strict=True), 1):
             plan[number - 1] = _complete_shard(root, facts) or _write_shard(root, facts, some)
             if progress is not None:
                 progress(number, len(plan), facts["name"])
         hashes = {name: value for facts in plan for name, value in facts["sequences"].items()}
-        index = {"format": tables.FORMAT, "samples": samples, "content_hash": hashing.dataset_hash(hashes)}
-        index["shards"] = plan
+        index = {"format": tables.FORMAT, "content_hash": hashing.dataset_hash(hashes), "shards": plan}
         write_file(root / INDEX, tables.json_document(index))
     return index
 
@@ -205,17 +117,12 @@ def size_of(text: str) -> int:
     return size
 
 
-def _items(source: Path, samples: str) -> list[SequenceItem]:
-    found = sorted((read_item(p, samples) for p in sequence_folders(source, "generated")), key=lambda item: item.name)
+def _items(source: Path) -> list[SequenceItem]:
+    folders = sequence_folders(source, "generated")
+    found = sorted((SequenceItem(p, read_whole_manifest(p)) for p in folders), key=lambda item: item.name)
     twice = next((a.name for a, b in pairwise(found) if a.name == b.name), None)
     if twice is not None:
         raise InputError(file=source, got=f"two sequences {twice}", expected="unique names", remedy="export them apart")
-    video = next((item for item in found if samples == "frame" and item.images == "mp4"), None)
-    if video is not None:
-        raise InputError(
-            file=video.folder, place="--samples frame", got="videos", expected="pictures by frame",
-            remedy="generate with --images jpg or png, or export --samples sequence",
-        )  # fmt: skip
     return found
 
 
@@ -224,18 +131,19 @@ def _shards(items: list[SequenceItem], size: int) -> Iterator[list[SequenceItem]
     some: list[SequenceItem] = []
     full = 0
     for item in items:
-        if some and -(-(full + item.bytes + 2 * BLOCK) // RECORD) * RECORD > size:  # a tar ends with two empty blocks
+        more = item.tar_bytes()
+        if some and -(-(full + more + 2 * BLOCK) // RECORD) * RECORD > size:  # a tar ends with two empty blocks
             yield some
             some, full = [], 0
         some.append(item)
-        full += item.bytes
+        full += more
     yield some
 
 
-def _facts(samples: str, number: int, items: list[SequenceItem]) -> dict[str, Any]:
-    manifests = hashing.canonical_hash([item.manifest for item in items])
-    hashes = {item.name: item.content for item in items}
-    return {"name": f"shard-{number:06d}.tar", "samples": samples, "manifests": manifests, "sequences": hashes}
+def _facts(number: int, items: list[SequenceItem]) -> dict[str, Any]:
+    manifests = hashing.canonical_hash([item.manifest["sha256"] for item in items])
+    hashes = {item.name: item.manifest["content_hash"] for item in items}
+    return {"name": f"shard-{number:06d}.tar", "manifests": manifests, "sequences": hashes}
 
 
 def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
@@ -269,7 +177,7 @@ def _write_shard(root: Path, facts: dict[str, Any], items: list[SequenceItem]) -
     # The .json stands for a whole tar.
     path.with_suffix(".json").unlink(missing_ok=True)
     with new_file(path) as beside:
-        _tar(beside, (member for item in items for member in tar_members(item, facts["samples"])))
+        _tar(beside, (member for item in items for member in item.members()))
         with beside.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     done = {**facts, "bytes": path.stat().st_size, "sha256": digest}

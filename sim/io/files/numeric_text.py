@@ -9,11 +9,12 @@ import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, DETECTIONS, FRAMES, TEXT_BYTES
+from scenarios.limits import COORDINATE, DETECTIONS, FRAMES, TEXT_BYTES, XML_BYTES
 from scenarios.reading import read_regular
 from sim.types import Array, Bools, Ints
 
@@ -162,3 +163,27 @@ def read_number(text: str) -> float:
     if "_" in text or not text.strip().isascii():
         raise ValueError(f"{text!r} is no number")
     return float(text)
+
+
+def number_or_nan(text: str | None) -> float:
+    """Returns the number of a text, nan for another text and for None."""
+    return read_number(text) if text is not None and is_number_text(text) else float("nan")
+
+
+def person_ids(path: Path, place: str, text: str) -> set[int]:
+    """Returns the ids that a text lists, apart by blanks or commas: whole numbers from 0 on."""
+    values = [number_or_nan(word) for word in text.replace(",", " ").split()]
+    if not all(0 <= v <= LARGEST and v == round(v) for v in values):
+        expected = "ids of people, whole numbers from 0 on"
+        raise InputError(file=path, place=place, got=text.strip(), expected=expected, remedy="correct the list")
+    return {int(v) for v in values}
+
+
+def xml_root(path: Path, expected: str, remedy: str) -> ElementTree.Element:
+    """Returns the root of an XML file."""
+    try:
+        return ElementTree.fromstring(read_regular(path, XML_BYTES))
+    except (ElementTree.ParseError, ValueError, LookupError) as error:  # the last two: an encoding that Python lacks
+        place = f"line {error.position[0]}" if isinstance(error, ElementTree.ParseError) else "line 1"
+        got = f"broken XML ({error})"
+        raise InputError(file=path, place=place, got=got, expected=expected, remedy=remedy) from None

@@ -117,7 +117,7 @@ def file_name(label: str) -> str:
 
     Different labels may give one name.
     """
-    name = "".join("_" if _is_forbidden(c) else c for c in label)
+    name = "".join("_" if c in FORBIDDEN or is_control(c) else c for c in label)
     if name[:1] in ("", "."):
         name = "_" + name[1:]
     if name[-1] in (".", " "):
@@ -129,10 +129,6 @@ def file_name(label: str) -> str:
         return name
     digest = hashlib.sha256(label.encode("utf-8", "surrogatepass")).hexdigest()[:16]
     return body[: LONGEST - 17].decode("utf-8", "ignore") + "-" + digest
-
-
-def _is_forbidden(character: str) -> bool:
-    return character in FORBIDDEN or is_control(character)
 
 
 def output_path(folder: str | Path, label: str, ending: str = "") -> Path:

@@ -8,8 +8,8 @@ another kind.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -62,14 +62,17 @@ class Column:
     kind: type = np.float64  # number type of the arrays of a column of lists, by default float64; ignored otherwise
 
 
+def columns_of(names: Iterable[str], values: Array | None, unit: str) -> list[Column]:
+    """Returns the columns of an array (R, n) by n names; none if the array is None."""
+    return [] if values is None else [Column(name, values[:, k], unit) for k, name in enumerate(names)]
+
+
 @dataclass(frozen=True)
 class StoredTable:
     """A Parquet table of R rows as read from `file`."""
 
     file: Path
-    # by name an array (R,). For a column of lists it is the pair (all values in one array; array (R,) of the index
-    # after each list's last value).
-    columns: dict[str, Any]
+    columns: dict[str, NDArray[Any]]  # by name an array (R,), of a column of lists an array of R arrays
     facts: dict[str, Any]  # the metadata that was stored with the table, by name, and "format"
 
     def has(self, name: str) -> bool:
@@ -78,33 +81,26 @@ class StoredTable:
 
     def floats(self, *names: str) -> Array:
         """Returns the columns `names` as float64: one as (R,), n > 1 as (R, n)."""
-        found = [np.asarray(self._numbers(name, "iufb"), np.float64) for name in names]
+        found = [np.asarray(self._numbers(name, "iufb", "numbers"), np.float64) for name in names]
         return found[0] if len(found) == 1 else np.stack(found, axis=1)
 
     def ints(self, name: str) -> Ints:
         """Returns column `name` as (R,), int64."""
-        return np.asarray(self._numbers(name, "i"), np.int64)
+        return np.asarray(self._numbers(name, "i", "whole numbers"), np.int64)
 
     def lists(self, name: str, kind: type) -> list[NDArray[Any]]:
         """Returns column `name`, a column of lists, as R arrays of number type `kind`; no rows give []."""
-        column = self._get(name)
-        if not isinstance(column, tuple) or column[0].dtype.kind != np.dtype(kind).kind:
-            raise InputError(file=self.file, place=name, got="another column", expected="lists of numbers", remedy=REDO)
-        values, ends = column
-        return [np.asarray(v, kind) for v in np.split(values, ends[:-1])] if len(ends) else []
+        column, wanted = self._numbers(name, "O", "lists of numbers"), np.dtype(kind).kind
+        other = any(not isinstance(v, np.ndarray) or v.dtype.kind != wanted for v in column)
+        self.reject(other, name, "another column", "lists of numbers")
+        return [np.asarray(v, kind) for v in column]
 
-    def _numbers(self, name: str, kinds: str) -> NDArray[Any]:
-        column = self._get(name)
-        if isinstance(column, tuple) or column.dtype.kind not in kinds:
-            got = "a column of lists" if isinstance(column, tuple) else f"a column of {column.dtype}"
-            expected = "whole numbers" if kinds == "i" else "numbers"
-            raise InputError(file=self.file, place=name, got=got, expected=expected, remedy=REDO)
-        return np.asarray(column)
-
-    def _get(self, name: str) -> Any:
+    def _numbers(self, name: str, kinds: str, expected: str) -> NDArray[Any]:
         if name not in self.columns:
             raise InputError(file=self.file, got=f"no column {name}", expected="that column", remedy=REDO)
-        return self.columns[name]
+        column = self.columns[name]
+        self.reject(column.dtype.kind not in kinds, name, f"a column of {column.dtype}", expected)
+        return column
 
     def facts_as(self, kind: type[M]) -> M:
         """Returns the table's metadata as a model."""
@@ -126,18 +122,24 @@ class StoredTable:
 def table_bytes(columns: Iterable[Column], facts: dict[str, Any]) -> bytes:
     """Returns a Parquet file as bytes; `facts` is metadata in its schema. Equal content gives equal bytes."""
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     columns = list(columns)
     arrays = [_arrow(c) for c in columns]
     schema = pa.schema(
-        [pa.field(c.name, a.type, metadata={"unit": c.unit}) for c, a in zip(columns, arrays, strict=True)],
-        metadata={KEY: json_text({"format": FORMAT, **facts}).encode()},
+        [pa.field(c.name, a.type, metadata={"unit": c.unit}) for c, a in zip(columns, arrays, strict=True)]
     )
+    return parquet_bytes(pa.Table.from_arrays(arrays, schema=schema), facts)
+
+
+def parquet_bytes(table: Any, facts: Mapping[str, Any]) -> bytes:
+    """Returns a pyarrow.Table as the bytes of a Parquet file that is marked as ours; `facts`: its metadata."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     sink = pa.BufferOutputStream()
-    table = pa.Table.from_arrays(arrays, schema=schema)
+    marked = table.replace_schema_metadata({KEY: json_text({"format": FORMAT, **facts}).encode()})
     # Checksums of pages: a damaged file is an error, and not other numbers.
-    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
+    pq.write_table(marked, sink, compression="zstd", write_page_checksum=True)
     return bytes(sink.getvalue())
 
 
@@ -164,18 +166,14 @@ def read_table(path: Path) -> StoredTable:
         reason = f"no readable Parquet ({(str(error).splitlines() or [type(error).__name__])[0]})"
         raise InputError(file=path, got=reason, expected="a whole Parquet file", remedy=REDO) from None
     facts = parse_json(metadata, path, REDO)
-    if not isinstance(facts, dict):
-        raise InputError(file=path, place="schema", got="no JSON object", expected="a JSON object", remedy=REDO)
-    if facts.get("format") != FORMAT:
-        raise InputError(
-            file=path, place="schema", got=f"format {facts.get('format')}", expected=f"format {FORMAT}", remedy=REDO
-        )
-    columns = {}
-    for name, column in zip(table.column_names, table.columns, strict=True):
-        if column.null_count:
-            raise InputError(file=path, place=name, got="empty cells", expected="none", remedy=REDO)
-        columns[name] = _numpy(column.combine_chunks())
-    return StoredTable(path, columns, facts)
+    columns = dict(zip(table.column_names, table.columns, strict=True))
+    found = StoredTable(path, {}, facts)
+    found.reject(not isinstance(facts, dict), "schema", "no JSON object", "a JSON object")
+    found.reject(facts.get("format") != FORMAT, "schema", f"format {facts.get('format')}", f"format {FORMAT}")
+    for name, column in columns.items():
+        found.reject(column.null_count > 0, name, "empty cells", "none")
+        found.columns[name] = column.to_numpy()
+    return found
 
 
 def is_own_table(path: Path) -> bool:
@@ -189,13 +187,15 @@ def is_own_table(path: Path) -> bool:
         raise InputError(file=path, got="no Parquet table", expected="one", remedy=REDO) from None
 
 
-def _numpy(column: Any) -> Any:
-    import pyarrow as pa
-
-    if pa.types.is_list(column.type):
-        lengths = np.diff(column.offsets.to_numpy())
-        return column.flatten().to_numpy(zero_copy_only=False), np.cumsum(lengths)
-    return column.to_numpy(zero_copy_only=False)
+def plain(value: Any) -> Any:
+    """Returns a value as JSON has it: arrays and tuples as lists, dataclasses as dicts, nan as None."""
+    if is_dataclass(value):
+        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, tuple | list):
+        return [plain(v) for v in value]
+    return None if value != value else value
 
 
 def json_text(value: Any) -> str:
@@ -237,11 +237,6 @@ def read_document(path: Path, remedy: str = REDO) -> dict[str, Any]:
     if found != FORMAT or isinstance(found, bool):
         raise InputError(file=path, place="format", got=repr(found), expected=FORMAT, remedy="use the same version")
     return value
-
-
-def nan_to_none(value: float) -> float | None:
-    """Returns the number `value` as it stands in JSON: None for nan, else a float."""
-    return None if value != value else float(value)
 
 
 def none_to_nan(value: float | None) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, read_number, read_numbers, read_text
+from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_numbers, read_text
 from sim.io.formats.labels import labelled_sequence, labelled_truth_fields, require_size
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.types import Ints, Sequence, Truth
@@ -62,7 +62,7 @@ def read_groups(path: Path) -> dict[int, int]:
     """Returns the group label of each person in a groups.txt, by person id; people alone have no entry."""
     label: dict[int, int] = {}
     for number, line in enumerate(read_text(path).splitlines(), 1):
-        members = set(_ids(path, number, line))
+        members = person_ids(path, f"line {number}", line)
         if len(members) < 2:
             continue
         earlier = {label[m] for m in members if m in label}
@@ -84,19 +84,6 @@ def labels_of(path: Path, id: Ints) -> Ints:
     if names and len(id) and len(known) == len(set(known)):
         warnings.warn(f"{path}: no two people of this recording are in one of its groups: check the ids", stacklevel=3)
     return np.array([names.get(i, -1) for i in id.tolist()], np.int64)
-
-
-def _ids(path: Path, number: int, line: str) -> list[int]:
-    try:
-        values = [read_number(word) for word in line.replace(",", " ").split()]
-        if all(0 <= v <= LARGEST and v == round(v) for v in values):
-            return [int(v) for v in values]
-    except (ValueError, OverflowError):
-        pass
-    raise InputError(
-        file=path, place=f"line {number}", got=line.strip(), expected="ids of people, whole numbers from 0 on",
-        remedy="correct the line",
-    )  # fmt: skip
 
 
 def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:

@@ -17,14 +17,13 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, XML_BYTES, YAML_BYTES
+from scenarios.limits import COORDINATE, YAML_BYTES
 from scenarios.reading import require_regular
-from sim.io.files.numeric_text import read_number, read_text
+from sim.io.files.numeric_text import number_or_nan, read_text, xml_root
 from sim.io.store.camera_files import read_camera
 from sim.scene.camera import require_camera
 from sim.types import Array, Camera
@@ -53,27 +52,18 @@ def read_tsai(path: Path) -> Camera:
 
 
 def _values(path: Path) -> dict[str, float]:
-    try:
-        root = ElementTree.fromstring(read_text(path, XML_BYTES))
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        expected = "Tsai's calibration as XML, or a camera.json"
-        raise InputError(file=path, got=f"no XML ({error})", expected=expected, remedy="check --camera") from None
+    root = xml_root(path, "Tsai's calibration as XML, or a camera.json", "check --camera")
     found = {}
-    for part, names in PARTS.items():
+    for part, name in ((part, name) for part, names in PARTS.items() for name in names):
         element = root.find(part)
-        for name in names:
-            text = None if element is None else element.get(name)
-            try:
-                value = read_number(text if text is not None else "nan")
-            except ValueError:
-                value = float("nan")
-            if not abs(value) <= LARGEST or (name in POSITIVE and value <= 0):
-                kind = "a number above 0" if name in POSITIVE else f"a number within {LARGEST:g}"
-                raise InputError(
-                    file=path, place=f"{part} {name}", got="nothing" if text is None else repr(text), expected=kind,
-                    remedy="complete the calibration",
-                )  # fmt: skip
-            found[name] = value
+        text = None if element is None else element.get(name)
+        found[name] = value = number_or_nan(text)
+        if not abs(value) <= LARGEST or (name in POSITIVE and value <= 0):
+            expected = "a number above 0" if name in POSITIVE else f"a number within {LARGEST:g}"
+            raise InputError(
+                file=path, place=f"{part} {name}", got="nothing" if text is None else repr(text), expected=expected,
+                remedy="complete the calibration",
+            )  # fmt: skip
     return found
 
 

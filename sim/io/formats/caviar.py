@@ -8,7 +8,6 @@ although the people stand, so only their centres can be relied on. The image sca
 
 from __future__ import annotations
 
-import re
 import warnings
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, replace
@@ -18,10 +17,9 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, FRAMES, XML_BYTES
-from scenarios.reading import read_regular
+from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import read_number, whole_number
+from sim.io.files.numeric_text import number_or_nan, person_ids, xml_root
 from sim.io.formats.labels import CHORD, differentiate, labelled_sequence, labelled_truth_fields, require_size
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.scene.visibility import scale_of_all_boxes, scale_of_first_boxes
@@ -88,15 +86,7 @@ def read_xml(path: Path) -> CaviarRecording:
 
 
 def _root(path: Path) -> ET.Element:
-    body = read_regular(path, XML_BYTES)
-    try:
-        root = ET.fromstring(body)
-    except (ET.ParseError, ValueError, LookupError) as error:  # the last two: an encoding that Python does not have
-        place = f"line {error.position[0]}" if isinstance(error, ET.ParseError) else "line 1"
-        raise InputError(
-            file=path, place=place, got=f"broken XML ({error})", expected="a CAVIAR file (CVML)",
-            remedy="fetch the file again",
-        ) from None  # fmt: skip
+    root = xml_root(path, "a CAVIAR file (CVML)", "fetch the file again")
     if root.tag != "dataset":
         raise InputError(file=path, got=f"<{root.tag}>", expected="<dataset> (CAVIAR)", remedy="give another file")
     return root
@@ -104,10 +94,8 @@ def _root(path: Path) -> ET.Element:
 
 def _number(path: Path, place: str, element: ET.Element, key: str, largest: int = 0) -> float:
     """Returns the attribute `key`, a whole number from 0 to `largest` if that is given."""
-    text = element.get(key) or ""
-    try:
-        value = whole_number(text) if largest else read_number(text)
-    except ValueError:
+    value = number_or_nan(element.get(key))
+    if largest and value % 1:
         value = float("nan")
     if not (0 if largest else -COORDINATE) <= value <= (largest or COORDINATE):
         raise InputError(
@@ -121,13 +109,7 @@ def _number(path: Path, place: str, element: ET.Element, key: str, largest: int 
 def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
     label: dict[int, int] = {}
     for group in element.iterfind("grouplist/group"):
-        words = (group.findtext("members") or "").replace(",", " ").split()
-        if not all(re.fullmatch("[0-9]{1,15}", w) for w in words):
-            raise InputError(
-                file=path, place=f"frame {index - 1}: members", got=" ".join(words), expected="ids of people",
-                remedy="correct the list",
-            )  # fmt: skip
-        members = {int(w) for w in words}
+        members = person_ids(path, f"frame {index - 1}: members", group.findtext("members") or "")
         # One member is no group.
         if len(members) < 2:
             continue

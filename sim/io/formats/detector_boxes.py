@@ -32,7 +32,7 @@ HALF = 0.5 + 1e-6  # frames: a time belongs to a frame that is so near; times ma
 OUTSIDE = 1.1  # Boxes that end farther right or lower than this share of the picture are of another picture size.
 
 
-def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.boxes) -> Sequence:
+def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.box_options) -> Sequence:
     """Returns the sequence with the boxes of a file as its detections.
 
     Raises InputError if the file cannot be read, has no boxes, or does not fit the sequence's frames and pictures.

@@ -133,21 +133,8 @@ def differentiate(frame: Ints, id: Ints, pos: Array, fps: float, window: float =
     frame, id (R,), pos (R, D): rows in any order, each id once in a frame. window: s. 0 where an id has one row there,
     nan if one of the two positions is.
     """
-    if len(frame) == 0:
-        return np.zeros_like(pos)
     half = max(1, round(window * fps / 2))
-    order = np.lexsort((frame, id))
-    f, rank = frame[order], np.unique(id[order], return_inverse=True)[1]
-    # Keys of two people are further apart than a window, so one search serves all.
-    stride = int(f.max() - f.min()) + 2 * half + 2
-    key = rank * stride + (f - f.min()) + half
-    first = np.searchsorted(key, key - half, side="left")
-    last = np.searchsorted(key, key + half, side="right") - 1
-    frames = f[last] - f[first]
-    chord = pos[order][last] - pos[order][first]
-    vel = np.empty_like(pos)
-    vel[order] = np.where(frames[:, None] > 0, chord * fps / np.maximum(frames, 1)[:, None], 0.0)
-    return vel
+    return _chords(frame, id, pos, fps, half, half, 0.0)
 
 
 def chords(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:
@@ -156,13 +143,18 @@ def chords(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW
     frame, id (R,), pos (R, D): rows in any order, each id once in a frame. nan without an earlier row within the
     window.
     """
+    return _chords(frame, id, pos, fps, frames_of(window, fps), 0, np.nan)
+
+
+def _chords(frame: Ints, id: Ints, pos: Array, fps: float, back: int, ahead: int, alone: float) -> Array:
+    """Returns the velocities from the id's first to its last row within `back` and `ahead` frames of each row."""
     order = np.lexsort((frame, id))
-    rank = np.unique(id[order], return_inverse=True)[1]
-    f, span = frame[order], frames_of(window, fps)
-    key = rank * (int(f.max(initial=0)) + span + 2) + f
-    first = np.searchsorted(key, key - span)
-    steps = f - f[first]
+    f, rank = frame[order], np.unique(id[order], return_inverse=True)[1]
+    # Keys of two people are further apart than a window, so one search serves all.
+    key = rank * (int(f.max(initial=0)) + back + ahead + 2) + f
+    first, last = np.searchsorted(key, key - back), np.searchsorted(key, key + ahead, side="right") - 1
+    steps = f[last] - f[first]
+    chord = (pos[order][last] - pos[order][first]) * fps / np.maximum(steps, 1)[:, None]
     out = np.empty_like(pos)
-    chord = (pos[order] - pos[order][first]) * fps / np.maximum(steps, 1)[:, None]
-    out[order] = np.where(steps[:, None] > 0, chord, np.nan)
+    out[order] = np.where(steps[:, None] > 0, chord, alone)
     return out

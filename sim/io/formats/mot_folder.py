@@ -16,8 +16,7 @@ from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
-from sim.io.files.numeric_text import read_number, read_text
-from sim.io.files.own_files import is_hidden
+from sim.io.files.numeric_text import number_or_nan, read_text
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.labels import labelled_sequence
@@ -56,59 +55,28 @@ def read_seqinfo(path: Path) -> SeqInfo:
 
     def number(key: str, low: float, high: float, whole: bool = True) -> float | None:
         text = section.get(key.lower())
-        try:
-            value = None if text is None else read_number(text)
-        except ValueError:
-            value = float("nan")
+        value = None if text is None else number_or_nan(text)
         if value is not None and not (low <= value <= high and (not whole or value == round(value))):
             expected = f"a {'whole ' if whole else ''}number from {low:g} to {high:g}"
             raise InputError(file=path, place=key, got=repr(text), expected=expected, remedy="correct it")
         return value
 
     length, w, h = (number(k, 1, high) for k, high in (("seqLength", FRAMES), ("imWidth", SIDE), ("imHeight", SIDE)))
-    if w is not None and h is not None and not fits_picture(w, h):
-        got = f"{w:.0f}×{h:.0f} px"
+    size = None if w is None or h is None else (int(w), int(h))
+    if size is not None and not fits_picture(*size):
+        got = "{}×{} px".format(*size)
         raise InputError(file=path, place="imWidth, imHeight", got=got, expected=PICTURE_SIZES, remedy="correct them")
-    return SeqInfo(
-        section.get("name", path.parent.name),
-        number("frameRate", *FRAME_RATES, whole=False),
-        None if length is None else int(length),
-        None if w is None or h is None else (int(w), int(h)),
-        section.get("imdir", "img1"),
-    )
+    name, rate = section.get("name", path.parent.name), number("frameRate", *FRAME_RATES, whole=False)
+    return SeqInfo(name, rate, None if length is None else int(length), size, section.get("imdir", "img1"))
 
 
-def frame_rate(given: float | None, found: float | None, path: Path | None = None) -> float:
+def frame_rate(given: float | None, found: float | None = None) -> float:
     """Returns the frames per second: `given` (--fps), else `found` in the recording, else 25 with a warning."""
-    if given is not None:
-        return given
-    if found is None:
+    if given is None and found is None:
         # The text names no path, so that a command over many recordings prints it once.
         text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
-        if path is not None and (video := _video_beside(path)) is not None and video[1] != DEFAULT_FPS:
-            text = f"{path}: without a frame rate; taken at {DEFAULT_FPS:g} fps, but {video[0].name} beside it has "
-            text += f"{video[1]:g}: give --fps {video[1]:g}"
         warnings.warn(text, stacklevel=3)
-        return DEFAULT_FPS
-    return found
-
-
-def _video_beside(path: Path) -> tuple[Path, float] | None:
-    """Returns the video of the same name beside a text or folder, or the only one there, and its frames per second."""
-    from sim.io.formats import video
-
-    around = [path.parent, path] if path.is_dir() else [path.parent]
-    files = [p for folder in around for p in sorted(folder.iterdir()) if p.suffix.lower() in video.SUFFIXES]
-    found = [p for p in files if not is_hidden(p) and p.is_file()]
-    own = [p for p in found if p.stem == path.stem or p.parent == path] or (found if not path.is_dir() else [])
-    if len(own) != 1:
-        return None
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return own[0], float(f"{video.open_video(own[0]).fps:.5g}")
-    except InputError:
-        return None
+    return given or found or DEFAULT_FPS
 
 
 def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
@@ -118,12 +86,16 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     last frame of texts and pictures. The truth is read, and checked, when asked for.
     """
     info, images, background = _info(path), options.images, options.background
-    rate = frame_rate(options.fps, info.fps, path)
+    rate = frame_rate(options.fps, info.fps)
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
-    alone = not is_present(gt)
-    found = mot_text.read_detections(det, options.boxes, info.length, alone) if is_present(det) else None
-    if found is None:
-        names = "box_scale min_score person_class" if alone else "box_scale min_score"
+    found, of_boxes = None, options.box_options
+    if is_present(det):
+        table = read_table(det, length=info.length, boxless=True, box_scale=of_boxes.box_scale)
+        if not is_present(gt):  # else --class may be of the labels
+            mot_text.require_classes(table, of_boxes.person_class)
+        found = mot_text.detections_of_table(table, of_boxes)
+    else:
+        names = "box_scale min_score" if is_present(gt) else "box_scale min_score person_class"
         options.reject(path, "a recording without det/det.txt", "it has no detections", names)
     pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
@@ -158,7 +130,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         return pictures.read(wanted, seen if images else pictures.first_size())
 
     def truth() -> Truth:
-        return mot_text.read_truth(gt, info.name, rate, length, options.scale, options.boxes.person_class)
+        return mot_text.read_truth(gt, info.name, rate, length, options.scale, of_boxes.person_class)
 
     shown: dict[str, Any] = {} if choice is None else {"background": str(choice)}
     if pictures.numbering is not None:
@@ -170,7 +142,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         px_per_m=options.scale, has_images=images and bool(pictures.files),
         has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
-        source={"kind": "mot", "path": str(path), **options.boxes.given(), **shown},
+        source={"kind": "mot", "path": str(path), **of_boxes.given(), **shown},
     )  # fmt: skip
 
 
@@ -215,7 +187,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     The camera is not scaled.
     """
-    rate, of_boxes = frame_rate(options.fps, None, path), options.boxes
+    rate, of_boxes = frame_rate(options.fps), options.box_options
     table = read_table(path, boxless=True, box_scale=of_boxes.box_scale)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")

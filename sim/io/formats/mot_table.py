@@ -87,10 +87,8 @@ def require_pixels(rows: NumericTable, box: Array) -> None:
 def corner_doubt(box: Array) -> str:
     """Returns what speaks for corners x1,y1,x2,y2 in boxes (B, 4) read as left, top, width, height; "": nothing."""
     x1, y1, x2, y2 = box.T
-    if len(box) < ENOUGH or not ((x2 > x1) & (y2 > y1)).all():
-        return ""
     # A width that varies along with the left edge is a right edge.
-    if not np.std(x2 - x1) < SMOOTH * np.std(x2):
+    if len(box) < ENOUGH or not ((x2 > x1) & (y2 > y1)).all() or not np.std(x2 - x1) < SMOOTH * np.std(x2):
         return ""
     return (
         f"all {len(box)} boxes look like x1,y1,x2,y2, but are read as left,top,width,height; "

@@ -334,17 +334,6 @@ class DetectionTable:
         return Detections(index, (index - 1) / fps, self.plane, self.pos[low:high], None, box, self.score[low:high])
 
 
-def read_detections(path: Path, options: BoxOptions, length: int | None = None, alone: bool = False) -> DetectionTable:
-    """Reads a det.txt as `detections_of_table`.
-
-    length: the last frame allowed. alone: True if no labels are beside it, to which --class may belong instead.
-    """
-    table = read_table(path, length=length, boxless=True, box_scale=options.box_scale)
-    if alone:
-        require_classes(table, options.person_class)
-    return detections_of_table(table, options)
-
-
 def detections_of_table(table: MotTable, options: BoxOptions) -> DetectionTable:
     """Returns a text's table as detections: points on the ground (m) if every row has one, else the boxes' centres."""
     _check_boxes(table)

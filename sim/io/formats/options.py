@@ -39,7 +39,7 @@ class RecordingOptions:
     camera: Camera | None = None  # its calibration
     images: bool = True  # False leaves out the pictures of MOTChallenge folders
     background: BackgroundChoice | None = None  # which frames are the sample for background models
-    boxes: BoxOptions = BoxOptions()  # of MOTChallenge texts
+    box_options: BoxOptions = BoxOptions()  # of MOTChallenge texts
 
     @property
     def scale(self) -> float:
@@ -47,9 +47,9 @@ class RecordingOptions:
         return float("nan") if self.px_per_m is None else self.px_per_m
 
     def reject(self, path: Path, kind: str, why: str, names: str) -> None:
-        """Refuses the options `names`; "boxes" stands for all options of boxes. See `refuse_options`."""
-        values = {**vars(self), **vars(self.boxes)}
-        refuse_options(values, names.replace("boxes", " ".join(vars(self.boxes))), path, kind, why)
+        """Refuses the options `names`; "box_options" stands for all of BoxOptions. See `refuse_options`."""
+        values = {**vars(self), **vars(self.box_options)}
+        refuse_options(values, names.replace("box_options", " ".join(vars(self.box_options))), path, kind, why)
 
 
 def refuse_options(values: Mapping[str, Any], names: str, path: Path, kind: str, why: str) -> None:

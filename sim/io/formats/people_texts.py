@@ -30,7 +30,7 @@ from sim.io.formats.labels import labelled_sequence, require_size
 from sim.io.formats.mot_table import table_of_rows
 from sim.io.formats.mot_text import truth_of_table
 from sim.io.formats.options import RecordingOptions
-from sim.types import Ints, Sequence, Truth
+from sim.types import Sequence, Truth
 
 NDJSON = ".ndjson"
 ETH_FPS = 2.5
@@ -83,13 +83,10 @@ def open_text(path: Path, layout: str, options: RecordingOptions) -> Sequence:
     return labelled_sequence("people text", path, path.stem, rate, length, truth, options.scale)
 
 
-def _with_frames(rows: NumericTable, frame: Ints) -> NumericTable:
-    return replace(rows, values=np.column_stack([frame, rows.values[:, 1:]]))
-
-
 def _counted(rows: NumericTable) -> NumericTable:
     """Returns rows `frame, id, x, y` with the frames of a video counted from 1."""
-    return _with_frames(rows, frame_numbers(rows.integers(0, "frame"), rows.integers(1, "id")))
+    frame = frame_numbers(rows.integers(0, "frame"), rows.integers(1, "id"))
+    return replace(rows, values=np.column_stack([frame, rows.values[:, 1:]]))
 
 
 def _read_eth(path: Path, fps: float | None) -> People:
@@ -137,17 +134,13 @@ def _json_row(path: Path, number: int, line: str) -> tuple[list[float] | None, f
     except InputError as error:
         raise _bad(path, number, error.got, "a JSON object") from None
     match value:
-        case {"track": {"f": f, "p": p, "x": x, "y": y}} if all(_finite(v) for v in (f, p, x, y)):
+        case {"track": {"f": f, "p": p, "x": x, "y": y}} if all(is_number(v, -LARGEST, LARGEST) for v in (f, p, x, y)):
             return [float(v) for v in (f, p, x, y)], None
         case {"scene": {"fps": fps}} if is_number(fps, *FRAME_RATES):
             return None, float(fps)
         case {"scene": dict() as scene} if "fps" not in scene:
             return None, None
     raise _bad(path, number, line.strip()[:80], '{"track": {"f", "p", "x", "y"}} of numbers, or {"scene": {…, "fps"}}')
-
-
-def _finite(value: object) -> bool:
-    return is_number(value, -LARGEST, LARGEST)
 
 
 def _bad(path: Path, number: int, got: object, expected: str) -> InputError:

@@ -7,9 +7,8 @@ The hash of the table of visible pixels is not checked.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError
 from sim import hashing, streams
 from sim.io.files import atomic
-from sim.io.files.tables import Column, StoredTable, read_table, table_bytes
+from sim.io.files.tables import Column, columns_of, read_table, table_bytes
 from sim.io.pictures import video_files
 from sim.io.pictures.picture_folder import require_size
 from sim.io.pictures.video_files import VideoWriter, write_video
@@ -50,41 +49,25 @@ NO_PICTURES = WrittenPictures()
 
 
 class StreamWriter:
-    """Writes one stream as picture files or as one video below `folder`; used as a context manager.
+    """Writes one stream as picture files below `folder`, or into an open video.
 
-    State: the hash of the raw pixels so far, the open video if there is one, and {"sha256", "bytes"} of each complete
-    file by name. A video is listed when the block ends without exception.
+    State: the hash of the raw pixels so far, and {"sha256", "bytes"} of each picture file by name.
     """
 
-    def __init__(self, folder: Path, stream: str, images: str, size: tuple[int, int], fps: float):
-        self.stream, self.images, self.folder = stream, images, folder
+    def __init__(self, folder: Path, stream: str, images: str, movie: VideoWriter | None) -> None:
+        self.folder, self.stream, self.images, self.movie = folder, stream, images, movie
         self.pixels, self.files = hashing.PixelHash(), Facts()
-        self._open: AbstractContextManager[VideoWriter | None] = nullcontext()
-        if streams.suffix(stream, images) == "mp4":
-            self._open = write_video(folder / streams.file_name(stream, images, 1), size, fps)
 
     def add(self, picture: NDArray[Any]) -> None:
         """Writes the next picture: (H, W, 3) BGR uint8, or (H, W) uint16 for ids and disparity."""
         self.pixels.add(picture)
-        if self._movie is not None:
-            self._movie.add(picture)
+        if self.movie is not None:
+            self.movie.add(picture)
             return
         name = streams.file_name(self.stream, self.images, self.pixels.count)
         body = encoded(picture, streams.suffix(self.stream, self.images))
         atomic.write_inside(self.folder / name, body)
         self.files |= file_facts({name: body})
-
-    def __enter__(self) -> StreamWriter:
-        self._movie = self._open.__enter__()
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._open.__exit__(*error)
-        if self._movie is not None and error[0] is None:
-            name = streams.file_name(self.stream, self.images, 1)
-            with (self.folder / name).open("rb") as file:
-                digest = hashlib.file_digest(file, "sha256").hexdigest()
-            self.files[name] = {"sha256": digest, "bytes": (self.folder / name).stat().st_size}
 
 
 def encoded(picture: NDArray[Any], kind: str) -> bytes:
@@ -106,49 +89,45 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
         return NO_PICTURES
     assert sequence.image_size is not None, "pictures have a size"
     known: list[PixelTruth] = []
+    outputs, movies = dict[str, StreamWriter](), [name for name in wanted if streams.suffix(name, images) == "mp4"]
     with ExitStack() as stack:
-        form = (images, sequence.image_size, sequence.fps)
-        outputs = {name: stack.enter_context(StreamWriter(folder, name, *form)) for name in wanted}
-        if "background" in outputs:
-            for picture in _background(sequence):
-                outputs["background"].add(picture)
-        seen = not outputs.keys().isdisjoint({"left", "right"})
-        for frame in sequence if seen else sequence.without_pictures():
-            _add(outputs, sequence, frame, known)
+        for name in wanted:
+            path = folder / streams.file_name(name, images, 1)
+            video = write_video(path, sequence.image_size, sequence.fps) if name in movies else nullcontext()
+            outputs[name] = StreamWriter(folder, name, images, stack.enter_context(video))
+        empty = sequence.background() if "background" in wanted else ()
+        if empty is None:
+            raise _missing(sequence, "background")
+        for picture in empty:
+            outputs["background"].add(picture)
+        for frame in sequence if {"left", "right"} & outputs.keys() else sequence.without_pictures():
+            pixels = None if sequence.load_pixels is None else sequence.load_pixels(frame.index)
+            for name in outputs.keys() - {"background"}:
+                outputs[name].add(_picture(name, sequence, frame, pixels))
+            if pixels is not None:
+                known.append(pixels.replace(ids=np.zeros((0, 0), np.int64), disparity=None))
     files = {name: facts for output in outputs.values() for name, facts in output.files.items()}
+    for path in (folder / streams.file_name(name, images, 1) for name in movies):
+        files |= file_facts({path.name: path.read_bytes()})
     if known and sequence.truth is not None:
         body = pixel_table(sequence.truth, known)
         atomic.write_inside(folder / TABLE, body)
         files |= file_facts({TABLE: body})
-    pixels = {name: output.pixels.hex() for name, output in outputs.items()}
-    return WrittenPictures(wanted, streams.coding(wanted, images), pixels, files)
+    hashes = {name: output.pixels.hex() for name, output in outputs.items()}
+    return WrittenPictures(wanted, streams.coding(wanted, images), hashes, files)
 
 
-def _background(sequence: Sequence) -> Image:
-    found = sequence.background()
-    if found is None:
-        raise _missing(sequence, "background")
-    return found
-
-
-def _add(outputs: dict[str, StreamWriter], sequence: Sequence, frame: Frame, known: list[PixelTruth]) -> None:
-    for name, picture in (("left", frame.image), ("right", frame.right)):
-        if name in outputs:
-            if picture is None:
-                raise _missing(sequence, name)
-            outputs[name].add(picture)
-    if sequence.load_pixels is None:
-        if not outputs.keys().isdisjoint(streams.EXACT):
-            raise _missing(sequence, "ids and disparity")
-        return
-    pixels = sequence.load_pixels(frame.index)
-    if "ids" in outputs:
-        outputs["ids"].add(streams.encode_ids(pixels.ids))
-    if "disparity" in outputs:
-        if pixels.disparity is None:
-            raise _missing(sequence, "disparity")
-        outputs["disparity"].add(streams.encode_disparity(pixels.disparity, sequence.camera))
-    known.append(pixels.replace(ids=np.zeros((0, 0), np.int64), disparity=None))
+def _picture(name: str, sequence: Sequence, frame: Frame, pixels: PixelTruth | None) -> NDArray[Any]:
+    """Returns a frame's picture of a stream; InputError without one."""
+    if name == "left" and frame.image is not None:
+        return frame.image
+    if name == "right" and frame.right is not None:
+        return frame.right
+    if name == "ids" and pixels is not None:
+        return streams.encode_ids(pixels.ids)
+    if name == "disparity" and pixels is not None and pixels.disparity is not None:
+        return streams.encode_disparity(pixels.disparity, sequence.camera)
+    raise _missing(sequence, name)
 
 
 def _missing(sequence: Sequence, stream: str) -> InputError:
@@ -170,14 +149,10 @@ def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
 
     box = np.concatenate([pixels.box.reshape(-1, 4) for pixels in known])
     columns = [
-        Column("frame", truth.frame),
-        Column("id", truth.id),
-        Column("visible_px", joined("visible_px"), "px²"),
-        Column("amodal_px", joined("amodal_px"), "px²"),
-        Column("visibility_px", joined("visibility")),
-        *(Column(name, box[:, k], "px") for k, name in enumerate(BOX)),
-        Column("blob", joined("blob")),
-    ]
+        Column("frame", truth.frame), Column("id", truth.id), Column("visible_px", joined("visible_px"), "px²"),
+        Column("amodal_px", joined("amodal_px"), "px²"), Column("visibility_px", joined("visibility")),
+        *columns_of(BOX, box, "px"), Column("blob", joined("blob")),
+    ]  # fmt: skip
     return table_bytes(columns, {"frames": len(known)})
 
 
@@ -245,16 +220,12 @@ class StoredPictures:
         """Returns (frame, picture) of the left camera for the frames `wanted` (from 1, ascending)."""
         return zip(wanted, self.all("left", self.manifest["sequence"]["length"], wanted), strict=True)
 
-    def table(self) -> StoredTable:
-        """Returns the table of visible pixels (`pixel_table`)."""
-        return read_table(self.folder / TABLE)
-
     def pixel_loader(self) -> Callable[[int], PixelTruth]:
         """Returns a function that maps a frame (from 1) to its PixelTruth; the stream ids is stored."""
 
         @cache
         def columns() -> tuple[Ints, Array, Array, Array, Ints]:
-            table = self.table()
+            table = read_table(self.folder / TABLE)
             counts = (table.floats("visible_px"), table.floats("amodal_px"))
             return table.ints("frame"), *counts, table.floats(*BOX), table.ints("blob")
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -149,15 +149,8 @@ def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
     """Yields the packets up to the first that cannot be read; the last, empty one flushes the decoder."""
     import av
 
-    packets = container.demux(stream)
-    while True:
-        try:
-            packet = next(packets, None)
-        except av.FFmpegError:
-            return
-        if packet is None:
-            return
-        yield packet
+    with suppress(av.FFmpegError):
+        yield from container.demux(stream)
 
 
 def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:

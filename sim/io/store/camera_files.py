@@ -12,26 +12,17 @@ from scenarios.errors import InputError
 from sim.io.files import tables
 from sim.io.files.tables import Number, Pair, Triple, validated
 from sim.scene.camera import require_camera
-from sim.types import Camera, Scene, Stairs
+from sim.types import Camera, Scene
 
 Pixels = Annotated[float, Field(strict=True, multiple_of=1)]
 
 
 def camera_document(camera: Camera) -> dict[str, Any]:
     """Returns the content of camera.json: the fields of Camera; rotation is world to camera."""
-    distortion = {"radial": camera.radial} if camera.radial else {}
-    return {
-        "format": tables.FORMAT,
-        "kind": camera.kind,
-        "image": list(camera.image),
-        "focal_px": list(camera.focal_px),
-        "centre_px": list(camera.centre_px),
-        "position": camera.position.tolist(),
-        "rotation": camera.rotation.tolist(),
-        "baseline": camera.baseline,
-        "px_per_m": tables.nan_to_none(camera.px_per_m),
-        **distortion,
-    }
+    document = {"format": tables.FORMAT, **tables.plain(camera)}
+    if not camera.radial:
+        del document["radial"]
+    return document
 
 
 class _Camera(BaseModel):
@@ -61,14 +52,7 @@ def read_camera(path: Path) -> Camera:
 
 def scene_document(scene: Scene) -> dict[str, Any]:
     """Returns the content of scene.json, all lengths in m: the fields of Scene as lists."""
-    stairs = [
-        {"foot": s.foot.tolist(), "head": s.head.tolist(), "width": s.width, "rise": s.rise, "steps": s.steps,
-         "landing": s.landing}
-        for s in scene.stairs
-    ]  # fmt: skip
-    arrays = {name: getattr(scene, name).tolist() for name in ("size", "walls", "pillars", "doors", "service")}
-    heights = {"wall_height": scene.wall_height, "pillar_height": scene.pillar_height}
-    return {"format": tables.FORMAT, **arrays, "stairs": stairs, **heights}
+    return {"format": tables.FORMAT, **tables.plain(scene)}
 
 
 class _Stairs(BaseModel):
@@ -93,12 +77,5 @@ class _Scene(BaseModel):
 
 def read_scene(path: Path) -> Scene:
     """Reads a scene.json."""
-    d = validated(path, tables.read_document(path), _Scene, "correct it")
-    return Scene(
-        size=np.array(d.size), walls=np.array(d.walls, float).reshape(-1, 2, 2),
-        pillars=np.array(d.pillars, float).reshape(-1, 3), doors=np.array(d.doors, float).reshape(-1, 2, 2),
-        service=np.array(d.service, float).reshape(-1, 2), wall_height=d.wall_height, pillar_height=d.pillar_height,
-        stairs=tuple(
-            Stairs(np.array(s.foot), np.array(s.head), s.width, s.rise, int(s.steps), s.landing) for s in d.stairs
-        ),
-    )  # fmt: skip
+    found = validated(path, tables.read_document(path), _Scene, "correct it")
+    return Scene.of(found, found.walls, found.doors)

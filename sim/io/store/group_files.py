@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
 from collections.abc import Sequence as Series
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -23,27 +22,11 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, INTEGER
 from sim.io.files import tables
 from sim.io.files.numeric_text import read_numbers, read_text, whole_number
-from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, StoredTable, none_to_nan, validated
+from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, StoredTable, columns_of, none_to_nan, validated
 from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
-ORDER_KEYS = ("id", "kind", "fired", "time", "before", "after", "event")
 GroupId = Annotated[int, Field(strict=True, ge=-1, le=INTEGER)]
-
-
-def event_dict(event: GroupEvent) -> dict[str, Any]:
-    """Returns an event as a dict for JSON, with the fields of GroupEvent as keys."""
-    return {
-        "kind": event.kind, "start": int(event.start), "end": int(event.end),
-        "emitted": None if event.emitted is None else int(event.emitted),
-        "before": [int(g) for g in event.before], "after": [int(g) for g in event.after],
-        "members": [int(m) for m in event.members], "pos": [tables.nan_to_none(float(v)) for v in event.pos],
-    }  # fmt: skip
-
-
-def events_bytes(events: Iterable[GroupEvent]) -> bytes:
-    """Returns the events.json of a truth, one event per line."""
-    return tables.json_list("events", map(event_dict, events))
 
 
 class _Event(BaseModel):
@@ -71,19 +54,9 @@ class _Events(BaseModel):
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
     """Reads an events.json as pairs (event, frame whose tracks reported it, None if not stored)."""
     found = validated(path, tables.read_document(path), _Events, "correct the event").events
-    return [
-        (
-            GroupEvent(**e.model_dump(exclude={"frame", "pos"}), pos=(none_to_nan(e.pos[0]), none_to_nan(e.pos[1]))),
-            e.frame,
-        )
-        for e in found
-    ]
-
-
-def near_bytes(near: Near) -> bytes:
-    """Returns near.csv: start, end (frames from 1, inclusive), a, b (ids of strangers who satisfy the merge rule)."""
-    rows = zip(near.start, near.end, near.a, near.b, strict=True)
-    return "".join([NEAR_COLUMNS + "\n", *(f"{s},{e},{a},{b}\n" for s, e, a, b in rows)]).encode()
+    places = [(none_to_nan(e.pos[0]), none_to_nan(e.pos[1])) for e in found]
+    fields = [e.model_dump(exclude={"frame", "pos"}) for e in found]
+    return [(GroupEvent(**f, pos=pos), e.frame) for f, pos, e in zip(fields, places, found, strict=True)]
 
 
 def read_near(path: Path) -> Near:
@@ -99,11 +72,6 @@ def read_near(path: Path) -> Near:
     expected = f"frames from 1 to {FRAMES}, start not after end, and two ids from 0 on"
     rows.reject(wrong, expected, "restore it", "restore them")
     return Near(start, end, a, b)
-
-
-def script_bytes(orders: Iterable[Order]) -> bytes:
-    """Returns script.json, one order of the script per line."""
-    return tables.json_list("orders", ({key: getattr(o, key) for key in ORDER_KEYS} for o in orders))
 
 
 class _Order(BaseModel):
@@ -148,12 +116,11 @@ def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
         Column("frame", np.repeat(np.arange(first, first + len(frames), dtype=np.int64), counts)),
         Column("group", np.concatenate([np.zeros(0, np.int64), *ids])),
         Column("members", _lists([g.members for g in known], ids, np.zeros(0, np.int64)), "1", np.int64),
-        *(Column(a, pos[:, k], unit) for k, a in enumerate(axes)),
-        *(Column(f"v{a}", vel[:, k], f"{unit}/s") for k, a in enumerate(axes)),
-        *(Column(name, extent[:, k], f"{unit}^2") for k, name in enumerate(EXTENT)),
+        *columns_of(axes, pos, unit), *columns_of([f"v{a}" for a in axes], vel, f"{unit}/s"),
+        *columns_of(EXTENT, extent, f"{unit}^2"),
         Column("size", np.concatenate([np.zeros(0), *(g.size for g in known)]), "people"),
         Column("hull", _lists([g.hull for g in known], ids, np.zeros(0)), f"{unit}: x1, y1, x2, …"),
-    ]
+    ]  # fmt: skip
     missing = [first + k for k, g in enumerate(frames) if g is None]
     memberless = [first + k for k, g in enumerate(frames) if g is not None and len(g.members) < len(g.id)]
     facts = {"first": first, "frames": len(frames), "missing": missing, "memberless": memberless}
@@ -228,13 +195,11 @@ def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None
         here = None if ground is None else ground[k]
         px = None if image is None else image[k]
         pictured = {} if px is None else {int(g): wkt(h, 2) for g, h in zip(px.id, px.hull, strict=False)}
-        for row in _csv_rows(here if here is not None else Groups.none() if px is None else _placeless(px)):
+        if here is None:
+            here = Groups.none() if px is None else px.replace(pos=np.full_like(px.pos, np.nan), hull=())
+        for row in _csv_rows(here):
             writer.writerow([first + k, *row, *([pictured.get(row[0], "")] if image is not None else [])])
     return text.getvalue().encode()
-
-
-def _placeless(groups: Groups) -> Groups:
-    return groups.replace(pos=np.full_like(groups.pos, np.nan), hull=())
 
 
 def _csv_rows(groups: Groups) -> list[tuple[int, str, str, str, str, str]]:
@@ -294,16 +259,8 @@ def _row(path: Path, line: int, row: dict[str, str], length: int) -> tuple[int, 
 
 def _from_rows(rows: list[_Row]) -> Groups:
     id, members, pos, size, hull = zip(*rows, strict=True)
-    n = len(rows)
-    return Groups(
-        np.array(id, np.int64),
-        members,
-        np.array(pos),
-        np.zeros((n, 2)),
-        np.full((n, 2, 2), np.nan),
-        np.array(size),
-        hull,
-    )
+    still, unknown = np.zeros((len(rows), 2)), np.full((len(rows), 2, 2), np.nan)
+    return Groups(np.array(id, np.int64), members, np.array(pos), still, unknown, np.array(size), hull)
 
 
 def _bad(path: Path, line: int, got: str, expected: str) -> InputError:

@@ -30,16 +30,9 @@ from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, Ima
 
 
 def write_sequence(
-    folder: Path,
-    sequence: Sequence,
-    *,
-    scenario: str,
-    seed: int,
-    repeat: int = 0,
-    streams: Iterable[str] = (),
-    images: str = "jpg",
-    keep: Callable[[], bool] = lambda: False,
-) -> Path:
+    folder: Path, sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, streams: Iterable[str] = (),
+    images: str = "jpg", keep: Callable[[], bool] = lambda: False,
+) -> Path:  # fmt: skip
     """Writes a sequence as a folder, complete or not at all.
 
     Args:
@@ -115,7 +108,7 @@ def sequence_files(
         "sequence": {
             "name": sequence.name, "fps": sequence.fps, "length": len(frames),
             "image_size": None if sequence.image_size is None else list(sequence.image_size),
-            "px_per_m": tables.nan_to_none(sequence.px_per_m),
+            "px_per_m": tables.plain(sequence.px_per_m),
         },
         "versions": versions(bool(pictures.streams)),
         "files": dict(sorted((seal.file_facts(files) | pictures.files).items())),

@@ -23,16 +23,10 @@ from scenarios.errors import InputError
 from sim.arrays import repeated_ids
 from sim.io.files import tables
 from sim.io.files.atomic import hold_lock, replace_sealed
-from sim.io.files.tables import Column, Count, Rate, table_bytes
+from sim.io.files.tables import Column, Count, Rate, columns_of, table_bytes
 from sim.io.formats.labels import chords
 from sim.io.formats.mot_table import MotTable, read_table, require_pixels
-from sim.io.formats.mot_text import (
-    ground_positions,
-    of_class,
-    reject_duplicate_ids,
-    require_metres,
-    unit_scores,
-)
+from sim.io.formats.mot_text import ground_positions, of_class, reject_duplicate_ids, require_metres, unit_scores
 from sim.io.formats.options import BoxScale, Classes
 from sim.io.store import group_files
 from sim.io.store.group_files import AXES
@@ -67,9 +61,8 @@ class RunRows:
     def reject_faults(self, file: object, remedy: str) -> None:
         """Raises InputError for the first fault, with its frame: a wrong id or group, or number."""
         for wrong, got, expected in self._checks():
-            row = int(np.argmax(wrong)) if wrong.any() else None
-            if row is not None:
-                place = f"frame {self.frame[row]}, id {self.id[row]}"
+            if wrong.any():
+                place = "frame {}, id {}".format(*(rows[np.argmax(wrong)] for rows in (self.frame, self.id)))
                 raise InputError(file=file, place=place, got=got, expected=expected, remedy=remedy)
 
     def _checks(self) -> Iterator[tuple[Any, str, str]]:
@@ -126,19 +119,14 @@ def track_table(rows: RunRows, every: list[Tracks], fps: float) -> bytes:
     values = np.concatenate([rows.pos, rows.vel], axis=1)
     units = [f"{unit}/s" if name.startswith("v") else unit for name in state]
     columns = [
-        Column("frame", rows.frame),
-        Column("id", rows.id),
-        Column("group", rows.group),
+        Column("frame", rows.frame), Column("id", rows.id), Column("group", rows.group),
         *(Column(name, values[:, k], u) for k, (name, u) in enumerate(zip(state, units, strict=True))),
-        *(Column(name, rows.box[:, k], "px") for k, name in enumerate(BOX)),
-        Column("score", rows.score),
-        Column("seen", rows.seen),
+        *columns_of(BOX, rows.box, "px"), Column("score", rows.score), Column("seen", rows.seen),
         *(
             Column(f"cov_{a}_{b}", rows.cov[:, i, j], f"{units[i]} {units[j]}")
-            for i, a in enumerate(state)
-            for j, b in enumerate(state)
+            for i, a in enumerate(state) for j, b in enumerate(state)
         ),
-    ]
+    ]  # fmt: skip
     facts = {
         "plane": rows.plane, "unit": rows.unit, "fps": fps, "first": every[0].index if every else 1,
         "frames": len(every), "boxless": [t.index for t in every if t.box is None],
@@ -152,9 +140,7 @@ def pair_table(frame: Ints, a: Ints, b: Ints, probability: Array) -> bytes:
 
     frame (R,): from 1. a, b (R,): ids. probability (R,): 0 to 1.
     """
-    return table_bytes(
-        [Column("frame", frame), Column("a", a), Column("b", b), Column("probability", probability, "1")], {}
-    )
+    return table_bytes([Column("frame", frame), Column("a", a), Column("b", b), Column("probability", probability)], {})
 
 
 class _TrackFacts(BaseModel):
@@ -313,15 +299,9 @@ def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
 
 
 def write_tracks(
-    folder: str | Path,
-    tracks: Iterable[Tracks],
-    *,
-    fps: float,
-    camera: Camera | None = None,
-    scene: Scene | None = None,
-    info: dict[str, Any] | None = None,
-    pairs: bytes | None = None,
-) -> Path:
+    folder: str | Path, tracks: Iterable[Tracks], *, fps: float, camera: Camera | None = None,
+    scene: Scene | None = None, info: dict[str, Any] | None = None, pairs: bytes | None = None,
+) -> Path:  # fmt: skip
     """Writes the tracks of consecutive frames of one tracker into a folder; run.json comes last.
 
     Args:
@@ -348,14 +328,9 @@ def write_tracks(
 
 
 def tracks_files(
-    tracks: Iterable[Tracks],
-    *,
-    fps: float,
-    camera: Camera | None = None,
-    scene: Scene | None = None,
-    info: dict[str, Any] | None = None,
-    pairs: bytes | None = None,
-) -> dict[str, bytes]:
+    tracks: Iterable[Tracks], *, fps: float, camera: Camera | None = None, scene: Scene | None = None,
+    info: dict[str, Any] | None = None, pairs: bytes | None = None,
+) -> dict[str, bytes]:  # fmt: skip
     """Returns the files of one tracker's tracks, as `write_tracks` writes them: content by name, run.json last."""
     every = list(tracks)
     rows, boxes = flatten(every), box_source(every, camera)
@@ -375,7 +350,7 @@ def tracks_files(
         files["groups.csv"] = group_files.groups_csv(groups, None, first)
     if pairs is not None:
         files[PAIRS] = pairs
-    events = [{**group_files.event_dict(e), "frame": t.index} for t in every for e in t.events]
+    events = [{**tables.plain(e), "frame": t.index} for t in every for e in t.events]
     files["events.json"] = tables.json_list("events", events)
     return {**files, RUN: sealed_run({**(info or {}), "boxes": boxes}, files)}
 

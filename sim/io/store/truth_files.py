@@ -9,18 +9,24 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel
 
-from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.io.files import tables
-from sim.io.files.tables import REDO, Column, Count, FrameNumber, Rate, Scale, StoredTable, read_table, table_bytes
+
+# isort: off
+# fmt: off
+from sim.io.files.tables import (
+    Column, Count, FrameNumber, Rate, Scale, StoredTable, columns_of, read_table, table_bytes,
+)
+# fmt: on
+# isort: on
 from sim.io.store import group_files
 from sim.scene.terrain import height_at
-from sim.types import Array, Bools, Detections, Groups, Ints, Scene, Truth
+from sim.types import Array, Bools, Detections, Groups, Ints, Order, Scene, Truth
 
 BOX = ("box_left", "box_top", "box_width", "box_height")
 VISIBLE = ("visible_left", "visible_top", "visible_width", "visible_height")
@@ -29,7 +35,7 @@ SINGLE = (("z", "m"), ("heading", "rad"), ("height", "m"), ("truncation", "1"))
 
 def truth_files(truth: Truth) -> dict[str, bytes]:
     """Returns the files under gt/ of a truth, content by name: those for which it has values."""
-    files = {"gt/truth.parquet": _table(truth), "gt/script.json": group_files.script_bytes(truth.orders)}
+    files = {"gt/truth.parquet": _table(truth), "gt/script.json": tables.json_list("orders", map(_order, truth.orders))}
     if truth.box is not None:
         seen = has_box(truth.box)
         visibility = [f"1,1,{v:.3f}" for v in truth.visibility[seen].tolist()]
@@ -41,30 +47,32 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
     if truth.groups is not None or truth.groups_px is not None:
         files["gt/groups.csv"] = group_files.groups_csv(truth.groups, truth.groups_px)
     if truth.events is not None:
-        files["gt/events.json"] = group_files.events_bytes(truth.events)
+        files["gt/events.json"] = tables.json_list("events", map(tables.plain, truth.events))
     if truth.near is not None:
-        files["gt/near.csv"] = group_files.near_bytes(truth.near)
+        rows = zip(truth.near.start, truth.near.end, truth.near.a, truth.near.b, strict=True)
+        lines = [group_files.NEAR_COLUMNS, *(",".join(map(str, row)) for row in rows)]
+        files["gt/near.csv"] = "".join(f"{line}\n" for line in lines).encode()
     return files
 
 
 def _table(truth: Truth) -> bytes:
-    columns = [Column("frame", truth.frame), Column("id", truth.id), Column("group", truth.group)]
-    for array, names, unit in (
-        (truth.pos, ("x", "y"), "m"),
-        (truth.vel, ("vx", "vy"), "m/s"),
-        (truth.box, BOX, "px"),
-        (truth.visible_box, VISIBLE, "px"),
-    ):
-        if array is not None:
-            columns += [Column(name, array[:, k], unit) for k, name in enumerate(names)]
-    columns.append(Column("visibility", truth.visibility))
+    columns = [
+        Column("frame", truth.frame), Column("id", truth.id), Column("group", truth.group),
+        *columns_of(("x", "y"), truth.pos, "m"), *columns_of(("vx", "vy"), truth.vel, "m/s"),
+        *columns_of(BOX, truth.box, "px"), *columns_of(VISIBLE, truth.visible_box, "px"),
+        Column("visibility", truth.visibility),
+    ]  # fmt: skip
     singles = ((name, unit, getattr(truth, name)) for name, unit in SINGLE)
     columns += [Column(name, array, unit) for name, unit, array in singles if array is not None]
     facts = {
-        "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": tables.nan_to_none(truth.px_per_m),
+        "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": tables.plain(truth.px_per_m),
         "labelled": None if truth.labelled is None else spans(truth.labelled),
     }  # fmt: skip
     return table_bytes(columns, facts)
+
+
+def _order(order: Order) -> dict[str, Any]:
+    return {key: getattr(order, key) for key in ("id", "kind", "fired", "time", "before", "after", "event")}
 
 
 def spans(flags: Bools) -> list[list[int]]:
@@ -145,14 +153,10 @@ def read_truth(folder: Path) -> Truth:
 
 
 def _check_rows(table: StoredTable, length: int) -> None:
-    frame, id = table.ints("frame"), table.ints("id")
-    step = np.diff(frame)
-    wrong = (step < 0) | ((step == 0) & (np.diff(id) <= 0))
-    outside = len(frame) > 0 and (frame.min() < 1 or frame.max() > length)
-    if wrong.any() or outside:
-        place = f"row {int(np.argmax(wrong)) + 1}" if wrong.any() else "frame"
-        got = f"rows out of order, twice, or outside frames 1 to {length}"
-        raise InputError(file=table.file, place=place, got=got, expected="rows sorted by (frame, id)", remedy=REDO)
+    table.cuts(1, length)
+    twice = (np.diff(table.ints("frame")) == 0) & (np.diff(table.ints("id")) <= 0)
+    place = f"row {int(np.argmax(twice)) + 1}" if len(twice) else ""
+    table.reject(bool(twice.any()), place, "rows out of order, or twice", "rows sorted by (frame, id)")
 
 
 def _groups(path: Path) -> tuple[Groups, ...] | None:
@@ -167,33 +171,26 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     detections: one Detections per frame, all of one plane, and all with or without boxes and velocities. scene: gives
     the z of ground points in det.txt; None: 0.
     """
-    plane, boxed, moving = _form(detections)
+    forms = {(d.plane, d.box is not None, d.vel is not None) for d in detections}
+    assert len(forms) <= 1, f"detections of one sequence differ in kind: {sorted(forms)}"
+    plane, boxed, moving = next(iter(forms), ("image", True, False))
     axes = ("x", "y", "z")[: detections[0].pos.shape[1]] if detections else ("x", "y")
     unit = "px" if plane == "image" else "m"
-    counts = [len(d.pos) for d in detections]
     pos = np.concatenate([np.zeros((0, len(axes))), *(d.pos for d in detections)])
     score = np.concatenate([np.zeros(0), *(scores_or_ones(d.score, len(d.pos)) for d in detections)])
-    frame = np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), counts)
-    places = (Column(a, pos[:, k], unit) for k, a in enumerate(axes))
-    columns = [Column("frame", frame), *places, Column("score", score)]
-    if moving:
-        vel = np.concatenate([d.vel for d in detections if d.vel is not None])
-        columns += [Column(f"v{a}", vel[:, k], f"{unit}/s") for k, a in enumerate(axes)]
+    frame = np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), [len(d.pos) for d in detections])
+    vel = np.concatenate([d.vel for d in detections if d.vel is not None]) if moving else None
     box = np.concatenate([d.box for d in detections if d.box is not None]) if boxed else None
-    if box is not None:
-        columns += [Column(name, box[:, k], "px") for k, name in enumerate(BOX)]
+    columns = [
+        Column("frame", frame), *columns_of(axes, pos, unit), Column("score", score),
+        *columns_of([f"v{a}" for a in axes], vel, f"{unit}/s"), *columns_of(BOX, box, "px"),
+    ]  # fmt: skip
     facts = {"plane": plane, "frames": len(detections), "fps": fps}
     rest = score_and_place(score, None if plane == "image" else with_ground_height(pos, scene))
     # An alarm at the picture's edge may be a box without width.
     shown = np.full((len(score), 4), np.nan) if box is None else np.c_[box[:, :2], np.maximum(box[:, 2:], 0.01)]
     text = mot_text(frame, np.full(len(frame), -1), shown, rest)
     return {"det/det.parquet": table_bytes(columns, facts), "det/det.txt": text}
-
-
-def _form(detections: list[Detections]) -> tuple[str, bool, bool]:
-    forms = {(d.plane, d.box is not None, d.vel is not None) for d in detections}
-    assert len(forms) <= 1, f"detections of one sequence differ in kind: {sorted(forms)}"
-    return next(iter(forms), ("image", True, False))
 
 
 def scores_or_ones(score: Array, rows: int) -> Array:

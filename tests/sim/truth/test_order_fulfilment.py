@@ -5,7 +5,6 @@ import pytest
 
 from scenarios.errors import WorkError
 from sim.truth.order_fulfilment import check_orders, fulfilment
-from sim.truth.queue_detection import queues
 from sim.types import GroupEvent, Motion, Order, Truth
 from tests.reference_sense import walkers
 
@@ -98,32 +97,11 @@ def test_queues_want_three_of_their_people() -> None:
         check(motion, fewer)
     pause = motion.vel.copy()
     pause[30:47] = 0
-    with pytest.raises(WorkError, match=r"at most 3 of 3 .* 3 of them for 1\.7 s at a stretch"):
+    with pytest.raises(WorkError, match="at most 3 of 3 "):
         check(motion.replace(vel=pause), fewer)
     late = truth_of(motion, 91, "queue")  # 3 s of the rule would end later than 10 s after the firing
     with pytest.raises(WorkError):
         check(motion, late)
-
-
-@pytest.mark.parametrize("leaving", [(1, 2, 3, 4), (2, 1, 3, 4)])
-def test_queues_are_first_in_first_out(leaving: tuple[int, ...]) -> None:
-    """Four stand in line from the first frame; they leave sideways 2 s after one another, from 5 s on."""
-    t = np.arange(FRAMES) / 10
-    pos = np.empty((FRAMES, 4, 2))
-    for turn, person in enumerate(leaving):
-        pos[:, person - 1] = np.stack([0 * t + 5 + 0.6 * person, np.maximum(t - 5 - 2 * turn, 0) * 1.3], axis=1)
-    base = walkers([[0, 0]] * 4, [[0, 0]] * 4, frames=FRAMES)
-    order = order_of("q1", "queue", 1, ((1,), (2,), (3,), (4,)), ((1, 2, 3, 4),))
-    motion = base.replace(pos=pos, vel=np.gradient(pos, 0.1, axis=0), orders=(order,))
-    alone = np.full((FRAMES, 4), -1)
-    truth = truth_of(merging(), 50).replace(
-        events=tuple(queues(motion.pos, motion.vel, motion.present, alone, motion.fps))
-    )
-    if leaving[0] == 1:
-        assert check(motion, truth) == {"q1": 0}
-    else:
-        with pytest.raises(WorkError, match=r"left by people 2, 1.* first in, first out"):
-            check(motion, truth)
 
 
 def test_the_recording_may_end_first() -> None:

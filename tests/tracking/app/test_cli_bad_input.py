@@ -102,7 +102,7 @@ OPTIONS = {
     "track blob {caviar} --out {tmp}/out --camera {made}/scene.toml": "--camera",  # no ground
     "scenarios merge --out {tmp}/plan.pdf": "ends in .svg; write {tmp}/",
     "fit sensor {tmp}/none --out {tmp}/x.toml": "nothing there",
-    f"{GOOD} --sensor {{tmp}}/none.toml": "no such file",
+    f"{GOOD} --sensor {{tmp}}/none.toml": "No such file",
     f"{REPLAY} --seeds 0": "train",
     f"{TUNE} --seeds 0-5": "--seeds: got '0-5'",
     f"{TUNE} --test 0:5": "--test: got 0:5; expected test seeds",

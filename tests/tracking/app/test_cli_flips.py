@@ -398,7 +398,7 @@ FLIPS = {
     "sheet {0}/mot --out {1}/sheet.png": {"fps": "--fps 5"},
     "validate {0}/data": {"folder": ("data", "tracks")},
     "export webdataset {0}/data --out {1}": {
-        "folder": ("{0}/data", ONE), "shard_size": "--shard-size 1kB", "samples": "--samples frame",
+        "folder": ("{0}/data", ONE), "shard_size": "--shard-size 1kB",
     },
     **{
         f"export {form} {{0}}/{source} --out {{1}}": flip
@@ -437,12 +437,11 @@ ELSEWHERE = {
     ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("view", "by"),  # report/test_in_browser.py
     ("view", "workers"),
-    ("coco", "min_visibility"),  # tests/sim/io/export/test_coco.py
     *((command, "person_class") for command in ("coco", "score", "track")),  # tests/sim/io/formats/test_mot_people.py
     *((command, "box_scale") for command in ("score", "track")),  # tests/sim/io/formats/test_box_columns.py
 }
 OWN = (
-    "compare", "errors", "group", "grouping", "joint", "minimize", "relational", "replay", "sensor", "stress", "tune",
+    "compare", "errors", "group", "grouping", "minimize", "replay", "sensor", "stress", "tune",
 )  # fmt: skip
 """Commands whose options are tested one by one in commands/, ../stress, ../errors, and test_*.py here."""
 

@@ -7,7 +7,6 @@ import pytest
 
 from scenarios.errors import InputError
 from tests import reference_background as reference
-from tracking.detect import background_training as brightness_gain
 from tracking.detect.background import (
     BACKGROUND,
     DARK,
@@ -253,12 +252,6 @@ def test_a_sample_that_is_none_is_refused_in_one_line(sample, words):
 
 
 # --- grey and extreme pictures ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("n", [1, 2, 3, 8, 50, 51, 5000])
-def test_median_is_numpys(n):
-    values = np.random.default_rng(n).normal(1, 0.2, n).astype(np.float32)
-    assert brightness_gain._median(values) == float(np.median(values))
 
 
 def test_a_frame_of_another_kind_is_refused():

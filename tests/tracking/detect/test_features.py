@@ -106,7 +106,7 @@ def test_the_stated_covariance_of_a_velocity_is_that_of_its_errors() -> None:
     uvd = np.repeat(project_pair(camera, X)[None], n * 10, 0).reshape(n, 10, 3).copy()
     uvd[..., 2] += 0.25 * r.standard_normal((n, 10))
     world = back_project(camera, uvd.reshape(-1, 3)).reshape(n, 10, 3)
-    vel, spread, _ = slopes(world, np.ones((n, 10), bool), np.arange(10) / FPS)
+    vel, spread = slopes(world, np.ones((n, 10), bool), np.arange(10) / FPS)
     measured = np.median(np.abs(vel @ camera.rotation[2])) * 1.4826
     cov = point_covariances(camera, X, np.square([1e-9, 1e-9, 0.25]))[0]
     stated = np.sqrt(camera.rotation[2] @ cov @ camera.rotation[2] / spread[0])

@@ -9,7 +9,6 @@ from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Context
 from tracking.detect import person_size
 from tracking.detect.person_size import ENOUGH, PersonSize
-from tracking.detect.person_size_kernels import look_up
 
 BARE = Context(10.0, float("nan"), image_size=(480, 360))
 
@@ -89,22 +88,3 @@ def test_few_or_wild_blobs_are_not_relied_on():
     cut, size = blobs(r, 80), PersonSize(BARE)
     size.learn(cut, ellipses(cut), np.zeros(80, bool))
     assert not size.reliable
-
-
-def slow(table, at):
-    """Bilinear values, all points at once."""
-    at = np.clip(np.nan_to_num(at), 0.0, np.array(table.shape[:0:-1]) - 1.001)
-    (u, v), (a, b) = at.astype(int).T, (at - np.floor(at)).T
-    low = table[:, v, u] * (1 - a) + table[:, v, u + 1] * a
-    high = table[:, v + 1, u] * (1 - a) + table[:, v + 1, u + 1] * a
-    return (low * (1 - b) + high * b).T
-
-
-@pytest.mark.parametrize("n", [0, 1, 50])
-def test_values_between_nodes_are_the_slow_way(n):
-    r = np.random.default_rng(n)
-    table = r.random((2, 6, 8))
-    table[:, 0] = np.nan
-    at = r.uniform(-3, 11, (n, 2))
-    at[: n // 10, 0], at[n // 5 : n // 4] = np.nan, (np.inf, -np.inf)
-    assert np.array_equal(look_up(table, at), slow(table, at), equal_nan=True)

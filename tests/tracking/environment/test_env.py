@@ -17,7 +17,8 @@ from sim.sequence import simulate
 from tests.processes import FAKE, TOY, python
 from tests.toy_tracker import Toy
 from tracking.config import Config, param
-from tracking.environment.env import OBSERVATIONS, TuningEnv
+from tracking.environment.env import TuningEnv
+from tracking.environment.observation import NAMES
 from tracking.parameter_space import encode
 from tracking.running.tracker_registry import names
 
@@ -45,12 +46,9 @@ def played(env, actions=None, **reset):
     return np.array(everything), np.array(rewards), info
 
 
-@pytest.mark.parametrize(
-    ("tracker", "observation", "every"),
-    [*((name, OBSERVATIONS[0], 10) for name in names()), *((TOY, seen, None) for seen in OBSERVATIONS)],
-)
-def test_gymnasium_checks_it_without_a_warning(tracker, observation, every):
-    env = make(tracker, decision_every=every, observation=observation, set=TINY)
+@pytest.mark.parametrize(("tracker", "every"), [*((name, 10) for name in names()), (TOY, None)])
+def test_gymnasium_checks_it_without_a_warning(tracker, every):
+    env = make(tracker, decision_every=every, set=TINY)
     check_env(env.unwrapped)
 
 
@@ -109,14 +107,13 @@ def test_the_truth_is_for_the_score_alone():
 
 def test_from_pixels():
     tiny = ["camera.fps=5", "duration=2", "camera.image=[160,120]"]
-    env = make("group-pda", "cross", set=tiny, detections="image", decision_every=5, render_mode="rgb_array")
+    env = make("group-pda", "cross", set=tiny, detections="image", decision_every=5)
     seen, rewards, info = played(env, seed=1)
-    named = dict(zip(env.unwrapped.observation_names, seen[-1], strict=True))
+    named = dict(zip(NAMES, seen[-1], strict=True))
     assert named["score"] == named["detections"] == 0
     assert len(rewards) == 2
     assert "pixel_radius" in info["names"]
     assert "radius" not in info["names"]
-    assert env.render().shape == (152, 160, 3)
 
 
 class Deaf(Toy):
@@ -145,9 +142,8 @@ class StillToy(Toy):
 WRONG_ARGUMENTS = [
     (FAKE, {}, "a tracker with parameters"), ("blbo", {}, "did you mean blob"),
     ("blob", {"decision_every": 0}, "1 or more"), ("blob", {"decision_every": 2.5}, "1 or more"),
-    ("blob", {"observation": "statistic"}, "did you mean statistics"),
     ("blob", {"params": {"gaet": 0.5}}, "did you mean gate"),
-    ("blob", {"suite": "nothing at all"}, "a scenario, a suite"), ("blob", {"render_mode": "human"}, "rgb_array"),
+    ("blob", {"suite": "nothing at all"}, "a scenario, a suite"),
     ("blob", {"detections": "boxes"}, "one of None, image, truth, file"),
     ("blob", {"seeds": 5}, r"write for example range\(5\)"), ("blob", {"seeds": [0, 20_000]}, "seeds of one split"),
     ("blob", {"cache": -1}, "bytes"),

@@ -23,12 +23,12 @@ def scores(true, est, events=(), **options):
 def test_one_giant_group_is_not_two():
     # Hulls 2 x 1, 1 x 1 and 5 x 1: IoU 2/5 and 1/5, so the first is matched: TP 1, FN 1, FP 0. All its people are
     # inside (GDSR 1/2), but only 2 of the giant's 4 are right (GDSR2 0). Jaccard 2/4: nothing is found (F1 0).
-    # Middles (1, 0.5) and (2.5, 0.5): 1.5 m. Size 4 instead of 2.
+    # Middles (1, 0.5) and (2.5, 0.5): 1.5 m.
     true = [Scene(APART, {1: ((1, 2), (0, 0, 2, 1)), 2: ((3, 4), (3, 0, 4, 1))})]
     found = scores(true, [Scene(APART, {9: ((1, 2, 3, 4), (0, 0, 5, 1))})])
     expected = {
         "TP": 1, "FN": 1, "FP": 0, "1-FP": 1, "1-FN": 0.5, "GDSR": 0.5, "GDSR2": 0, "MOTP": 1.5, "MOTA": 0.5,
-        "F1": 0, "precision": 0, "recall": 0, "size_error": 2,
+        "F1": 0, "precision": 0, "recall": 0,
     }  # fmt: skip
     for key, value in expected.items():
         assert found[f"group_{key}"] == near(value), key
@@ -85,8 +85,7 @@ def test_a_method_without_members_has_the_people_in_its_hulls():
         true = truth([Scene(people, {1: ((1, 2), None)})])
         return evaluate(true, tracks([Scene({}, {1: ((), (0, 0, 2, 1))})], unit="group"))
 
-    assert found(0.29)["group_size_error"] == 1
-    assert found(0.31)["group_size_error"] == 0
+    assert found(0.31)["pairwise_precision"] == 1
     assert found(0.29)["pairwise_precision"] == near(1 / 3)
     assert np.isnan(found(0.31)["HOTA"])
     assert found(0.31)["objective"] == found(0.31)["group_F1"]

@@ -7,10 +7,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from sim.geometry.polygons import iou_matrix
 from sim.truth.group_hulls import groups_over_time
 from sim.types import Groups, Tracks, Truth
 from tests import reference_social as reference
+from tests.reference_polygons import iou_matrix
 from tests.reference_trackeval import trackeval_scores
 from tracking.scoring import evaluate
 

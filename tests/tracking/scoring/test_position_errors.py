@@ -6,13 +6,12 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from scipy.linalg import sqrtm
 
 from sim.types import Truth
 from tracking.scoring.candidate_pairs import Pairs, point_pairs
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.people_and_groups import PersonRows
-from tracking.scoring.position_errors import PARTS, gaussian_wasserstein, gospa_of, gospa_parts, weighted_positions
+from tracking.scoring.position_errors import PARTS, gospa_of, gospa_parts, weighted_positions
 from tracking.scoring.rows import FrameRows
 from tracking.scoring.weighted_sums import unweighted
 
@@ -40,19 +39,6 @@ def test_only_mapped_people_at_known_places_count() -> None:
     assert np.isnan(found["RMSE_vel"])
     found = errors(np.zeros((3, 2)), np.array([[0, 1], [9, 9], [0, 2.0], [np.nan, 0]]))
     assert found["RMSE_vel"] == pytest.approx(np.sqrt((1 + 4) / 2))
-
-
-def test_distance_of_gaussians_by_matrix_roots() -> None:
-    r = np.random.default_rng(0)
-    a, b = (m @ m.transpose(0, 2, 1) for m in r.normal(size=(2, 50, 2, 2)))
-    p, q = r.normal(size=(2, 50, 2))
-    expected = []
-    for s1, s2, m1, m2 in zip(a, b, p, q, strict=True):
-        root = sqrtm(s1)
-        shape = np.trace(s1 + s2 - 2 * np.real(sqrtm(root @ s2 @ root)))
-        expected.append(np.sqrt(((m1 - m2) ** 2).sum() + shape))
-    assert gaussian_wasserstein(p, a, q, b) == pytest.approx(expected, abs=1e-9)
-    assert gaussian_wasserstein(p, a, p, a) == pytest.approx(np.zeros(50), abs=1e-6)
 
 
 def one_frame(x: np.ndarray, y: np.ndarray, cutoff: float) -> Pairs:

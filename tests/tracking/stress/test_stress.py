@@ -12,7 +12,7 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from tracking.environment.episode_cache import Source
 from tracking.stress.axes import AXES, parse_axes, parse_axis
-from tracking.stress.curves import NEVER, breaking_point, crossing, falling
+from tracking.stress.curves import NEVER, breaking_point, crossing
 from tracking.stress.episodes import Outcome, Store, Tasks
 from tracking.stress.sweep import Plan, Sweep
 from tracking.tuning.parallel_episodes import EpisodeTask
@@ -65,13 +65,6 @@ def test_no_break() -> None:
     point = breaking_point(WAY, np.ones((8, 9)), 0.5)
     assert point.at == point.low == point.high == NEVER
     assert breaking_point(WAY, np.zeros((8, 9)), 0.5).at == NEVER
-
-
-def test_overtaking() -> None:
-    first, second = scenes(0.4, 30, 1), np.full((30, 9), 0.7)
-    point = falling(WAY, first - second)
-    assert point.low < point.at < point.high
-    assert point.at == pytest.approx(np.interp(0.3, [0, 0.5], [0.2, 0.4]), abs=0.05)
 
 
 @pytest.mark.parametrize("text", ["nothing", "detection=1", "detection=a:b", "detection=1:1", "sensor.x=1:2:3"])

@@ -12,7 +12,7 @@ from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.link_rule import LinkRule
 from tracking.scoring import evaluate
 from tracking.tuning import grouping_episodes as episodes
-from tracking.tuning import tune
+from tracking.tuning.search import tune
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 
 from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import toy_plan
-from tracking.tuning.comparison import Candidate, Goal, TrialRecord
+from tracking.tuning.comparison import Candidate, TrialRecord
 from tracking.tuning.result import TuningResult
 
 DEFAULTS = {"reach": 0.1, "skip": 0, "colour": "red", "forbidden": 0.0}
@@ -41,12 +41,3 @@ def test_history_marks_a_trial_that_loses_by_far(found):
     assert {"played to the end", "pruned, estimated", "best so far", "defaults", "far worse"} <= set(shown)
     near = tuple(replace(t, values=(0.45,)) if t.pruned else t for t in found.trials)
     assert "far worse" not in words(replace(found, trials=near).plots()[".history.svg"])
-
-
-def test_front_is_drawn_for_two_goals(found):
-    made = replace(found.plan, goals=(Goal("HOTA"), Goal("GOSPA", False)))
-    configs = [found.default, ToyConfig(skip=1), ToyConfig(skip=2)]
-    points = [(0.5, 2.0), (0.7, 3.0), (0.4, 4.0)]
-    three = [Candidate(k, config, (), p) for k, (config, p) in enumerate(zip(configs, points, strict=True))]
-    two = replace(found, plan=made, candidates=tuple(three), front=tuple(three[:2]))
-    assert {"defaults", "trial 1", "trial 2", "Pareto front", "dominated"} <= set(words(two.plots()[".front.svg"]))

@@ -84,7 +84,7 @@ def test_settings_reach_the_scenes(tmp_path):
 WRONG_OPTIONS = [
     ({"trials": 0}, "--trials: got 0"), ({"prune": 1.0}, "--prune: got 1.0"), ({"finalists": 0}, "--finalists"),
     ({"seed": -1}, "--seed"), ({"only": ["reech"]}, "did you mean reach"),
-    ({"only": ["reach"], "set": ["reach=1"]}, "reach, which is set"), ({"only": ["steps"]}, "about pixels alone"),
+    ({"only": ["reach"], "set": ["reach=1"]}, "reach, which is set"), ({"only": ["steps"]}, "without effect"),
     ({"set": ["reach=99"]}, "from 0.05 to 5"), ({"detections": "image"}, "--detections"),
     ({"tracker": "tests/fake_tracker.py:Nearest"}, "a tracker with parameters"),
     ({"tracker": "blobb"}, "did you mean blob"), ({"suite": "crosing"}, "--suite.*crossing"),

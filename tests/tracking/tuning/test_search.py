@@ -15,9 +15,9 @@ from scenarios.errors import FlockscopeError, InputError
 from tests.processes import ROOT
 from tests.toy_tracker import Toy, ToyConfig
 from tests.tuning_toys import TOY, toy_plan, tune_arguments
-from tracking.tuning import tune
 from tracking.tuning.parallel_episodes import episode_player
 from tracking.tuning.sampler import AGAIN
+from tracking.tuning.search import tune
 from tracking.tuning.study import FINISHED, open_study, run_trials
 
 KILLED_AT = """
@@ -25,7 +25,7 @@ import os, signal, sys
 from pathlib import Path
 import tracking.tuning.parallel_episodes as work
 from tests.tuning_toys import toy_plan, tune_arguments
-from tracking.tuning import tune
+from tracking.tuning.search import tune
 played, attempt = 0, work._attempt
 def counted(*given):
     global played
@@ -159,7 +159,6 @@ def test_several_goals_give_a_front(tmp_path):
     found = tune(**given, out=tmp_path / "toy.toml")
     assert found.front
     assert found.pruned == 0
-    assert (tmp_path / "toy.front.svg").is_file()
     assert found.config == found.front[0].config
     assert ToyConfig.from_toml(tmp_path / "toy.front-1.toml").as_dict() == found.config.as_dict()
     for k, one in enumerate(found.front, 1):

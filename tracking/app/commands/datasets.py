@@ -19,7 +19,7 @@ from tracking.app.progress import ProgressMeter
 def generate(options: GenerateOptions) -> CommandResult:
     """Stores one sequence for every named scenario or suite entry and every seed, all seeds of an entry together."""
     from sim.dataset.generate import generate as make
-    from sim.workers.start import WorkerOptions
+    from sim.workers.pool import WorkerOptions
 
     option_parsing.output_folder(options.out)
     seeds = option_parsing.seeds(options.seeds)
@@ -59,7 +59,7 @@ def export_coco(options: CocoOptions) -> CommandResult:
     from sim.io.export.coco import coco
 
     out = option_parsing.output_file(options.out, ".json")
-    paths = coco(options.folder, out, options.min_visibility, person_class=options.person_class)
+    paths = coco(options.folder, out, person_class=options.person_class)
     root = options.folder if options.folder.is_dir() else options.folder.parent
     text = "\n".join([*map(str, paths), f"file names are relative to {root}"])
     return CommandResult({"file": paths[0] if len(paths) == 1 else None, "files": paths, "root": root}, text)
@@ -80,7 +80,7 @@ def export_webdataset(options: WebdatasetOptions) -> CommandResult:
     out = option_parsing.output_folder(options.out)
     size = size_of(options.shard_size)
     with ProgressMeter("export") as meter:
-        index = webdataset(options.folder, out, shard_size=size, samples=options.samples, progress=meter.update)
+        index = webdataset(options.folder, out, shard_size=size, progress=meter.update)
     shards = index["shards"]
     count, total = sum(len(s["sequences"]) for s in shards), sum(s["bytes"] for s in shards)
     packed = f"{counted(count, 'sequence')} in {counted(len(shards), 'shard')}"

@@ -9,7 +9,8 @@ import math
 import os
 import re
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from html import escape
 from itertools import zip_longest
@@ -17,7 +18,7 @@ from pathlib import Path
 
 from scenarios.errors import printable
 from sim.io.files.own_files import GENERATOR, output_path
-from sim.types import DetectionMode, Sequence
+from sim.types import Array, DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
@@ -188,7 +189,7 @@ QUICK_SCENES, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
 QUICK_TRACKERS = ("blob", "group-pda")  # one that reports people, one that reports groups
 PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)  # The scene that is rendered and tracked from its pictures.
 
-QUICK_PIXEL_SETTINGS = ("camera.fps=5",)  # What --quick changes in that scene.
+QUICK_PIXEL_SETTINGS = ("camera.fps=5", "camera.image=[480,360]")  # What --quick changes in that scene.
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,33 +207,34 @@ def demo(options: DemoOptions) -> CommandResult:
     from sim.io.files.atomic import write_file
     from sim.io.files.own_files import refuse_foreign_file
     from sim.io.source import open_source
-    from sim.workers.start import WorkerOptions
+    from sim.workers.pool import WorkerOptions
 
     start, out, quick = time.monotonic(), options.out, options.quick
     refuse_foreign_file(option_parsing.output_folder(out) / "index.html")
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
-    workers = os.cpu_count() or 1
-    with ProgressMeter("generate") as meter:
-        count = WorkerOptions(1 if quick else workers)
-        folders = generate(names, seeds, out / "data", workers=count, progress=meter.update, streams=())
-        settings = QUICK_PIXEL_SETTINGS if quick else ()
-        (rendered,) = generate(
-            [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
-        )  # fmt: skip
-    sequences = [open_source(folder)[0] for folder in folders]
-    trackers = QUICK_TRACKERS if quick else tracker_registry.names()
-    of_pixels = QUICK_TRACKERS[:1] if quick else [n for n in trackers if "pixels" in tracker_registry.find(n).needs]
-    image_jobs = [
-        _TrackJob(name, "image", [rendered], out / "tracks" / f"{name}-image", _pictures(out) / f"{name}.mp4")
-        for name in of_pixels
-    ]
-    half = len(trackers) // 2
-    file_jobs = [
-        _TrackJob(name, "file", folders, out / "tracks" / name) for name in (*trackers[half:], *trackers[:half])
-    ]
-    # Neighbours are of different trackers: two that run at once need not compile the same.
-    jobs = [job for two in zip_longest(image_jobs, file_jobs) for job in two if job is not None]
-    runs = _run(jobs, workers)
+    workers = 1 if quick else os.cpu_count() or 1
+    with _compiled_ahead() if quick else nullcontext(_tracked) as tracked:
+        with ProgressMeter("generate") as meter:
+            count = WorkerOptions(workers)
+            folders = generate(names, seeds, out / "data", workers=count, progress=meter.update, streams=())
+            settings = QUICK_PIXEL_SETTINGS if quick else ()
+            (rendered,) = generate(
+                [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
+            )  # fmt: skip
+        sequences = [open_source(folder)[0] for folder in folders]
+        trackers = QUICK_TRACKERS if quick else tracker_registry.names()
+        of_pixels = QUICK_TRACKERS[:1] if quick else [n for n in trackers if "pixels" in tracker_registry.find(n).needs]
+        image_jobs = [
+            _TrackJob(name, "image", [rendered], out / "tracks" / f"{name}-image", _pictures(out) / f"{name}.mp4")
+            for name in of_pixels
+        ]
+        half = len(trackers) // 2
+        file_jobs = [
+            _TrackJob(name, "file", folders, out / "tracks" / name) for name in (*trackers[half:], *trackers[:half])
+        ]
+        # Neighbours are of different trackers: two that run at once need not compile the same.
+        jobs = [job for two in zip_longest(image_jobs, file_jobs) for job in two if job is not None]
+        runs = _run(jobs, workers, tracked)
     from_points, from_pixels = (
         {j.tracker: runs[j] for j in jobs if j.detections == mode} for mode in ("file", "image")
     )
@@ -251,12 +253,80 @@ def demo(options: DemoOptions) -> CommandResult:
     return CommandResult({"sequences": len(sequences), "scores": data, "page": page}, "\n".join(text))
 
 
-def _run(jobs: list[_TrackJob], workers: int) -> dict[_TrackJob, list[TrackingRun]]:
-    from sim.workers.start import results_in_order, start_workers
+@contextmanager
+def _compiled_ahead() -> Iterator[Callable[[_TrackJob], list[TrackingRun]]]:
+    """Compiles the kernels of QUICK_TRACKERS in another process; yields `_tracked`, which waits for those that it
+    needs."""
+    from sim.workers.pool import WorkerProcess
+
+    worker = WorkerProcess()
+    # With one processor it would only take longer: the process imports everything again.
+    compiling = list(QUICK_TRACKERS) if (os.cpu_count() or 1) > 1 else []
+
+    def tracked(job: _TrackJob) -> list[TrackingRun]:
+        while job.tracker in compiling:
+            del compiling[0]
+            worker.receive()
+        return _tracked(job)
+
+    try:
+        for tracker in compiling:
+            worker.send(_compile, tracker)
+        yield tracked
+    finally:
+        worker.terminate()
+        worker.join()
+
+
+def _compile(tracker: str) -> None:
+    pixels = "pixels" in tracker_registry.find(tracker).needs
+    TrackerSetup(tracker, detections="image" if pixels else "file").run(_made_up_people())
+
+
+def _made_up_people() -> Sequence:
+    """Returns pictures and points of two people side by side and one apart, all that a tracker needs to call its
+    kernels, with the types of simulated sequences."""
+    import numpy as np
+
+    from sim.scene.camera import camera_rotation, project, px_per_m_at_centre
+    from sim.types import Camera, Detections, Frame, Image
+
+    wide, high, fps = 320, 240, 5.0
+    position, rotation = np.array([0.0, -10.0, 6.0]), camera_rotation(0.6, 0.0)
+    camera = Camera("pinhole", (wide, high), (250.0, 250.0), (wide / 2, high / 2), position, rotation)
+    r = np.random.default_rng(0)
+    ground = r.integers(90, 170, (high, wide, 1))
+    walks = [np.array([[x - 3.0, 0.0], [x - 2.75, 0.0], [3.0 - x, 2.0]]) for x in np.linspace(0.0, 5.0, 16)]
+
+    def picture(people: Iterable[Array] = ()) -> Image:
+        image = ground + r.normal(0.0, 2.0, (high, wide, 3))
+        for x, y in people:
+            (u, foot), (_, head) = project(camera, np.array([[x, y, 0.0], [x, y, 1.75]]))[0]
+            half = 0.13 * (foot - head)
+            image[int(head) : int(foot), int(u - half) : int(u + half)] = 20, 20, 150
+        made: Image = image.clip(0, 255).astype(np.uint8)
+        made.setflags(write=False)
+        return made
+
+    def frames() -> Iterator[Frame]:
+        for k, pos in enumerate(walks):
+            yield Frame(k + 1, k / fps, picture(pos), None, Detections(k + 1, k / fps, "ground", pos))
+
+    return Sequence(
+        "made-up", fps, len(walks), frames, image_size=camera.image, camera=camera, has_images=True,
+        has_detections=True, px_per_m=px_per_m_at_centre(camera),
+        load_background=lambda: np.stack([picture() for _ in range(12)]),
+    )  # fmt: skip
+
+
+def _run(
+    jobs: list[_TrackJob], workers: int, tracked: Callable[[_TrackJob], list[TrackingRun]]
+) -> dict[_TrackJob, list[TrackingRun]]:
+    from sim.workers.pool import results_in_order, start_workers
 
     runs = {}
     with ProgressMeter("track", len(jobs)) as meter, start_workers(workers) as run:
-        for job, found in zip(jobs, results_in_order(run, _tracked, jobs), strict=True):
+        for job, found in zip(jobs, results_in_order(run, tracked, jobs), strict=True):
             runs[job] = found
             meter.step(f"{job.tracker}{' from pixels' if job.overlay else ''}")
     return runs

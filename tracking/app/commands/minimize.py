@@ -43,7 +43,7 @@ class Scene:
 
 def minimize(options: MinimizeOptions) -> CommandResult:
     """Searches the smallest scene, writes it as a scenario file and a replay page, and returns what was removed."""
-    from sim.workers.start import results_in_order, start_workers
+    from sim.workers.pool import results_in_order, start_workers
 
     failure = parse_failure(options.condition)
     out = option_parsing.output_file(options.out, ".toml")

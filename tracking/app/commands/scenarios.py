@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.loading.resolve import Entry, dump, find_suite, load, names, read_suite, resolve, suite_file, suite_names
+from scenarios.loading.resolve import Entry, dump, load, names, read_suite, resolve, suite_file, suite_names
+from scenarios.loading.toml_files import SUITES
 from scenarios.schema.scenario import Scenario
 from tracking.app.command_options import ScenariosOptions
 from tracking.app.command_result import CommandResult
@@ -34,7 +35,7 @@ def scenarios(options: ScenariosOptions) -> CommandResult:
 def catalogue() -> CommandResult:
     """Returns every scenario and suite of the catalogue with its line of description, sorted by name."""
     scenarios = {name: load(name).about for name in names()}
-    suites = {name: read_suite(find_suite(name)).about for name in suite_names()}
+    suites = {name: read_suite(SUITES / f"{name}.toml").about for name in suite_names()}
     text = ["Scenarios", *_rows(scenarios), "", "Suites", *_rows(suites)]
     return CommandResult({"scenarios": scenarios, "suites": suites}, "\n".join(text))
 

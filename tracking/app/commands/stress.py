@@ -1,4 +1,4 @@
-"""`flockscope stress`: trackers on scenes that get harder; where each breaks, who overtakes whom, and worst scenes."""
+"""`flockscope stress`: trackers on scenes that get harder; where each breaks, and worst scenes."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def _data(sweep: Sweep, found: list[Failure] | None) -> dict[str, Any]:
         "axes": [{"name": axis.name, "easy": axis.easy, "hard": axis.hard} for axis in plan.axes],
         "values": sweep.values, "by": plan.by, "share": plan.share, "scenarios": list(plan.scenarios),
         "seeds": sweep.seeds, "episodes": sum(row["tracker"] != ORACLE for row in rows),
-        "curves": {}, "by_scenario": None, "matrix": None, "overtakings": [], "found": None,
+        "curves": {}, "by_scenario": None, "matrix": None, "found": None,
         "failures": [row for row in rows if row["failed"]],
         "left_out": [row for row in rows if row["left_out"] and row["tracker"] == ORACLE],
     }  # fmt: skip
@@ -105,8 +105,6 @@ def _data(sweep: Sweep, found: list[Failure] | None) -> dict[str, Any]:
     elif len(plan.axes) == 1:
         for name, point in sweep.breaks().items():
             data["curves"][name]["break"] = _on_axis(plan, point)
-        pairs = sweep.overtakings()
-        data["overtakings"] = [{"first": a, "second": b, **_on_axis(plan, point)} for a, b, point in pairs]
     else:
         first, second = ([*dict.fromkeys(values[k] for values in sweep.values)] for k in range(MOST_AXES))
         means = {name: np.reshape(curve["mean"], (len(first), -1)).tolist() for name, curve in data["curves"].items()}
@@ -196,13 +194,11 @@ def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
 
 
 def _break_lines(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
-    """Yields words on the breaking points and overtakings of a sweep along one axis."""
+    """Yields words on the breaking points of a sweep along one axis."""
     if len(sweep.plan.axes) != 1 or data["found"] is not None:
         return
     for name in sweep.trackers:
         yield f"{printable(name)} {_break_words(data['curves'][name]['break'], sweep.plan.share)}"
-    for o in data["overtakings"]:
-        yield f"{printable(o['first'])} falls behind {printable(o['second'])} at {_span(o)}"
 
 
 def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:

@@ -51,8 +51,8 @@ CommandLine.__doc__ = "Search a tracker's parameters on simulated scenes; measur
 
 def tune(options: Any) -> CommandResult:
     """Searches parameters as `tracking.tune` does, and returns what was gained."""
-    from tracking.tuning import tune as search
     from tracking.tuning.result import short
+    from tracking.tuning.search import tune as search
 
     given = {f.name: getattr(options, f.name) for f in fields(options)}
     sensor = option_parsing.sensor_settings(given.pop("sensor"))

@@ -17,28 +17,29 @@ from sim.io.pictures.video_files import write_video
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app.replay_page.video import even_size, refuse_source
 from tracking.drawing.canvas import Canvas
-from tracking.drawing.layer_painting import LayerStyle, draw_banner, draw_captions, draw_label, letter_size, paint_layer
+from tracking.drawing.layer_painting import LayerStyle, draw_banner, draw_captions, letter_size, paint_layer
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.running.run import grouped
 
-TruthPlacement = Literal["beside", "over", "only"]
-Panel = list[tuple[Layer, LayerStyle]]  # The layers that are drawn over one copy of the picture, the lowest first.
+Layers = list[tuple[Layer, LayerStyle]]  # What is drawn over the picture, the lowest first.
 
 LOW = 400  # px: pictures less high than this are shown at twice their size.
 
 BANNER_HEIGHT = 32
 GREY = (128, 128, 128)
-PANEL_NAME_COLOUR = (60, 51, 45)
 
 
 def write_overlay(
     sequence: Sequence,
     tracks: SequenceOf[Tracks] | None,
     out: str | Path,
-    truth: TruthPlacement | None = None,
+    truth: Literal["over"] | None = None,
     step: Callable[[str], None] = lambda _: None,
 ) -> Path:
-    """Writes the MP4 and returns its path. The file is complete, or is not written at all."""
+    """Writes the MP4, complete or not at all, and returns its path.
+
+    truth: "over" draws it, too; without tracks it is drawn alone.
+    """
     if not sequence.has_images:
         raise InputError(
             file=sequence.name, got="a sequence without pictures", expected="one with pictures",
@@ -46,31 +47,27 @@ def write_overlay(
         )  # fmt: skip
     path = Path(out)
     refuse_source(sequence, path)
-    panels = _panels(sequence, tracks, truth)
+    layers = _layers(sequence, tracks, truth is not None)
     with new_file(path) as partial:
-        _write(partial, sequence, panels, step)
+        _write(partial, sequence, layers, step)
     return path
 
 
-def _panels(sequence: Sequence, tracks: SequenceOf[Tracks] | None, placement: TruthPlacement | None) -> list[Panel]:
-    if tracks is None or placement is not None:
+def _layers(sequence: Sequence, tracks: SequenceOf[Tracks] | None, with_truth: bool) -> Layers:
+    layers = Layers()
+    if tracks is None or with_truth:
         if sequence.truth is None:
             got = "a sequence without labels" if tracks is not None else "neither tracks nor labels"
             remedy = "leave --truth out" if tracks is not None else "give what `flockscope track` wrote"
             raise InputError(file=sequence.name, got=got, expected="something to draw", remedy=remedy)
-        true = layer_of_truth(sequence.truth)
-    if tracks is None or placement == "only":
-        return [[(true, LayerStyle())]]
-    tracked = layer_of_tracks(grouped(tracks, sequence), sequence.camera, sequence.scene)
-    if placement == "beside":
-        return [[(true, LayerStyle())], [(tracked, LayerStyle())]]
-    if placement == "over":
-        return [[(true, LayerStyle(plain=True)), (tracked, LayerStyle())]]
-    return [[(tracked, LayerStyle())]]
+        layers.append((layer_of_truth(sequence.truth), LayerStyle(plain=tracks is not None)))
+    if tracks is not None:
+        layers.append((layer_of_tracks(grouped(tracks, sequence), sequence.camera, sequence.scene), LayerStyle()))
+    return layers
 
 
-def _write(path: Path, sequence: Sequence, panels: list[Panel], step: Callable[[str], None]) -> None:
-    pictures = overlay_pictures(sequence, panels)
+def _write(path: Path, sequence: Sequence, layers: Layers, step: Callable[[str], None]) -> None:
+    pictures = overlay_pictures(sequence, layers)
     first = next(pictures, None)
     if first is None:
         raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
@@ -82,39 +79,35 @@ def _write(path: Path, sequence: Sequence, panels: list[Panel], step: Callable[[
             step(sequence.name)
 
 
-def overlay_pictures(sequence: Sequence, panels: list[Panel]) -> Iterator[Image]:
+def overlay_pictures(sequence: Sequence, layers: Layers) -> Iterator[Image]:
     """Yields the video's pictures, BGR uint8, one per frame, of even width and height."""
     last: Image | None = None
     for frame in sequence:
         if frame.image is not None:
             last = frame.image
-        drawn = [_draw_panel(last, sequence, frame.index, panel) for panel in panels]
-        if len(drawn) > 1:
-            for image, panel in zip(drawn, panels, strict=True):
-                draw_label(image, panel[0][0].name, (image.shape[1] / 2 - 30, 30), 0.7, PANEL_NAME_COLOUR)
-        body = np.concatenate(drawn, axis=1)
+        body = _drawn(last, sequence, frame.index, layers)
         banner = np.zeros((BANNER_HEIGHT, body.shape[1], 3), np.uint8)
-        draw_banner(banner, banner_words(sequence, frame, panels), _warnings(sequence, frame), 0.55)
+        draw_banner(banner, banner_words(sequence, frame, layers), _warnings(sequence, frame), 0.55)
         yield even_size(np.concatenate([banner, body]))
 
 
-def _draw_panel(picture: Image | None, sequence: Sequence, index: int, panel: Panel) -> Image:
+def _drawn(picture: Image | None, sequence: Sequence, index: int, layers: Layers) -> Image:
     assert sequence.image_size is not None, "pictures have a size"
     width, height = sequence.image_size
     shown = np.full((height, width, 3), GREY, np.uint8) if picture is None else picture
     factor = 2 if height < LOW else 1
     image = np.array(cv2.resize(shown, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR), np.uint8)
     canvas = Canvas(image, factor, np.zeros(2), np.array([width, height], float), upwards=False)
-    for layer, style in panel:
+    for layer, style in layers:
         paint_layer(canvas, layer, index, sequence.fps, style)
-    draw_captions(image, panel[-1][0], index, sequence.fps, letter_size(canvas))
+    draw_captions(image, layers[-1][0], index, sequence.fps, letter_size(canvas))
     return image
 
 
-def banner_words(sequence: Sequence, frame: Frame, panels: list[Panel]) -> str:
+def banner_words(sequence: Sequence, frame: Frame, layers: Layers) -> str:
     """Returns the banner's text: sequence, frame, time in s, and how many people or groups each layer has."""
     of = "" if sequence.length is None else f" of {sequence.length}"
-    marks = {layer.name: layer.at(frame.index) for panel in panels for layer, _ in panel}
+    marks = {layer.name: layer.at(frame.index) for layer, _ in layers}
     count = "".join(f"   {name} {len(m.id)}{' groups' * m.whole_groups}" for name, m in marks.items())
     return f"{sequence.name}   frame {frame.index}{of}   {frame.t:.2f} s{count}"
 

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from collections.abc import Sequence as SequenceOf
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
 
 
-@dataclass(frozen=True)
-class Bar:
+class Bar(NamedTuple):
     """One unbroken life of a group id, a bar of the timeline."""
 
     id: int
@@ -31,8 +30,7 @@ class Bar:
     size: int  # most people in one of its frames, rounded
 
 
-@dataclass(frozen=True)
-class Link:
+class Link(NamedTuple):
     """Group `a` becomes or joins group `b`, a link between their bars; both are ids."""
 
     frame: int  # when a tracker reported it; of truth the event's first frame
@@ -196,8 +194,8 @@ def encode_rows(rows: PageRows, events: Iterable[GroupEvent]) -> Json:
         "vis": run_lengths(np.nan_to_num(rows.visibility[order] * 10, nan=10).round().astype(np.int64)),
         "wholes": None if rows.groups is None else encode_groups(rows.groups, order, rows.plane, scale),
         "events": [_event(e) for e in events if e.start >= 1],
-        "bars": [list(asdict(bar).values()) for bar in _bars(rows)],
-        "links": [list(asdict(link).values()) for link in links(events)],
+        "bars": _bars(rows),
+        "links": links(events),
     }
 
 

@@ -13,7 +13,7 @@ from bokeh.models.annotations import Legend, Whisker
 from bokeh.plotting import figure
 from bokeh.resources import Resources
 
-from tracking.app.report.content import CauseBar, Curves, Json, RankedRow, Report, Speed
+from tracking.app.report.content import CauseBar, Curves, Json, RankedRow, Report
 
 # Their contrast to both backgrounds is 3 : 1 or more.
 COLOURS = ("#2f81d8", "#d9730d", "#1a9e6c", "#c2478f", "#8a63d2", "#a08000", "#d6453d", "#3d8ea3", "#6b7a2f", "#8b6f5c")
@@ -36,8 +36,6 @@ def charts(report: Report) -> Json:
         found[f"chart-curves-{k}"] = _curves(curves, report.by)
     if report.causes:
         found["chart-causes"] = _causes(report.causes)
-    if report.speeds:
-        found["chart-speed"] = _speed(report.speeds, report.by)
     return {name: json_item(model, ID(name)) for name, model in found.items()}
 
 
@@ -148,22 +146,3 @@ def _causes(bars: SequenceOf[CauseBar]) -> Any:
 
 def _sum(bars: SequenceOf[CauseBar], kind: tuple[str, str]) -> float:
     return sum(sum(bar.gains.values()) for bar in bars if (bar.kind, bar.cause) == kind)
-
-
-def _speed(speeds: SequenceOf[Speed], by: str) -> Any:
-    ends = _range([value for one in speeds for value in (one.low, one.score, one.high)])
-    rates = [one.frames_per_second for one in speeds]
-    plot = _figure(
-        340, x_axis_type="log", x_range=(min(rates) / 1.5, max(rates) * 2), y_range=ends,
-        x_axis_label="frames per second, of the tracker alone", y_axis_label=by,
-    )  # fmt: skip
-    for k, one in enumerate(sorted(speeds, key=lambda one: one.name)):
-        low, high = _or(one.low, one.score), _or(one.high, one.score)
-        data = {"x": [one.frames_per_second], "y": [one.score], "low": [low], "high": [high], "name": [one.name]}
-        source = ColumnDataSource(data)
-        plot.add_layout(Whisker(base="x", lower="low", upper="high", source=source))
-        dots = plot.scatter("x", "y", size=12, color=colour(k), source=source)
-        plot.text("x", "y", text="name", x_offset=9, y_offset=-6, text_font_size="12px", source=source)
-        tips = [("", "@name"), ("frames per second", "@x{0}"), (by, "@y{0.000}")]
-        plot.add_tools(HoverTool(renderers=[dots], tooltips=tips))
-    return plot

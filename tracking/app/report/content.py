@@ -65,7 +65,7 @@ class Curves:
     about: str
     values: SequenceOf[float]
     curves: SequenceOf[Curve]
-    words: SequenceOf[str]  # breaking points and overtakings in words
+    words: SequenceOf[str]  # breaking points in words
 
 
 @dataclass(frozen=True)
@@ -78,17 +78,6 @@ class CauseBar:
     errors: int
     seconds: float
     gains: Mapping[str, float]  # HOTA, group_F1
-
-
-@dataclass(frozen=True)
-class Speed:
-    """Frames per second of a tracker, beside its score."""
-
-    name: str
-    frames_per_second: float
-    score: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -131,7 +120,6 @@ class Report:
     matrices: SequenceOf[HeatMap] = ()
     causes: SequenceOf[CauseBar] = ()
     causes_about: str = ""
-    speeds: SequenceOf[Speed] = ()
     moments: SequenceOf[Moment] = ()
     failures: SequenceOf[Failure] = ()
     sequences: SequenceOf[tuple[str, str, float]] = ()  # name, address of its page, score: worst first

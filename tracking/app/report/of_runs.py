@@ -15,7 +15,7 @@ from tracking.app.commands.score_ranking import RankedRuns, rank_words, ranked_r
 from tracking.app.commands.score_tables import SIMILARITY
 from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, read_runs, score_runs
 from tracking.app.replay_page.page import Run
-from tracking.app.report.content import HeatCell, HeatMap, RankedRow, Report, Speed
+from tracking.app.report.content import HeatCell, HeatMap, RankedRow, Report
 from tracking.app.report.moments import COSTS, Candidate, cause_bars, moments, shown_errors
 from tracking.app.sequence_workers import OpenedAs, results_over_sequences
 from tracking.errors.found import RunErrors
@@ -67,7 +67,7 @@ def report_of_runs(
         heat=_heat(ranked) if len(ranked.scenarios) > 1 else None,
         causes=cause_bars([(name, one.errors[k]) for k, name in enumerate(c.runs) for one in found]),
         causes_about="What the repair of the errors of one kind and cause adds, mean over the sequences.",
-        speeds=list(_speeds(ranked, found)), moments=moments(candidates, replayed),
+        moments=moments(candidates, replayed),
         sequences=[
             (one.sequence, files[one.sequence], one.score)
             for one in sorted(candidates, key=lambda one: one.score) if one.sequence in files
@@ -125,12 +125,3 @@ def _candidates(ranked: RankedRuns) -> Iterator[Candidate]:
             rival = max(known, key=known.__getitem__, default="")
             if math.isfinite(score):
                 yield Candidate(name, scenario[k], sequence, float(score), _best(ranked, name, k), rival)
-
-
-def _speeds(ranked: RankedRuns, found: SequenceOf[JudgedRuns]) -> Iterator[Speed]:
-    rows = {row["run"]: row for row in ranked.table}
-    for r, name in enumerate(ranked.comparison.runs):
-        speeds = [speed for one in found if (speed := one.scored.infos[r].get("frames_per_second"))]
-        if speeds:
-            row = rows[name]
-            yield Speed(name, float(len(speeds) / np.sum(1 / np.array(speeds))), row["mean"], row["low"], row["high"])

@@ -13,7 +13,7 @@ from scenarios.loading.resolve import rows
 from sim.types import Array, Sequence
 from tracking.app.commands.score_ranking import rank_words
 from tracking.app.replay_page.page import Run
-from tracking.app.report.content import Curve, Curves, Failure, HeatCell, HeatMap, Json, RankedRow, Report, Speed
+from tracking.app.report.content import Curve, Curves, Failure, HeatCell, HeatMap, Json, RankedRow, Report
 from tracking.app.report.moments import COSTS, Candidate, cause_bars, moments, shown_errors
 from tracking.environment.episodes import streams_for
 from tracking.errors.found import RunErrors
@@ -31,7 +31,7 @@ CAUSES = "What the repair of the errors of one kind and cause adds, mean over th
 def report_of_sweep(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Report:
     """Returns the report on a sweep.
 
-    data: as stress.json has it; words: on breaking points and overtakings.
+    data: as stress.json has it; words: on breaking points.
     """
     plan, searched = sweep.plan, data["found"] is not None
     scenes = [*sweep.scenes.values()]
@@ -44,7 +44,7 @@ def report_of_sweep(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Report:
         ranking=[] if searched else list(_ranking(sweep, easy)), ranking_words=_ranking_words(sweep, easy),
         heat=_scenarios(sweep, easy), curves=_curves(sweep, data, words), matrices=list(_matrices(sweep, data)),
         causes=cause_bars(errors), causes_about=CAUSES,
-        speeds=list(_speeds(sweep, easy)), moments=shown,
+        moments=shown,
         failures=[Failure(row["tracker"], _scene(row), row["failed"], row["traceback"]) for row in data["failures"]],
     )  # fmt: skip
 
@@ -128,15 +128,6 @@ def _matrices(sweep: Sweep, data: Json) -> Iterator[HeatMap]:
     for name in sweep.trackers:
         cells = {f"{rows} {a:g}": [_cell(sweep, name, of[a, b]) for b in second] for a in first}
         yield HeatMap(name, tuple(f"{columns} {b:g}" for b in second), cells)
-
-
-def _speeds(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[Speed]:
-    for name in sweep.trackers:
-        rows = [row for scene in scenes if (row := sweep.row(name, scene)) is not None and row["seconds"] > 0]
-        if rows:
-            rate = sum(row["frames"] for row in rows) / sum(row["seconds"] for row in rows)
-            mean, low, high = (float(end[0]) for end in mean_interval(_values(sweep, name, scenes)[:, None]))
-            yield Speed(name, rate, mean, low, high)
 
 
 def _candidates(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[tuple[Candidate, Scene]]:

@@ -21,9 +21,8 @@ HERE = Path(__file__).parent
 KEYS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")  # scores beside the one that ranks
 PARTS = {
     "ranking": "Ranking", "heat": "Scenes", "curves": "Curves", "matrices": "Matrices", "moments": "Worst moments",
-    "causes": "Causes", "speeds": "Speed", "sequences": "Sequences", "failures": "Failures",
+    "causes": "Causes", "sequences": "Sequences", "failures": "Failures",
 }  # fmt: skip
-IDS = {"heat": "scenes", "speeds": "speed"}  # of the elements, where they differ
 
 
 def check_packages() -> None:
@@ -49,7 +48,7 @@ def report_html(report: Report) -> str:
 
     from tracking.app.report.charts import cause_parts, charts, scripts
 
-    drawn = [(IDS.get(name, name), word) for name, word in PARTS.items() if getattr(report, name)]
+    drawn = [("scenes" if name == "heat" else name, word) for name, word in PARTS.items() if getattr(report, name)]
     keys = [key for key in KEYS if key != report.by and any(_known(row.scores, key) for row in report.ranking)]
     replay = page_html("Replay", "@@DATA@@").replace("</script", "<\\/script")
     found = _environment().get_template("report.html").render(

@@ -15,7 +15,7 @@ from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
 from tracking.papers.joint.division_kernels import divide
-from tracking.papers.joint.partition_kernels import clusters, same_row
+from tracking.papers.joint.partition_kernels import clusters, nearest_place, same_row
 
 X, Y, VX, VY, XX, XY, YY, SPREAD, SIZE = range(9)
 """Columns of moments (G, 9): mean place and velocity, covariance of the places shrunk to PRIOR, mean squared distance
@@ -37,20 +37,23 @@ ORDER, EVENT, PARTS = range(3)
 
 @njit(cache=True)
 def nearest_places(places: Array, count: int, nearest: Ints) -> None:
-    """Writes the nearest other one of `count` places to each, of equal ones the first; -1 without."""
+    """Writes the nearest other one of the first `count` places (K, 2 or more) to each, of equal ones the first; -1
+    without."""
+    x, order, alive = np.empty(count), np.empty(count, np.int64), np.empty(count, np.bool_)
     for k in range(count):
-        nearest[k], least = -1, np.inf
-        for other in range(count):
-            far = (places[other, 0] - places[k, 0]) ** 2 + (places[other, 1] - places[k, 1]) ** 2
-            if other != k and far < least:
-                nearest[k], least = other, far
+        x[k], order[k], alive[k] = places[k, 0], k, True
+    sort_by(x, order)
+    for at in range(count):
+        nearest[order[at]] = nearest_place(places, alive, order, at)
 
 
 @njit(cache=True)
 def moments_of(state: Array, cluster: Ints, count: int, out: Array) -> None:
     """Writes the moments (G, 9) of the clusters of people: state (K, 4), cluster (K,), count G."""
     n = len(cluster)
-    out[:count] = 0.0
+    for g in range(count):
+        for c in range(SIZE + 1):
+            out[g, c] = 0.0
     for k in range(n):
         g = cluster[k]
         out[g, SIZE] += 1

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from sim.compiler import njit
-from sim.types import Array, Ints
+from sim.types import Array, Bools, Ints
 
 SCATTER, APART = range(2)
 """Slots of `scales` (2,): prior scatter s_0, virtual distance D_0; m."""
@@ -72,6 +72,27 @@ def clusters(label: Ints, cluster: Ints, head: Ints) -> int:
         else:
             cluster[k] = cluster[label[k] - 1]
     return count
+
+
+@njit(cache=True)
+def nearest_place(places: Array, alive: Bools, order: Ints, at: int) -> int:
+    """Returns the nearest other place to that of order[at], of equally near ones the first; -1 without.
+
+    places (K, 2 or more): x, y; only those with `alive` (K,) count; order (G,): places sorted by x.
+    """
+    own, best, least = order[at], -1, np.inf
+    for step in (-1, 1):
+        n = at + step
+        while 0 <= n < len(order):
+            other = order[n]
+            x, y = places[other, 0] - places[own, 0], places[other, 1] - places[own, 1]
+            if x * x > least:  # so are all beyond
+                break
+            far = x * x + y * y
+            if alive[other] and (far < least or (far == least and other < best)):
+                best, least = other, far
+            n += step
+    return best
 
 
 @njit(cache=True)
@@ -147,26 +168,27 @@ def validities(points: Array, label: Ints, scales: Array, out: Array) -> None:
 
 
 @njit(cache=True)
-def _pair_sum(worth, label):  # type: ignore[no-untyped-def]
-    total = 0.0
-    for k in range(len(label)):
-        if label[k] > 0:
-            for other in range(label[k] - 1, k):  # from the group's least member on
-                if label[other] == label[k]:
-                    total += worth[k, other]
-    return total
-
-
-@njit(cache=True)
 def pair_sums(worth: Array, label: Ints, out: Array) -> None:
     """Writes the sum of worth (K, K) over the pairs in one group of each partition, (N_x, N_z); label (N_x, N_z, K)."""
-    particles, partitions, _ = label.shape
+    particles, partitions, n = label.shape
+    following, last = np.empty(n, np.int64), np.empty(n, np.int64)  # next member of a group; last one so far, by head
     for i in range(particles):
         for j in range(partitions):
             if j > 0 and same_row(label[i, j], label[i, j - 1]):
                 out[i, j] = out[i, j - 1]
                 continue
-            out[i, j] = _pair_sum(worth, label[i, j])
+            total = 0.0
+            for k in range(n):
+                if label[i, j, k] > 0:
+                    head = label[i, j, k] - 1
+                    if k > head:
+                        following[last[head]] = k
+                    last[head] = k
+                    other = head
+                    while other != k:
+                        total += worth[k, other]
+                        other = following[other]
+            out[i, j] = total
 
 
 @njit(cache=True)
@@ -189,10 +211,9 @@ def uniform_partitions(cumulated: Array, uniforms: Array, label: Ints) -> None:
 
 @njit(cache=True)
 def head_votes(label: Ints, weights: Array, out: Array) -> None:
-    """Writes the weighted histogram of Fig. 3 summed over i, (K, K): weight of partitions in which k's cluster has head
-    g. A person alone is the head of the own cluster (ours: nobody votes for group 0)."""
+    """Adds the weighted histogram of Fig. 3 summed over i to `out`, (K, K): weight of partitions in which k has the
+    cluster of head g. A person alone is the head of the own cluster (ours: nobody votes for group 0)."""
     particles, partitions, n = label.shape
-    out[:] = 0.0
     for i in range(particles):
         for j in range(partitions):
             for k in range(n):

@@ -31,7 +31,7 @@ def moments(state: Array, weights: Array) -> tuple[Array, Array]:
 
 def histogram_partition(label: Ints, weights: Array) -> list[Ints]:
     """Returns the groups of two or more people by the histogram of Fig. 3: each person has the label of most weight."""
-    votes = np.empty((label.shape[2], label.shape[2]))
+    votes = np.zeros((label.shape[2], label.shape[2]))
     partition_kernels.head_votes(label, weights, votes)
     return groups_of(votes.argmax(axis=1))
 

@@ -14,10 +14,10 @@ import math
 import numpy as np
 
 from sim.compiler import njit
-from sim.types import Array, Ints
+from sim.types import Array
 
 EXACT_BITS = 12
-"""Largest number of columns of an exact sum; above it sums are propagated."""
+"""Largest number of rows or columns, whichever is less, of an exact sum; above it sums are propagated."""
 SWEEPS = 200
 """Most sweeps of belief propagation."""
 CONVERGED = 1e-10
@@ -96,20 +96,22 @@ def exact_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
 
 
 @njit(cache=True)
-def free_messages(W: Array, miss: Array, spare: Array) -> Array:
-    """Returns the messages nu (n, m) of `propagated_sum`: the probability, by belief propagation, that no other row has
-    a column."""
-    psi, mu, nu = np.zeros(W.shape), np.zeros(W.shape), np.ones(W.shape)
-    _propagate(W, miss, spare, psi, mu, nu)
-    return nu
+def propagated_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
+    """Returns the Bethe approximation of the log of the sum over all mappings, and write its marginals (n, m).
 
-
-@njit(cache=True)
-def _propagate(W, miss, spare, psi, mu, nu):  # type: ignore[no-untyped-def]
+    W (n, m), miss (n,), spare (m,): not negative. Messages of Williams & Lau 2014: with psi = W / (miss spare),
+    mu[i, j] = psi[i, j] / (1 + sum of psi nu over the other columns) and nu[i, j] = 1 / (1 + sum of mu over the other
+    rows). The value is exact for one row or one column, and a lower bound in all cases that were tried.
+    """
     n, m = W.shape
+    psi, mu, nu = np.empty((n, m)), np.empty((n, m)), np.empty((n, m))
+    log_sum = 0.0
+    for i in range(n):
+        log_sum += math.log(max(miss[i], TINY))
     for j in range(m):
+        log_sum += math.log(max(spare[j], TINY))
         for i in range(n):
-            psi[i, j] = W[i, j] / (max(miss[i], TINY) * max(spare[j], TINY))
+            psi[i, j], nu[i, j] = W[i, j] / (max(miss[i], TINY) * max(spare[j], TINY)), 1.0
     for _ in range(SWEEPS):
         change = 0.0
         for i in range(n):
@@ -128,24 +130,6 @@ def _propagate(W, miss, spare, psi, mu, nu):  # type: ignore[no-untyped-def]
                 nu[i, j] = new
         if change < CONVERGED:
             break
-
-
-@njit(cache=True)
-def propagated_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
-    """Returns the Bethe approximation of the log of the sum over all mappings, and write its marginals (n, m).
-
-    W (n, m), miss (n,), spare (m,): not negative. Messages of Williams & Lau 2014: with psi = W / (miss spare),
-    mu[i, j] = psi[i, j] / (1 + sum of psi nu over the other columns) and nu[i, j] = 1 / (1 + sum of mu over the other
-    rows). The value is exact for one row or one column, and a lower bound in all cases that were tried.
-    """
-    n, m = W.shape
-    psi, mu, nu = np.zeros((n, m)), np.zeros((n, m)), np.ones((n, m))
-    log_sum = 0.0
-    for i in range(n):
-        log_sum += math.log(max(miss[i], TINY))
-    for j in range(m):
-        log_sum += math.log(max(spare[j], TINY))
-    _propagate(W, miss, spare, psi, mu, nu)
     for i in range(n):
         whole = 1.0
         for j in range(m):
@@ -159,26 +143,6 @@ def propagated_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> flo
             whole += mu[i, j]
             log_sum -= math.log(1.0 + mu[i, j] * nu[i, j])
         log_sum += math.log(whole)
-    return log_sum
-
-
-@njit(cache=True)
-def dense_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
-    """Returns the log of the sum over all mappings and write the marginals (n, m): exact if n or m is at most 12, else
-    propagated. Arguments as of `exact_sum`; subsets are those of the smaller side."""
-    n, m = W.shape
-    if min(n, m) > EXACT_BITS:
-        return propagated_sum(W, miss, spare, marginals)
-    if m <= n:
-        return exact_sum(W, miss, spare, marginals)
-    turned, found = np.empty((m, n)), np.empty((m, n))
-    for i in range(n):
-        for j in range(m):
-            turned[j, i] = W[i, j]
-    log_sum = exact_sum(turned, spare, miss, found)
-    for i in range(n):
-        for j in range(m):
-            marginals[i, j] = found[j, i]
     return log_sum
 
 
@@ -219,15 +183,6 @@ def cheapest(cost: Array, u: Array, v: Array) -> None:
 
 
 @njit(cache=True)
-def chosen(values: Array, rows: Ints) -> Array:
-    """Returns values (N,) at rows (M,), (M,)."""
-    out = np.empty(len(rows))
-    for k in range(len(rows)):
-        out[k] = values[rows[k]]
-    return out
-
-
-@njit(cache=True)
 def linked(W, start, row_done, column_done, rows, columns):  # type: ignore[no-untyped-def]
     """Writes the connected component of W (n, m) that row `start` is in: its rows and columns, in the order in which
     they are reached. Marks them as done and returns (number of rows, number of columns)."""
@@ -255,7 +210,7 @@ def sparse_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
     """Returns the log of the sum over all mappings, -inf if it is 0, and write the marginals (n, m).
 
     Arguments as of `exact_sum`. Rows and columns with a pair of weight above 0 are linked; the sum is the product over
-    connected components of `dense_sum`.
+    connected components: exact if a component has at most EXACT_BITS rows or columns, else propagated.
     """
     n, m = W.shape
     marginals[:], log_sum = 0.0, 0.0
@@ -273,39 +228,23 @@ def sparse_sum(W: Array, miss: Array, spare: Array, marginals: Array) -> float:
 
 
 @njit(cache=True)
-def _line_sum(W, miss, spare, marginals, rows, columns):  # type: ignore[no-untyped-def]
-    total = 1.0
-    for i in rows:
-        total *= miss[i]
-    for j in columns:
-        total *= spare[j]
-    for i in rows:
-        for j in columns:
-            weight = W[i, j]
-            for other in rows:
-                weight *= miss[other] if other != i else 1.0
-            for other in columns:
-                weight *= spare[other] if other != j else 1.0
-            marginals[i, j] = weight
-            total += weight
-    for i in rows:
-        for j in columns:
-            marginals[i, j] /= total if total > 0 else 1.0
-    return math.log(total) if total > 0 else -math.inf
-
-
-@njit(cache=True)
 def _component_sum(W, miss, spare, marginals, rows, columns):  # type: ignore[no-untyped-def]
     if len(columns) == 0:
         return math.log(miss[rows[0]]) if miss[rows[0]] > 0 else -math.inf
-    if len(columns) == 1 or len(rows) == 1:
-        return _line_sum(W, miss, spare, marginals, rows, columns)
-    block, found = np.empty((len(rows), len(columns))), np.empty((len(rows), len(columns)))
-    for a in range(len(rows)):
-        for b in range(len(columns)):
-            block[a, b] = W[rows[a], columns[b]]
-    log_sum = dense_sum(block, chosen(miss, rows), chosen(spare, columns), found)
-    for a in range(len(rows)):
-        for b in range(len(columns)):
-            marginals[rows[a], columns[b]] = found[a, b]
+    turned = len(columns) > len(rows)  # subsets are those of the smaller side
+    long, short = (columns, rows) if turned else (rows, columns)
+    alone, other_alone = (spare, miss) if turned else (miss, spare)
+    n, m = len(long), len(short)
+    block, found, first, second = np.empty((n, m)), np.empty((n, m)), np.empty(n), np.empty(m)
+    for b in range(m):
+        second[b] = other_alone[short[b]]
+    for a in range(n):
+        first[a] = alone[long[a]]
+        for b in range(m):
+            block[a, b] = W[short[b], long[a]] if turned else W[long[a], short[b]]
+    log_sum = propagated_sum(block, first, second, found) if m > EXACT_BITS else exact_sum(block, first, second, found)
+    for a in range(n):
+        for b in range(m):
+            i, j = (short[b], long[a]) if turned else (long[a], short[b])
+            marginals[i, j] = found[a, b]
     return log_sum

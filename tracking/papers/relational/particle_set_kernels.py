@@ -28,20 +28,6 @@ def column_sums(a: Array, b: Array) -> Array:
 
 
 @njit(cache=True)
-def pair_sums(a: Array, exist: Array, pairs: Ints, b: Array) -> Array:
-    """Returns the sums over particles of a exist b of each pair, (N,).
-
-    a, exist (P, K); b (P, N); pairs (N, 2): person and detection.
-    """
-    out = np.zeros(len(pairs))
-    for p in range(len(b)):
-        for n in range(len(pairs)):
-            k = pairs[n, 0]
-            out[n] += a[p, k] * exist[p, k] * b[p, n]
-    return out
-
-
-@njit(cache=True)
 def weigh(weights: Array, logs: Array) -> None:
     """Multiply weights (P, K) by exp(logs), and divide them by their sums over the particles; logs (P, K) or (P, 1)."""
     particles, n = weights.shape

@@ -12,9 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.papers.relational import particle_set_kernels, sensor_kernels
+from tracking.papers.relational import sensor_kernels
+from tracking.papers.relational.association_sums_kernels import sparse_sum
 from tracking.papers.relational.config import ParticleConfig
 from tracking.papers.relational.particle_set import ParticleSet
+from tracking.papers.relational.particle_set_kernels import column_sums
 
 # Distance, in standard deviations of a point and of a displaced point, above both of which a person and a detection are
 # no pair (ours).
@@ -23,6 +25,7 @@ REACH, WIDE_REACH = 6.0, 3.0
 # probability (ours).
 UNLIKELY = 1e-3
 ALMOST = 1 - 1e-9  # Largest probability of a detection (ours).
+LEAST_MISS = 1e-6  # Least weight of a person without detection in the average over others, which divides by it.
 
 
 @dataclass(frozen=True)
@@ -62,64 +65,99 @@ def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, con
     if certain:
         pairs, logs, marginals = _complete(particles, points, noise)
     else:
-        pairs, density = _pairs(particles, points, sight, noise, config)
-        logs, marginals = np.empty(particles.exist.shape), np.empty(density.shape)
         detect = np.minimum(sight.detect, ALMOST)
-        free = _free(particles, pairs, density, count, detect, config)
+        pairs, density, mean = _pairs(particles, points, sight, detect, noise, config)
+        free = free_detections(mean, np.maximum(1 - particles.existence * detect, LEAST_MISS))
+        logs, measured = np.empty((2, *particles.exist.shape))
+        marginals = np.empty(density.shape)
         sensor_kernels.person_sums(
-            density, pairs, particles.exist, detect, config.clutter_density, free, logs, marginals
+            density, pairs, particles.exist, detect, config.clutter_density, free, logs, marginals, measured
         )
-        sensor_kernels.partner_factors(particles.pairs, particles.related, particles.weights, sight.missed, logs)
-    particles.weigh(logs)
-    measured = sensor_kernels.measured(marginals, pairs, people)
-    if not certain:
+        add_partner_factors(particles, sight.missed, logs)
         unseen = particles.exist * (1 - detect) / np.maximum(1 - particles.exist * detect, np.finfo(float).tiny)
         particles.exist = np.minimum(measured + (1 - measured) * unseen, 1.0)
+    particles.weigh(logs)
     found = np.zeros((people, count))
-    found[pairs[:, 0], pairs[:, 1]] = particle_set_kernels.pair_sums(
-        particles.weights, np.ones_like(particles.exist), pairs, marginals
-    )
-    exist, seen = particles.existence, particle_set_kernels.column_sums(particles.weights, measured)
-    seen = np.divide(seen, exist, out=np.zeros(people), where=exist > 0)
+    found[pairs[:, 0], pairs[:, 1]] = column_sums(particles.weights.take(pairs[:, 0], 1), marginals)
+    exist = particles.existence
+    seen = np.divide(found.sum(axis=1), exist, out=np.zeros(people), where=exist > 0)
     return Weighing(found, seen, 1.0 - found.sum(axis=0))
 
 
 def _complete(particles: ParticleSet, points: Array, noise: float) -> tuple[Ints, Array, Array]:
-    near = sensor_kernels.near_detections(particles.pos, points, (REACH * noise) ** 2)
+    most = (REACH * noise) ** 2
+    near = may_reach(particles.pos, points, most)
+    k, j = np.nonzero(near)
+    near[k, j] = (np.square(points[j] - particles.pos[:, k]).sum(axis=2) <= most).any(axis=0)
     person, point = sensor_kernels.components(near)
-    pairs = _places_of(person[:, None] == point)
+    pairs = np.ascontiguousarray(np.argwhere(person[:, None] == point))
     logs, marginals = np.zeros((particles.count, 1)), np.empty((particles.count, len(pairs)))
     sensor_kernels.complete_sums(particles.pos, points, noise, person, point, logs, marginals)
     return pairs, logs, marginals
 
 
 def _pairs(
-    particles: ParticleSet, points: Array, sight: Sight, noise: float, config: ParticleConfig
-) -> tuple[Ints, Array]:
+    particles: ParticleSet, points: Array, sight: Sight, detect: Array, noise: float, config: ParticleConfig
+) -> tuple[Ints, Array, Array]:
     wide = max(config.outlier_noise, noise)
     normal = config.outlier_share == 0
     share = np.zeros(particles.people) if normal else config.outlier_share + (1 - config.outlier_share) * sight.cut
     displaced = WIDE_REACH * wide if config.outlier_share > 0 else 0.0
     reach = max(REACH * noise, displaced) ** 2
-    pairs = _places_of(sensor_kernels.near_detections(particles.pos, points, reach))
+    pairs = np.ascontiguousarray(np.argwhere(may_reach(particles.pos, points, reach)))
     density = sensor_kernels.densities(particles.pos, points, pairs, noise, wide, share, sight.eye, reach)
-    person = pairs[:, 0]
-    mean = particle_set_kernels.pair_sums(particles.weights, particles.exist, pairs, density)
-    odds = mean * sight.detect[person] / config.clutter_density
-    total = 1 - particles.existence * sight.detect + np.bincount(person, odds, particles.people)
+    person, weights = pairs[:, 0], particles.weights * particles.exist
+    odds = column_sums(weights.take(person, 1), density) * detect[person] / config.clutter_density
+    total = 1 - particles.existence * detect + np.bincount(person, odds, particles.people)
     likely = odds > UNLIKELY * total[person]
-    return pairs[likely], np.compress(likely, density, 1)
+    mean = np.zeros((particles.people, len(points)))
+    mean[person[likely], pairs[likely, 1]] = odds[likely]
+    return pairs[likely], np.compress(likely, density, 1), mean
 
 
-def _places_of(flags: Bools) -> Ints:
-    return np.ascontiguousarray(np.argwhere(flags))
+def may_reach(pos: Array, points: Array, most: float) -> Bools:
+    """Returns which of M detections are within reach of the box round each person's particles, (K, M).
+
+    pos (P, K, 2), m; points (M, 2), m; most: reach, squared distance in m^2.
+    """
+    low, high = pos.min(axis=0)[:, None], pos.max(axis=0)[:, None]
+    apart = np.maximum(np.maximum(low - points, points - high), 0.0)
+    return np.asarray(np.square(apart).sum(axis=2) <= most)
 
 
-def _free(
-    particles: ParticleSet, pairs: Ints, density: Array, count: int, detect: Array, config: ParticleConfig
-) -> Array:
-    person = pairs[:, 0]
-    mean = np.zeros((particles.people, count))
-    found = particle_set_kernels.pair_sums(particles.weights, particles.exist, pairs, density)
-    mean[person, pairs[:, 1]] = found * detect[person] / config.clutter_density
-    return sensor_kernels.free_detections(mean, np.maximum(1 - particles.existence * detect, 0.0))
+def free_detections(W: Array, miss: Array) -> Array:
+    """Returns the probability that nobody else has a detection, (K, M), for each person: that of the sum over all
+    mappings of the other people.
+
+    W (K, M): mean weight of each person and detection; miss (K,), above 0: mean weight of the person without detection;
+    both over the particles; spare weights are 1. It is 1 for pairs without weight.
+
+    With m the marginals of the sum over all mappings of all people, it is m[k, j] / W[k, j] over the share of the
+    mappings in which k has no detection, by its weight `miss`: all three are sums over mappings of the others.
+    """
+    m = np.empty(W.shape)
+    sparse_sum(W, miss, np.ones(W.shape[1]), m)
+    alone = np.maximum(1 - m.sum(axis=1), np.finfo(float).tiny) / miss
+    free = np.divide(m, W * alone[:, None], out=np.ones(W.shape), where=W > 0)
+    return np.asarray(np.minimum(free, 1.0))
+
+
+def add_partner_factors(particles: ParticleSet, missed: Bools, logs: Array) -> None:
+    """Add to the log-likelihoods of each missed person those of the partners: what is seen of them tells where the
+    person is.
+
+    particles: with the weights before the frame; missed (K,); logs (P, K): log-likelihoods of each person; changed.
+
+    The factor of a partner is l(p) / mean l in the particles in which the two walk together, 1 in all others. So the
+    person has the posterior of the joint filter if the partner's is independent of it.
+    """
+    rows, side = np.nonzero(missed[particles.pairs])
+    partners, at = np.unique(particles.pairs[rows, 1 - side], return_inverse=True)
+    own, weights = logs.T[partners], particles.weights.T[partners]
+    top = own.max(axis=1, keepdims=True, initial=-np.inf)
+    with np.errstate(invalid="ignore"):
+        mean = (weights * np.exp(own - top)).sum(axis=1, keepdims=True)
+        factor = own - (top + np.log(np.maximum(mean, np.finfo(float).tiny)))
+    for row, person, k in zip(rows, particles.pairs[rows, side], at, strict=True):
+        if top[k] > -np.inf:
+            logs[:, person] += np.where(particles.related[row], factor[k], 0.0)

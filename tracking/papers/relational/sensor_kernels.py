@@ -1,4 +1,4 @@
-"""Kernels of tracking.papers.relational.sensor: which detections are near whom, and the sums of each particle."""
+"""Kernels of tracking.papers.relational.sensor: densities of detections, and the sums of each particle."""
 
 from __future__ import annotations
 
@@ -7,16 +7,8 @@ import math
 import numpy as np
 
 from sim.compiler import njit
-from sim.elementary_kernels import sort_by
 from sim.types import Array, Bools, Ints
-from tracking.papers.relational.association_sums_kernels import (
-    EXACT_BITS,
-    cheapest,
-    chosen,
-    free_messages,
-    linked,
-    sparse_sum,
-)
+from tracking.papers.relational.association_sums_kernels import cheapest, linked, sparse_sum
 
 NOTHING = 1e-20
 """Pairs of complete mappings that are less probable than those of the best mapping by this factor are left out."""
@@ -64,67 +56,16 @@ def densities(
 
 
 @njit(cache=True)
-def free_detections(W: Array, miss: Array) -> Array:
-    """Returns the probability that nobody else has a detection, (K, M), for each person: that of the sum over all
-    mappings of the other people.
-
-    W (K, M): mean weight of each person and detection; miss (K,): mean weight of the person without detection; both
-    over the particles; spare weights are 1. People are linked by detections that both may have. The sum is over the
-    linked people. Where it is propagated, one sum over all of them serves each person, with the messages of the others
-    alone (ours): one sum for each person would cost the cube of their number.
-    """
-    n, m = W.shape
-    free, done = np.ones((n, m)), np.zeros(n, np.bool_)
-    level = np.zeros(max(n, m))
-    rows, columns, reached = np.empty(n, np.int64), np.empty(m, np.int64), np.zeros(m, np.bool_)
-    for k in range(n):
-        if done[k]:
-            continue
-        count, width = linked(W, k, done, reached, rows, columns)
-        if count > 1:
-            sort_by(level, rows[:count])  # of equal keys: by number
-            sort_by(level, columns[:width])
-            _free_of_linked(W, miss, rows[:count], columns[:width], free)
-    return free
-
-
-@njit(cache=True)
-def _free_of_linked(W, miss, rows, columns, free):  # type: ignore[no-untyped-def]
-    n, m = len(rows), len(columns)
-    block, spare = np.empty((n, m)), np.ones(m)
-    for a in range(n):
-        for b in range(m):
-            block[a, b] = W[rows[a], columns[b]]
-    found = np.empty((n, m))
-    if min(n - 1, m) > EXACT_BITS:
-        messages = free_messages(block, chosen(miss, rows), spare)
-        for a in range(n):
-            for b in range(m):
-                free[rows[a], columns[b]] = messages[a, b]
-        return
-    own = chosen(miss, rows)
-    for a in range(n):
-        for b in range(m):
-            block[a, b] = 0.0
-        sparse_sum(block, own, spare, found)
-        for b in range(m):
-            others_have = 0.0
-            for other in range(n):
-                others_have += found[other, b]
-            free[rows[a], columns[b]] = max(1.0 - others_have, 0.0)
-            block[a, b] = W[rows[a], columns[b]]
-
-
-@njit(cache=True)
 def person_sums(
-    density: Array, pairs: Ints, exist: Array, detect: Array, clutter: float, free: Array, logs: Array, marginals: Array
-) -> None:
-    """Writes the log-likelihoods (P, K) of each person in each particle, all others averaged, and the marginals (P, N):
-    the probability of each pair.
+    density: Array, pairs: Ints, exist: Array, detect: Array, clutter: float, free: Array, logs: Array,
+    marginals: Array, measured: Array,
+) -> None:  # fmt: skip
+    """Writes the log-likelihoods (P, K) of each person in each particle, all others averaged, the marginals (P, N): the
+    probability of each pair, and the probability that each person is measured, (P, K): the sum of the person's pairs.
 
     density (P, N): of the N pairs (N, 2) of a person and a point, all others are impossible, as `densities` gives it;
     exist (P, K): probability that each person exists; detect (K,): probability that each is measured if existing;
-    clutter: false alarms per m^2, above 0; free (K, M): of `free_detections`.
+    clutter: false alarms per m^2, above 0; free (K, M): probability that nobody else has a detection.
 
     The sum over all mappings is linear in a person's weights: with W = exist detect g free / clutter it is 1 - exist
     detect + sum of W.
@@ -134,13 +75,16 @@ def person_sums(
     for p in range(particles):
         for k in range(n):
             total[k] = 1.0 - exist[p, k] * detect[k]
+            measured[p, k] = 0.0
         for c in range(len(pairs)):
             k, j = pairs[c, 0], pairs[c, 1]
             marginals[p, c] = exist[p, k] * detect[k] * density[p, c] * free[k, j] / clutter
             total[k] += marginals[p, c]
         for c in range(len(pairs)):
-            if total[pairs[c, 0]] > 0.0:
-                marginals[p, c] /= total[pairs[c, 0]]
+            k = pairs[c, 0]
+            if total[k] > 0.0:
+                marginals[p, c] /= total[k]
+            measured[p, k] += marginals[p, c]
         for k in range(n):
             logs[p, k] = math.log(total[k]) if total[k] > 0.0 else -math.inf
 
@@ -205,77 +149,3 @@ def _complete_component(pos, points, sd, rows, columns, first, logs, marginals):
             for b in range(m):
                 row, column = (b, a) if turned else (a, b)
                 marginals[p, first[rows[row]] + column] = found[a, b]
-
-
-@njit(cache=True)
-def measured(marginals: Array, pairs: Ints, people: int) -> Array:
-    """Returns the probability that each person is measured, in each particle, (P, K): the sum of marginals (P, N) of
-    the person's pairs (N, 2)."""
-    out = np.zeros((len(marginals), people))
-    for p in range(len(marginals)):
-        for c in range(len(pairs)):
-            out[p, pairs[c, 0]] += marginals[p, c]
-    return out
-
-
-@njit(cache=True)
-def near_detections(pos: Array, points: Array, most: float) -> Bools:
-    """Returns which people and detections (K, M) are within reach of each other, in some particle.
-
-    pos (P, K, 2), m; points (M, 2), m; most: reach, squared distance in m^2.
-    """
-    particles, n, _ = pos.shape
-    near = np.zeros((n, len(points)), np.bool_)
-    for k in range(n):
-        left, right, low, high = np.inf, -np.inf, np.inf, -np.inf
-        for p in range(particles):
-            left, right = min(left, pos[p, k, 0]), max(right, pos[p, k, 0])
-            low, high = min(low, pos[p, k, 1]), max(high, pos[p, k, 1])
-        for j in range(len(points)):
-            x, y = points[j, 0], points[j, 1]
-            dx, dy = max(left - x, x - right, 0.0), max(low - y, y - high, 0.0)
-            if dx * dx + dy * dy > most:
-                continue
-            for p in range(particles):
-                dx, dy = x - pos[p, k, 0], y - pos[p, k, 1]
-                if dx * dx + dy * dy <= most:
-                    near[k, j] = True
-                    break
-    return near
-
-
-@njit(cache=True)
-def partner_factors(pairs: Ints, related: Bools, weights: Array, missed: Bools, logs: Array) -> None:
-    """Add to the log-likelihoods of each missed person those of the partners: what is seen of them tells where the
-    person is.
-
-    pairs (N, 2), related (N, P): who walks together by the frame's relations; weights (P, K): of the particles before
-    the frame; missed (K,); logs (P, K): log-likelihoods of each person; changed.
-
-    The factor of a partner is l(p) / mean l in the particles in which the two walk together, 1 in all others. So the
-    person has the posterior of the joint filter if the partner's is independent of it.
-    """
-    particles, n = logs.shape
-    some = False
-    for k in range(n):
-        some = some or missed[k]
-    if not some:
-        return
-    own, level = np.empty((particles, n)), np.empty(n)
-    for v in range(n):
-        top, mean, level[v] = -np.inf, 0.0, -np.inf
-        for p in range(particles):
-            own[p, v] = logs[p, v]
-            top = max(top, own[p, v])
-        if top == -np.inf:
-            continue
-        for p in range(particles):
-            mean += weights[p, v] * math.exp(own[p, v] - top)
-        level[v] = top + math.log(max(mean, 1e-300))
-    for k in range(len(pairs)):
-        for side in range(2):
-            h, v = pairs[k, side], pairs[k, 1 - side]
-            if missed[h] and level[v] > -np.inf:
-                for p in range(particles):
-                    if related[k, p]:
-                        logs[p, h] += own[p, v] - level[v]

@@ -83,7 +83,7 @@ from tracking.filters.particles import ParticleHealth
 from tracking.filters.person_streams import PersonStreams, birth_keys
 from tracking.grouping.belief import UNSEEN
 from tracking.grouping.pair_belief import PairBelief
-from tracking.papers.relational import particle_set_kernels, sensor, transition_kernels
+from tracking.papers.relational import particle_set_kernels, sensor, transition, transition_kernels
 from tracking.papers.relational.config import (
     BIRTH_DOUBT,
     BODY_RADIUS,
@@ -315,7 +315,7 @@ class Relational(Particle):
         if p.people < 2:
             return
         if self.belief is None:
-            p.hold(transition_kernels.near_pairs(p.pos, rules))
+            p.hold(transition.near_pairs(p.pos, rules))
             odds = np.full(len(p.pairs), self.config.relation_bias)
         else:
             log_odds, seen = _log_odds(self.belief), self.belief.seen()
@@ -343,7 +343,7 @@ class Relational(Particle):
         label = np.empty(p.exist.shape, np.int64)
         particle_set_kernels.group_labels(p.pairs, p.related, label)
         uniforms = self.streams.uniforms(JOINING, self.slots.key[-new:], 1, p.count)[0]
-        pairs, related = transition_kernels.join(p.pos, p.exist, label, points, NEWCOMER_SHARE, uniforms, self._rules)
+        pairs, related = transition.join(p.pos, p.exist, label, points, NEWCOMER_SHARE, uniforms, self._rules)
         p.pairs, p.related = np.concatenate([p.pairs, pairs]), np.concatenate([p.related, related])
 
     def _report(self, frame: Frame) -> Tracks:

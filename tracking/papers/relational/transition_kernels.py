@@ -1,14 +1,12 @@
 """Kernels of `relational`: motion given relations (sec. 3.2), and relations given motion.
 
-Arrays are over P particles and K people. The relation "walking together" is kept for the pairs only that walk together
-in some particle, so that the cost is that of the neighbours: pairs (N, 2) are people i < j, in order of j, then i, and
-related (N, P) says in which particles. The groups of a particle are the connected components of its related pairs. The
-columns of the speed table are named here.
+The columns of the speed table are named here.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -26,24 +24,15 @@ RATE, BIAS, DISTANCE, VELOCITY = range(4)
 at the same place, their loss per m of distance and per m/s of velocity difference."""
 
 
-NEGLIGIBLE = 1e-4
-"""Pairs whose belonging is below this in every particle do not start to walk together."""
-FAR = 1e-6
-"""A new person does not join people whose belonging is below this in every particle."""
+def belonging(distance: Any, difference: Any, rules: Array) -> Any:
+    """Returns the probability that two people walk together by their states (ours); 1 if BIAS is inf.
+
+    distance: between them, m; difference: of their velocities, m/s: numbers or arrays; rules (4,).
+    """
+    return 1.0 / (1.0 + np.exp(rules[DISTANCE] * distance + rules[VELOCITY] * difference - rules[BIAS]))
 
 
-@njit(cache=True)
-def _boxes(pos):  # type: ignore[no-untyped-def]
-    particles, n, _ = pos.shape
-    box = np.empty((n, 4))
-    for i in range(n):
-        box[i, 0], box[i, 1], box[i, 2], box[i, 3] = np.inf, -np.inf, np.inf, -np.inf
-    for p in range(particles):
-        for i in range(n):
-            x, y = pos[p, i, 0], pos[p, i, 1]
-            box[i, 0], box[i, 1] = min(box[i, 0], x), max(box[i, 1], x)
-            box[i, 2], box[i, 3] = min(box[i, 2], y), max(box[i, 3], y)
-    return box
+_belonging = njit(cache=True)(belonging)
 
 
 @njit(cache=True)
@@ -77,7 +66,7 @@ def move(
                 dx, dy = pos[p, i, 0] - pos[p, j, 0], pos[p, i, 1] - pos[p, j, 1]
                 du, dv = vel[p, i, 0] - vel[p, j, 0], vel[p, i, 1] - vel[p, j, 1]
                 distance = math.sqrt(max(dx * dx + dy * dy - spread[k, 0], 0.0))
-                w = belonging(distance, math.sqrt(max(du * du + dv * dv - spread[k, 1], 0.0)), alike)
+                w = _belonging(distance, math.sqrt(max(du * du + dv * dv - spread[k, 1], 0.0)), alike)
                 for turn in range(2):
                     a, b = (j, i) if turn else (i, j)
                     sums[a, 0] += w * exist[p, b] * vel[p, b, 0]
@@ -108,15 +97,6 @@ def move(
 
 
 @njit(cache=True)
-def belonging(distance: float, difference: float, rules: Array) -> float:
-    """Returns the probability that two people walk together by their states (ours); 1 if BIAS is inf.
-
-    distance: between them, m; difference: of their velocities, m/s; rules (4,).
-    """
-    return 1.0 / (1.0 + math.exp(rules[DISTANCE] * distance + rules[VELOCITY] * difference - rules[BIAS]))
-
-
-@njit(cache=True)
 def pair_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
     """Returns what the filter's uncertainty adds on average to the squared distance, m^2, and to the squared velocity
     difference, m^2/s^2, of pairs in a particle, (N, 2): twice their variances over the particles, as a particle
@@ -137,25 +117,6 @@ def pair_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
             mean = first[d] / particles
             out[k, d // 2] += 2 * max(second[d] / particles - mean * mean, 0.0)
     return out
-
-
-@njit(cache=True)
-def near_pairs(pos: Array, rules: Array) -> Ints:
-    """Returns the pairs i < j (N, 2) that may start to walk together, in order of j, then i.
-
-    pos (P, K, 2), m; rules (4,). Pairs whose boxes round all particles are so far apart that their belonging is below
-    NEGLIGIBLE are left out (ours).
-    """
-    n = pos.shape[1]
-    box, found, count = _boxes(pos), np.empty((n * n, 2), np.int64), 0
-    for j in range(n):
-        for i in range(j):
-            dx = max(box[i, 0] - box[j, 1], box[j, 0] - box[i, 1], 0.0)
-            dy = max(box[i, 2] - box[j, 3], box[j, 2] - box[i, 3], 0.0)
-            if belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules) >= NEGLIGIBLE:
-                found[count, 0], found[count, 1] = i, j
-                count += 1
-    return found[:count]
 
 
 @njit(cache=True)
@@ -189,23 +150,19 @@ def relate(
 
 @njit(cache=True)
 def join(
-    pos: Array, exist: Array, label: Ints, points: Array, share: float, uniforms: Array, rules: Array
-) -> tuple[Ints, Bools]:
-    """Relate M new people, the last slots, to the groups that they join in each particle, one after the other (sec.
-    3.2). Return their pairs (N, 2) and relations (N, P); the groups label (P, K) of the new people are changed.
+    pos: Array, exist: Array, label: Ints, points: Array, some: Ints, ends: Ints, share: float, uniforms: Array,
+    rules: Array,
+) -> Ints:  # fmt: skip
+    """Writes the groups label (P, K) of M new people, the last slots, and returns their relations: three numbers for
+    each, the new person, the other one, the particle.
 
-    pos (P, K, 2), m; exist (P, K): with the new people; points (M, 2), m: where they were detected; uniforms (M, P) in
-    [0, 1); rules (4,). With the probability `share` (the paper: 1/2) a person joins a group, people alone being groups
-    of one; which one is drawn in proportion to the belonging at the distance of the group's nearest member, at equal
-    velocities (ours). Where these sum to less than 1, the person is alone with what is missing. People whose belonging
-    is below FAR in all particles are left out, so that the cost of a person is that of the neighbours.
+    Arguments as of `transition.join`; some (S,): who is near the new people, ends (M,): where each one's end in it.
     """
     particles, n, _ = pos.shape
     old = n - len(points)
-    some, ends = _neighbours(_boxes(pos), points, rules)
     near, groups, weight = np.zeros(n), np.empty(n, np.int64), np.empty(n)
     last, following = np.empty(n, np.int64), np.empty(n, np.int64)
-    found, count = np.empty(16 * n, np.int64), 0  # of each relation the new person, the other one, the particle
+    found, count = np.empty(16 * n, np.int64), 0
     for p in range(particles):
         for i in range(old):
             following[i] = -1
@@ -221,7 +178,7 @@ def join(
             for row in range(first, begin):
                 i = some[row]
                 dx, dy = pos[p, i, 0] - points[m, 0], pos[p, i, 1] - points[m, 1]
-                g = exist[p, i] * belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
+                g = exist[p, i] * _belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
                 near[label[p, i]] = max(near[label[p, i]], g)
             total, several = 0.0, 0
             for row in range(first, begin):
@@ -242,52 +199,12 @@ def join(
                     i, label[p, new] = g, g
                     while i >= 0:
                         if count + 3 > len(found):
-                            found = _doubled(found)
+                            longer = np.empty(2 * count, np.int64)
+                            for r in range(count):  # a copy of a slice takes a second to compile
+                                longer[r] = found[r]
+                            found = longer
                         found[count], found[count + 1], found[count + 2] = m, i, p
                         i, count = following[i], count + 3
                     following[last[g]] = last[g] = new
                     break
-    return _relations(found[:count], len(points), n, particles)
-
-
-@njit(cache=True)
-def _doubled(values):  # type: ignore[no-untyped-def]
-    longer = np.empty(2 * len(values), np.int64)
-    for k in range(len(values)):
-        longer[k] = values[k]
-    return longer
-
-
-@njit(cache=True)
-def _neighbours(box, points, rules):  # type: ignore[no-untyped-def]
-    old, ends = len(box) - len(points), np.empty(len(points), np.int64)
-    some, count = np.empty(64, np.int64), 0
-    for m in range(len(points)):
-        for i in range(old + m):
-            dx = max(box[i, 0] - points[m, 0], points[m, 0] - box[i, 1], 0.0)
-            dy = max(box[i, 2] - points[m, 1], points[m, 1] - box[i, 3], 0.0)
-            if belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules) >= FAR:
-                if count == len(some):
-                    some = _doubled(some)
-                some[count] = i
-                count += 1
-        ends[m] = count
-    return some, ends
-
-
-@njit(cache=True)
-def _relations(found: Ints, new: int, people: int, particles: int) -> tuple[Ints, Bools]:
-    row, count = np.zeros((new, people), np.int64), 0
-    for r in range(0, len(found), 3):
-        row[found[r], found[r + 1]] = 1
-    for m in range(new):
-        for i in range(people):
-            if row[m, i]:
-                row[m, i] = count
-                count += 1
-    pairs, related = np.empty((count, 2), np.int64), np.zeros((count, particles), np.bool_)
-    for r in range(0, len(found), 3):
-        m, i = found[r], found[r + 1]
-        k = row[m, i]
-        pairs[k, 0], pairs[k, 1], related[k, found[r + 2]] = i, people - new + m, True
-    return pairs, related
+    return found[:count]

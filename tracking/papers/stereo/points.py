@@ -190,10 +190,10 @@ class PointLinks:
         M, unit = len(self.id), np.eye(3)
         known = np.isfinite(self.world[..., 0])
         moving = known.sum(1) > 1
-        vel, vel_cov, lag = np.zeros((M, 3)), np.repeat(SPEED**2 * unit[None], M, 0), np.zeros(M)
+        vel, vel_cov = np.zeros((M, 3)), np.repeat(SPEED**2 * unit[None], M, 0)
         if moving.any():
             times = np.arange(self.world.shape[1]) / self.fps
-            vel[moving], spread, lag[moving] = slopes(self.world[moving], known[moving], times)
+            vel[moving], spread = slopes(self.world[moving], known[moving], times)
             vel_cov[moving] = config.point_noise**2 / spread[:, None, None] * unit
         cov = np.repeat(config.point_noise**2 * unit[None], M, 0)
-        return SpacePoints(self.id, self.world[:, -1].copy(), cov, vel, vel_cov, lag)
+        return SpacePoints(self.id, self.world[:, -1].copy(), cov, vel, vel_cov)

@@ -237,9 +237,6 @@ def spread_of(points: SpacePoints, config: StereoConfig) -> Array:
     if config.point_covariance:
         C[np.ix_(POS, POS)] -= points.cov.mean(0)
         C[np.ix_(VEL, VEL)] -= points.vel_cov.mean(0)
-        both = (points.lag[:, None, None] * points.vel_cov).mean(0)
-        C[np.ix_(POS, VEL)] -= both
-        C[np.ix_(VEL, POS)] -= both.T
         values, U = np.linalg.eigh(C)
         C = (U * np.maximum(values, 0.0)) @ U.T
     w = config.spread_weight

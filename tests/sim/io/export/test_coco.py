@@ -4,7 +4,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
 from sim.io.export.coco import coco
 from sim.io.store import sequence_folder
 from sim.io.store.validate import content_hash
@@ -90,7 +89,7 @@ def test_names_of_pictures_of_recordings_resolve(tmp_path):
         assert found["images"][0]["width"] == 64
 
 
-def test_people_outside_the_picture_or_hardly_visible_are_left_out(tmp_path):
+def test_people_outside_the_picture_are_left_out(tmp_path):
     rows = [
         "1,1,-20,5,20,9,1,1,1", "1,2,64,5,9,9,1,1,1", "1,3,5,48,9,9,1,1,1", "1,4,5,-30,9,29,1,1,1",
         "1,5,-4,40,10,20,1,1,0.3", "1,6,10,10,5,5,1,1,0.1",
@@ -101,10 +100,6 @@ def test_people_outside_the_picture_or_hardly_visible_are_left_out(tmp_path):
     assert [a["track_id"] for a in found] == [5, 6]
     assert found[0]["bbox"] == [-4, 40, 10, 20], "amodal and unclipped, as in gt.txt"
     assert found[0]["segmentation"] == [[0, 40, 6, 40, 6, 48, 0, 48]], "the part inside the picture"
-    (path,) = coco(tmp_path / "s", tmp_path / "c.json", min_visibility=0.2)
-    assert [a["track_id"] for a in json.loads(path.read_text())["annotations"]] == [5]
-    with pytest.raises(InputError, match="--min-visibility: got 2"):
-        coco(tmp_path / "s", tmp_path / "c.json", min_visibility=2)
 
 
 def decoded(segmentation):

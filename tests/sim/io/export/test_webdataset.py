@@ -10,14 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
 import pytest
 
 from scenarios.errors import InputError
 from sim.io.export.webdataset import size_of, webdataset
 from sim.io.files import atomic, tables
-from sim.io.source import open_source, sequence_folders
+from sim.io.source import sequence_folders
 from sim.io.store import sequence_folder
 from sim.io.store.seal import read_manifest, with_hash
 from sim.io.store.validate import content_hash, validate
@@ -75,41 +73,6 @@ def test_a_sequence_is_a_sample_and_can_be_unpacked(data: Path, tmp_path: Path) 
     assert [p for s in (tmp_path / "back").glob("*/*") for p in validate(s)] == []
 
 
-def test_a_frame_is_a_sample_with_its_labels(data: Path, tmp_path: Path) -> None:
-    index = webdataset(data, tmp_path / "out", samples="frame")
-    assert index["content_hash"] == content_hash(data)
-    found = samples(tmp_path / "out" / "shard-000000.tar")
-    assert len(found) == sum(s.length or 0 for s in open_source(data))
-    for folder in sorted((data / "flockscope-train").iterdir()):
-        (sequence,) = open_source(folder)
-        for frame in sequence:
-            sample = found[f"flockscope-train/{folder.name.replace('.', '%2E')}/{frame.index:06d}"]
-            assert set(sample) == {"json", "left.png", "ids.png"}
-            picture = cv2.imdecode(np.frombuffer(sample["left.png"], np.uint8), cv2.IMREAD_COLOR)
-            assert np.array_equal(picture, frame.image)
-            agrees(json.loads(sample["json"]), sequence.truth.at(frame.index), frame.detections)
-
-
-def agrees(labels: dict[str, Any], truth: Any, detections: Any) -> None:
-    """The labels of a frame say all that is true of its people and groups, and what the sensor saw."""
-    people = labels["people"]
-    assert labels["frame"] == truth.index
-    assert [p["id"] for p in people] == truth.id.tolist()
-    assert [p["group"] for p in people] == truth.group.tolist()
-    boxes = np.array([p["box"] for p in people], float).reshape(-1, 4)
-    places = np.array([[p[k] for k in ("x", "y", "vx", "vy")] for p in people], float).reshape(-1, 4)
-    np.testing.assert_array_equal(boxes, truth.box)
-    np.testing.assert_array_equal(places, np.hstack([truth.pos, truth.vel]))
-    assert [p["visibility"] for p in people] == truth.visibility.tolist()
-    if truth.groups is None:
-        assert labels["groups"] is None
-    else:
-        assert [g["members"] for g in labels["groups"]] == [m.tolist() for m in truth.groups.members]
-        assert [g["hull"] for g in labels["groups"]] == [h.tolist() for h in truth.groups.hull]
-    assert [d["score"] for d in labels["detections"]] == detections.score.tolist()
-    assert [[d[k] for k in "xy"] for d in labels["detections"]] == detections.pos[:, :2].tolist()
-
-
 def test_the_same_bytes_from_anywhere_and_nothing_of_the_machine(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -161,19 +124,6 @@ def test_an_altered_file_is_named_and_its_shard_not_written(data: Path, tmp_path
     assert not (tmp_path / "out" / "index.json").exists()
 
 
-def test_frames_of_videos_are_refused(tmp_path: Path) -> None:
-    folder = tmp_path / "x-s00000"
-    sequence_folder.write_sequence(
-        folder, make_pictured(1, ("left",)), scenario="schema = 1\n", seed=1, streams=("left",), images="mp4"
-    )
-    with pytest.raises(InputError, match=r"--samples frame: got videos; .*--images jpg or png"):
-        webdataset(folder, tmp_path / "out", samples="frame")
-    assert not (tmp_path / "out").exists()
-    webdataset(folder, tmp_path / "out")
-    (sample,) = samples(tmp_path / "out" / "shard-000000.tar").values()
-    assert sample["left.mp4"] == (folder / "left.mp4").read_bytes()
-
-
 def test_what_is_not_ours_is_refused(tmp_path: Path) -> None:
     mot_folder(tmp_path / "mot", det="1,-1,0,0,4,6,1,-1,-1,-1\n")
     for source, word in ((tmp_path / "mot", "a recording, mot"), (tmp_path / "no", "no sequences")):
@@ -210,16 +160,15 @@ CHANGED_MANIFESTS = [
 ]
 
 
-@pytest.mark.parametrize("samples", ["sequence", "frame"])
 @pytest.mark.parametrize(("change", "words"), CHANGED_MANIFESTS)
-def test_what_a_changed_manifest_vouches_for_is_not_exported(data, tmp_path: Path, change, words, samples: str) -> None:
+def test_what_a_changed_manifest_vouches_for_is_not_exported(data, tmp_path: Path, change, words) -> None:
     folder = copied(data, tmp_path, change)
     with pytest.raises(InputError, match=words):
-        webdataset(folder, tmp_path / "out", samples=samples)
+        webdataset(folder, tmp_path / "out")
     assert not list((tmp_path / "out").glob("*"))
 
 
-@pytest.mark.parametrize(("part", "more"), [("", {"shard_size": 1}), ("", {"samples": "frame"}), ("b-s00000", {})])
+@pytest.mark.parametrize(("part", "more"), [("", {"shard_size": 1}), ("b-s00000", {})])
 def test_another_export_is_not_overwritten(data: Path, tmp_path: Path, part: str, more: dict[str, Any]) -> None:
     source = data / "flockscope-train" / part
     for first, second in (((data, {}), (source, more)), ((source, more), (data, {}))):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.formats.mot_text import read_detections
-from sim.io.formats.options import BoxOptions, parse_box_scale
+from sim.io.formats.options import parse_box_scale
 from sim.io.source import open_source
 from sim.io.store.track_files import read_track_text
 
@@ -48,7 +47,8 @@ def test_shares_of_the_picture_are_refused_and_scaled(tmp_path):
     scaled = written(tmp_path, np.c_[rows[:, :2], rows[:, 2:] / (1920, 1080, 1920, 1080)])
     with pytest.raises(InputError, match=r"numbers up to .* expected pixels; .*--box-scale WIDTH,HEIGHT"):
         open_source(scaled, fps=10)
-    box = read_detections(scaled, BoxOptions(box_scale=parse_box_scale("1920,1080"))).box
+    (sequence,) = open_source(scaled, fps=10, box_scale="1920,1080")
+    box = np.concatenate([frame.detections.box for frame in sequence])
     assert box == pytest.approx(rows[:, 2:], rel=1e-5)
 
 

@@ -66,7 +66,7 @@ def test_a_calibration_is_scaled_to_the_recording(tmp_path, bent):
 
 
 BROKEN = [
-    ("<Camera", "Camera", "no XML"), ("Geometry", "Geometrie", "Geometry width"),
+    ("<Camera", "Camera", "broken XML"), ("Geometry", "Geometrie", "Geometry width"),
     ('kappa1="5.1e-03"', "", "Intrinsic kappa1"), ('focal="5.5"', 'focal="0"', "Intrinsic focal"),
     ('rx="2.04"', 'rx="nan"', "Extrinsic rx"), ('rx="2.04"', 'rx="two"', "Extrinsic rx"),
 ]  # fmt: skip

@@ -7,7 +7,6 @@ from sim.io.formats.labels import chords, differentiate
 from sim.io.formats.mot_text import unit_scores
 from sim.io.source import open_source
 from tests.recordings import mot_folder
-from tests.small_videos import write_video
 
 DRAWN = {
     "margins": np.random.default_rng(1).gamma(3, 9, 900) + 3,
@@ -219,18 +218,6 @@ def test_copied_names_of_sequences_are_said_and_the_folders_names_count(tmp_path
         mot_folder(tmp_path / name, ini="name=MOT17-02\nframeRate=30\nseqLength=3\n", det="")
     with pytest.warns(UserWarning, match="MOT17-02 is the name of 2 sequences"):
         assert [s.name for s in open_source(tmp_path)] == ["cam1", "cam2"]
-
-
-@pytest.mark.parametrize("folder", [False, True])
-def test_the_rate_of_a_video_beside_it_is_named(tmp_path, folder):
-    """25 fps would be wrong for labels of a video of 7."""
-    write_video(tmp_path / "cam.mp4", [np.full((48, 64, 3), 40 * k, np.uint8) for k in range(5)], rate=7)
-    path = tmp_path / "cam" if folder else tmp_path / "cam.txt"
-    text = path / "gt" / "gt.txt" if folder else path
-    text.parent.mkdir(parents=True, exist_ok=True)
-    text.write_text("1,1,5,5,10,20\n2,1,6,5,10,20\n")
-    with pytest.warns(UserWarning, match=r"taken at 25 fps, but cam\.mp4 beside it has 7: give --fps 7"):
-        assert open_source(path)[0].fps == 25
 
 
 def test_an_outlier_among_shares_is_clipped():

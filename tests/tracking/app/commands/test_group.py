@@ -12,8 +12,8 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
+from sim.io.files.tables import plain
 from sim.io.source import open_source
-from sim.io.store.group_files import event_dict
 from sim.io.store.seal import NAMES, check_run
 from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
@@ -72,7 +72,7 @@ def walk(tmp_path: Path) -> Path:
 
 
 def told(tracks: Tracks) -> list[dict]:
-    return [event_dict(e) for e in tracks.events]
+    return [plain(e) for e in tracks.events]
 
 
 def content(folder: Path) -> dict[str, bytes]:

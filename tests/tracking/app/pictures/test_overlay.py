@@ -54,7 +54,7 @@ def test_every_frame_in_its_slot(tmp_path: Path) -> None:
 def test_boxes_are_where_they_belong() -> None:
     """At twice its size: the left edge of a box at u = 40 is drawn at 80, in the colour of its id, the id above it."""
     side = layer_of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None)
-    (picture,) = overlay_pictures(sequence(1), [[(side, LayerStyle())]])
+    (picture,) = overlay_pictures(sequence(1), [(side, LayerStyle())])
     edges = np.argwhere(np.abs(picture[STRIP:].astype(int) - colour(3)).max(axis=2) < 12)
     box = edges[edges[:, 0] > 61]
     (_, left), (bottom, right) = box.min(axis=0), box.max(axis=0)
@@ -62,7 +62,7 @@ def test_boxes_are_where_they_belong() -> None:
     assert 40 < edges[:, 0].min() < 58
 
 
-def test_the_truth_stands_beside_over_or_alone(tmp_path: Path) -> None:
+def test_the_truth_stands_over_or_alone(tmp_path: Path) -> None:
     truth = Truth(
         "coded", 10.0, 3, 20.0, np.arange(1, 4), np.ones(3, np.int64), np.full(3, -1), None, None,
         np.tile([10.0, 30, 10, 20], (3, 1)), np.ones(3),
@@ -71,9 +71,9 @@ def test_the_truth_stands_beside_over_or_alone(tmp_path: Path) -> None:
     tracks = [answer(k, {3: [40, 30, 10, 20]}) for k in range(1, 4)]
     wide = [
         frames_of(write_overlay(labelled, given, tmp_path / "o.mp4", how))[0].shape[1]
-        for given, how in ((tracks, None), (tracks, "beside"), (tracks, "over"), (tracks, "only"), (None, None))
+        for given, how in ((tracks, None), (tracks, "over"), (None, None))
     ]
-    assert wide == [166, 332, 166, 166, 166]
+    assert wide == [166, 166, 166]
     for given, how, word in ((tracks, "over", "without labels"), (None, None, "neither tracks nor labels")):
         with pytest.raises(InputError, match=word):
             write_overlay(sequence(3), given, tmp_path / "x.mp4", how)
@@ -91,7 +91,7 @@ def test_what_a_frame_lacks_is_told() -> None:
 
     case = dataclasses.replace(sequence(3), frames=frames, has_detections=True)
     side = layer_of_tracks([answer(k, {}) for k in (1, 2, 3)], None, None)
-    made = list(overlay_pictures(case, [[(side, LayerStyle())]]))
+    made = list(overlay_pictures(case, [(side, LayerStyle())]))
     red = [(np.abs(p[:STRIP].astype(int) - colour(6)).max(axis=2) < 4).sum() > 50 for p in made]
     assert red == [False, True, True]
     assert [number(p, STRIP, 2) for p in made] == [1, 1, 3]
@@ -132,7 +132,7 @@ def test_a_group_has_its_extent_its_way_and_its_size() -> None:
     np.testing.assert_allclose((offset**2 / [9.0, 1.0]).sum(axis=1), 9.21, rtol=1e-6)
     np.testing.assert_allclose(region.motion, [[40, 30], [50, 30]])
     assert region.size == 3.04
-    (picture,) = overlay_pictures(sequence(1), [[(side, LayerStyle())]])
+    (picture,) = overlay_pictures(sequence(1), [(side, LayerStyle())])
     drawn = coloured(picture, 4)
     drawn = drawn[drawn[:, 1] <= 30]  # above its name
     reach = 3 * np.sqrt(9.21)

@@ -68,7 +68,7 @@ def test_tracks_come_back(sequence: Sequence, tracks: list[Tracks]) -> None:
         np.testing.assert_allclose(side["box"][now], answer.box[order], atol=0.26)
     bars = page_data(sequence, Run(tracks))["tracks"]["bars"]
     assert sorted(bar[0] for bar in bars) == [0, 7, 8]
-    assert page_data(sequence, Run(tracks))["tracks"]["links"] == [[54, 7, 0], [114, 0, 8]]
+    assert page_data(sequence, Run(tracks))["tracks"]["links"] == [(54, 7, 0), (114, 0, 8)]
 
 
 def test_detections_come_back(sequence: Sequence) -> None:

@@ -22,8 +22,8 @@ def test_bars_and_links_of_groups(sequence: Sequence) -> None:
     assert {bar[0]: (*bar[1:3], bar[4]) for bar in data["tracks"]["bars"]} == {
         1: (1, 160, 5), 2: (1, 53, 2), 3: (114, 160, 2),
     }  # fmt: skip
-    assert data["tracks"]["links"] == [[54, 2, 1], [114, 1, 3]]
-    assert data["truth"]["links"] == [[50, 2, 1], [110, 1, 3]]
+    assert data["tracks"]["links"] == [(54, 2, 1), (114, 1, 3)]
+    assert data["truth"]["links"] == [(50, 2, 1), (110, 1, 3)]
 
 
 @given(st.lists(st.tuples(st.floats(0, 8), st.floats(0, 8)), min_size=1, max_size=9))

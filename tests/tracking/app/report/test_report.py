@@ -31,7 +31,6 @@ def full(name: str) -> content.Report:
         name, name, "HOTA", rows, [name], maps[0],
         [content.Curves(name, name, [1, 0.8, 0.4], [curve], [name])], maps[1:],
         [content.CauseBar(name, name, name, 2, 1.5, {"HOTA": 0.1, "group_F1": 0.2})], name,
-        [content.Speed(name, 100.0, 0.8, 0.7, 0.9)],
         [content.Moment(name, name, name, 0.5, 0.9, 1.0, name, name, json.dumps({"name": "x"}))],
         [content.Failure(name, name, name, name)], [(name, "page.html", 0.5)],
     )  # fmt: skip
@@ -39,10 +38,10 @@ def full(name: str) -> content.Report:
 
 def test_all_parts_stand_in_the_page() -> None:
     page = report_html(full("blob"))
-    parts = ("ranking", "scenes", "curves", "matrices", "moments", "causes", "speed", "sequences", "failures")
+    parts = ("ranking", "scenes", "curves", "matrices", "moments", "causes", "sequences", "failures")
     assert [id for id in parts if f'<section id="{id}">' in page] == list(parts)
     charts = json.loads(re.findall(r'id="charts">(.*?)</script>', page, re.DOTALL)[0])
-    assert list(charts) == ["chart-ranking", "chart-curves-0", "chart-causes", "chart-speed"]
+    assert list(charts) == ["chart-ranking", "chart-curves-0", "chart-causes"]
     assert all(f'id="{id}"' in page for id in charts)
     assert "no scene, blob" in page, "an empty cell says why"
 

@@ -195,9 +195,9 @@ def test_sums_of_people_are_those_of_all_mappings_with_the_others_averaged():
     density, pairs, exist, detect = candidates(5)
     W = np.array([weights_of(density, pairs, exist, detect, 0.01, p) for p in range(20)])
     mean, miss = W.mean(axis=0), 1 - (exist * detect).mean(axis=0)
-    free = sensor_kernels.free_detections(mean, miss)
-    logs, found = np.empty((20, 6)), np.empty(density.shape)
-    sensor_kernels.person_sums(density, pairs, exist, detect, 0.01, free, logs, found)
+    free = sensor.free_detections(mean, miss)
+    (logs, measured), found = np.empty((2, 20, 6)), np.empty(density.shape)
+    sensor_kernels.person_sums(density, pairs, exist, detect, 0.01, free, logs, found, measured)
     for k in range(6):
         rest = np.delete(np.arange(6), k)
         others = reference_sum(mean[rest], miss[rest])[0]

@@ -16,7 +16,7 @@ from tests.reference_relational import drawn, relate, relations
 from tests.tracking.papers.relational.test_particle_weights import sight
 from tracking.filters.person_streams import birth_keys
 from tracking.grouping.belief import UNSEEN
-from tracking.papers.relational import sensor, transition_kernels
+from tracking.papers.relational import sensor, transition, transition_kernels
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.tracker import Particle, Relational
@@ -199,7 +199,7 @@ def test_people_who_are_equal_in_all_particles_change_no_weight(detect):
 
 def joined_by(particles, label, points, uniforms, rules):
     """Relates the new people, the last slots, to the groups that they join."""
-    pairs, related = transition_kernels.join(particles.pos, particles.exist, label, points, 0.5, uniforms, rules)
+    pairs, related = transition.join(particles.pos, particles.exist, label, points, 0.5, uniforms, rules)
     particles.hold(pairs)
     particles.related[len(particles.pairs) - len(pairs) :] = related
     assert np.array_equal(particles.pairs[len(particles.pairs) - len(pairs) :], pairs)
@@ -233,7 +233,7 @@ def test_a_newcomer_in_an_empty_scene_is_alone_and_beside_a_group_in_it_by_half(
 
 
 def reconsidered(particles, rules, rng):
-    particles.hold(transition_kernels.near_pairs(particles.pos, rules))
+    particles.hold(transition.near_pairs(particles.pos, rules))
     uniforms = rng.random((particles.count, particles.people, 2))
     odds = np.full(len(particles.pairs), rules[transition_kernels.BIAS])
     related = particles.related

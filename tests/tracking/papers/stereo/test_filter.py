@@ -21,7 +21,7 @@ FIT = {"tilt": 20.0, "focal": 1000.0, "baseline": 0.5, "height": 3.0}
 def at_places(pos: np.ndarray, cov: np.ndarray, vel: np.ndarray | None = None, vel_cov: float = 0.01) -> SpacePoints:
     n = len(pos)
     vel = np.zeros((n, 3)) if vel is None else vel
-    return SpacePoints(np.arange(1, n + 1), pos, cov, vel, np.repeat(vel_cov * np.eye(3)[None], n, 0), np.zeros(n))
+    return SpacePoints(np.arange(1, n + 1), pos, cov, vel, np.repeat(vel_cov * np.eye(3)[None], n, 0))
 
 
 def cloud(seed: int, count: int, centre, sd: float = 0.3) -> np.ndarray:

@@ -60,7 +60,7 @@ def together(*groups) -> list[SpacePoints]:
     for parts in zip(*groups, strict=True):
         pos, vel, id = (np.concatenate([p[a] for p in parts]) for a in range(3))
         cov = np.repeat(4e-4 * np.eye(3)[None], len(pos), 0)
-        made.append(SpacePoints(id, pos, cov, vel, 25 * cov, np.zeros(len(pos))))
+        made.append(SpacePoints(id, pos, cov, vel, 25 * cov))
     return made
 
 
@@ -126,9 +126,7 @@ def test_a_point_in_no_region_belongs_to_nobody(away: float, owner: int) -> None
     config = StereoConfig()
     group = space_group.newborn(step, PLACE, space_group.motion_model(config, 1 / FPS), 0.0)
     cov = 4e-4 * np.eye(3)[None]
-    point = SpacePoints(
-        np.array([99]), group.pos[None] + [away, 0, 0], cov, group.ekf.x[None, VEL, 0], 25 * cov, np.zeros(1)
-    )
+    point = SpacePoints(np.array([99]), group.pos[None] + [away, 0, 0], cov, group.ekf.x[None, VEL, 0], 25 * cov)
     assert sphere_groups(np.concatenate([step.pos, point.pos]), config.radius, 1).tolist() == [0] * 13
     assert space_group.associated([group], point, config).tolist() == [owner]
 
