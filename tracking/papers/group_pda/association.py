@@ -22,7 +22,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.geometry.hull_kernels import convex_hulls
-from sim.scene.body import PERSON_HEIGHT
 from sim.scene.camera import to_ground
 from sim.types import Array, Bools, Camera, Ints
 from tracking.papers.group_pda import association_kernels as kernels
@@ -30,7 +29,7 @@ from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
-HEAD_ERROR = 0.1  # m by which a point may be further from the camera than the place below the head.
+LOWEST_HEAD = 1.5  # m above the ground: only few people, mostly children, are shorter.
 BELOW = 0.1  # Share of a box's height below its lower edge at which another box hides the feet.
 FASTEST = 2.0  # m/s: nobody walks faster than this relative to a group (walking distance).
 
@@ -54,15 +53,16 @@ class PointClaims:
 
 
 def below_heads(points: Array, box: Array, camera: Camera) -> Array:
-    """Returns the points (M, 2), m on the ground, of people whose feet are hidden no further from the camera than
-    HEAD_ERROR = 0.1 m behind the place below the head, at the upper edge of the box (M, 4) px; others as they are.
+    """Returns the points (M, 2), m on the ground, of people whose feet are hidden no further from the camera than the
+    place below the head would be if it were LOWEST_HEAD = 1.5 m high; others as they are.
 
     Hidden feet displace a point away from the camera. They may be hidden if another box contains the place just below
-    the box (ours).
+    the box (M, 4), px. The head is at its upper edge. As most people are taller, a point that nothing displaces is
+    nearer and stays (ours).
     """
     way = points - camera.position[:2]
-    head = to_ground(camera, box[:, :2] + box[:, 2:] * np.array([0.5, 0.0]), PERSON_HEIGHT)
-    most = np.hypot(*(head - camera.position[:2]).T) + HEAD_ERROR
+    head = to_ground(camera, box[:, :2] + box[:, 2:] * np.array([0.5, 0.0]), LOWEST_HEAD)
+    most = np.hypot(*(head - camera.position[:2]).T)
     excess = np.fmax(1 - most / np.maximum(np.hypot(*way.T), 1e-9), 0.0)  # 0 if the head shows no ground
     below = (box[:, :2] + box[:, 2:] * np.array([0.5, 1 + BELOW]))[:, None]
     hidden = ((below > box[:, :2]) & (below < box[:, :2] + box[:, 2:])).all(2).any(1)  # never in a box of its own

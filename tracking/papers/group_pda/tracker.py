@@ -49,8 +49,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated.
   Why: they would swell.
 - no points: coasts, lost after `coast_time`. Paper: null masses, as before a split. Why: occlusion.
-- hidden feet: with boxes and a camera, points are put below the heads, at 1.7 m. Paper: points as they are. Why: hidden
-  feet displace points.
+- hidden feet: with boxes and a camera, points are put no further than below heads at 1.5 m. Paper: points as they are.
+  Why: hidden feet displace points.
 - pixels: on a grid of 0.1 m, each a share of a person. Paper: all, each counts one. Why: N in people; speed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
   similar groups cross.
