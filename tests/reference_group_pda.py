@@ -29,8 +29,7 @@ class Rules:
     detect: float
     miss: float  # probability of the miss before any measurement
     freeze: float  # share of N in others' points from which on extent and size rest
-    keep_extent: float
-    keep_size: float
+    keep: float
     correct: bool  # what the gate cuts off is put back
     redrawn: bool
     association: str = "pda"  # or nearest, all, none
@@ -43,7 +42,7 @@ class Rules:
         cut = truncation(c.gate) if self.correct else 1.0
         return np.array([
             c.gate, c.link, P[0, 0], P[0, 1], P[1, 1], c.strength, c.least, self.noise, self.count_noise,
-            self.count_share, self.detect, self.miss, self.freeze, self.keep_extent, self.keep_size, cut, self.redrawn,
+            self.count_share, self.detect, self.miss, self.freeze, self.keep, cut, self.redrawn,
             ASSOCIATIONS[self.association], self.others,
         ], float)  # fmt: skip
 
@@ -200,6 +199,6 @@ def adapted(sets, share, points, weights, extent, size, rules):
     for b, s in zip(share[1:], sets, strict=True):
         n, _, S = moments(points[s], weights[s])
         shrunk = (n * S + c.strength * c.prior) / (n + c.strength) / cut
-        new_extent = new_extent + b * (rules.keep_extent * extent + (1 - rules.keep_extent) * shrunk)
-        new_size = new_size + b * (rules.keep_size * size + (1 - rules.keep_size) * n)
+        new_extent = new_extent + b * (rules.keep * extent + (1 - rules.keep) * shrunk)
+        new_size = new_size + b * (rules.keep * size + (1 - rules.keep) * n)
     return new_extent, new_size

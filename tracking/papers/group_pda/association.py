@@ -4,6 +4,8 @@ Input: points (M, 2), in m on the ground or px, and the bank of G groups. Output
 (a bool array); the groups' states in the bank are updated in place. Order in a frame: `gated_distances`, `claimed`,
 `with_missed_members`, `associate`. The masses and the update are in association_kernels and association_mass_kernels.
 
+Points of hidden feet are put below their heads first: `below_heads` (ours).
+
 Members that the detector missed in a frame stand in at their predicted places (ours), so that misses do not move or
 split a group.
 
@@ -20,12 +22,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.geometry.hull_kernels import convex_hulls
-from sim.types import Array, Bools, Ints
+from sim.scene.camera import to_ground
+from sim.types import Array, Bools, Camera, Ints
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
+LOWEST_HEAD = 1.5  # m above the ground: only few people, mostly children, are shorter.
+BELOW = 0.1  # Share of a box's height below its lower edge at which another box hides the feet.
 FASTEST = 2.0  # m/s: nobody walks faster than this relative to a group (walking distance).
 
 
@@ -45,6 +50,23 @@ class PointClaims:
     d2: Array
     owner: Ints
     claimants: Ints
+
+
+def below_heads(points: Array, box: Array, camera: Camera) -> Array:
+    """Returns the points (M, 2), m on the ground, of people whose feet are hidden no further from the camera than the
+    place below the head would be if it were LOWEST_HEAD = 1.5 m high; others as they are.
+
+    Hidden feet displace a point away from the camera. They may be hidden if another box contains the place just below
+    the box (M, 4), px. The head is at its upper edge. As most people are taller, a point that nothing displaces is
+    nearer and stays (ours).
+    """
+    way = points - camera.position[:2]
+    head = to_ground(camera, box[:, :2] + box[:, 2:] * np.array([0.5, 0.0]), LOWEST_HEAD)
+    most = np.hypot(*(head - camera.position[:2]).T)
+    excess = np.fmax(1 - most / np.maximum(np.hypot(*way.T), 1e-9), 0.0)  # 0 if the head shows no ground
+    below = (box[:, :2] + box[:, 2:] * np.array([0.5, 1 + BELOW]))[:, None]
+    hidden = ((below > box[:, :2]) & (below < box[:, :2] + box[:, 2:])).all(2).any(1)  # never in a box of its own
+    return np.asarray(points - (excess * hidden)[:, None] * way)
 
 
 def search_regions(bank: GroupBank, scaled: ScaledParameters) -> Array:

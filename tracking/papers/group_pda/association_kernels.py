@@ -22,8 +22,7 @@ from tracking.papers.group_pda.association_mass_kernels import (
     FREEZE_SHARE,
     GATE,
     GATE_FACTOR,
-    KEEP_EXTENT,
-    KEEP_SIZE,
+    KEEP,
     LEAST_WEIGHT,
     LINK,
     NEAREST,
@@ -144,23 +143,17 @@ def associate(
                 mine, people, start, rules[LINK], rules[GATE], prior, rules[PRIOR_WEIGHT], rules[LEAST_WEIGHT]
             )[0]
             if rules[ASSOCIATION] != PREFIXES:
-                for j in range(len(feasible) - 1):
-                    feasible[j] = False
-        taken, some = 0, False
-        for j in range(len(feasible)):
-            some = some or feasible[j]
-        if some:
+                feasible[:-1] = False
+        taken = 0
+        if feasible.any():
             best = _estimate(
                 mine, people, ages, colour, start, feasible, region[g], x[g], P[g], extent[g], size[g : g + 1],
                 rest[g] or others > rules[FREEZE_SHARE] * size[g], rules,
             )  # fmt: skip
             if best >= 0:
                 state[g], taken = MEASURED, start + best
-        else:
-            sums = components(mine, people, rules[LINK])[1]
-            for c in range(len(sums)):
-                if sums[c, WEIGHT] >= rules[LEAST_WEIGHT]:
-                    state[g], taken = NULL, n
+        elif (components(mine, people, rules[LINK])[1][:, WEIGHT] >= rules[LEAST_WEIGHT]).any():
+            state[g], taken = NULL, n
         for k in range(taken):
             chosen[g, order[k]] = True
     return state, chosen
@@ -201,13 +194,9 @@ def _estimate(
     seen, mean_age = running_ages(weights, age, start)
     S = np.empty((len(people), 3))
     log_mass, beta = np.empty(len(people)), np.empty(len(people))
-    unit = 0.0
-    for k in range(len(weights)):
-        unit += weights[k]
-    unit /= len(weights)  # people that one point stands for: makes m_N a mass of numbers of points
+    unit = weights.sum() / len(weights)  # people that one point stands for: makes m_N a mass of numbers of points
     evidence = np.zeros(len(colour) - start + 1)
-    for k in range(start, len(colour)):
-        evidence[k - start + 1] = evidence[k - start] + colour[k]
+    evidence[1:] = np.cumsum(colour[start:])
     log_m_miss = log_miss(unit, start, region, size[0], rules)
     top = log_m_miss
     width = rules[COUNT_SD] ** 2 + (rules[COUNT_SHARE] * size[0]) ** 2  # sigma_n^2
@@ -226,9 +215,8 @@ def _estimate(
     for j in range(len(beta)):
         beta[j] = np.exp(log_mass[j] - top)
         total += beta[j]
-    miss = np.exp(log_m_miss - top)
-    total, best, matched = total + miss, 0, 0.0
-    miss /= total
+    total += np.exp(log_m_miss - top)
+    miss, best, matched = np.exp(log_m_miss - top) / total, 0, 0.0
     for j in range(len(beta)):
         beta[j] /= total
         matched += beta[j]
@@ -282,10 +270,10 @@ def _adapt(beta: Array, total: float, people: Array, cov: Array, extent: Array, 
                 total_cov = n * cov[j, a] + rules[PRIOR_WEIGHT] * rules[PRIOR_XX + a]
                 target[a] += share * total_cov / (n + rules[PRIOR_WEIGHT]) / rules[GATE_FACTOR]
             count += share * n
-    keep = rules[KEEP_EXTENT] + (1 - rules[KEEP_EXTENT]) * (1 - total)
-    extent[0, 0] = keep * extent[0, 0] + (1 - rules[KEEP_EXTENT]) * target[0]
-    extent[0, 1] = keep * extent[0, 1] + (1 - rules[KEEP_EXTENT]) * target[1]
+    new = 1 - rules[KEEP]
+    keep = rules[KEEP] + new * (1 - total)
+    extent[0, 0] = keep * extent[0, 0] + new * target[0]
+    extent[0, 1] = keep * extent[0, 1] + new * target[1]
     extent[1, 0] = extent[0, 1]
-    extent[1, 1] = keep * extent[1, 1] + (1 - rules[KEEP_EXTENT]) * target[2]
-    keep = rules[KEEP_SIZE] + (1 - rules[KEEP_SIZE]) * (1 - total)
-    size[0] = keep * size[0] + (1 - rules[KEEP_SIZE]) * count
+    extent[1, 1] = keep * extent[1, 1] + new * target[2]
+    size[0] = keep * size[0] + new * count

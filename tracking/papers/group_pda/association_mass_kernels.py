@@ -17,8 +17,7 @@ from sim.compiler import njit
 from sim.types import Array
 
 (GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, PRIOR_WEIGHT, LEAST_WEIGHT, POINT_SD, COUNT_SD, COUNT_SHARE, DETECT_PROB,
- MISS_PROB, FREEZE_SHARE, KEEP_EXTENT, KEEP_SIZE, GATE_FACTOR, REDRAWN, ASSOCIATION,
- LEAST_OTHERS) = range(19)  # fmt: skip
+ MISS_PROB, FREEZE_SHARE, KEEP, GATE_FACTOR, REDRAWN, ASSOCIATION, LEAST_OTHERS) = range(18)  # fmt: skip
 RULES = LEAST_OTHERS + 1
 """Slots of the array `rules`, RULES in all; tracking.papers.group_pda.scaled_parameters fills them.
 
@@ -27,7 +26,7 @@ covariance that extents are shrunk to, with the weight PRIOR_WEIGHT in people. L
 component is noise. POINT_SD: standard deviation of one person's measured position. COUNT_SD (people), COUNT_SHARE:
 sigma_n^2 = COUNT_SD^2 + (COUNT_SHARE N)^2. DETECT_PROB: probability that a member is among the points. MISS_PROB: prior
 probability of the miss hypothesis, 0 without it. FREEZE_SHARE: share of N in points of other groups above which extent
-and size rest. KEEP_EXTENT, KEEP_SIZE: alpha_s, alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that
+and size rest. KEEP: alpha_s = alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that
 a Gaussian keeps inside the gate. REDRAWN: 1 if members are drawn anew in each frame. ASSOCIATION: one of PREFIXES,
 NEAREST, ALL, UNCONSTRAINED. LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
 """

@@ -44,10 +44,9 @@ from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
-# s before and after a moment over which the difference of two groups' velocities is averaged: the time of one step, so
-# that the sway of people has no part in it.
+# s before and after a moment over which the difference of two groups' velocities is averaged, or a chord for parts that
+# leave: the time of one step, so that the sway of people has no part in it.
 STEP_TIME = 0.5
-SPLIT_CHORD = 0.4  # s before and after a moment over which the velocity of a part that leaves is a chord.
 # Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three.
 REACH = 1.1
 
@@ -118,14 +117,13 @@ def split_onset(
         apart.append(middle[1] - middle[0])
     when, d = np.array(times[::-1]), np.array(apart[::-1])
     gap = np.hypot(*d.T) - reach
-    slow = chords(when, d, SPLIT_CHORD) < SPLIT_VELOCITY
+    slow = chords(when, d, STEP_TIME) < SPLIT_VELOCITY
     together = (gap <= MERGE_DISTANCE) | ((gap <= SPLIT_DISTANCE) & slow)
     k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(when) - 1)
     return float(when[k]), before[k][1].mean(0) / metres_per_unit
 
 
 HISTORY_TIME = 5.0  # s of a pair's past that are kept.
-PATIENCE = 1.5  # s for which the past of a pair is kept while the two are not near or one of them cannot merge.
 
 Pair = tuple[int, int]  # Ids of two groups, the smaller first.
 
@@ -134,7 +132,7 @@ class GroupChanges:
     """Splits groups whose parts have come apart, and merges parts and groups that stay near with like velocities.
 
     State: moments, a dict by pair of ids (the smaller first): a `PairMoment` for each of the last 5 s in which the two
-    were near, or parts of one group, and could merge, oldest first. A pair is kept for 1.5 s after the last of them.
+    were near, or parts of one group, and could merge, oldest first. A pair is kept for `coast_time` after the last.
     """
 
     def __init__(self) -> None:
@@ -143,7 +141,8 @@ class GroupChanges:
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
         """Split groups, and merge parts and groups; yield the events of groups. t: s."""
         # First: an id that a part has from its lost group must not bring that group's past, if it is older.
-        self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= PATIENCE + 1e-9}
+        patience = scaled.config.coast_time + 1e-9
+        self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= patience}
         yield from self._split(bank, scaled, t)
         self._join_parts(bank, scaled, t)
         yield from self._merge(bank, scaled, t)

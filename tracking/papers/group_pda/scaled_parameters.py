@@ -35,7 +35,7 @@ class ScaledParameters:
 
     config: the GroupPdaConfig they come from. dt: s between frames. scale: units per metre (1 on the ground).
     constraint: the rule G_y by which points are one group (sec. 3.3). point_sd: standard deviation of one person's
-    measured position. kernel_rules (19,): the array `rules` of the kernels (gates, priors, noises). F, Q (4, 4):
+    measured position. kernel_rules (18,): the array `rules` of the kernels (gates, priors, noises). F, Q (4, 4):
     transition and process noise covariance of x, y, vx, vy, eq. 2.3. from_pixels: True if the points are foreground
     pixels, not people. metres_per_unit (2,): metres on the ground per unit along x and along y (depth in an image).
     body_cov (2, 2): covariance of one person's pixels, zeros from points. colour_bins: bins of colour histograms (64),
@@ -102,7 +102,7 @@ def _kernel_rules(
     rules[kernels.DETECT_PROB] = 1.0 if pixels else 1 - (1 - c.detect_prob) ** looks
     ours = c.corrections and c.association != "none"
     rules[kernels.MISS_PROB], rules[kernels.FREEZE_SHARE] = (MISS_PROB, FREEZE_SHARE) if ours else (0.0, np.inf)
-    rules[[kernels.KEEP_EXTENT, kernels.KEEP_SIZE]] = np.exp(-1 / fps / np.full(2, c.extent_time))
+    rules[kernels.KEEP] = np.exp(-1 / fps / c.extent_time)
     rules[kernels.GATE_FACTOR] = factor
     rules[kernels.REDRAWN] = not c.corrections
     rules[kernels.ASSOCIATION] = ASSOCIATIONS[c.association]

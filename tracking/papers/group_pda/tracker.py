@@ -49,6 +49,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated.
   Why: they would swell.
 - no points: coasts, lost after `coast_time`. Paper: null masses, as before a split. Why: occlusion.
+- hidden feet: with boxes and a camera, points are put no further than below heads at 1.5 m. Paper: points as they are.
+  Why: hidden feet displace points.
 - pixels: on a grid of 0.1 m, each a share of a person. Paper: all, each counts one. Why: N in people; speed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
   similar groups cross.
@@ -95,6 +97,7 @@ from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.association import (
     PointClaims,
     associate,
+    below_heads,
     claimed,
     gated_distances,
     remember,
@@ -162,8 +165,8 @@ class GroupPda:
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
-        Order: predict; remove lost groups; gate, associate, update, fall apart (Fig. 1), births; remove duplicates;
-        split, merge; confirm.
+        Order: predict; remove lost groups and duplicates of the frame before; gate, associate, update, fall apart (Fig.
+        1), births; duplicates; split, merge; confirm.
         From points `detections.pos` is used (x, y), from pixels `frame.image`. A frame without them (None), and from
         pixels one with too much foreground, is predicted only; before the first detections the Tracks are empty. A
         config that has replaced `config` since the last frame holds from this frame on; the groups stay.
@@ -181,11 +184,10 @@ class GroupPda:
         if bank.colour_hist.shape[1] != scaled.colour_bins:
             bank.colour_hist = np.zeros((len(bank), scaled.colour_bins))
         bank.predict(scaled)
-        events: list[WholeGroupEvent] = [*remove_lost(bank, scaled, t)]
+        events = list(remove_lost(bank, scaled, t))
         if points is not None:
             self._measure(points, weights, scaled, t)
         self.duplicates.step(bank, scaled, t)
-        events += remove_lost(bank, scaled, t)
         events += self.changes.step(bank, scaled, t)
         events += confirm(bank, scaled, t, self.ids)
         return self._report(frame, events, scaled, self._outline(detections))
@@ -214,7 +216,10 @@ class GroupPda:
         if detections is None:
             return None, np.zeros(0)
         self.plane = "image" if detections.plane == "image" else "ground"
-        return np.array(detections.pos[:, :2]), np.ones(len(detections.pos))
+        points, camera = np.array(detections.pos[:, :2]), self.context.camera
+        if self.plane == "ground" and detections.box is not None and camera is not None and camera.kind != "top":
+            points = below_heads(points, detections.box, camera)
+        return points, np.ones(len(points))
 
     def _outline(self, detections: Detections | None) -> Array:
         if self.pixels is not None:

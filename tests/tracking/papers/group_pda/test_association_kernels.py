@@ -23,7 +23,7 @@ from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_param
 
 STATES = ["nothing", "null", "measured"]
 PLAIN = reference.Rules(
-    Constraint(1.5, 9.21, 0.09 * np.eye(2), 3.0), 0.06, 0.5, 0.15, 1.0, 0.0, np.inf, 0.9, 0.9, True, False
+    Constraint(1.5, 9.21, 0.09 * np.eye(2), 3.0), 0.06, 0.5, 0.15, 1.0, 0.0, np.inf, 0.9, True, False
 )
 
 
@@ -43,7 +43,7 @@ def random_rules(r, seed):
     return reference.Rules(
         constraint, r.uniform(0.02, 0.3), r.uniform(0.2, 2), r.uniform(0.05, 0.4), r.uniform(0.6, 1),
         r.uniform(0.01, 0.5) if miss and not every else 0.0, r.uniform(0, 0.8) if freeze and not every else np.inf,
-        r.uniform(0.1, 0.99), r.uniform(0.1, 0.99), correct, redrawn, association, float(r.choice([1e-9, 1.0])),
+        r.uniform(0.1, 0.99), correct, redrawn, association, float(r.choice([1e-9, 1.0])),
     )  # fmt: skip
 
 

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sim.scene.body import person_boxes
 from sim.truth.merge_split_rules import SPLIT_VELOCITY
 from sim.types import Array, Context, Tracks
 from tests.painted import ids
+from tests.reference_sense import pinhole
 from tests.tracking.papers.group_pda.test_tracker import FPS, GROUND, block, changes, events, noisy, sizes, track
+from tracking.papers.group_pda.association import below_heads
 from tracking.papers.group_pda.config import GroupPdaConfig
 
 
@@ -175,3 +178,9 @@ def test_a_hidden_member_does_not_end_a_group_of_two_parts() -> None:
     said = one_aside(0, 80, hidden=50)
     assert ids(said) == {1}
     assert not events(said, "leave", "split")
+
+
+def test_hidden_feet_are_no_further_than_below_a_head_at_one_and_a_half_m() -> None:
+    box = person_boxes(pinhole(), np.array([[8.0, 4.0, 0.0], [8.0, 5.0, 0.0]]), np.zeros(2), np.full(2, 1.5))
+    box[1, 3] *= 0.4
+    assert below_heads(np.array([[8, 5.5], [8, 6.5]]), box, pinhole())[:, 1] == pytest.approx([5.5, 5.0], abs=0.05)
