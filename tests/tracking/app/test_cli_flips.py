@@ -441,7 +441,7 @@ ELSEWHERE = {
     *((command, "box_scale") for command in ("score", "track")),  # tests/sim/io/formats/test_box_columns.py
 }
 OWN = (
-    "compare", "errors", "group", "grouping", "minimize", "replay", "sensor", "stress", "tune",
+    "compare", "errors", "group", "grouping", "joint", "minimize", "relational", "replay", "sensor", "stress", "tune",
 )  # fmt: skip
 """Commands whose options are tested one by one in commands/, ../stress, ../errors, and test_*.py here."""
 
