@@ -1,7 +1,7 @@
 """Keeps opened sequences between episodes on the same sources, so that motions, truths and detections are computed
 once.
 
-The memory is bounded by their bytes.
+The memory is bounded by the bytes of the arrays that they hold.
 
 Also here: the sequences that episodes are played on: scenarios with seeds, stored or real recordings, sequences in
 memory.
@@ -12,13 +12,15 @@ memory.
 from __future__ import annotations
 
 import hashlib
-import pickle
 from collections import Counter, OrderedDict
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import FunctionType, MethodType
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Frame, Sequence, Truth
@@ -124,6 +126,7 @@ def _stored(path: Path) -> list[Source]:
     return [Source(s.name, int(s.source.get("seed", 0)), path=str(s.source.get("path", path))) for s in found]
 
 
+T = TypeVar("T")
 DEFAULT_LIMIT = 256 * 2**20  # Bytes that a SourceCache keeps by default.
 TIMES_COUNTED = 2  # How often the bytes of a source are counted; after that it holds all that it will hold.
 
@@ -137,11 +140,10 @@ class OpenedSource:
     def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
         found = source.open(streams)
         loads = {name: getattr(found, name) for name in ("load_truth", "load_background")}
-        once: dict[str, Any] = {name: cache(load) for name, load in loads.items() if load is not None}
+        once: dict[str, Any] = {name: _computed_once(load) for name, load in loads.items() if load is not None}
         opened = replace(found, **once)
         self.source, self._opened = source, opened
-        frames_once = cache(lambda: tuple(opened.without_pictures()))
-        self._computed = (*once.values(), frames_once)
+        frames_once = _computed_once(lambda: tuple(opened.without_pictures()))
 
         def frames_without_pictures() -> Iterator[Frame]:
             return iter(frames_once())
@@ -149,12 +151,6 @@ class OpenedSource:
         pictures = opened.has_images or opened.has_right
         frames = opened.frames if pictures else frames_without_pictures
         self.sequence = replace(opened, bare=frames_without_pictures, frames=frames)
-
-    @property
-    def bytes(self) -> int:
-        """Bytes of what was computed so far, as they are pickled."""
-        kept = [compute() for compute in self._computed if compute.cache_info().currsize]
-        return len(pickle.dumps((kept, self.__dict__.get("judge")), protocol=5))
 
     @cached_property
     def truth(self) -> Truth:
@@ -173,10 +169,21 @@ class OpenedSource:
         return ObjectiveScorer(self.truth)
 
 
+def _computed_once(compute: Callable[[], T]) -> Callable[[], T]:
+    kept: list[T] = []
+
+    def first_result() -> T:
+        if not kept:
+            kept.append(compute())
+        return kept[0]
+
+    return first_result
+
+
 class SourceCache:
     """Opened sources for reuse; the least recently used one is dropped first. len() gives their number.
 
-    limit: bytes that all of them may hold together. The source in use is kept whatever its size. The bytes
+    limit: bytes of arrays that all of them may hold together. The source in use is kept whatever its size. The bytes
     of a source are counted when the next one is opened, and again after its second use.
     """
 
@@ -193,7 +200,7 @@ class SourceCache:
 
     @property
     def bytes(self) -> int:
-        """Bytes of what the opened sources hold, counted anew for the last used one; 0 without sources."""
+        """Bytes of the arrays that the opened sources hold, counted anew for the last used one; 0 without sources."""
         self._counted.clear()
         self._count_last()
         return sum(self._bytes.values())
@@ -215,9 +222,44 @@ class SourceCache:
         key = next(reversed(self._opened), None)
         if key is not None and self._counted[key] < TIMES_COUNTED:
             self._counted[key] += 1
-            self._bytes[key] = self._opened[key].bytes
+            self._bytes[key] = array_bytes(self._opened[key])
 
     def _make_room(self) -> None:
         while self._opened and sum(self._bytes.values()) > self.limit:
             key, _ = self._opened.popitem(last=False)
             del self._bytes[key], self._counted[key]
+
+
+def array_bytes(root: object) -> int:
+    """Returns the bytes of all numpy arrays that can be reached from the object `root`."""
+    arrays: dict[int, int] = {}
+    seen: set[int] = set()
+    waiting: list[Any] = [root]
+    while waiting:
+        one = waiting.pop()
+        if id(one) in seen:
+            continue
+        seen.add(id(one))
+        if isinstance(one, np.ndarray):
+            while isinstance(one.base, np.ndarray):
+                one = one.base
+            arrays[id(one)] = one.nbytes
+        else:
+            waiting.extend(_parts(one))
+    return sum(arrays.values())
+
+
+def _parts(one: Any) -> list[Any]:
+    if isinstance(one, tuple | list):
+        return list(one)
+    if isinstance(one, dict):
+        return list(one.values())
+    if isinstance(one, MethodType):
+        return [one.__self__]
+    if isinstance(one, FunctionType) or hasattr(one, "__wrapped__"):
+        cells = getattr(one, "__closure__", None) or ()
+        return [*(c.cell_contents for c in cells), getattr(one, "__wrapped__", None)]
+    if type(one).__module__.split(".")[0] not in ("sim", "tracking"):
+        return []
+    named = [getattr(one, f.name) for f in fields(one)] if is_dataclass(one) and not isinstance(one, type) else []
+    return [*named, *getattr(one, "__dict__", {}).values()]
