@@ -2,9 +2,8 @@
 
 What kernels call has no wrapper for calls from Python, and LLVM optimises it within its callers only; so with numba's
 own functions, such as np.empty. numba's answers to what type `a + b` has are remembered. `a[i, j]` needs
-fewer instructions than numba's. Results are the same to the last bit. The changes hold for the whole process. All
-names of numba's inside are looked up before the first change: if one is missing, the import fails and numba stays as it
-was.
+fewer instructions than numba's. Results are the same to the last bit. The changes hold for the whole process. What
+is replaced is looked up before the first change: if it is missing, the import fails and numba stays as it was.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import re
+from inspect import cleandoc
 from typing import Annotated, Any, Self
 
 from pydantic import (
@@ -61,8 +62,8 @@ class Model(BaseModel):
         reference = handler(core)
         schema = handler.resolve_ref_schema(reference)
         for kind in (kind for kind in reversed(cls.__mro__) if issubclass(kind, Model)):
-            meanings = (kind.__doc__ or "").partition("Attributes:")[2]
-            for name, words in re.findall(r"^ {8}(\w+): (.*?)(?=^ {4,8}\S|\Z)", meanings, re.DOTALL | re.MULTILINE):
+            meanings = cleandoc(kind.__doc__ or "").partition("Attributes:")[2]  # Python 3.13 has no indents there
+            for name, words in re.findall(r"^ {4}(\w+): (.*?)(?=^ {0,4}\S|\Z)", meanings, re.DOTALL | re.MULTILINE):
                 key = cls.model_fields[name].alias or name
                 schema["properties"][key]["description"] = " ".join(words.split())
         return reference

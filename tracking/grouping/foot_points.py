@@ -21,7 +21,8 @@ from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 from tracking.grouping.grouped_tracks import names_groups, with_groups, with_velocities
 from tracking.grouping.grouping_choice import Grouping
 
-FLATTENED = 0.4  # k of `as_measured`.
+FLATTENED = 0.4  # k of `as_measured`: F1 of pairs was greatest, of 0 to 1, seen from 5 to 25 degrees above people.
+OVERHEAD = 1e-6  # Level part of the axis of a camera that looks straight down.
 CLIMB = 8  # Steps in which the height of the ground below a foot point is found.
 
 
@@ -54,10 +55,11 @@ def as_measured(pos: Array, camera: Camera) -> Array:
     So a length dy in depth becomes dy / sqrt(1 + (k y / C)^2): as it is seen from far above, and from far away as it is
     seen in the picture.
     """
-    if camera.kind == "top":
+    level = float(np.hypot(*camera.rotation[2, :2]))
+    if camera.kind == "top" or level < OVERHEAD:
         return pos
-    ahead = camera.rotation[2, :2] / np.hypot(*camera.rotation[2, :2])
-    along, side = (pos - camera.position[:2]) @ ahead, (pos - camera.position[:2]) @ camera.rotation[0, :2]
+    x, y = camera.rotation[2, :2] / level
+    along, side = ((pos - camera.position[:2]) @ direction for direction in ([x, y], [y, -x]))
     reach = camera.position[2] / FLATTENED
     return np.column_stack([side, reach * np.arcsinh(along / reach)])
 
@@ -78,10 +80,11 @@ def completed(
     """
     if all(t.derived for t in tracks):
         return tuple(tracks)
-    camera = ground_below(tracks, camera, px_per_m, pixels).camera
-    if camera is None:
+    ground = ground_below(tracks, camera, px_per_m, pixels).camera
+    if ground is None:
         return with_groups(tracks, fps, px_per_m, rule)
-    feet = [t.replace(pos=as_measured(t.pos, camera)) for t in standing(tracks, camera, scene)]
+    stairs = None if camera is None else scene  # the boxes tell no place in the scene
+    feet = [t.replace(pos=as_measured(t.pos, ground)) for t in standing(tracks, ground, stairs)]
     grouped = with_groups(feet, fps, 1.0, rule)
     named = names_groups(tracks)
     return tuple(_grouped_as(t, g, named) for t, g in zip(with_velocities(tracks, fps), grouped, strict=True))

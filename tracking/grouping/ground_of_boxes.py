@@ -32,12 +32,13 @@ FOCAL = 1.1  # focal length over the width of the picture: between wide lenses (
 FARTHEST = 0.5  # largest deviation of ln (H / C) that counts, and that of boxes that cannot stand on the ground
 LOWEST = 2.5  # m: least height of a camera from which feet tell the depth
 STEEPEST = np.radians(60.0)
+DIFFER = 0.02  # least mean deviation of ln h: of equal boxes each tilt is right
 SURE = 2 / 3  # largest mean deviation, over that of ln h
 
 
 @dataclass(frozen=True)
 class Ground:
-    """The camera above the ground, None if unknown, and the last frame whose boxes it was taken from."""
+    """The camera above the ground, None if unknown, and the last frame whose boxes decided that; 0: none did."""
 
     camera: Camera | None = None
     frames: int = 0
@@ -50,20 +51,25 @@ def ground_of_boxes(tracks: Sequence[Tracks], px_per_m: float) -> Ground:
     for t in tracks:
         if len(box) >= BOXES:
             break
-        if t.box is not None and t.measured.any():
-            box, last = np.concatenate([box, t.box[t.measured]]), t.index
+        measured = t.measured & (t.box[:, 3] > 0) if t.box is not None else np.zeros(0, bool)
+        if t.box is not None and measured.any():
+            box, last = np.concatenate([box, t.box[measured]]), t.index
     if len(box) < LEAST or not px_per_m > 0:
-        return Ground()
+        return Ground(None, last)
     width, height = (box[:, :2] + box[:, 2:]).max(axis=0).tolist()  # of the picture, whose size need not be known
     size, focal = box[:, 3], FOCAL * width
+    differ = _spread(np.log(size / np.median(size)))
+    if width <= 0 or differ < DIFFER:
+        return Ground(None, last)
     log_ratio = _log_ratios((box[:, 1] + size - height / 2) / focal, size / focal)
-    middle = np.nanmedian(log_ratio, axis=1)
+    seen = np.isfinite(log_ratio).any(axis=1)
+    middle = np.zeros(len(TILTS))
+    middle[seen] = np.nanmedian(log_ratio[seen], axis=1)
     spread = _spread(log_ratio - middle[:, None])
     best = int(spread.argmin())
     position = np.array([0.0, 0.0, np.median(size) / px_per_m / np.exp(middle[best])])
-    sure = spread[best] <= SURE * _spread(np.log(size / np.median(size)))
-    if not sure or position[2] < LOWEST or TILTS[best] > STEEPEST:
-        return Ground()
+    if spread[best] > SURE * differ or position[2] < LOWEST or TILTS[best] > STEEPEST:
+        return Ground(None, last)
     picture, rotation = (int(np.ceil(width)), int(np.ceil(height))), camera_rotation(TILTS[best], 0.0)
     return Ground(Camera("pinhole", picture, (focal, focal), (width / 2, height / 2), position, rotation), last)
 

@@ -139,8 +139,11 @@ def _nearer(i: Ints, j: Ints, distance: Array) -> Array:
     """Returns how many other rows are nearer to the one of a pair than the other is, mean of both, (R,)."""
     centre, far = np.concatenate([i, j]), np.concatenate([distance, distance])
     order = np.lexsort((far, centre))
+    centre, far = centre[order], far[order]
+    # who is equally far shares a rank
+    further = np.append(True, (np.diff(centre) != 0) | (np.diff(far) > 0))[: len(order)]
     rank = np.empty(len(order))
-    rank[order] = np.arange(len(order)) - np.searchsorted(centre[order], centre[order])
+    rank[order] = np.maximum.accumulate(np.arange(len(order)) * further) - np.searchsorted(centre, centre)
     return np.asarray((rank[: len(i)] + rank[len(i) :]) / 2)
 
 
@@ -148,7 +151,9 @@ def _common(i: Ints, j: Ints, linked: Bools) -> Array:
     """Returns how many third rows are linked with both of a pair, (R,)."""
     from scipy.sparse import coo_array
 
-    low, rows = int(i.min(initial=0)), int(max(i.max(initial=-1), j.max(initial=-1))) + 1
+    if not len(i):
+        return np.zeros(0)
+    low, rows = int(i.min()), int(max(i.max(), j.max())) + 1
     near = np.concatenate([i[linked], j[linked]]) - low, np.concatenate([j[linked], i[linked]]) - low
     link = coo_array((np.ones(len(near[0])), near), (rows - low, rows - low)).tocsr()
     return np.asarray((link @ link)[i - low, j - low]).ravel()

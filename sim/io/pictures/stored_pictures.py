@@ -102,7 +102,7 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
             outputs["background"].add(picture)
         for frame in sequence if {"left", "right"} & outputs.keys() else sequence.without_pictures():
             pixels = None if sequence.load_pixels is None else sequence.load_pixels(frame.index)
-            for name in outputs.keys() - {"background"}:
+            for name in (name for name in outputs if name != "background"):
                 outputs[name].add(_picture(name, sequence, frame, pixels))
             if pixels is not None:
                 known.append(pixels.replace(ids=np.zeros((0, 0), np.int64), disparity=None))

@@ -26,3 +26,19 @@ def test_ground_is_that_of_the_camera_or_unknown(tilt: float, height: float, kno
         assert [found.position[2] / height, *found.rotation[2]] == pytest.approx([1, *view[2]], abs=0.15)
         far = as_measured(np.array([[0.0, 1000.0], [0.0, 1001.0]]), camera)
         assert far[1, 1] - far[0, 1] == pytest.approx(height / (0.4 * 1000), rel=0.01)
+
+
+def test_a_ground_that_is_refused_depends_on_its_boxes_too() -> None:
+    same = np.tile([500.0, 380.0, 10.0, 20.0], (60, 1))  # far too low for its width where the camera looks up
+    rows = (np.arange(60), np.full(60, -1), same[:, :2], same[:, :2], np.zeros((60, 4, 4)), same)
+    found = ground_of_boxes([Tracks(k, 0.0, "image", "person", *rows) for k in range(1, 9)], 12.0)
+    assert (found.camera, found.frames) == (None, 5)
+
+
+def test_depth_by_a_camera_that_is_turned_about_its_axis() -> None:
+    pos = np.array([[1.0, 5.0], [9.0, 5.0], [1.0, 8.0]])
+    for view in (camera_rotation(0.5, 0.0), camera_rotation(0.5, 0.0)[[1, 0, 2]] * [[-1], [1], [1]]):
+        camera = Camera("pinhole", (640, 480), (700.0, 700.0), (320.0, 240.0), np.array([0.0, 0.0, 6.0]), view)
+        moved = as_measured(pos, camera)
+        assert np.hypot(*(moved[1] - moved[0])) == pytest.approx(8)
+        assert np.hypot(*(moved[2] - moved[0])) == pytest.approx(2.7, abs=0.2)

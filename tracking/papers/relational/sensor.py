@@ -125,6 +125,9 @@ def may_reach(pos: Array, points: Array, most: float) -> Bools:
     return np.asarray(np.square(apart).sum(axis=2) <= most)
 
 
+CANCELLED = 1e-9  # Least share of the weight without detection: below it 1 minus the marginals is rounding.
+
+
 def free_detections(W: Array, miss: Array) -> Array:
     """Returns the probability that nobody else has a detection, (K, M), for each person: that of the sum over all
     mappings of the other people.
@@ -135,6 +138,7 @@ def free_detections(W: Array, miss: Array) -> Array:
     With m the marginals of the sum over all mappings of all people, it is m[k, j] / W[k, j] over the share of the
     mappings in which k has no detection, by its weight `miss`: all three are sums over mappings of the others.
     """
+    miss = np.maximum(miss, CANCELLED * W.max(axis=1, initial=0.0))
     m = np.empty(W.shape)
     sparse_sum(W, miss, np.ones(W.shape[1]), m)
     alone = np.maximum(1 - m.sum(axis=1), np.finfo(float).tiny) / miss
