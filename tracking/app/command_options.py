@@ -274,9 +274,10 @@ class ViewOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class SheetOptions:
-    """Write a contact sheet: several frames of a sequence in one picture, with the truth."""
+    """Write a contact sheet: several frames of a sequence in one picture, with the truth or, if given, the tracks."""
 
     source: Path = SOURCE()
+    tracks: Path | None = TRACKS()
     out: Path = FILE("Picture to write; for several sequences, a folder.", metavar="FILE.png")
     frames: int = option("Number of frames to show.", 8, low=1, high=64)
     fps: float | None = FPS()

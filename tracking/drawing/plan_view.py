@@ -108,8 +108,8 @@ def draw_trails(canvas: Canvas, truth: Truth, index: int, places: Array) -> None
             canvas.line(places[past][rows], (b, g, r), 3)
 
 
-def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, boxes: Array | None) -> None:
-    """Draws hull and id of each true group of two or more in frame `index`, in place: round boxes, or circles."""
+def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, boxes: Array | None, letter: str) -> None:
+    """Draws hull and id, after a letter, of each group of two or more in frame `index`: round boxes, or circles."""
     rows = truth.rows(index)
     group = truth.group[rows]
     for identity in np.unique(group[group >= 0]):
@@ -122,7 +122,7 @@ def draw_group_hulls(canvas: Canvas, truth: Truth, index: int, places: Array, bo
         canvas.fill(polygon, ink, 0.2)
         cv2.polylines(canvas.image, [fixed_point(polygon)], True, ink, 2, cv2.LINE_AA, SHIFT)
         x, y = polygon[polygon[:, 1].argmin()]
-        text(canvas.image, f"G{identity}", (x - 12, max(y - 8, 22)), 0.66, ink, 2)
+        text(canvas.image, f"{letter}{identity}", (x - 12, max(y - 8, 22)), 0.66, ink, 2)
 
 
 def _outlines(canvas: Canvas, places: Array, boxes: Array | None) -> Array:

@@ -20,7 +20,7 @@ from tracking.app.commands.score_tables import checked_key
 from tracking.app.commands.scored_sequence import ScoringJob, read_runs
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import OpenedAs
-from tracking.app.stored_tracks import find_tracks, match_tracks
+from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 
 if TYPE_CHECKING:
     from tracking.errors.found import RunErrors
@@ -117,10 +117,13 @@ def sheet(options: SheetOptions) -> CommandResult:
     """Writes a contact sheet, several frames in one PNG, for each sequence. The result's data: "files", their paths."""
     from tracking.app.pictures.contact_sheet import write_sheet
 
-    def write(sequence: Sequence, path: Path, _: Step) -> None:
-        write_sheet(sequence, path, options.frames)
-
     sequences = open_source(options.source, fps=options.fps, images=True)
+    stored = _stored(sequences, options.tracks)
+
+    def write(sequence: Sequence, path: Path, _: Step) -> None:
+        found = stored.get(sequence.name)
+        write_sheet(sequence, path, options.frames, None if found is None else found.read(sequence))
+
     return _write_each("sheet", sequences, options.out, ".png", write, 0)
 
 
@@ -129,14 +132,17 @@ def overlay(options: OverlayOptions) -> CommandResult:
     from tracking.app.pictures.overlay import write_overlay
 
     sequences = _open(options)
-    tracks = options.tracks
-    stored = {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
+    stored = _stored(sequences, options.tracks)
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
         found = stored.get(sequence.name)
         write_overlay(sequence, None if found is None else found.read(sequence), path, options.truth, step)
 
     return _write_each("overlay", sequences, options.out, ".mp4", write, _picture_count(sequences))
+
+
+def _stored(sequences: list[Sequence], tracks: Path | None) -> dict[str, StoredTracks]:
+    return {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
 
 
 def _open(options: ViewOptions | OverlayOptions) -> list[Sequence]:

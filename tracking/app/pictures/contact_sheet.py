@@ -1,11 +1,12 @@
 """Writes a contact sheet: pictures and plans of chosen frames of a sequence, and a timeline of events, as one PNG.
 
-Over the pictures the truth is drawn.
+Over the pictures the truth is drawn, or tracks in its place.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from collections.abc import Sequence as SequenceOf
 from pathlib import Path
 
 import cv2
@@ -14,11 +15,12 @@ import numpy as np
 from scenarios.errors import InputError, counted
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import marked_png
-from sim.types import Array, Frame, GroupEvent, Image, Ints, Sequence, Truth
+from sim.types import Array, Frame, GroupEvent, Image, Ints, Sequence, Tracks, Truth
 from tracking.drawing.canvas import FLOOR, INK, QUIET, THING, TRAIL_SECONDS, Canvas, colour, text, text_width
 from tracking.drawing.layer_painting import KIND_COLOUR, LayerStyle, event_words, kind_colour, paint_layer
-from tracking.drawing.layers import Layer, layer_of_truth
+from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.drawing.plan_view import MARGIN, draw_group_hulls, draw_people, draw_scene, draw_trails, plan_area
+from tracking.running.run import grouped
 
 GREY = 128
 
@@ -26,10 +28,10 @@ GREY = 128
 class PanelPictures:
     """Draws the pictures of chosen frames for a contact sheet's panels; they are read at construction."""
 
-    def __init__(self, sequence: Sequence, truth: Truth, chosen: Iterable[int]) -> None:
+    def __init__(self, sequence: Sequence, truth: Truth, chosen: Iterable[int], layer: Layer | None = None) -> None:
         self.size, self.fps = sequence.image_size, truth.fps
         self.frames = _frames(sequence, set(chosen)) if sequence.has_images and self.size is not None else {}
-        self.layer = layer_of_truth(truth) if self.frames else Layer("true", "G", {})
+        self.layer = layer or (layer_of_truth(truth) if self.frames else Layer("true", "G", {}))
 
     def height(self, width: int) -> int:
         """Returns the height in px of a picture at this width; 0 without pictures."""
@@ -70,15 +72,21 @@ SHOWN_KINDS = {"merge": 0, "split": 0, "cross": 1, "queue": 1, "form": 2, "disso
 CLOSE_SECONDS = 1.0  # s: events that begin within this time share a picture.
 
 
-def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8) -> Path:
-    """Writes the contact sheet as PNG and returns its path. The file is complete, or is not written at all."""
-    truth = sequence.truth
+def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8, tracks: SequenceOf[Tracks] | None = None) -> Path:
+    """Writes the contact sheet as PNG and returns its path. The file is complete, or is not written at all.
+
+    tracks: are shown in place of the truth.
+    """
+    layer, truth = None, sequence.truth
+    if tracks is not None:
+        tracks = grouped(tracks, sequence)
+        layer, truth = layer_of_tracks(tracks, sequence.camera, sequence.scene), as_labels(tracks, sequence)
     if (truth is None or not len(truth.frame)) and not sequence.has_images:
         raise InputError(
             file=sequence.name, got="no labelled people and no pictures", expected="a sequence with gt/ or pictures",
             remedy="name another",
         )  # fmt: skip
-    picture = sheet_picture(sequence, empty_truth(sequence) if truth is None else truth, frames)
+    picture = sheet_picture(sequence, empty_truth(sequence) if truth is None else truth, frames, layer)
     path = Path(out)
     done, code = cv2.imencode(".png", picture)
     assert done, "PNG holds any 8-bit picture"
@@ -93,12 +101,34 @@ def empty_truth(sequence: Sequence) -> Truth:
     return Truth(sequence.name, sequence.fps, length, nan, none, none, none, None, None, np.zeros((0, 4)), np.zeros(0))
 
 
-def sheet_picture(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
-    """Returns the contact sheet as an (H, W, 3) BGR uint8 picture; its size follows from the panels."""
+def as_labels(tracks: SequenceOf[Tracks], sequence: Sequence) -> Truth:
+    """Returns tracks in the form of labels; what a tracker of whole groups tracks stands for people."""
+    people = [t for t in tracks if len(t.id)]
+    none = empty_truth(sequence)
+    if not people:
+        return none
+    frame = np.repeat([t.index for t in people], [len(t.id) for t in people])
+    id, group, pos = (np.concatenate([getattr(t, name) for t in people]) for name in ("id", "group", "pos"))
+    box = np.concatenate(
+        [np.column_stack([t.pos[:, :2], 0 * t.pos[:, :2]]) if t.box is None else t.box for t in people]
+    )
+    order, ground = np.lexsort((id, frame)), people[0].plane != "image"
+    return none.replace(
+        length=max(none.length, int(frame.max())), frame=frame[order], id=id[order], group=group[order],
+        pos=pos[order, :2] if ground else None, box=box[order], visibility=np.ones(len(id)),
+        events=tuple(event for t in tracks for event in t.events),
+    )  # fmt: skip
+
+
+def sheet_picture(sequence: Sequence, truth: Truth, frames: int = 8, layer: Layer | None = None) -> Image:
+    """Returns the contact sheet as an (H, W, 3) BGR uint8 picture; its size follows from the panels.
+
+    layer: is drawn over the pictures in place of the truth.
+    """
     chosen = choose_frames(truth, frames)
     if not chosen:
         raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
-    pictures = PanelPictures(sequence, truth, chosen)
+    pictures, prefix = PanelPictures(sequence, truth, chosen, layer), "G" if layer is None else layer.prefix
     low, high = sheet_area(sequence, truth)
     large = pictures.height(WIDTH)
     plan = round(WIDTH * float(np.clip((high - low)[1] / (high - low)[0], 0.4, 1.2)))
@@ -115,9 +145,10 @@ def sheet_picture(sequence: Sequence, truth: Truth, frames: int = 8) -> Image:
         if large:
             pictures.draw(area[TITLE:y], index)
         if plan:
-            _draw_plan(Canvas.fit(area[y:], low, high, truth.pos is not None), sequence, truth, index)
-        _draw_title(area, truth, index)
-    _draw_head(sheet, sequence, truth)
+            canvas = Canvas.fit(area[y:], low, high, truth.pos is not None)
+            _draw_plan(canvas, sequence, truth, index, prefix)
+        _draw_title(area, truth, index, prefix)
+    _draw_head(sheet, sequence, truth, "people" if layer is None else "tracks")
     _draw_foot(sheet[-FOOT:], truth, chosen)
     return np.asarray(cv2.resize(sheet, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.uint8)
 
@@ -142,14 +173,14 @@ def sheet_area(sequence: Sequence, truth: Truth) -> tuple[Array, Array]:
     return (corners.min(axis=0), corners.max(axis=0) + 1e-3) if len(corners) else (np.zeros(2), np.ones(2))
 
 
-def _draw_plan(canvas: Canvas, sequence: Sequence, truth: Truth, index: int) -> None:
+def _draw_plan(canvas: Canvas, sequence: Sequence, truth: Truth, index: int, prefix: str) -> None:
     on_ground = canvas.upwards
     places, boxes = _places(truth), None if on_ground else truth.box
     canvas.image[:] = FLOOR
     if on_ground:
         draw_scene(canvas, sequence.scene)
     draw_trails(canvas, truth, index, places)
-    draw_group_hulls(canvas, truth, index, places, boxes)
+    draw_group_hulls(canvas, truth, index, places, boxes, prefix)
     rows = truth.rows(index)
     draw_people(canvas, truth, index, places, boxes, ids=rows.stop - rows.start <= MANY)
     for event in _events_near(truth, index) if on_ground else []:
@@ -157,9 +188,9 @@ def _draw_plan(canvas: Canvas, sequence: Sequence, truth: Truth, index: int) -> 
         canvas.disc(at, radius * canvas.scale, kind_colour(event.kind), 3)
 
 
-def _draw_title(area: Image, truth: Truth, index: int) -> None:
+def _draw_title(area: Image, truth: Truth, index: int, prefix: str) -> None:
     events = _events_near(truth, index)
-    words = f"{(index - 1) / truth.fps:.1f} s" + "".join(f"   {event_words(event)}" for event in events)
+    words = f"{(index - 1) / truth.fps:.1f} s" + "".join(f"   {event_words(event, prefix)}" for event in events)
     ink = kind_colour(events[0].kind) if events else QUIET
     text(area, words[:62], (2, TITLE - 12), 0.72, ink, 2 if events else 1)
     border = (ink, 5) if events else (THING, 2)
@@ -180,14 +211,14 @@ def event_ring(event: GroupEvent, ids: Ints, places: Array) -> tuple[Array, floa
     return centre, float(np.linalg.norm(members - centre, axis=1).max()) + RING_MARGIN
 
 
-def _draw_head(sheet: Image, sequence: Sequence, truth: Truth) -> None:
+def _draw_head(sheet: Image, sequence: Sequence, truth: Truth, noun: str) -> None:
     text(sheet, sequence.name, (GAP, 48), 1.3, INK, 3)
     width = text_width(sequence.name, 1.3, 3)
     unit = "m" if truth.pos is not None else "px"
     low, high = sheet_area(sequence, truth)
     if truth.pos is not None and sequence.scene is not None:
         low, high = np.zeros(2), sequence.scene.size
-    people = f"{len(np.unique(truth.id))} people, " if len(truth.id) else ""
+    people = f"{len(np.unique(truth.id))} {noun}, " if len(truth.id) else ""
     facts = f"{people}{counted(truth.length, 'frame')}, {truth.fps:g}/s, "
     facts += f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} {unit}; trails {TRAIL_SECONDS:g} s"
     text(sheet, facts, (GAP + width + 30, 46), 0.75, QUIET)

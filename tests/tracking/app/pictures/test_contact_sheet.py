@@ -15,6 +15,8 @@ from sim.types import GroupEvent, Sequence, Truth
 from tests.coded_pictures import SIZE, number, sequence
 from tracking.app.pictures import contact_sheet
 from tracking.drawing.canvas import FLOOR, colour
+from tracking.grouping.known_people import people_as_tracks
+from tracking.running.run import grouped
 
 
 def bare(length: int, starts: dict[int, str]) -> Truth:
@@ -44,11 +46,15 @@ def test_frames_are_distinct_and_inside(length: int, frames: int, starts: dict[i
     assert chosen[-1] <= length
 
 
-def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_path: Path) -> None:
+@pytest.mark.parametrize("moved", [None, 0.5])
+def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_path: Path, moved: float | None) -> None:
+    """moved: the tracks are, and are drawn in place of the truth."""
     from tracking.app.pictures.contact_sheet import sheet_area
 
+    tracks = None if moved is None else [t.replace(pos=t.pos + moved) for t in people_as_tracks(truth)]
+    path = contact_sheet.write_sheet(sequence, tmp_path / "new" / "sheet.png", 1, tracks)
+    truth = truth if tracks is None else contact_sheet.as_labels(grouped(tracks, sequence), sequence)
     index = contact_sheet.choose_frames(truth, 1)[0]
-    path = contact_sheet.write_sheet(sequence, tmp_path / "new" / "sheet.png", frames=1)
     picture = cv2.imread(str(path))
     low, high = sheet_area(sequence, truth)
     scale = contact_sheet.WIDTH / 2 / (high - low)[0]
