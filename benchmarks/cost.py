@@ -1,21 +1,19 @@
-"""What datasets cost: CPU seconds, bytes and files of a sequence, speed-up by workers, throughput of a scheduler.
+"""What datasets cost: CPU seconds, bytes and files of a sequence, speed-up by workers.
 
     python -m benchmarks.cost sequences [--entry merge queue pillar crowd] [--seeds 0:1] [--repeats 1]
         [--sequences 1000000] [--cores 1000]
-    python -m benchmarks.cost workers [--entry crowd] [--seeds 0:32] [--set duration=4] [--rounds 3] [--cluster]
-    python -m benchmarks.cost scheduler [--items 2000]
+    python -m benchmarks.cost workers [--entry crowd] [--seeds 0:32] [--set duration=4] [--rounds 3]
 
 sequences: every entry with every seed is made in this process, kernels warm, with several kinds of pictures. Columns,
 per sequence, each the best of --repeats runs: CPU seconds to make it (simulate, draw, encode, write), to check it (the
 same command again, which reads every byte) and to pack it into tar shards; MB, files, MB in a shard; ms to open it and
 ms per frame to read it back. A second table multiplies the means over all entries by --sequences; its column `hours`
 divides the core hours by --cores.
-workers: one process and two make the same dataset in turn, with --cluster also one and two workers of a dask scheduler
-on loopback. Columns: wall and CPU seconds, best of the rounds, and MB of the largest process. CPU seconds and memory
-are those of all processes that work; starting them counts, so the seeds must be many. "By CPU time at most" is
-2 CPU_1 / CPU_2, what two idle cores could give. Memory must not grow with the number of sequences: a quarter of the
-seeds is made, too. Exit code 1 below MUST times the speed, or above GROWTH times the memory.
-scheduler: items per second that a scheduler on loopback gives to two workers and gets back, if the work is nothing.
+workers: one process and two make the same dataset in turn. Columns: wall and CPU seconds, best of the rounds, and MB of
+the largest process. CPU seconds and memory are those of all processes that work; starting them counts, so the seeds
+must be many. "By CPU time at most" is 2 CPU_1 / CPU_2, what two idle cores could give. Memory must not grow with the
+number of sequences: a quarter of the seeds is made, too. Exit code 1 below MUST times the speed, or above GROWTH times
+the memory.
 """
 
 from __future__ import annotations
@@ -24,12 +22,10 @@ import argparse
 import tempfile
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import psutil
 
 from benchmarks.support.generate_runs import GenerateRun, measured
 from benchmarks.support.options import add_seeds, new_parser, seeds_text
@@ -38,9 +34,6 @@ from benchmarks.support.timing import machine_load
 from sim.dataset.generate import generate
 from sim.io.export.webdataset import webdataset
 from sim.io.source import open_source
-from sim.workers.pool import start_workers
-from tests.errands import process
-from tests.loopback import Loopback, loopback
 
 MUST, AIM = 1.7, 1.9  # times the speed of one worker
 GROWTH = 1.1  # times the memory
@@ -113,36 +106,12 @@ def sequences(args: argparse.Namespace) -> int:
     return 0
 
 
-@dataclass(frozen=True)
-class Way:
-    """One way to make the dataset: `workers` processes of the command, or the workers of a running cluster."""
-
-    workers: int
-    cluster: Loopback | None = None
-
-    def cost(self, run: GenerateRun) -> tuple[float, float, float]:
-        """Returns wall seconds, CPU seconds of all processes, and MB of the largest one (of the command's own)."""
-        more = () if self.cluster is None else ("--cluster", self.cluster.address)
-        with tempfile.TemporaryDirectory() as name:
-            before, begun = self._cluster_seconds(), time.perf_counter()
-            started = replace(run, workers=self.workers, more=(*run.more, *more)).start(Path(name) / "out")
-            cpu, memory = measured(started)
-            return time.perf_counter() - begun, cpu + self._cluster_seconds() - before, memory
-
-    def _cluster_seconds(self) -> float:
-        """Returns the CPU seconds of the cluster's processes so far."""
-        some = [] if self.cluster is None else [self.cluster.scheduler, *self.cluster.workers]
-        return sum(sum(psutil.Process(p.pid).cpu_times()[:2]) for p in some)
-
-
-def all_ways(stack: ExitStack, with_cluster: bool) -> dict[str, Way]:
-    """Returns the ways to compare; clusters end with the stack."""
-    ways = {"1 process": Way(1), "2 processes": Way(2)}
-    if with_cluster:
-        for count, name in ((1, "1 worker of a cluster"), (2, "2 workers of a cluster")):
-            folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-            ways[name] = Way(1, stack.enter_context(loopback(folder, count)))
-    return ways
+def way_cost(run: GenerateRun, count: int) -> tuple[float, float, float]:
+    """Returns wall seconds, CPU seconds of all processes, and MB of the largest, of a dataset by `count` workers."""
+    with tempfile.TemporaryDirectory() as name:
+        begun = time.perf_counter()
+        cpu, memory = measured(replace(run, workers=count).start(Path(name) / "out"))
+        return time.perf_counter() - begun, cpu, memory
 
 
 def workers(args: argparse.Namespace) -> int:
@@ -150,20 +119,19 @@ def workers(args: argparse.Namespace) -> int:
     more = [word for text in args.set for word in ("--set", text)]
     run = GenerateRun(args.entry or ["crowd"], seeds_text(seeds), more=more, env=ONE_THREAD)
     first, quarter = seeds[:1], seeds[: max(1, len(seeds) // 4)]
-    with ExitStack() as stack:
-        ways = all_ways(stack, args.cluster)
-        for way in ways.values():
-            way.cost(replace(run, seeds=seeds_text(first)))  # compiles the kernels, imports
-        found = [{name: way.cost(run) for name, way in ways.items()} for _ in range(args.rounds)]
-        few = ways["1 process"].cost(replace(run, seeds=seeds_text(quarter)))
+    ways = {"1 process": 1, "2 processes": 2}
+    for count in ways.values():
+        way_cost(replace(run, seeds=seeds_text(first)), count)  # compiles the kernels, imports
+    found = [{name: way_cost(run, count) for name, count in ways.items()} for _ in range(args.rounds)]
+    few = way_cost(replace(run, seeds=seeds_text(quarter)), 1)
     best = {name: np.min([f[name] for f in found], axis=0) for name in ways}
     print(f"{', '.join(run.entries)}, seeds {run.seeds}; {machine_load()}")
     head(["", "wall s (best)", "CPU s (best)", "MB of the largest process"])
     for name, (wall, cpu, memory) in [*best.items(), ("1 process, a quarter of the seeds", few)]:
         row([name, f"{wall:.1f}", f"{cpu:.1f}", f"{memory:.0f}"])
-    names = list(ways)
-    for slow, fast in ((0, 1), (2, 3), (0, 3))[: 3 if args.cluster else 1]:
-        _print_speed_up(names[slow], names[fast], best, found)
+    each = ", ".join(f"{f['1 process'][0] / f['2 processes'][0]:.2f}" for f in found)
+    possible = 2 * best["1 process"][1] / best["2 processes"][1]
+    print(f"speed-up by rounds: {each}; by CPU time at most {possible:.2f}")
     growth = best["1 process"][2] / few[2]
     print(f"memory with four times the sequences: x{growth:.2f}; must be at most {GROWTH}")
     speed_up = best["1 process"][0] / best["2 processes"][0]
@@ -171,40 +139,18 @@ def workers(args: argparse.Namespace) -> int:
     return 0 if speed_up >= MUST and growth <= GROWTH else 1
 
 
-def _print_speed_up(slow: str, fast: str, best: dict[str, np.ndarray], found: list[dict]) -> None:
-    ratio, possible = best[slow][0] / best[fast][0], 2 * best[slow][1] / best[fast][1]
-    each = ", ".join(f"{f[slow][0] / f[fast][0]:.2f}" for f in found)
-    print(f"{fast} against {slow}: x{ratio:.2f} (rounds: {each}), by CPU time at most x{possible:.2f}")
-
-
-def scheduler(args: argparse.Namespace) -> int:
-    with (
-        tempfile.TemporaryDirectory() as name,
-        loopback(Path(name)) as cluster,
-        start_workers(1, cluster.address) as run,
-    ):
-        list(run(process, range(20), ahead=20))
-        begun = time.perf_counter()
-        list(run(process, range(args.items), ahead=100))
-        rate = args.items / (time.perf_counter() - begun)
-    print(f"a scheduler and two workers: {rate:.0f} items/s; {machine_load()}")
-    return 0
-
-
 def main() -> int:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["sequences", "workers", "scheduler"])
+    parser.add_argument("mode", choices=["sequences", "workers"])
     parser.add_argument("--entry", nargs="+")
     add_seeds(parser, None, what="sequences 0:1, workers 0:32; ")
     parser.add_argument("--repeats", type=int, default=1, help="sequences: runs of which the best counts")
     parser.add_argument("--sequences", type=int, default=1_000_000, help="sequences: size of the planned dataset")
     parser.add_argument("--cores", type=int, default=1000, help="sequences: cores that make it")
     parser.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE", help="workers: settings of the scenarios")
-    parser.add_argument("--rounds", type=int, default=3, help="workers: rounds, all ways in turn")
-    parser.add_argument("--cluster", action="store_true", help="workers: compare with a dask cluster on loopback")
-    parser.add_argument("--items", type=int, default=2000, help="scheduler: items of empty work")
+    parser.add_argument("--rounds", type=int, default=3, help="workers: rounds, both in turn")
     args = parser.parse_args()
-    return {"sequences": sequences, "workers": workers, "scheduler": scheduler}[args.mode](args)
+    return {"sequences": sequences, "workers": workers}[args.mode](args)
 
 
 if __name__ == "__main__":

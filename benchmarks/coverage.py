@@ -1,22 +1,16 @@
 """How often 95 % intervals hold the truth, on simulated recordings.
 
-    python -m benchmarks.coverage recordings [--scenes plaza,street,quiet] [--seeds 20000:20008] [--store FOLDER]
-    python -m benchmarks.coverage sequences [--store FOLDER]
+    python -m benchmarks.coverage recordings [--scenes plaza street quiet] [--seeds 20000:20008]
 
 recordings: stationary scenes of 5 minutes, in which people pass by and groups meet, stand and part at random times.
 Each is tracked once from its sensor's detections, by `blob` and `group-pda`, and scored as five recordings of 1 minute,
 two of 2 minutes and one of 5 minutes. The truth is the mean score over all recordings of a scene, tracker and length.
 Columns: share of intervals that hold the truth, with Wilson's interval; mean width of an interval; number of
 recordings without an interval. Seeds on which an order fails are left out and printed.
-sequences: draws of S of the recordings of 1 minute stand for S sequences. Columns: share of Student's intervals of the
-mean that hold the mean of all, and share of false stars: sure differences of two trackers whose true difference is 0.
---store keeps the intervals of each recording in FOLDER, so that a run can be continued and tables printed again.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -35,7 +29,7 @@ from tracking.ranking import SCALES, presence
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import weighted_scorers
-from tracking.stats import block_intervals, mean_interval
+from tracking.stats import block_intervals
 
 KEYS = ("HOTA", "IDF1", "MOTA", "IDSW", "group_F1_hull", "event_F1")
 MORE = ("AssA", "GOSPA", "pairwise_F1", "group_HOTA", "group_IDSW", "lineage_accuracy")
@@ -165,20 +159,15 @@ def intervals(truth: Truth, answers: Sequence[Tracks], frames: range) -> dict[st
     return dict(zip((*KEYS, *MORE), zip(*(end.tolist() for end in ends), strict=True), strict=True))
 
 
-def measured(given: argparse.Namespace) -> list[Row]:
-    """Returns the rows of all scenes and seeds, from the store where they are."""
+def measured(seeds: range, scenes: Sequence[str]) -> list[Row]:
+    """Returns the rows of all scenes and seeds."""
     rows: list[Row] = []
-    for seed in given.seeds:
-        for name in given.scenes.split(","):
-            file = given.store / f"{name}-{seed}.json"
-            if not file.exists():
-                try:
-                    found = list(rows_of(name, seed))
-                except FlockscopeError as error:
-                    print(f"{name}, seed {seed}, left out: {error.line()}", flush=True)
-                    found = []
-                file.write_text(json.dumps(found), encoding="utf-8")
-            rows += json.loads(file.read_text(encoding="utf-8"))
+    for seed in seeds:
+        for name in scenes:
+            try:
+                rows += rows_of(name, seed)
+            except FlockscopeError as error:
+                print(f"{name}, seed {seed}, left out: {error.line()}", flush=True)
     return rows
 
 
@@ -211,38 +200,14 @@ def cells(rows: list[Row], key: str, minutes: int) -> list[str]:
     return [share(held, count), number(width / count if count else float("nan")), str(none)]
 
 
-def sequences(rows: list[Row], rounds: int = 4000) -> None:
-    """Prints how often Student's interval over S sequences holds the mean of all, and how many stars are false."""
-    short = [r for r in rows if r["minutes"] == 1]
-    blob, other = ([r for r in short if r["tracker"] == tracker] for tracker in TRACKERS)
-    populations = {key: np.array([r[key][0] for r in blob], float) for key in KEYS}
-    for key in ("group_F1_hull", "event_F1"):
-        populations[f"difference of {key}"] = np.array(
-            [a[key][0] - b[key][0] for a, b in zip(blob, other, strict=True)], float
-        )
-    sizes, r = (6, 10, 20, 50), np.random.default_rng(0)
-    head(["score", *(f"{s} sequences" for s in sizes)])
-    for name, values in populations.items():
-        known = values[np.isfinite(values)]
-        found = []
-        for s in sizes:
-            _, low, high = mean_interval(r.choice(known, (s, rounds)))
-            found.append(((low <= known.mean()) & (known.mean() <= high)).mean())
-        row([name, *(f"{1 - v:.3f} false stars" if name.startswith("diff") else f"{v:.3f}" for v in found)])
-
-
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["recordings", "sequences"])
-    parser.add_argument("--scenes", default=",".join(SCENES), metavar="NAMES")
+    parser.add_argument("mode", choices=["recordings"])
+    parser.add_argument("--scenes", nargs="+", default=[*SCENES], metavar="NAME")
     add_seeds(parser, "20000:20008")
-    parser.add_argument("--store", type=Path, metavar="FOLDER")
-    given = parser.parse_args()
+    args = parser.parse_args()
     one_thread()
-    with tempfile.TemporaryDirectory() as name:
-        given.store = given.store or Path(name)
-        given.store.mkdir(parents=True, exist_ok=True)
-        {"recordings": recordings, "sequences": sequences}[given.mode](measured(given))
+    recordings(measured(args.seeds, args.scenes))
 
 
 if __name__ == "__main__":

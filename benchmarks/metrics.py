@@ -1,15 +1,12 @@
-"""Scores of people beside TrackEval (equal? how fast?), and how long all scores of groups take.
+"""Scores of people beside TrackEval: equal? how fast?
 
     python -m benchmarks.metrics trackeval [--frames 1000] [--people 30] [--rounds 7] [--cases 200] [--data FOLDER]
-    python -m benchmarks.metrics groups [--frames 1000] [--people 30] [--rounds 5]
 
 trackeval: HOTA, CLEAR and Identity of a random crowd with misses, false alarms and changed ids are computed by both in
 turn; the best wall time of each counts. Ours includes the search for pairs of near people; TrackEval gets tables of
 similarity that were made before. Then random crowds, every other one on a coarse grid (equal distances), and the
 detections and true boxes of real recordings under --data, if there are any, are scored by both. Printed: the greatest
 difference of any score, for each kind of crowd and each recording. Exit code 1 above TOLERANCE.
-groups: people in groups of three, tracks with errors of all kinds. Columns: least CPU and wall seconds of `evaluate`,
-by what is scored; the first row is the scores of people alone on the same frames.
 """
 
 from __future__ import annotations
@@ -17,7 +14,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -25,12 +22,8 @@ import numpy as np
 
 from benchmarks.support.options import add_data, new_parser
 from benchmarks.support.tables import head, row
-from benchmarks.support.timing import best_in_turn, best_times
+from benchmarks.support.timing import best_in_turn
 from sim.io.formats.mot_table import read_table
-from sim.truth.group_hulls import groups_over_time
-from sim.types import Groups, Tracks, Truth
-from tracking.grouping.grouped_tracks import with_groups
-from tracking.scoring import evaluate
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.evaluation import people_scores
 from tracking.scoring.rows import FrameRows
@@ -131,7 +124,7 @@ def recordings(data: Path) -> Iterator[tuple[str, Pairs]]:
 
 
 def trackeval(args: argparse.Namespace) -> int:
-    print_speed(args.frames, args.people, args.rounds or 7)
+    print_speed(args.frames, args.people, args.rounds)
     worst: dict[str, float] = {}
     for seed in range(args.cases):
         r = np.random.default_rng(seed)
@@ -144,69 +137,16 @@ def trackeval(args: argparse.Namespace) -> int:
     return int(max(worst.values(), default=0.0) > TOLERANCE)
 
 
-def grouped_scene(frames: int, people: int) -> tuple[Truth, list[Tracks]]:
-    """Groups of three that stroll over 20 m by 20 m, and tracks 0.2 m off, one in twenty in another's group."""
-    r = np.random.default_rng(0)
-    name = np.arange(people) // 3
-    middle = r.uniform(0, 20, (people // 3 + 1, 2)) + np.cumsum(r.normal(0, 0.1, (frames, people // 3 + 1, 2)), axis=0)
-    pos = (middle[:, name] + r.uniform(-0.6, 0.6, (people, 2))).reshape(-1, 2)
-    frame, id = np.repeat(np.arange(1, frames + 1), people), np.tile(np.arange(1, people + 1), frames)
-    group, vel = np.tile(name + 1, frames), np.zeros_like(pos)
-    estimated = np.where(r.random(len(group)) < 0.05, r.integers(1, name[-1] + 2, len(group)), group)
-    seen = pos + r.normal(0, 0.2, pos.shape)
-    hulls = [tuple(groups_over_time(frame, id, g, p, vel, 1, frames)) for g, p in ((group, pos), (estimated, seen))]
-    truth = Truth(
-        "speed", FPS, frames, 40.0, frame, id, group, pos, vel, None, np.ones(len(id)), groups=hulls[0],
-        labelled=np.ones(frames, bool), events=(),
-    )  # fmt: skip
-    zero, cov, one = np.zeros((people, 2)), np.zeros((people, 4, 4)), np.ones(people)
-    rows = [slice(k * people, (k + 1) * people) for k in range(frames)]
-    return truth, [
-        Tracks(k, k / FPS, "ground", "person", id[r], estimated[r], seen[r], zero, cov, None, one, hulls[1][k - 1])
-        for k, r in enumerate(rows, 1)
-    ]
-
-
-def groups_only(t: Tracks) -> Tracks:
-    """Returns the answer as of a method that reports groups without members."""
-    g = t.groups
-    assert g is not None
-    n = len(g.id)
-    none = tuple(np.zeros(0, np.int64) for _ in range(n))
-    bare = Groups(g.id, none, g.pos, g.vel, g.extent, np.full(n, np.nan), g.hull)
-    cov = np.zeros((n, 4, 4))
-    return Tracks(t.index, t.t, t.plane, "group", g.id, g.id, g.pos, g.vel, cov, None, np.ones(n), bare)
-
-
-def groups(args: argparse.Namespace) -> int:
-    truth, tracks = grouped_scene(args.frames, args.people)
-    derived = with_groups(tracks, FPS, 1.0)
-    unlabelled, bare = truth.replace(groups=None, labelled=None, events=None), [groups_only(t) for t in tracks]
-    perfect = [t.replace(pos=truth.at(t.index).pos, groups=truth.at(t.index).groups) for t in tracks]
-    cases: dict[str, Callable[[], object]] = {
-        "people alone": lambda: evaluate(unlabelled, tracks),
-        "all, groups by hulls": lambda: evaluate(truth, derived),
-        "all, groups by members": lambda: evaluate(truth, derived, group_match="members"),
-        "all, events derived as well": lambda: evaluate(truth, tracks),
-        "all, hulls of the truth": lambda: evaluate(truth, perfect),
-        "a method without members": lambda: evaluate(truth, bare),
-    }
-    head([f"{args.frames} frames, {args.people} people", "CPU s", "wall s"])
-    for name, work in cases.items():
-        row([name, *(f"{seconds:.3f}" for seconds in best_times(work, args.rounds or 5))])
-    return 0
-
-
 def main() -> int:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["trackeval", "groups"])
+    parser.add_argument("mode", choices=["trackeval"])
     parser.add_argument("--frames", type=int, default=1000)
     parser.add_argument("--people", type=int, default=30)
-    parser.add_argument("--rounds", type=int, help="runs of which the best counts")
-    parser.add_argument("--cases", type=int, default=200, help="trackeval: random crowds")
+    parser.add_argument("--rounds", type=int, default=7, help="runs of which the best counts")
+    parser.add_argument("--cases", type=int, default=200, help="random crowds")
     add_data(parser)
     args = parser.parse_args()
-    return {"trackeval": trackeval, "groups": groups}[args.mode](args)
+    return trackeval(args)
 
 
 if __name__ == "__main__":
