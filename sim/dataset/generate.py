@@ -6,7 +6,6 @@ The stored bytes depend on scenario, seed and versions only, not on the workers.
 
 from __future__ import annotations
 
-import socket
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -14,7 +13,6 @@ from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any, TypedDict, Unpack, cast
-from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, shortened
 from scenarios.loading.resolve import Entry, resolve
@@ -24,7 +22,7 @@ from scenarios.schema.scenario import ObservationSpec
 from sim.clock import check_stride
 from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
 from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
-from sim.io.files.atomic import PARTIAL, lock_folder, remove_partials, write_file
+from sim.io.files.atomic import lock_folder, remove_partials, write_file
 from sim.io.files.own_files import is_side_file, output_path, output_paths
 from sim.io.store import sequence_folder
 from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest
@@ -32,34 +30,9 @@ from sim.streams import check_streams
 from sim.types import Camera, Sequence
 from sim.workers.pool import WorkerOptions, start_workers
 
-MOST = 3  # differences that are named; the others are counted
+MOST = 4  # differences that are named; the others are counted
 LONGEST = 40  # characters of a value
-
-
-def differences(stored: Table, wanted: Table) -> str:
-    """Returns the entries that differ between two tables, as "camera.fps 10 → 5, duration 20 → 30"."""
-    before, after = (dict(_flat("", table)) for table in (stored, wanted))
-    keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
-    words = [f"{key} {_word(before.get(key))} → {_word(after.get(key))}" for key in keys[:MOST]]
-    return ", ".join(words + [f"{len(keys) - MOST} more"] * (len(keys) > MOST))
-
-
-def _flat(prefix: str, value: Any) -> list[tuple[str, Any]]:
-    if isinstance(value, dict):
-        dot = "." if prefix else ""
-        return [pair for key, inner in value.items() for pair in _flat(f"{prefix}{dot}{key}", inner)]
-    if isinstance(value, list) and any(isinstance(inner, dict) for inner in value):
-        return [pair for k, inner in enumerate(value) for pair in _flat(f"{prefix}[{k}]", inner)]
-    return [(prefix, value)]
-
-
-def _word(value: Any) -> str:
-    text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
-    text = text.removesuffix(".0") if isinstance(value, float) else text
-    return "none" if value is None or not text else shortened(text, LONGEST)
-
-
-MARKER_TIMEOUT = 5.0  # s that a shared file system may take to show one machine the file of another
+SHARED_DELAY = 5.0  # s that a shared file system may take to show one machine the file of another
 
 
 @dataclass(frozen=True)
@@ -73,9 +46,6 @@ class SequenceJob:
     streams: tuple[str, ...] = ()
     images: str = "jpg"  # their file type, "jpg", "png" or "mp4"
     stride: int = 1  # N stores every N-th frame of the camera
-    # a file that a worker must see before it starts, because it would otherwise write to another file system; None for
-    # local workers
-    marker: Path | None = None
 
     @property
     def name(self) -> str:
@@ -111,24 +81,39 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
         raise error.replaced(remedy="delete that folder, or choose another --out") from None
     scenario = dump(job.entry.scenario)
     wanted = {**identity(scenario, job.seed, job.entry.repeat, job.streams, job.images), "stride": job.stride}
-    manifest = {"stride": 1, **manifest}
-    different = {key: value for key, value in wanted.items() if manifest.get(key) != value}
-    if different:
-        expected = "the same scenario, version, streams and images, or an empty place"
+    stored = {key: manifest.get(key, 1 if key == "stride" else None) for key in wanted}
+    if stored != wanted:
         raise InputError(
-            file=job.folder, got=f"another sequence (stored → asked for: {_differences(job, manifest, different)})",
-            expected=expected, remedy="choose another --out, or delete that folder",
+            file=job.folder, got=f"another sequence (stored → asked for: {_differences(job, stored, wanted)})",
+            expected="the same scenario, version, streams and images, or an empty place",
+            remedy="choose another --out, or delete that folder",
         )  # fmt: skip
     return manifest
 
 
-def _differences(job: SequenceJob, manifest: dict[str, Any], different: dict[str, Any]) -> str:
-    settings = ""
-    if "scenario_hash" in different:
-        with suppress(InputError):
-            settings = differences(parse(job.folder / "scenario.toml"), parse_toml(dump(job.entry.scenario)))
-    others = {key: value for key, value in different.items() if key != "scenario_hash" or not settings}
-    return ", ".join(filter(None, [settings, differences({key: manifest.get(key) for key in others}, others)]))
+def _differences(job: SequenceJob, stored: Table, wanted: Table) -> str:
+    """Returns what differs, as "camera.fps 10 → 5, duration 20 → 30"; the scenario's keys come first."""
+    if stored["scenario_hash"] != wanted["scenario_hash"]:
+        with suppress(InputError):  # of an unreadable scenario only the hashes are known
+            mine, same = parse_toml(dump(job.entry.scenario)), {"scenario_hash": None}
+            stored, wanted = parse(job.folder / "scenario.toml") | stored | same, mine | wanted | same
+    before, after = _flat("", stored), _flat("", wanted)
+    keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
+    words = [f"{key} {_word(before.get(key))} → {_word(after.get(key))}" for key in keys[:MOST]]
+    return ", ".join(words + [f"{len(keys) - MOST} more"] * (len(keys) > MOST))
+
+
+def _flat(place: str, value: Any) -> Table:
+    if isinstance(value, list) and any(isinstance(inner, dict) for inner in value):
+        value = dict(enumerate(value))
+    if not isinstance(value, dict):
+        return {place: value}
+    return {key: v for step, inner in value.items() for key, v in _flat(f"{place}.{step}".strip("."), inner).items()}
+
+
+def _word(value: Any) -> str:
+    text = ",".join(map(str, value)) if isinstance(value, list) else "none" if value is None else str(value)
+    return shortened(text.removesuffix(".0") or "none", LONGEST)
 
 
 def is_stored(job: SequenceJob) -> bool:
@@ -168,15 +153,10 @@ def simulate_and_store(job: SequenceJob) -> None:
 def run_job(job: SequenceJob) -> JobOutcome:
     """Makes the job's sequence unless it is stored undamaged; errors are in the outcome, not raised."""
     try:
-        if job.marker is not None:
-            _wait_for_marker(job.marker)
         if not is_stored(job):
             simulate_and_store(job)
     except FlockscopeError as error:
-        fatal = isinstance(error.__cause__, OSError)
-        if fatal and job.marker is not None:
-            error = error.replaced(place=f"on {socket.gethostname()}")
-        return JobOutcome(error, fatal)
+        return JobOutcome(error, isinstance(error.__cause__, OSError))
     return JobOutcome()
 
 
@@ -185,15 +165,17 @@ def lost_job(job: SequenceJob, error: WorkError) -> JobOutcome:
     return JobOutcome(error.replaced(file=job.name))
 
 
-def _wait_for_marker(marker: Path) -> None:
-    end = time.monotonic() + MARKER_TIMEOUT
-    while not marker.exists():
-        if time.monotonic() > end:
-            raise InputError(
-                file=marker.parent, got="another folder, or none", expected="the one that the command writes to",
-                remedy="choose an --out that all machines share under the same path",
-            ) from FileNotFoundError(marker)  # fmt: skip
-        time.sleep(MARKER_TIMEOUT / 20)
+def _missing(job: SequenceJob) -> JobOutcome | None:
+    """Returns the outcome of a sequence that a worker has made, but on another file system than this one."""
+    for _ in range(20):
+        if (job.folder / MANIFEST).is_file():
+            return None
+        time.sleep(SHARED_DELAY / 20)
+    error = WorkError(
+        file=job.folder, got="nothing, though a worker has made it", expected="a folder that all machines share",
+        remedy="choose an --out that all machines share under the same path",
+    )  # fmt: skip
+    return JobOutcome(error, fatal=True)
 
 
 LEFT_OUT = 0.05  # greatest share of sequences that may be left out because an order of their script did not come true
@@ -262,24 +244,14 @@ def generate(
             stored_manifest(job)
         errors = _run_jobs(jobs, workers, progress)
         try:
-            complete = write_seqmap(root, split)
+            write_seqmap(root, split)
         except FlockscopeError as error:
             errors["seqmaps"] = error
     unfulfilled = {name: error for name, error in errors.items() if isinstance(error, OrderError)}
-    if len(unfulfilled) <= LEFT_OUT * len(jobs):
-        errors = {name: error for name, error in errors.items() if name not in unfulfilled}
-    else:
-        unfulfilled = {}
-    made = [job for job in jobs if job.name not in unfulfilled]
-    for job in made if not errors else ():
-        if job.name not in complete:
-            errors[job.name] = WorkError(
-                file=job.folder, got="nothing, though a worker has made it",
-                expected="a folder that all machines share", remedy="run again, or choose another --out",
-            )  # fmt: skip
-    if errors:
-        raise _summary(errors, len(jobs))
-    return Folders((job.folder for job in made), unfulfilled)
+    if len(errors) > len(unfulfilled) or len(unfulfilled) > LEFT_OUT * len(jobs):
+        many = len(unfulfilled) > LEFT_OUT * len(jobs)
+        raise _summary({name: e for name, e in errors.items() if many or name not in unfulfilled}, len(jobs))
+    return Folders((job.folder for job in jobs if job.name not in unfulfilled), unfulfilled)
 
 
 @contextmanager
@@ -296,13 +268,10 @@ def _dataset(root: Path, folder: Path) -> Iterator[None]:
 def _run_jobs(jobs: list[SequenceJob], workers: WorkerOptions, progress: Progress | None) -> dict[str, FlockscopeError]:
     errors: dict[str, FlockscopeError] = {}
     with start_workers(min(workers.count, max(1, len(jobs))), workers.cluster) as run:
-        if jobs and workers.cluster is not None:
-            # A worker starts a job only if it sees this file: else it would write to another file system.
-            marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
-            write_file(marker, b"")
-            jobs = [replace(job, marker=marker) for job in jobs]
         done = run(run_job, jobs, ahead=QUEUED_JOBS, on_loss=lost_job)
         for count, (job, outcome) in enumerate(done, 1):
+            if outcome.error is None and workers.cluster is not None:
+                outcome = _missing(job) or outcome
             if outcome.error is not None:
                 errors[job.name] = outcome.error
             if outcome.fatal:
@@ -312,13 +281,12 @@ def _run_jobs(jobs: list[SequenceJob], workers: WorkerOptions, progress: Progres
     return {job.name: errors[job.name] for job in jobs if job.name in errors}
 
 
-def write_seqmap(root: Path, split: str) -> set[str]:
-    """Writes ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of complete sequences; returns their names."""
+def write_seqmap(root: Path, split: str) -> None:
+    """Writes ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of complete sequences."""
     folder = root / f"flockscope-{split}"
     complete = sorted(p.parent.name for p in folder.glob(f"*/{MANIFEST}") if not p.parent.name.startswith("."))
     if complete:
         write_file(root / "seqmaps" / f"flockscope-{split}.txt", "\n".join(["name", *complete, ""]).encode())
-    return {*complete}
 
 
 def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
