@@ -22,7 +22,7 @@ from pydantic import BaseModel
 from scenarios.errors import InputError
 from sim.arrays import repeated_ids
 from sim.io.files import tables
-from sim.io.files.atomic import hold_lock, replace_sealed
+from sim.io.files.atomic import lock_folder, replace_sealed
 from sim.io.files.tables import Column, Count, Rate, columns_of, table_bytes
 from sim.io.formats.labels import chords
 from sim.io.formats.mot_table import MotTable, read_table, require_pixels
@@ -321,7 +321,7 @@ def write_tracks(
     """
     folder = Path(folder)
     files = tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info, pairs=pairs)
-    with hold_lock(folder):
+    with lock_folder(folder, held=True):
         reject_foreign(folder)
         replace_sealed(folder, files, RUN, NAMES)
     return folder
