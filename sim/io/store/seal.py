@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Container, Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 
@@ -108,9 +109,10 @@ class _Run(_Sealed):
     px_per_m: Annotated[float, Field(strict=True)] | None = None
 
 
-def file_facts(files: Mapping[str, bytes]) -> dict[str, dict[str, Any]]:
-    """Returns what a seal states of each file, {"sha256", "bytes"} by name, sorted. files: content by name."""
-    return {name: {"sha256": hashing.file_hash(body), "bytes": len(body)} for name, body in sorted(files.items())}
+def file_facts(files: Mapping[str, bytes | Path]) -> dict[str, dict[str, Any]]:
+    """Returns what a seal states of each file, {"sha256", "bytes"} by name, sorted. files: contents or paths."""
+    sizes = {name: len(body) if isinstance(body, bytes) else body.stat().st_size for name, body in files.items()}
+    return {name: {"sha256": hashing.file_hash(body), "bytes": sizes[name]} for name, body in sorted(files.items())}
 
 
 def with_hash(document: dict[str, Any]) -> dict[str, Any]:
@@ -139,24 +141,23 @@ def damaged_files(
     """
     for name, facts in files.items():
         try:
-            whole_file(folder / name, facts, seal, remedy, name in size_only)
+            check_file(folder / name, facts, seal, remedy, name in size_only)
         except InputError as error:
             yield error
 
 
-def whole_file(
-    path: Path, facts: Mapping[str, Any], seal: str = MANIFEST, remedy: str = REDO, size_only: bool = False
-) -> bytes:
-    """Returns the bytes of a file, none if only its size is compared; InputError if it is not as a seal states."""
-    body, size = b"", None
-    try:
+def check_file(
+    path: Path, facts: Mapping[str, Any], seal: str = MANIFEST, remedy: str = REDO, size_only: bool = False,
+    body: bytes | None = None,
+) -> None:  # fmt: skip
+    """Raises InputError if a file is not as a seal states. body: its content; None: it is read in parts."""
+    size = None
+    with suppress(OSError):
         if path.is_file():  # a FIFO would block its reader
             size = path.stat().st_size
-            body = path.read_bytes() if size == facts["bytes"] and not size_only else b""
-    except OSError:
-        size = None
-    if size == facts["bytes"] and (size_only or hashing.file_hash(body) == facts["sha256"]):
-        return body
+            same = size == facts["bytes"]
+            if same and (size_only or hashing.file_hash(path if body is None else body) == facts["sha256"]):
+                return
     kind = "truncated" if size is not None and size < facts["bytes"] else "altered"
     got = "missing" if size is None else f"{kind}: {size} bytes"
     expected = f"the file of {facts['bytes']} bytes that {seal} names"
