@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from scenarios.limits import FRAMES, fits_picture
-from scenarios.reading import refuse_irregular
+from scenarios.reading import is_present
 from sim.io.files.own_files import is_hidden
 from sim.types import Image, Ints
 
@@ -301,6 +301,4 @@ def _picture_files(folder: Path) -> list[Path]:
     if not os.path.isdir(folder):
         return []
     found = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES and not is_hidden(p))
-    for path in found:
-        refuse_irregular(path)
-    return found
+    return [path for path in found if is_present(path)]
