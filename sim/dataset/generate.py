@@ -63,19 +63,19 @@ class JobOutcome:
 
 def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
     """Returns the manifest in the job's folder, None without one; raises InputError if it is another sequence's."""
-    if not job.folder.exists():
+    folder = job.folder
+    if not folder.exists():
         return None
-    inside = job.folder.is_dir() and any(not is_side_file(path.name) for path in job.folder.iterdir())
-    if not job.folder.is_dir() or (inside and not is_own_sequence(job.folder)):
+    inside = [path for path in folder.iterdir() if not is_side_file(path.name)] if folder.is_dir() else [folder]
+    if inside and not is_own_sequence(folder):
         raise InputError(
-            file=job.folder, got="something that flockscope did not write", expected="a stored sequence, or nothing",
+            file=folder, got="something that flockscope did not write", expected="a stored sequence, or nothing",
             remedy="choose another --out, or move it away",
         )  # fmt: skip
-    path = job.folder / MANIFEST
-    if not path.exists():
+    if not (folder / MANIFEST).exists():
         return None
     try:
-        manifest = read_manifest(job.folder)
+        manifest = read_manifest(folder)
     except InputError as error:
         # An invalid manifest does not tell what the folder holds.
         raise error.replaced(remedy="delete that folder, or choose another --out") from None
@@ -84,7 +84,7 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
     stored = {key: manifest.get(key, 1 if key == "stride" else None) for key in wanted}
     if stored != wanted:
         raise InputError(
-            file=job.folder, got=f"another sequence (stored → asked for: {_differences(job, stored, wanted)})",
+            file=folder, got=f"another sequence (stored → asked for: {_differences(job, stored, wanted)})",
             expected="the same scenario, version, streams and images, or an empty place",
             remedy="choose another --out, or delete that folder",
         )  # fmt: skip
@@ -144,10 +144,8 @@ def simulate_and_store(job: SequenceJob) -> None:
             raise
         raise error.replaced(file=entry.file or error.file or job.name) from error
     except Exception as error:
-        raise WorkError(
-            file=job.name, got=f"{type(error).__name__}: {error}", expected="a sequence",
-            remedy="report it with the scenario and seed",
-        ) from error  # fmt: skip
+        got, remedy = f"{type(error).__name__}: {error}", "report it with the scenario and seed"
+        raise WorkError(file=job.name, got=got, expected="a sequence", remedy=remedy) from error
 
 
 def run_job(job: SequenceJob) -> JobOutcome:
@@ -187,9 +185,7 @@ Progress = Callable[[int, int, str], None]  # called as progress(sequences done,
 class Folders(list[Path]):
     """The folders of the sequences made; `left_out` has the error of each whose script did not come true, by name."""
 
-    def __init__(self, folders: Iterable[Path], left_out: dict[str, OrderError]) -> None:
-        super().__init__(folders)
-        self.left_out = left_out
+    left_out: dict[str, OrderError]
 
 
 class Stored(TypedDict, total=False):
@@ -234,11 +230,8 @@ def generate(
     output_paths(folder, [entry.name for entry in found], source="entries")
     for entry in found:
         check_stride(stride, entry.scenario.camera.fps)
-    jobs = [
-        SequenceJob(output_path(folder, entry.name, f"-s{seed:05d}"), entry, seed, streams, images, stride)
-        for entry in found
-        for seed in seeds
-    ]
+    paths = [(output_path(folder, e.name, f"-s{seed:05d}"), e, seed) for e, seed in product(found, seeds)]
+    jobs = [SequenceJob(*job, streams, images, stride) for job in paths]
     with _dataset(root, folder):
         for job in jobs:
             stored_manifest(job)
@@ -251,7 +244,9 @@ def generate(
     if len(errors) > len(unfulfilled) or len(unfulfilled) > LEFT_OUT * len(jobs):
         many = len(unfulfilled) > LEFT_OUT * len(jobs)
         raise _summary({name: e for name, e in errors.items() if many or name not in unfulfilled}, len(jobs))
-    return Folders((job.folder for job in jobs if job.name not in unfulfilled), unfulfilled)
+    folders = Folders(job.folder for job in jobs if job.name not in unfulfilled)
+    folders.left_out = unfulfilled
+    return folders
 
 
 @contextmanager
@@ -290,16 +285,15 @@ def write_seqmap(root: Path, split: str) -> None:
 
 
 def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
-    first, *_ = errors.values()
-    if len(errors) == 1:
+    first, *others = errors.values()
+    if not others:
         return first
-    others = ", ".join(list(errors)[1:6]) + (", …" if len(errors) > 6 else "")
     # One text for all failures: that of the first, and the names of some others.
-    kind = type(first) if len({type(e) for e in errors.values()}) == 1 else WorkError
-    return kind(
-        file=first.file, place=first.place, got=f"{first.got} (and {len(errors) - 1} more of {total}: {others})",
-        expected=first.expected, remedy=first.remedy + ("" if len(errors) == total else "; the others are kept"),
-    )  # fmt: skip
+    names = ", ".join(list(errors)[1:6]) + (", …" if len(others) > 5 else "")
+    got, kept = f"{first.got} (and {len(others)} more of {total}: {names})", "; the others are kept"
+    kind = type(first) if {type(e) for e in others} == {type(first)} else WorkError
+    remedy = first.remedy + ("" if len(errors) == total else kept)
+    return kind(**first.as_dict() | {"got": got, "remedy": remedy})
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from scenarios.limits import COORDINATE
 from sim.arrays import no_ids
 from sim.geometry.polygons import cross
 from sim.io.files.atomic import write_file
-from sim.io.files.numeric_text import is_number_text
+from sim.io.files.numeric_text import number_or_nan
 from sim.io.files.own_files import refuse_foreign_file
 from sim.io.files.tables import parquet_bytes
 from sim.io.formats.labels import differentiate
@@ -395,7 +395,7 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
     expected = {"--line": "NAME=x1,y1,x2,y2", "--zone": "NAME=x1,y1,x2,y2,x3,y3,…"}
     for option, text in [*(("--line", text) for text in lines), *(("--zone", text) for text in zones)]:
         name, _, cells = text.partition("=")
-        values = [float(cell) if is_number_text(cell) else np.inf for cell in cells.split(",")]
+        values = list(map(number_or_nan, cells.split(",")))
         count = len(values) == 4 if option == "--line" else len(values) >= 6 and len(values) % 2 == 0
         if not name.isidentifier() or name in found or not count or not np.max(np.abs(values)) <= COORDINATE:
             raise InputError(

@@ -17,6 +17,7 @@ import struct
 import unicodedata
 import zlib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path, PurePath
 
 from scenarios.errors import InputError, is_control
@@ -100,11 +101,9 @@ def _picture(path: Path) -> bool:
 def _video(path: Path) -> bool:
     import av
 
-    try:
-        with av.open(str(path), metadata_errors="ignore") as container:
-            return container.metadata.get("comment") == GENERATOR
-    except av.FFmpegError:
-        return False
+    with suppress(av.FFmpegError), av.open(str(path), metadata_errors="ignore") as container:
+        return container.metadata.get("comment") == GENERATOR
+    return False
 
 
 LONGEST = 200  # bytes of a file name made from a label: 255 less temporary prefixes and our suffixes
@@ -118,12 +117,8 @@ def file_name(label: str) -> str:
     Different labels may give one name.
     """
     name = "".join("_" if c in FORBIDDEN or is_control(c) else c for c in label)
-    if name[:1] in ("", "."):
-        name = "_" + name[1:]
-    if name[-1] in (".", " "):
-        name = name[:-1] + "_"
-    if RESERVED.fullmatch(name):
-        name = "_" + name
+    name = re.sub(r"^(\.|$)|[. ]$", "_", name)
+    name = "_" + name if RESERVED.fullmatch(name) else name
     body = name.encode()
     if len(body) <= LONGEST:
         return name

@@ -69,9 +69,8 @@ def read_groups(path: Path) -> dict[int, int]:
         name = min(earlier, default=max(label.values(), default=0) + 1)
         # Lines that share a person become one group, with the lowest label.
         if earlier:
-            warnings.warn(
-                f"{path}: line {number}: shares a person with an earlier line; taken as one group", stacklevel=2
-            )
+            text = f"{path}: line {number}: shares a person with an earlier line; taken as one group"
+            warnings.warn(text, stacklevel=2)
         for person in [p for p, g in label.items() if g in earlier] + sorted(members):
             label[person] = name
     return label

@@ -53,21 +53,21 @@ def read_seqinfo(path: Path) -> SeqInfo:
         raise InputError(file=path, got=got, expected="[Sequence]", remedy="correct the name of the section")
     section = dict(parser["Sequence"]) if parser.sections() else {}
 
-    def number(key: str, low: float, high: float, whole: bool = True) -> float | None:
+    def number(key: str, low: float, high: float, whole: bool = True) -> Any:
         text = section.get(key.lower())
-        value = None if text is None else number_or_nan(text)
-        if value is not None and not (low <= value <= high and (not whole or value == round(value))):
+        value = number_or_nan(text)
+        if text is not None and not (low <= value <= high and (not whole or value == round(value))):
             expected = f"a {'whole ' if whole else ''}number from {low:g} to {high:g}"
             raise InputError(file=path, place=key, got=repr(text), expected=expected, remedy="correct it")
-        return value
+        return None if text is None else int(value) if whole else value
 
     length, w, h = (number(k, 1, high) for k, high in (("seqLength", FRAMES), ("imWidth", SIDE), ("imHeight", SIDE)))
-    size = None if w is None or h is None else (int(w), int(h))
+    size = None if w is None or h is None else (w, h)
     if size is not None and not fits_picture(*size):
         got = "{}×{} px".format(*size)
         raise InputError(file=path, place="imWidth, imHeight", got=got, expected=PICTURE_SIZES, remedy="correct them")
     name, rate = section.get("name", path.parent.name), number("frameRate", *FRAME_RATES, whole=False)
-    return SeqInfo(name, rate, None if length is None else int(length), size, section.get("imdir", "img1"))
+    return SeqInfo(name, rate, length, size, section.get("imdir", "img1"))
 
 
 def frame_rate(given: float | None, found: float | None = None) -> float:
@@ -117,13 +117,13 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         for index in range(1, length + 1):
             yield Frame(index, (index - 1) / rate, detections=None if found is None else found.at(index, rate))
 
-    def frames() -> Iterator[Frame]:
+    def shown(folder: PictureFolder, name: str) -> Iterator[Image | None]:
         every = range(1, length + 1)
-        shown = fill_gaps(pictures.read(every, seen), length, path.name)
-        other = (
-            fill_gaps(right.read(every, seen), length, f"{path.name}, right") if right.files else repeat(None, length)
-        )
-        for frame, picture, beside in zip(bare(), shown, other, strict=True):
+        return fill_gaps(folder.read(every, seen), length, name) if folder.files else repeat(None, length)
+
+    def frames() -> Iterator[Frame]:
+        both = shown(pictures, path.name), shown(right, f"{path.name}, right")
+        for frame, picture, beside in zip(bare(), *both, strict=True):
             yield frame.replace(image=picture, right=beside)
 
     def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
@@ -132,9 +132,8 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     def truth() -> Truth:
         return mot_text.read_truth(gt, info.name, rate, length, options.scale, of_boxes.person_class)
 
-    shown: dict[str, Any] = {} if choice is None else {"background": str(choice)}
-    if pictures.numbering is not None:
-        shown["numbering"] = astuple(pictures.numbering)
+    more: dict[str, Any] = {} if choice is None else {"background": str(choice)}
+    more |= {} if pictures.numbering is None else {"numbering": astuple(pictures.numbering)}
     return Sequence(
         name=info.name, fps=rate, length=length, frames=frames if images and pictures.files else bare, bare=bare,
         load_truth=truth if gt.is_file() else None,
@@ -142,7 +141,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         px_per_m=options.scale, has_images=images and bool(pictures.files),
         has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
-        source={"kind": "mot", "path": str(path), **of_boxes.given(), **shown},
+        source={"kind": "mot", "path": str(path), **of_boxes.given(), **more},
     )  # fmt: skip
 
 
@@ -213,6 +212,5 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
 
 def _labelled_frames(path: Path) -> Ints:
-    texts = [text for text in (path / "det" / "det.txt", path / "gt" / "gt.txt") if text.is_file()]
-    frames = [read_table(text, boxless=True).frame for text in texts]
-    return np.unique(np.concatenate([np.zeros(0, np.int64), *frames]))
+    texts = filter(is_present, (path / "det" / "det.txt", path / "gt" / "gt.txt"))
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *(read_table(text, boxless=True).frame for text in texts)]))

@@ -265,6 +265,15 @@ class MotTable:
     rest: Array  # (N, 0 to 4) the columns after the box: confidence or flag; then class and visibility, or x, y, z in m
     group: Ints | None = None  # (N,) labels of a column `group`, -1 for alone
 
+    @property
+    def on_ground(self) -> bool:
+        """True for a text of positions alone."""
+        return self.rows.values.shape[1] == GROUND_COLUMNS
+
+    def scores(self) -> Array:
+        """Returns column 7 (N,), a confidence or flag; 1 without it."""
+        return self.rest[:, 0] if self.rest.shape[1] else np.ones(len(self.frame))
+
     def boxes(self) -> Array:
         """Returns the boxes of the rows that have one, (B, 4)."""
         return self.box[~self.without_box()]

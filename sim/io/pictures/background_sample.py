@@ -64,15 +64,14 @@ class BackgroundChoice:
         """Returns the picture of the empty place, which must be `size` (width, height) px; None: any."""
         assert self.picture is not None
         picture = read_picture(self.picture)
-        if picture is None:
-            got = "no picture that can be read" if self.picture.is_file() else "no such file"
-            expected, remedy = "a JPG or PNG of the empty place", "check the path, or store the picture anew"
-            raise InputError(file=self.picture, place="--background", got=got, expected=expected, remedy=remedy)
-        if size not in (None, size_of(picture)):
+        if picture is not None and size in (None, size_of(picture)):
+            return picture
+        got = "no picture that can be read" if self.picture.is_file() else "no such file"
+        expected, remedy = "a JPG or PNG of the empty place", "check the path, or store the picture anew"
+        if picture is not None:
             got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px, as the recording".format(*size or ())
             remedy = "give a picture of the same camera in the same size"
-            raise InputError(file=self.picture, place="--background", got=got, expected=expected, remedy=remedy)
-        return picture
+        raise InputError(file=self.picture, place="--background", got=got, expected=expected, remedy=remedy)
 
     def indices(self, length: int) -> list[int]:
         """Returns the frames of the sample, from 1 and ascending, of a recording of `length` frames."""

@@ -118,15 +118,14 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
 
 def _picture(name: str, sequence: Sequence, frame: Frame, pixels: PixelTruth | None) -> NDArray[Any]:
     """Returns a frame's picture of a stream; InputError without one."""
-    if name == "left" and frame.image is not None:
-        return frame.image
-    if name == "right" and frame.right is not None:
-        return frame.right
+    picture = {"left": frame.image, "right": frame.right}.get(name)
     if name == "ids" and pixels is not None:
-        return streams.encode_ids(pixels.ids)
+        picture = streams.encode_ids(pixels.ids)
     if name == "disparity" and pixels is not None and pixels.disparity is not None:
-        return streams.encode_disparity(pixels.disparity, sequence.camera)
-    raise _missing(sequence, name)
+        picture = streams.encode_disparity(pixels.disparity, sequence.camera)
+    if picture is None:
+        raise _missing(sequence, name)
+    return picture
 
 
 def _missing(sequence: Sequence, stream: str) -> InputError:

@@ -206,19 +206,16 @@ def read_whole_manifest(folder: Path) -> dict[str, Any]:
     for stream in manifest.get("streams", ()):
         count = BACKGROUNDS if stream == "background" else length
         wanted += [file_name(stream, images, k) for k in range(1, count + 1)]
-    missing = [name for name in wanted if name not in manifest["files"]]
-    if missing:
-        got = f"no {missing[0]}" + (f" and {len(missing) - 1} more" if len(missing) > 1 else "")
-        expected = "every file of the sequence"
+    expected = "every file of the sequence"
+    first, *more = [name for name in wanted if name not in manifest["files"]] or [""]
+    if first:
+        got = f"no {first}" + (f" and {len(more)} more" if more else "")
         raise InputError(file=folder / MANIFEST, place="files", got=got, expected=expected, remedy=REDO)
     # A stranger's dataset must not make an export read files elsewhere.
-    inside = folder.resolve()
-    for name in (MANIFEST, *manifest["files"]):
-        if not (folder / name).resolve().is_relative_to(inside):
-            raise InputError(
-                file=folder / name, got="a link that leads out of the sequence", expected="a file of the sequence",
-                remedy="export a copy that holds the files themselves (cp -rL)",
-            )  # fmt: skip
+    for path in (folder / name for name in (MANIFEST, *manifest["files"])):
+        if not path.resolve().is_relative_to(folder.resolve()):
+            got, remedy = "a link that leads out of the sequence", "export a copy that holds the files (cp -rL)"
+            raise InputError(file=path, got=got, expected=expected, remedy=remedy)
     return manifest
 
 
@@ -237,19 +234,15 @@ def run_folder(path: Path) -> Path | None:
 
 def reject_foreign(folder: Path) -> None:
     """Raises InputError if a file that is not ours, or a stored sequence, would be changed by a run here."""
+    expected, remedy = "a new folder, or one with a run", "choose another --out"
     for place in (folder.absolute(), *folder.absolute().parents):
         if is_ours(place / MANIFEST, MARKS):
-            raise InputError(
-                file=folder, got=f"a place inside the stored sequence {place.name}", expected="a folder of its own",
-                remedy="choose another --out",
-            )  # fmt: skip
-    found = [name for name in (RUN, EXACT, *NAMES) if (folder / name).exists()]
-    if found and not is_ours(folder / found[0], RUN_MARKS):
-        got = "a file of another program, or a damaged one"
-        raise InputError(
-            file=folder / found[0], got=got, expected="a new folder, or one with a run",
-            remedy="choose another --out, or move the file; delete a damaged run",
-        )  # fmt: skip
+            got = f"a place inside the stored sequence {place.name}"
+            raise InputError(file=folder, got=got, expected=expected, remedy=remedy)
+    found = [folder / name for name in (RUN, EXACT, *NAMES) if (folder / name).exists()]
+    if found and not is_ours(found[0], RUN_MARKS):
+        got, remedy = "a file of another program, or a damaged one", f"{remedy}, or move it; delete a damaged run"
+        raise InputError(file=found[0], got=got, expected=expected, remedy=remedy)
 
 
 def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
@@ -271,10 +264,10 @@ def read_run(folder: Path) -> dict[str, Any]:
 def run_problems(folder: Path, run: dict[str, Any]) -> Iterator[InputError]:
     """Yields an error for each file of a run that is missing, altered, or of another run."""
     yield from damaged_files(folder, run["files"], RUN, AGAIN)
-    for name in NAMES:
-        if name not in run["files"] and name != RUN and (folder / name).exists():
-            got, expected = f"a file that {RUN} does not name", "the files of one run"
-            yield InputError(file=folder / name, got=got, expected=expected, remedy=AGAIN)
+    got, expected = f"a file that {RUN} does not name", "the files of one run"
+    for path in (folder / name for name in NAMES if name not in run["files"] and name != RUN):
+        if path.exists():
+            yield InputError(file=path, got=got, expected=expected, remedy=AGAIN)
 
 
 def check_run(folder: Path) -> dict[str, Any]:
@@ -287,7 +280,5 @@ def check_run(folder: Path) -> dict[str, Any]:
 
 def tracked_hash(sequence: Sequence) -> str | None:
     """Returns the SHA-256 of the truth that was tracked; None for a sequence without labels."""
-    stated = sequence.source.get("truth_hash")
-    if stated is not None:
-        return str(stated)
-    return None if sequence.truth is None else hashing.labels_hash(sequence.truth)
+    stated: str | None = sequence.source.get("truth_hash")
+    return hashing.labels_hash(sequence.truth) if stated is None and sequence.truth is not None else stated

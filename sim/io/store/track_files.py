@@ -250,7 +250,7 @@ def read_track_text(
         table.rows.reject(table.without_box(), "a box, or a ground position in every line", "complete the lines")
     pos = (centres(table.box) if ground is None else ground[:, :2])[order]
     box = None if table.without_box().any() else table.box[order]
-    score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.id)))[0][order]
+    score = unit_scores(table.scores())[0][order]
     plane: Plane = "image" if ground is None else "ground"
     vel, count = chords(frame, id, pos, fps), length or int(frame.max(initial=0))
     cuts = np.searchsorted(frame, np.arange(1, count + 2)).tolist()
