@@ -115,7 +115,7 @@ def svg(scenario: Scenario) -> str:
     tall = min(TALLEST, (WIDTH - 0.6) * depth / width)
     script = tall + 1.2  # inches from the top to the script
     height = script + ROW * (len(orders) + 1)
-    texts = [
+    texts: list[tuple[float, float, str, dict[str, Any]]] = [
         (0.03, 0.25, scenario.name, {"size": 13, "weight": "bold"}),
         (0.03, 0.5, describe.cut(scenario.about, 140), {"color": GREY}),
         (0.03, script - 0.05, "Script", {"weight": "bold"}),

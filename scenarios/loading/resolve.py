@@ -56,7 +56,7 @@ def sensor_settings(path: str | Path) -> tuple[str, ...]:
 def sensor_table(path: str | Path) -> Table:
     """Returns the keys given in the file's [sensor] table with their values, without defaults."""
     path = Path(path)
-    table = toml_files.parse(path)
+    table = toml_files.parse(path, "check the path, or make one with `flockscope fit sensor`")
     validate(table, path, model=SensorFile)
     given: Table = table["sensor"]
     return given
@@ -103,9 +103,9 @@ def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
 
 def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
     """Returns camera, sensor, light and picture of a TOML file (None: all defaults), with settings applied."""
-    file = Path(path) if path is not None else ""
-    table, places = toml_files.apply_settings({} if path is None else toml_files.parse(Path(path)), tuple(set), file)
-    return validate(table, file, places, model=ObservationSpec)
+    table = {} if path is None else toml_files.parse(Path(path), "check --camera: a TOML file with [camera]")
+    table, places = toml_files.apply_settings(table, tuple(set), path or "")
+    return validate(table, path or "", places, model=ObservationSpec)
 
 
 class SuiteEntry(Model):

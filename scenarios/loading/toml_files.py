@@ -84,9 +84,9 @@ def find(name: str | Path, beside: Path | None = None) -> Path:
     raise InputError(file=text, got="no such file", expected="a scenario file", remedy=remedy)
 
 
-def parse(path: Path) -> Table:
-    """Returns the content of a TOML file, without applying `extends`."""
-    body = read_regular(path, TOML_BYTES, "check the path and its permissions")
+def parse(path: Path, remedy: str = "check the path and its permissions") -> Table:
+    """Returns the content of a TOML file, without applying `extends`. remedy: if it cannot be read."""
+    body = read_regular(path, TOML_BYTES, remedy)
     try:
         return parse_toml(body.decode("utf-8-sig"), path)
     except UnicodeDecodeError as error:
@@ -228,7 +228,10 @@ def _put(here: Any, steps: list[str], value: Any, text: str, file: object, path:
         key = ".".join(map(str, path))
         got, remedy = f"{key} = {here!r}, which has no {steps[0]!r}", f"set {key} itself"
         raise InputError(file=file, place=place_of(text), got=got, expected="a key that exists", remedy=remedy)
-    step, rest = (steps[0], steps[1:]) if isinstance(here, dict) else _index(here, steps, value, text, file)
+    step: Any = steps[0]
+    rest = steps[1:]
+    if isinstance(here, list):
+        step, rest = _index(here, steps, value, text, file)
     if rest:
         inside = here.setdefault(step, {}) if isinstance(here, dict) else here[step]
         return _put(inside, rest, value, text, file, (*path, step))

@@ -68,10 +68,8 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
         return None
     inside = [path for path in folder.iterdir() if not is_side_file(path.name)] if folder.is_dir() else [folder]
     if inside and not is_own_sequence(folder):
-        raise InputError(
-            file=folder, got="something that flockscope did not write", expected="a stored sequence, or nothing",
-            remedy="choose another --out, or move it away",
-        )  # fmt: skip
+        got, expected = "something that flockscope did not write", "a stored sequence, or nothing"
+        raise InputError(file=folder, got=got, expected=expected, remedy="choose another --out, or move it away")
     if not (folder / MANIFEST).exists():
         return None
     try:
@@ -83,11 +81,9 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
     wanted = {**identity(scenario, job.seed, job.entry.repeat, job.streams, job.images), "stride": job.stride}
     stored = {key: manifest.get(key, 1 if key == "stride" else None) for key in wanted}
     if stored != wanted:
-        raise InputError(
-            file=folder, got=f"another sequence (stored → asked for: {_differences(job, stored, wanted)})",
-            expected="the same scenario, version, streams and images, or an empty place",
-            remedy="choose another --out, or delete that folder",
-        )  # fmt: skip
+        got = f"another sequence (stored → asked for: {_differences(job, stored, wanted)})"
+        expected = "the same scenario, version, streams and images, or an empty place"
+        raise InputError(file=folder, got=got, expected=expected, remedy="choose another --out, or delete that folder")
     return manifest
 
 
@@ -322,10 +318,9 @@ def store_replays(
     folder, cut = root / f"flockscope-{split}", options.cut
     output_paths(folder, [replay_name(recording.name, cut) for recording in recordings], source="recordings")
     if split in TUNING_SPLITS and any(is_real(recording) for recording in recordings):
-        raise InputError(
-            place="--seeds", got=f"{seeds.start} ({split})", expected="seeds from 20000 (test) on, for real motion",
-            remedy="choose other seeds: nothing is tuned on recordings",
-        )  # fmt: skip
+        got, expected = f"{seeds.start} ({split})", "seeds from 20000 (test) on, for real motion"
+        remedy = "choose other seeds: nothing is tuned on recordings"
+        raise InputError(place="--seeds", got=got, expected=expected, remedy=remedy)
     streams = check_streams(options.streams, options.images)
     made: list[Path] = []
     with _dataset(root, folder):

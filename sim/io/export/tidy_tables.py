@@ -205,19 +205,15 @@ Rows = list[tuple[int, int, float, float]]  # frame, id, x, y
 def _places_in_metres(tables: TidyTables, folder: Path) -> Rows:
     columns = tables.people.columns
     if "x_m" not in columns:
-        raise InputError(
-            file=folder, got="people in the image, px", expected="positions on the ground, m",
-            remedy="track with --camera, or from points",
-        )  # fmt: skip
+        got, expected = "people in the image, px", "positions on the ground, m"
+        raise InputError(file=folder, got=got, expected=expected, remedy="track with --camera, or from points")
     return list(zip(*(columns[name].tolist() for name in ("frame", "id", "x_m", "y_m")), strict=True))
 
 
 def _trajnet(tables: TidyTables, rows: Rows, fps: float) -> str:
     stays = tables.people_summary.columns
     spans = zip(*(np.asarray(stays[name]).tolist() for name in ("id", "start_frame", "end_frame")), strict=True)
-    scenes = [
-        {"scene": {"id": k, "p": p, "s": first, "e": last, "fps": fps}} for k, (p, first, last) in enumerate(spans)
-    ]
+    scenes = [{"scene": {"id": k, "p": p, "s": s, "e": e, "fps": fps}} for k, (p, s, e) in enumerate(spans)]
     tracks = [{"track": {"f": f, "p": p, "x": round(x, 4), "y": round(y, 4)}} for f, p, x, y in rows]
     return "".join(json.dumps(line) + "\n" for line in [*scenes, *tracks])
 
@@ -231,12 +227,10 @@ def _csv(table: pyarrow.Table) -> bytes:
     import pyarrow as pa
     from pyarrow import csv
 
-    columns = [
-        pa.array([" ".join(map(str, ids)) for ids in column.to_pylist()], pa.string())
-        if pa.types.is_list(column.type)
-        else column
-        for column in table.columns
-    ]
+    columns = list(table.columns)
+    for k, column in enumerate(columns):
+        if pa.types.is_list(column.type):
+            columns[k] = pa.array([" ".join(map(str, ids)) for ids in column.to_pylist()], pa.string())
     sink = pa.BufferOutputStream()
     # pyarrow would quote the header.
     options = csv.WriteOptions(include_header=False, quoting_style="needed")
@@ -371,10 +365,9 @@ def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:
     columns["events"] = _per(minute(starts), minutes)
     for name, corners in rows.places.items():
         if len(corners) == LINE:
-            ways = crossings(rows.frame, rows.id, rows.pos, corners, downwards=rows.unit == "px")
-            columns |= {
-                f"{name}_to_{side}": _per(minute(k), minutes) for side, k in zip(("left", "right"), ways, strict=True)
-            }
+            left, right = crossings(rows.frame, rows.id, rows.pos, corners, downwards=rows.unit == "px")
+            columns[f"{name}_to_left"] = _per(minute(left), minutes)
+            columns[f"{name}_to_right"] = _per(minute(right), minutes)
         else:
             there = inside(rows.pos, corners)
             columns[f"{name}_people"] = distinct(rows.frame[there], rows.id[there])
@@ -398,10 +391,9 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
         values = list(map(number_or_nan, cells.split(",")))
         count = len(values) == 4 if option == "--line" else len(values) >= 6 and len(values) % 2 == 0
         if not name.isidentifier() or name in found or not count or not np.max(np.abs(values)) <= COORDINATE:
-            raise InputError(
-                place=option, got=repr(text), expected=f"{expected[option]}, each name once",
-                remedy="write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image",
-            )  # fmt: skip
+            got, expected = repr(text), f"{expected[option]}, each name once"
+            remedy = "write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image"
+            raise InputError(place=option, got=got, expected=expected, remedy=remedy)
         found[name] = np.reshape(values, (-1, 2))
     return found
 
@@ -414,14 +406,12 @@ def crossings(frame: Ints, id: Ints, pos: Array, line: Array, downwards: bool) -
     order = np.lexsort((frame, id))
     frame, pos = frame[order], pos[order, :2]
     same = np.diff(id[order]) == 0
-    a, b = pos[:-1][same], pos[1:][same]
-    first, along = line[0], line[1] - line[0]
-    before, after = cross(along, a - first) > 0, cross(along, b - first) > 0
+    a, b, when = pos[:-1][same], pos[1:][same], frame[1:][same]
+    along, step = line[1] - line[0], b - a
+    before, after = cross(along, a - line[0]) > 0, cross(along, b - line[0]) > 0
     # The ends of the line are on different sides of the step, too.
-    step = b - a
     hits = (before != after) & ((cross(step, line[0] - a) > 0) != (cross(step, line[1] - a) > 0))
     left = after != downwards
-    when = frame[1:][same]
     return when[hits & left], when[hits & ~left]
 
 

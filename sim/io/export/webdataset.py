@@ -119,10 +119,8 @@ def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
         beside = path.with_suffix(".json")
         facts = wanted.get(path.name)
         if facts is None or (beside.is_file() and not facts.items() <= tables.read_json(beside).items()):
-            raise InputError(
-                file=path, got="a shard of another export", expected="one of this dataset, size and kind, or none",
-                remedy="choose another --out, or delete that folder",
-            )  # fmt: skip
+            got, remedy = "a shard of another export", "choose another --out, or delete that folder"
+            raise InputError(file=path, got=got, expected="one of this dataset, size and kind, or none", remedy=remedy)
 
 
 def _complete_shard(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:

@@ -41,10 +41,8 @@ def lock_folder(root: Path, held: bool = False) -> Iterator[None]:
                 try:
                     fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 except BlockingIOError:
-                    raise InputError(
-                        file=root, got="another run that writes here", expected="one at a time",
-                        remedy="wait, or choose another --out",
-                    ) from None  # fmt: skip
+                    got, remedy = "another run that writes here", "wait, or choose another --out"
+                    raise InputError(file=root, got=got, expected="one at a time", remedy=remedy) from None
             token = _held.set(_held.get() | {root.resolve()})
             try:
                 yield

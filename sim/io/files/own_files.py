@@ -87,10 +87,8 @@ def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
 def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
     """Raises InputError if there is a file at `path` that is not ours: only our own files are replaced unasked."""
     if path.exists() and not is_ours(path, marks):
-        raise InputError(
-            file=path, got="a file that flockscope did not write", expected="its own file, or none",
-            remedy="move it away, or choose another --out",
-        )  # fmt: skip
+        got, expected = "a file that flockscope did not write", "its own file, or none"
+        raise InputError(file=path, got=got, expected=expected, remedy="move it away, or choose another --out")
 
 
 def _picture(path: Path) -> bool:
@@ -140,10 +138,8 @@ def output_paths(folder: str | Path, labels: Iterable[str], ending: str = "", so
         key = unicodedata.normalize("NFC", path.name).casefold()
         if key in seen:
             both = f"the name {label!r} twice" if label == seen[key] else f"the names {seen[key]!r} and {label!r}"
-            raise InputError(
-                file=source, got=f"{both}, for one {path.name}", expected="unique names",
-                remedy="rename one, or take one at a time",
-            )  # fmt: skip
+            got = f"{both}, for one {path.name}"
+            raise InputError(file=source, got=got, expected="unique names", remedy="rename one, or take one at a time")
         seen[key] = label
         paths.append(path)
     return paths

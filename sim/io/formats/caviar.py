@@ -83,10 +83,8 @@ def _number(
     value = number_or_nan(element.get(key))
     if not low <= value <= high or (whole and value % 1):
         expected = f"a {'whole ' if whole else ''}number from {low:g} to {high:.0f}"
-        raise InputError(
-            file=path, place=f"{place}: {element.tag} {key}", got=repr(element.get(key)), expected=expected,
-            remedy="correct it",
-        )  # fmt: skip
+        got, remedy = repr(element.get(key)), "correct it"
+        raise InputError(file=path, place=f"{place}: {element.tag} {key}", got=got, expected=expected, remedy=remedy)
     return value
 
 
@@ -170,10 +168,8 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
 def _frame_rate(path: Path, found: CaviarRecording) -> float:
     if not found.caviar:
-        raise InputError(
-            file=path, place="--fps", got="labels without frame rate, not of CAVIAR's recordings",
-            expected="the frames per second of the video", remedy="give --fps",
-        )  # fmt: skip
+        got, expected = "labels without frame rate, not of CAVIAR's recordings", "the frames per second of the video"
+        raise InputError(file=path, place="--fps", got=got, expected=expected, remedy="give --fps")
     # The text names no path, so that a command over many recordings prints it once.
     words = f"CAVIAR's recordings are taken at {FPS:g} fps, with pictures of {IMAGE_SIZE[0]}×{IMAGE_SIZE[1]} px"
     warnings.warn(f"{words} (--fps says otherwise)", stacklevel=4)

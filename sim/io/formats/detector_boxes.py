@@ -51,10 +51,9 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
         raise InputError(file=path, got="points", expected="boxes, px", remedy="give the detector's boxes")
     last = int(found.frame.max())
     if sequence.length is not None and last > sequence.length:
-        raise InputError(
-            file=path, got=f"frame {last}", expected=f"at most {sequence.length}, the frames of {sequence.name}",
-            remedy="give the boxes of this recording; frames count from 1",
-        )  # fmt: skip
+        got, expected = f"frame {last}", f"at most {sequence.length}, the frames of {sequence.name}"
+        remedy = "give the boxes of this recording; frames count from 1"
+        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
     if sequence.image_size is not None:
         _check_size(path, found.box, sequence.image_size)
 
@@ -113,10 +112,8 @@ def _coco_results(path: Path) -> NumericTable:
     """Returns frame, -1, left, top, width, height, score and category of each result."""
     results = parse_json(read_text(path), path, "check the file")
     if not isinstance(results, list):
-        raise InputError(
-            file=path, got="no list", expected="a list of COCO results",
-            remedy="give the detector's results, with image_id, category_id, bbox and score",
-        )  # fmt: skip
+        remedy = "give the detector's results, with image_id, category_id, bbox and score"
+        raise InputError(file=path, got="no list", expected="a list of COCO results", remedy=remedy)
     rows = [_row(path, k, each) for k, each in enumerate(results, 1)]
     values = np.array(rows, np.float64).reshape(-1, 8)
     return NumericTable(path, values, np.arange(1, len(rows) + 1), COLUMNS, unit="result")
@@ -128,8 +125,6 @@ def _row(path: Path, number: int, result: Any) -> tuple[float, ...]:
             row = (frame, -1, x, y, w, h, score, category)
             if all(map(is_number, row)):
                 return row
-    raise InputError(
-        file=path, place=f"result {number}", got=json.dumps(result)[:80],
-        expected="image_id (a frame, from 1), category_id, bbox [left, top, width, height] and score, numbers",
-        remedy="correct the result",
-    )  # fmt: skip
+    got, remedy = json.dumps(result)[:80], "correct the result"
+    expected = "image_id (a frame, from 1), category_id, bbox [left, top, width, height] and score, numbers"
+    raise InputError(file=path, place=f"result {number}", got=got, expected=expected, remedy=remedy)

@@ -163,20 +163,18 @@ def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
 def _refuse_beyond(path: Path, pictures: PictureFolder, length: int) -> None:
     beyond = [file for frame, file in pictures.files.items() if frame > length]
     if beyond and len(pictures.files) <= length:
-        raise InputError(
-            file=path, got=f"{beyond[0].name} among {len(pictures.files)} pictures", expected=f"frames 1 to {length}",
-            remedy="rename the pictures: each gets the number of its frame, or correct seqLength",
-        )  # fmt: skip
+        got, expected = f"{beyond[0].name} among {len(pictures.files)} pictures", f"frames 1 to {length}"
+        remedy = "rename the pictures: each gets the number of its frame, or correct seqLength"
+        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
     if beyond:
         warnings.warn(f"{path}: {len(beyond)} pictures beyond frame {length} (seqLength) are not read", stacklevel=3)
 
 
 def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, int] | None) -> tuple[int, int] | None:
     if stated is not None and seen is not None and stated != seen:
-        raise InputError(
-            file=ini, place="imWidth, imHeight", got="{} × {}".format(*stated),
-            expected="{} × {}, the size of the pictures".format(*seen), remedy="correct it, or restore the pictures",
-        )  # fmt: skip
+        got, expected = "{} × {}".format(*stated), "{} × {}, the size of the pictures".format(*seen)
+        remedy = "correct it, or restore the pictures"
+        raise InputError(file=ini, place="imWidth, imHeight", got=got, expected=expected, remedy=remedy)
     # One of the two may be unknown.
     return stated or seen
 

@@ -154,10 +154,9 @@ def column_names(text: TextRows) -> list[str] | None:
     """Returns the names in the first line of a text, in lower case; None if a cell of it is a number."""
     line = text.text[0] if text.text else ""
     if ";" in line:
-        raise InputError(
-            file=text.file, place="line 1", got=line[:80], expected="columns apart by commas, blanks or tabs",
-            remedy="replace the semicolons, and write decimals with a point",
-        )  # fmt: skip
+        got, expected = line[:80], "columns apart by commas, blanks or tabs"
+        remedy = "replace the semicolons, and write decimals with a point"
+        raise InputError(file=text.file, place="line 1", got=got, expected=expected, remedy=remedy)
     cells = [cell.strip().strip('"').lower() for cell in line.split(text.separator)]
     return cells if any(cells) and not line.startswith("#") and not any(map(is_number_text, cells)) else None
 
@@ -242,10 +241,8 @@ def _in_order(column: dict[str, Column], units: dict[str, str]) -> list[Column] 
 
 
 def _refuse(path: Path, names: list[str]) -> NoReturn:
-    raise InputError(
-        file=path, place="line 1", got=f"columns {','.join(names)}", expected=EXPECTED,
-        remedy="rename the columns",
-    )  # fmt: skip
+    got = f"columns {','.join(names)}"
+    raise InputError(file=path, place="line 1", got=got, expected=EXPECTED, remedy="rename the columns")
 
 
 GROUND_COLUMNS = 4  # columns of a text of ground positions alone: frame, id, x, y
@@ -268,7 +265,7 @@ class MotTable:
     @property
     def on_ground(self) -> bool:
         """True for a text of positions alone."""
-        return self.rows.values.shape[1] == GROUND_COLUMNS
+        return bool(self.rows.values.shape[1] == GROUND_COLUMNS)
 
     def scores(self) -> Array:
         """Returns column 7 (N,), a confidence or flag; 1 without it."""

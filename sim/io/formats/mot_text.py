@@ -188,10 +188,9 @@ def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
     if file.name == LABELS or (np.isin(flag, (0, 1, -1)).all() and flag.any()):
         keep &= flag != 0
         if len(keep) and not keep.any():
-            raise InputError(
-                file=file, place="column 7", got=f"0 in all {len(keep)} rows, which leaves nobody",
-                expected="another flag than 0 for people", remedy="write 1 in column 7 of rows that count",
-            )  # fmt: skip
+            got, expected = f"0 in all {len(keep)} rows, which leaves nobody", "another flag than 0 for people"
+            remedy = "write 1 in column 7 of rows that count"
+            raise InputError(file=file, place="column 7", got=got, expected=expected, remedy=remedy)
     elif (flag == 0).all() and len(keep):
         text = f"{file}: column 7 is 0 in all {len(keep)} rows; it is taken as a confidence, and all rows count"
         warnings.warn(text, stacklevel=2)
@@ -202,10 +201,8 @@ def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
 def require_classes(table: MotTable, person_class: Classes | None) -> None:
     """Raises InputError if the user named the class of people, and the text has no classes."""
     if person_class is not None and classes_of(table, True) is None:
-        raise InputError(
-            file=table.rows.file, place="--class", got="no classes", expected="a column class, or classes in column 8",
-            remedy="leave --class out",
-        )  # fmt: skip
+        got, expected = "no classes", "a column class, or classes in column 8"
+        raise InputError(file=table.rows.file, place="--class", got=got, expected=expected, remedy="leave --class out")
 
 
 def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bools:
@@ -222,10 +219,8 @@ def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bool
     others = [f"{n} rows of class {each}" for each, n in zip(name, counts, strict=True) if n]
     said, people_are = ", ".join(others[:SHOWN]) + ", …" * (len(others) > SHOWN), " or ".join(wanted)
     if not people.any():
-        raise InputError(
-            file=file, place="classes", got=said, expected=f"people, of class {people_are}",
-            remedy="name the classes of people with --class",
-        )  # fmt: skip
+        remedy = "name the classes of people with --class"
+        raise InputError(file=file, place="classes", got=said, expected=f"people, of class {people_are}", remedy=remedy)
     if others and person_class is None:
         text = f"{file}: {said} are left out; people are class {people_are} (--class says otherwise)"
         warnings.warn(text, stacklevel=3)

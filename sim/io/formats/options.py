@@ -69,10 +69,9 @@ def parse_box_scale(text: str) -> BoxScale:
     cells = text.split(",")
     factors = list(map(number_or_nan, cells))
     if len(cells) > 2 or not all(0 < f <= PICTURE_SIDE for f in factors):
-        raise InputError(
-            place="--box-scale", got=repr(text), expected=f"X or X,Y, above 0, at most {PICTURE_SIDE}",
-            remedy="give pixels of the picture per unit of the boxes",
-        )  # fmt: skip
+        got, expected = repr(text), f"X or X,Y, above 0, at most {PICTURE_SIDE}"
+        remedy = "give pixels of the picture per unit of the boxes"
+        raise InputError(place="--box-scale", got=got, expected=expected, remedy=remedy)
     return factors[0], factors[-1]
 
 

@@ -118,7 +118,7 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
 
 def _picture(name: str, sequence: Sequence, frame: Frame, pixels: PixelTruth | None) -> NDArray[Any]:
     """Returns a frame's picture of a stream; InputError without one."""
-    picture = {"left": frame.image, "right": frame.right}.get(name)
+    picture: NDArray[Any] | None = {"left": frame.image, "right": frame.right}.get(name)
     if name == "ids" and pixels is not None:
         picture = streams.encode_ids(pixels.ids)
     if name == "disparity" and pixels is not None and pixels.disparity is not None:

@@ -12,6 +12,7 @@ import csv
 import io
 import re
 from collections.abc import Sequence as Series
+from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -186,25 +187,17 @@ def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([*CSV_COLUMNS, *(["hull_px"] if image is not None else [])])
-    for k in range(len(ground if ground is not None else image or ())):
-        here = None if ground is None else ground[k]
-        px = None if image is None else image[k]
-        pictured = {} if px is None else {int(g): wkt(h, 2) for g, h in zip(px.id, px.hull, strict=False)}
+    for frame, (here, px) in enumerate(zip_longest(ground or (), image or ()), first):
+        pictured = {} if px is None else {g: wkt(h, 2) for g, h in zip(px.id.tolist(), px.hull, strict=False)}
         if here is None:
             here = Groups.none() if px is None else px.replace(pos=np.full_like(px.pos, np.nan), hull=())
-        for row in _csv_rows(here):
-            writer.writerow([first + k, *row, *([pictured.get(row[0], "")] if image is not None else [])])
+        for k, id in enumerate(here.id.tolist()):
+            members = " ".join(map(str, here.members[k])) if len(here.members) else ""
+            hull = wkt(here.hull[k], 3) if len(here.hull) else ""
+            x, y, size = (_cell(v) for v in (here.pos[k, 0], here.pos[k, 1], here.size[k]))
+            more = [pictured.get(id, "")] if image is not None else []
+            writer.writerow([frame, id, members, x, y, hull, size, *more])
     return text.getvalue().encode()
-
-
-def _csv_rows(groups: Groups) -> list[tuple[int, str, str, str, str, str]]:
-    rows = []
-    for k, id in enumerate(groups.id):
-        members = " ".join(map(str, groups.members[k])) if len(groups.members) else ""
-        hull = wkt(groups.hull[k], 3) if len(groups.hull) else ""
-        x, y, size = (_cell(v) for v in (groups.pos[k, 0], groups.pos[k, 1], groups.size[k]))
-        rows.append((int(id), members, x, y, hull, size))
-    return rows
 
 
 def _cell(value: float) -> str:

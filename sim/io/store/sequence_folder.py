@@ -72,10 +72,8 @@ def _refuse_foreign(folder: Path, names: set[str]) -> bool:
     for path in found if folder.is_dir() else [folder]:
         inside = path.relative_to(folder)
         if inside.as_posix() not in ours and not is_side_file(inside):
-            raise InputError(
-                file=folder, got=f"{path}, a file that flockscope did not write", expected="its own files only",
-                remedy="move it away, or choose another --out",
-            )  # fmt: skip
+            got, expected = f"{path}, a file that flockscope did not write", "its own files only"
+            raise InputError(file=folder, got=got, expected=expected, remedy="move it away, or choose another --out")
     return False
 
 

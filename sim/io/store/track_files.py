@@ -370,10 +370,8 @@ def read_checked_tracks(
         return _with_events(read_track_table(folder), folder)
     text = folder / "tracks.txt" if path.is_dir() else path
     if not text.is_file():
-        raise InputError(
-            file=path, got="no tracks", expected="tracks.parquet, tracks.txt or a MOTChallenge text",
-            remedy="give the folder that `flockscope track` made",
-        )  # fmt: skip
+        got, expected = "no tracks", "tracks.parquet, tracks.txt or a MOTChallenge text"
+        raise InputError(file=path, got=got, expected=expected, remedy="give the folder that `flockscope track` made")
     found = read_track_text(text, 25.0 if fps is None else fps, length, person_class, box_scale)
     if not whole:
         return found
@@ -390,9 +388,7 @@ def _with_events(found: list[Tracks], folder: Path) -> list[Tracks]:
     for k, (event, frame) in enumerate(group_files.read_events(path)):
         at = next(index for index in (frame, event.emitted, event.end) if index is not None)
         if not first <= at <= last:
-            raise InputError(
-                file=path, place=f"events[{k}]", got=f"an event reported in frame {at}",
-                expected=f"a frame from {first} to {last}, as the tracks have", remedy="correct the event",
-            )  # fmt: skip
+            got, expected = f"an event reported in frame {at}", f"a frame from {first} to {last}, as the tracks have"
+            raise InputError(file=path, place=f"events[{k}]", got=got, expected=expected, remedy="correct the event")
         by_frame.setdefault(at, []).append(event)
     return [t.replace(events=tuple(by_frame[t.index])) if t.index in by_frame else t for t in found]
