@@ -77,12 +77,6 @@ def _mean(*points: XY) -> XY:
     return float(x), float(y)
 
 
-def order_marks(scenario: Scenario) -> list[OrderMark]:
-    """Returns the orders as drawn on the plan, numbered from 1."""
-    places = {name: (_at(group.start), _at(group.goal)) for group in scenario.group for name in group_names(group)}
-    return [_mark(k, event, places, scenario.world.size) for k, event in enumerate(scenario.event, 1)]
-
-
 def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> OrderMark:
     """Returns an order as drawn, and changes the start and goal of its groups in `places`."""
     ways: dict[str, Way]
@@ -109,7 +103,8 @@ def svg(scenario: Scenario) -> str:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    orders = order_marks(scenario)
+    places = {name: (_at(group.start), _at(group.goal)) for group in scenario.group for name in group_names(group)}
+    orders = [_mark(k, event, places, scenario.world.size) for k, event in enumerate(scenario.event, 1)]
     colour = _colours(scenario, orders)
     width, depth = scenario.world.size
     tall = min(TALLEST, (WIDTH - 0.6) * depth / width)

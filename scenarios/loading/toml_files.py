@@ -125,19 +125,16 @@ def _merge_value(key: str, below: Any, above: Any) -> Any:
         whole = key == "when" or (bool(above) and above.keys() <= DISTRIBUTION_KEYS)
         return above if whole else merge(below, above)
     if _has_ids(below) and _has_ids(above):
-        return _merge_by_id(below, above)
+        rows = list(below)
+        for row in above:
+            place = next((k for k, old in enumerate(below) if old["id"] == row["id"]), len(rows))
+            rows[place : place + 1] = [merge(rows[place], row) if place < len(rows) else row]
+        return rows
     return above
 
 
 def _has_ids(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and all(isinstance(row, dict) and "id" in row for row in value)
-
-
-def _merge_by_id(below: list[Table], above: list[Table]) -> list[Table]:
-    rows = {row["id"]: row for row in below}
-    for row in above:
-        rows[row["id"]] = merge(rows.get(row["id"], {}), row)
-    return list(rows.values())
 
 
 def dump(scenario: BaseModel, defaults: bool = True) -> str:

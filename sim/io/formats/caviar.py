@@ -156,7 +156,14 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     the last frame of these boxes.
     """
     found, px_per_m = read_xml(path), options.px_per_m
-    rate = options.fps or _frame_rate(path, found)
+    rate = options.fps or FPS
+    if options.fps is None and not found.caviar:
+        got, expected = "labels without frame rate, not of CAVIAR's recordings", "the frames per second of the video"
+        raise InputError(file=path, place="--fps", got=got, expected=expected, remedy="give --fps")
+    if options.fps is None:
+        # The text names no path, so that a command over many recordings prints it once.
+        words = f"CAVIAR's recordings are taken at {FPS:g} fps, with pictures of {IMAGE_SIZE[0]}×{IMAGE_SIZE[1]} px"
+        warnings.warn(f"{words} (--fps says otherwise)", stacklevel=3)
     scale, learned = scale_of_first_boxes(found.frame, found.size.max(axis=1)) if px_per_m is None else (px_per_m, 0)
 
     sequence = labelled_sequence(
@@ -164,16 +171,6 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         **({"px_per_m_frames": learned} if learned else {}),
     )  # fmt: skip
     return replace(sequence, image_size=IMAGE_SIZE if found.caviar else None)
-
-
-def _frame_rate(path: Path, found: CaviarRecording) -> float:
-    if not found.caviar:
-        got, expected = "labels without frame rate, not of CAVIAR's recordings", "the frames per second of the video"
-        raise InputError(file=path, place="--fps", got=got, expected=expected, remedy="give --fps")
-    # The text names no path, so that a command over many recordings prints it once.
-    words = f"CAVIAR's recordings are taken at {FPS:g} fps, with pictures of {IMAGE_SIZE[0]}×{IMAGE_SIZE[1]} px"
-    warnings.warn(f"{words} (--fps says otherwise)", stacklevel=4)
-    return FPS
 
 
 def is_caviar(path: Path) -> bool:

@@ -46,7 +46,11 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     found = mot_text.detections_of_table(table, options)
     if not len(found.frame):
         raise InputError(file=path, got="no box", expected="the boxes of a detector", remedy="check the file")
-    found = replace(found, frame=_frames_of_pictures(found.frame, sequence))
+    # Boxes may be numbered like picture files that are counted otherwise.
+    origin, step = sequence.source.get("numbering", (1, 1))
+    before, rest = np.divmod(found.frame - origin, step)
+    if found.frame.max() > (sequence.length or np.inf) and not rest.any() and before.min() >= 0:
+        found = replace(found, frame=before + 1)
     if found.plane != "image" or found.box is None:
         raise InputError(file=path, got="points", expected="boxes, px", remedy="give the detector's boxes")
     last = int(found.frame.max())
@@ -55,7 +59,11 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
         remedy = "give the boxes of this recording; frames count from 1"
         raise InputError(file=path, got=got, expected=expected, remedy=remedy)
     if sequence.image_size is not None:
-        _check_size(path, found.box, sequence.image_size)
+        far = np.quantile(found.box[:, :2] + found.box[:, 2:], 0.95, axis=0)
+        if (far > OUTSIDE * np.array(sequence.image_size)).any():
+            got, remedy = "boxes that end at {:.0f}, {:.0f} px".format(*far), "if they are of another size, --box-scale"
+            expected = "boxes in pictures of {} × {} px".format(*sequence.image_size)
+            raise InputError(file=path, got=got, expected=expected, remedy=remedy)
 
     def joined(frames: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
         for frame in frames():
@@ -66,14 +74,6 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
         sequence, frames=lambda: joined(sequence.frames), bare=None if bare is None else lambda: joined(bare),
         has_detections=True, source=source,
     )  # fmt: skip
-
-
-def _frames_of_pictures(number: Ints, sequence: Sequence) -> Ints:
-    """Returns the frames of boxes (N,), which may be numbered like picture files that are counted otherwise."""
-    origin, step = sequence.source.get("numbering", (1, 1))
-    before, rest = np.divmod(number - origin, step)
-    like_files = number.max() > (sequence.length or np.inf) and not rest.any() and before.min() >= 0
-    return before + 1 if like_files else number
 
 
 def _frames_at(path: Path, sequence: Sequence, seconds: Array) -> Ints:
@@ -97,15 +97,6 @@ def _frames_at(path: Path, sequence: Sequence, seconds: Array) -> Ints:
     if not fits.all():
         warnings.warn(f"{path}: {out}, and are left out", stacklevel=2)
     return np.where(fits, k + 1, 0)
-
-
-def _check_size(path: Path, box: Array, size: tuple[int, int]) -> None:
-    far = np.quantile(box[:, :2] + box[:, 2:], 0.95, axis=0) / size
-    if (far > OUTSIDE).any():
-        x, y = far * size
-        got, expected = f"boxes that end at {x:.0f}, {y:.0f} px", "boxes in pictures of {} × {} px".format(*size)
-        remedy = "if the detector saw another picture size, give --box-scale"
-        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
 
 
 def _coco_results(path: Path) -> NumericTable:

@@ -103,9 +103,19 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     if not length:
         expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
         raise InputError(file=path, got="nothing that tells its length", expected=expected, remedy="complete it")
-    _refuse_beyond(path, pictures, length)
+    beyond = [file.name for frame, file in pictures.files.items() if frame > length]
+    if beyond and len(pictures.files) <= length:
+        got, expected = f"{beyond[0]} among {len(pictures.files)} pictures", f"frames 1 to {length}"
+        remedy = "rename the pictures: each gets the number of its frame, or correct seqLength"
+        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
+    if beyond:
+        warnings.warn(f"{path}: {len(beyond)} pictures beyond frame {length} (seqLength) are not read", stacklevel=2)
     seen = pictures.first_size() if images else None
-    size = _picture_size(path / "seqinfo.ini", info.image_size, seen)
+    size = info.image_size or seen
+    if seen is not None and size != seen:
+        got, expected = "{} × {}".format(*size or ()), "{} × {}, the size of the pictures".format(*seen)
+        ini, remedy = path / "seqinfo.ini", "correct it, or restore the pictures"
+        raise InputError(file=ini, place="imWidth, imHeight", got=got, expected=expected, remedy=remedy)
     doubt = "" if found is None or found.box is None or size is None else size_doubt(found.box, size)
     if doubt:
         warnings.warn(f"{det}: {doubt}", stacklevel=2)
@@ -158,25 +168,6 @@ def _info(path: Path) -> SeqInfo:
 def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
     texts = is_present(path / "gt" / "gt.txt") or is_present(path / "det" / "det.txt")
     return find_pictures(path / info.image_dir, info.length, (lambda: _labelled_frames(path)) if texts else None)
-
-
-def _refuse_beyond(path: Path, pictures: PictureFolder, length: int) -> None:
-    beyond = [file for frame, file in pictures.files.items() if frame > length]
-    if beyond and len(pictures.files) <= length:
-        got, expected = f"{beyond[0].name} among {len(pictures.files)} pictures", f"frames 1 to {length}"
-        remedy = "rename the pictures: each gets the number of its frame, or correct seqLength"
-        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
-    if beyond:
-        warnings.warn(f"{path}: {len(beyond)} pictures beyond frame {length} (seqLength) are not read", stacklevel=3)
-
-
-def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, int] | None) -> tuple[int, int] | None:
-    if stated is not None and seen is not None and stated != seen:
-        got, expected = "{} × {}".format(*stated), "{} × {}, the size of the pictures".format(*seen)
-        remedy = "correct it, or restore the pictures"
-        raise InputError(file=ini, place="imWidth, imHeight", got=got, expected=expected, remedy=remedy)
-    # One of the two may be unknown.
-    return stated or seen
 
 
 def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:

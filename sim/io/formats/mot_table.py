@@ -135,6 +135,12 @@ NAMES = {
     "y": ("y", *(f"y_{unit}" for unit in UNITS)),
 }
 
+# columns of which a text has a box, the first four that it has all of
+BOXES = (
+    ("left", "top", "width", "height"), ("left", "top", "right", "bottom"), ("cx", "cy", "width", "height"),
+    ("x", "y", "width", "height"),
+)  # fmt: skip
+
 MEANINGS = {name: meaning for meaning, names in NAMES.items() for name in names}
 
 # further names of a column of classes in words, if PEOPLE are among these: it may hold anything else
@@ -224,20 +230,17 @@ def _in_order(column: dict[str, Column], units: dict[str, str]) -> list[Column] 
     ground = [column[axis] * UNITS.get(unit, 1.0) for axis, unit in units.items()]
     if have >= {"id", "x", "y"} and not have & {"width", "height", "left", "cx"}:
         return [frame, column["id"], *ground]
-    whole = have >= {"left", "top", "width", "height"}
-    if whole and "id" in have and "class" not in have and len(units) == 2 and all(units.values()):
-        last = [*ground, np.zeros_like(frame)]
-    else:
-        last = [column["class"]]
-    if not whole and have >= {"left", "top", "right", "bottom"}:
-        column |= {"width": column["right"] - column["left"], "height": column["bottom"] - column["top"]}
-    elif not whole and have >= {"cx", "cy", "width", "height"}:
-        column |= {"left": column["cx"] - column["width"] / 2, "top": column["cy"] - column["height"] / 2}
-    elif not whole and have >= {"x", "y", "width", "height"}:
-        column |= {"left": column["x"], "top": column["y"]}
-    elif not whole:
+    form = next((form for form in BOXES if have >= {*form}), None)
+    if form is None:
         return None
-    return [*(column[name] for name in ("frame", "id", "left", "top", "width", "height", "score")), *last]
+    left, top, w, h = (column[name] for name in form)
+    if "right" in form:
+        w, h = w - left, h - top
+    if "cx" in form:
+        left, top = left - w / 2, top - h / 2
+    metres = form == BOXES[0] and "id" in have and "class" not in have and len(units) == 2 and all(units.values())
+    last = [*ground, np.zeros_like(frame)] if metres else [column["class"]]
+    return [frame, column["id"], left, top, w, h, column["score"], *last]
 
 
 def _refuse(path: Path, names: list[str]) -> NoReturn:

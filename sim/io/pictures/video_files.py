@@ -142,14 +142,6 @@ def _seconds(stream: Any) -> float:
     return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + float(found[3]) if found else 0.0
 
 
-def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
-    """Yields the packets up to the first that cannot be read; the last, empty one flushes the decoder."""
-    import av
-
-    with suppress(av.FFmpegError):
-        yield from container.demux(stream)
-
-
 def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
     """Yields (frame, picture) in the order in which frames are shown, of all frames or those `wanted`."""
     ranks, last, count = index.ranks(), max(wanted or [0]), 0
@@ -167,17 +159,20 @@ def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = Non
 
 def _decoded(container: Any, stream: Any, groups: set[int] | None) -> Iterator[Any]:
     """Yields the decoded libav frames as shown, None for a packet that cannot be decoded, of these packet groups."""
+    import av
+
     group, running = 0, False
-    for packet in _demuxed(container, stream):
-        group += packet.is_keyframe
-        if packet.size and groups is not None and group not in groups:
-            if running:
+    # Up to the first packet that cannot be read; the last, empty one flushes the decoder.
+    with suppress(av.FFmpegError):
+        for packet in container.demux(stream):
+            group += packet.is_keyframe
+            if not packet.size or groups is None or group in groups:
+                running = True
+                yield from _decode_packet(stream, packet)
+            elif running:
                 yield from _decode_packet(stream, None)
                 stream.codec_context.flush_buffers()
-            running = False
-            continue
-        running = True
-        yield from _decode_packet(stream, packet)
+                running = False
 
 
 def _decode_packet(stream: Any, packet: Any) -> list[Any]:
