@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Container
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -94,13 +95,14 @@ class TextRows:
         """A comma if the first row has one; None: blanks."""
         return "," if self.text and "," in self.text[0] else None
 
-    def cells(self) -> list[list[str]]:
-        """Returns the cells of each row."""
-        return [line.split(self.separator) for line in self.text]
+    def cells(self) -> Iterator[list[str]]:
+        """Yields the cells of each row."""
+        separator = self.separator
+        return (line.split(separator) for line in self.text)
 
     def words(self, column: int, first: int = 0) -> list[str]:
         """Returns the cells of a column (from 0) of the rows from `first` on, without quotes."""
-        return [row[column].strip().strip('"') for row in self.cells()[first:] if len(row) > column]
+        return [row[column].strip().strip('"') for row in islice(self.cells(), first, None) if len(row) > column]
 
     def numbers(
         self, columns: tuple[int, int], also: int | None = None, *, first: int = 0, layout: str = "",
@@ -121,7 +123,7 @@ class TextRows:
         try:
             text = io.StringIO("\n".join(rows.text))
             values = np.loadtxt(text, delimiter=rows.separator, comments=None, ndmin=2, dtype=np.float64, usecols=use)
-            if use is not None and any(len(cells) not in fits for cells in rows.cells()):
+            if use is not None and not {len(cells) for cells in rows.cells()} <= {*fits}:
                 raise ValueError("lines of different lengths")
         except ValueError:
             raise rows._first_bad(fits, use) from None
@@ -134,7 +136,7 @@ class TextRows:
         return table
 
     def _first_bad(self, fits: Container[int], use: list[int] | None) -> InputError:
-        width = len(self.cells()[0])
+        width = len(next(self.cells()))
         for number, line, cells in zip(self.line, self.text, self.cells(), strict=True):
             read = [cells[k] for k in use] if use is not None and len(cells) in fits else cells
             bad = [repr(cell.strip()) for cell in read if not is_number_text(cell)]
