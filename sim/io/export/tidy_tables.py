@@ -176,8 +176,7 @@ def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[st
     """
     if form in TEXTS:
         name, beginning = TEXTS[form]
-        text = _trajnet if form == "trajnet" else _pedpy
-        body = text(tables, _places_in_metres(tables, folder), facts["fps"])
+        body = _people_text(tables, folder, form, facts["fps"])
         _refuse_foreign(folder / name, beginning)
         write_file(folder / name, body.encode())
         return [folder / name]
@@ -199,28 +198,24 @@ def _refuse_foreign(path: Path, beginning: bytes | None) -> None:
     refuse_foreign_file(path)
 
 
-Rows = list[tuple[int, int, float, float]]  # frame, id, x, y
-
-
-def _places_in_metres(tables: TidyTables, folder: Path) -> Rows:
-    columns = tables.people.columns
+def _people_text(tables: TidyTables, folder: Path, form: Form, fps: float) -> str:
+    columns, stays = tables.people.columns, tables.people_summary.columns
     if "x_m" not in columns:
         got, expected = "people in the image, px", "positions on the ground, m"
         raise InputError(file=folder, got=got, expected=expected, remedy="track with --camera, or from points")
-    return list(zip(*(columns[name].tolist() for name in ("frame", "id", "x_m", "y_m")), strict=True))
-
-
-def _trajnet(tables: TidyTables, rows: Rows, fps: float) -> str:
-    stays = tables.people_summary.columns
-    spans = zip(*(np.asarray(stays[name]).tolist() for name in ("id", "start_frame", "end_frame")), strict=True)
-    scenes = [{"scene": {"id": k, "p": p, "s": s, "e": e, "fps": fps}} for k, (p, s, e) in enumerate(spans)]
-    tracks = [{"track": {"f": f, "p": p, "x": round(x, 4), "y": round(y, 4)}} for f, p, x, y in rows]
-    return "".join(json.dumps(line) + "\n" for line in [*scenes, *tracks])
-
-
-def _pedpy(tables: TidyTables, rows: Rows, fps: float) -> str:
-    head = f"# framerate: {fps:g}\n# id\tframe\tx/m\ty/m\n"
-    return head + "".join(f"{p}\t{f}\t{x:.4f}\t{y:.4f}\n" for f, p, x, y in rows)
+    rows = list(zip(*(columns[name].tolist() for name in ("frame", "id", "x_m", "y_m")), strict=True))
+    if form == "pedpy":
+        lines = [
+            f"# framerate: {fps:g}",
+            "# id\tframe\tx/m\ty/m",
+            *(f"{p}\t{f}\t{x:.4f}\t{y:.4f}" for f, p, x, y in rows),
+        ]
+    else:
+        spans = zip(*(np.asarray(stays[name]).tolist() for name in ("id", "start_frame", "end_frame")), strict=True)
+        scenes = ({"scene": {"id": k, "p": p, "s": s, "e": e, "fps": fps}} for k, (p, s, e) in enumerate(spans))
+        tracks = ({"track": {"f": f, "p": p, "x": round(x, 4), "y": round(y, 4)}} for f, p, x, y in rows)
+        lines = list(map(json.dumps, (*scenes, *tracks)))
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _csv(table: pyarrow.Table) -> bytes:

@@ -182,11 +182,11 @@ class StoredPictures:
 
     def check(self, name: str, body: bytes | None = None) -> None:
         """Raises InputError if a file is not the one that the manifest names. body: its content, if it was read."""
-        path, facts = self.folder / name, self.manifest["files"].get(name)
-        if facts is None:
+        path, files = self.folder / name, self.manifest["files"]
+        if name not in files:
             got, expected = "a manifest that does not name it", "a file that manifest.json names"
             raise InputError(file=path, got=got, expected=expected, remedy=REDO)
-        check_file(path, facts, body=body)
+        check_file(path, files[name], body=body)
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
         """Returns picture `index` (from 1) of a stream of picture files: BGR, or codes of ids and disparity."""

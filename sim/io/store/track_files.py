@@ -265,18 +265,17 @@ def read_track_text(
 
 
 def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
-    """Returns copies of one tracker's tracks with the groups of a groups.csv.
+    """Returns the list, with the groups of a groups.csv in one tracker's tracks.
 
     A person in two groups gets the one with the higher id. Members without a track stay in the groups.
     """
     every = group_files.read_groups_csv(path, len(found))
-    answers = []
-    for tracks, groups in zip(found, every, strict=True):
+    for k, (tracks, groups) in enumerate(zip(found, every, strict=True)):
         group = tracks.group.copy()
-        for k, members in zip(groups.id, groups.members, strict=True):
-            group[np.isin(tracks.id, members)] = k
-        answers.append(tracks.replace(group=group, groups=groups))
-    return answers
+        for name, members in zip(groups.id, groups.members, strict=True):
+            group[np.isin(tracks.id, members)] = name
+        found[k] = tracks.replace(group=group, groups=groups)
+    return found
 
 
 def write_tracks(
