@@ -40,12 +40,13 @@ def _parsed(load: Callable[[str], Any], text: str, file: object, form: str, reme
     except RecursionError:
         raise _too_deep(file) from None
     except (ValueError, OverflowError) as error:  # OverflowError: of dates, which tomllib lets through
-        # TOML's errors end with their place. Python's advice to raise its limit of digits helps no user.
-        message, _, place = str(error).rpartition(" (at ") if form == "TOML" else ("", "", "")
-        got = "a number of thousands of digits" if "integer string conversion" in str(error) else message or str(error)
+        place, got = "", str(error)
         if isinstance(error, json.JSONDecodeError):
             place, got = f"line {error.lineno}", f"no JSON ({error.msg})"
-        place = place.rstrip(")") if message or form == "JSON" else ""
+        elif isinstance(error, tomllib.TOMLDecodeError) and " (at " in got:
+            got, _, place = got.removesuffix(")").rpartition(" (at ")
+        elif "integer string conversion" in got:  # Python's advice to raise its limit of digits helps no user
+            got = "a number of thousands of digits"
         raise InputError(file=file, place=place, got=got, expected=form, remedy=remedy) from None
     _require_plain(value, file)
     return value

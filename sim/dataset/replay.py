@@ -82,11 +82,15 @@ def _inside(times: Array, t: Array) -> Bools:
     return np.asarray((t >= times[0] - 1e-9) & (t <= times[-1] + 1e-9))
 
 
+def _rows_of(frame: Ints, id: Ints, one: int) -> Ints:
+    rows = np.flatnonzero(id == one)
+    return np.asarray(rows[np.argsort(frame[rows])])
+
+
 def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: float) -> list[Segment]:
     from scipy.interpolate import CubicSpline
 
-    rows = np.flatnonzero(id == one)
-    rows = rows[np.argsort(frame[rows])]
+    rows = _rows_of(frame, id, one)
     cuts = np.flatnonzero(np.diff(frame[rows]) > GAP * rate) + 1
     made: list[Segment] = []
     for part in np.split(rows, cuts):
@@ -141,8 +145,7 @@ def nearest_row(frame: Ints, id: Ints, people: Ints, rate: float, t: Array) -> I
     """
     out = np.zeros((len(t), len(people)), np.int64)
     for column, one in enumerate(people):
-        rows = np.flatnonzero(id == one)
-        rows = rows[np.argsort(frame[rows])]
+        rows = _rows_of(frame, id, int(one))
         times = (frame[rows] - 1) / rate
         after = np.clip(np.searchsorted(times, t), 1, max(len(rows) - 1, 1))
         before = after - 1

@@ -380,13 +380,13 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
     Raises InputError if a text is none.
     """
     found: dict[str, Array] = {}
-    expected = {"--line": "NAME=x1,y1,x2,y2", "--zone": "NAME=x1,y1,x2,y2,x3,y3,…"}
+    forms = {"--line": "NAME=x1,y1,x2,y2", "--zone": "NAME=x1,y1,x2,y2,x3,y3,…"}
     for option, text in [*(("--line", text) for text in lines), *(("--zone", text) for text in zones)]:
         name, _, cells = text.partition("=")
         values = list(map(number_or_nan, cells.split(",")))
         count = len(values) == 4 if option == "--line" else len(values) >= 6 and len(values) % 2 == 0
         if not name.isidentifier() or name in found or not count or not np.max(np.abs(values)) <= COORDINATE:
-            got, expected = repr(text), f"{expected[option]}, each name once"
+            got, expected = repr(text), f"{forms[option]}, each name once"
             remedy = "write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image"
             raise InputError(place=option, got=got, expected=expected, remedy=remedy)
         found[name] = np.reshape(values, (-1, 2))

@@ -136,10 +136,9 @@ def _numbers(keys: list[Key]) -> list[int] | None:
         return None
     columns = list(zip(*(numbers for _, numbers in keys), strict=True))
     varying = [column for column in columns if len(set(column)) > 1]
-    if len(varying) > 1:
-        return None
-    found = list((varying or columns[-1:])[0])
-    return None if max(found) - min(found) >= SPARSE * len(found) else found
+    found = (varying or columns[-1:])[0]
+    stamps = len(varying) > 1 or max(found) - min(found) >= SPARSE * len(found)
+    return None if stamps else list(found)
 
 
 def _labelled_numbering(folder: Path, found: Ints, length: int | None, labels: Ints) -> Numbering:
