@@ -11,6 +11,8 @@ import json
 import os
 import stat
 import tomllib
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -23,45 +25,35 @@ FAR = "whole numbers within 64 bits"
 def parse_toml(text: str, file: object = "") -> dict[str, Any]:
     """Returns the table that a TOML text stands for."""
     remedy = "correct the line; strings need quotes, tables inside a line need { }"
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        message, _, place = str(error).rpartition(" (at ")
-        raise InputError(
-            file=file, place=place.rstrip(")"), got=message or str(error), expected="TOML", remedy=remedy
-        ) from None
-    except RecursionError:
-        raise _too_deep(file) from None
-    except (ValueError, OverflowError) as error:  # of int() and of dates, which tomllib lets through
-        raise InputError(file=file, got=_reason(error), expected="TOML", remedy=remedy) from None
-    _require_plain(table, file)
+    table: dict[str, Any] = _parsed(tomllib.loads, text, file, "TOML", remedy)
     return table
 
 
 def parse_json(text: str, file: object = "", remedy: str = "correct the file") -> Any:
     """Returns the value that a JSON text stands for."""
+    return _parsed(partial(json.loads, parse_constant=_constant), text, file, "JSON", remedy)
+
+
+def _parsed(load: Callable[[str], Any], text: str, file: object, form: str, remedy: str) -> Any:
     try:
-        value = json.loads(text, parse_constant=_constant)
-    except json.JSONDecodeError as error:
-        raise InputError(
-            file=file, place=f"line {error.lineno}", got=f"no JSON ({error.msg})", expected="JSON", remedy=remedy
-        ) from None
+        value = load(text)
     except RecursionError:
         raise _too_deep(file) from None
-    except ValueError as error:
-        raise InputError(file=file, got=_reason(error), expected="JSON", remedy=remedy) from None
+    except (ValueError, OverflowError) as error:  # OverflowError: of dates, which tomllib lets through
+        place, got = "", str(error)
+        if isinstance(error, json.JSONDecodeError):
+            place, got = f"line {error.lineno}", f"no JSON ({error.msg})"
+        elif isinstance(error, tomllib.TOMLDecodeError) and " (at " in got:
+            got, _, place = got.removesuffix(")").rpartition(" (at ")
+        elif "integer string conversion" in got:  # Python's advice to raise its limit of digits helps no user
+            got = "a number of thousands of digits"
+        raise InputError(file=file, place=place, got=got, expected=form, remedy=remedy) from None
     _require_plain(value, file)
     return value
 
 
 def _constant(word: str) -> NoReturn:
     raise ValueError(f"{word}, which is no number of JSON")
-
-
-def _reason(error: Exception) -> str:
-    text = str(error)
-    # Python's advice to raise its limit of digits helps no user.
-    return "a number of thousands of digits" if "integer string conversion" in text else text
 
 
 def _too_deep(file: object) -> InputError:
@@ -75,16 +67,11 @@ def _require_plain(value: Any, file: object) -> None:
         for item in level:
             if isinstance(item, int) and abs(item) > INTEGER:
                 raise InputError(file=file, got=item, expected=FAR, remedy="correct the number")
-        level = [inner for item in level for inner in _inside(item)]
+        inside = (item.values() if isinstance(item, dict) else item for item in level if isinstance(item, dict | list))
+        level = [inner for items in inside for inner in items]
         if not level:
             return
     raise _too_deep(file)
-
-
-def _inside(value: Any) -> list[Any]:
-    if isinstance(value, dict):
-        return list(value.values())
-    return value if isinstance(value, list) else []
 
 
 KINDS = {
@@ -93,11 +80,16 @@ KINDS = {
 }  # fmt: skip
 
 
-def require_regular(path: Path, remedy: str = "check the path") -> int:
-    """Returns the size in bytes of the regular file `path`, which is not opened; links are followed."""
+def require_regular(path: Path, remedy: str = "check the path", missing: bool = False) -> int:
+    """Returns the size in bytes of the regular file `path`, which is not opened; links are followed.
+
+    missing: True returns -1 for a missing file or a link to one.
+    """
     try:
         found = os.stat(path)
     except (OSError, ValueError) as error:
+        if missing and isinstance(error, FileNotFoundError):
+            return -1
         got = getattr(error, "strerror", None) or "a path that cannot be"
         raise InputError(file=path, got=got, expected="a readable file", remedy=remedy) from None
     if not stat.S_ISREG(found.st_mode):
@@ -106,21 +98,9 @@ def require_regular(path: Path, remedy: str = "check the path") -> int:
     return found.st_size
 
 
-def refuse_irregular(path: Path) -> None:
-    """Raises InputError as `require_regular` does, but not for a missing file or a link to one."""
-    try:
-        os.stat(path)
-    except FileNotFoundError:
-        return
-    except OSError:
-        pass
-    require_regular(path)
-
-
 def is_present(path: Path) -> bool:
     """Returns True if the regular file exists; raises InputError for something else, as a FIFO."""
-    refuse_irregular(path)
-    return os.path.isfile(path)
+    return require_regular(path, missing=True) >= 0
 
 
 def read_regular(path: Path, limit: int, remedy: str = "check the path") -> bytes:

@@ -39,9 +39,12 @@ def canonical_hash(value: Any) -> str:
     return h.hexdigest()
 
 
-def file_hash(content: bytes) -> str:
-    """Returns the SHA-256 of `content`, the bytes of a file, as 64 hex digits."""
-    return hashlib.sha256(content).hexdigest()
+def file_hash(content: bytes | Path) -> str:
+    """Returns the SHA-256 of the bytes of a file, as 64 hex digits; a path is read in parts."""
+    if isinstance(content, bytes):
+        return hashlib.sha256(content).hexdigest()
+    with content.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def scenario_hash(text: str) -> str:

@@ -1,8 +1,8 @@
-"""Draws a scenario as SVG, without simulating it: the plan, and beneath it the script.
+"""Draws a scenario as SVG, without simulating it: a plan, and beneath it the orders of the script in words.
 
-The plan shows ground, walls and pillars, ways, starts and orders, as far as they are known before the simulation; the
-script the groups that merge, split and queue. A distribution is replaced by its mean and the range of its draws. Where
-groups meet, and where a group divides, is taken to be half-way.
+The plan shows ground, walls and pillars, ways, starts and orders, as far as they are known before the simulation. A
+distribution is replaced by its mean and the range of its draws. Where groups meet, and where a group divides, is taken
+to be half-way.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ XY = tuple[float, float]
 Way = tuple[XY, ...]
 SLOTS = 6  # greatest number of places of a queue that are drawn
 WIDTH, TALLEST = 9.0, 6.2  # inches: of the drawing; greatest height of the plan
-ROW = 0.3  # inches between the lines of groups in the script, and between the words of orders
+ROW = 0.3  # inches between the words of orders
 # Of groups: dark enough to read on white, and distinct for colour-blind readers.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa3377", "#8a6d00", "#3d6fd6", "#b2182b", "#4d7c0f", "#6a51a3", "#5c5c5c")
 DARK, GREY, PALE = "#1b1f24", "#57606a", "#8c959f"
@@ -38,9 +38,7 @@ class OrderMark:
     number: int  # of the order in the file, from 1
     event: ScriptOrder  # the order
     at: XY  # x, y of where it happens, m
-    # before, after: names of its groups before and after it; the same for a queue
-    before: tuple[str, ...]
-    after: tuple[str, ...]
+    group: str  # the first of its groups before it
     ways: dict[str, Way]  # those it opens, by name of the group; empty if groups stay or keep their goals
     slots: Way = ()  # x, y of the places of a queue, m; empty for other orders
 
@@ -79,12 +77,6 @@ def _mean(*points: XY) -> XY:
     return float(x), float(y)
 
 
-def order_marks(scenario: Scenario) -> list[OrderMark]:
-    """Returns the orders as drawn on the plan, numbered from 1."""
-    places = {name: (_at(group.start), _at(group.goal)) for group in scenario.group for name in group_names(group)}
-    return [_mark(k, event, places, scenario.world.size) for k, event in enumerate(scenario.event, 1)]
-
-
 def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> OrderMark:
     """Returns an order as drawn, and changes the start and goal of its groups in `places`."""
     ways: dict[str, Way]
@@ -93,53 +85,49 @@ def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], wor
         goal = at if isinstance(event.goal, str) else _at(event.goal)
         places[event.into] = (at, goal)
         ways = {} if goal == at else {event.into: (at, *map(_at, event.via), goal)}
-        return OrderMark(number, event, at, event.groups, (event.into,), ways)
+        return OrderMark(number, event, at, event.groups[0], ways)
     if isinstance(event, SplitOrder):
         at = _mean(*places.pop(event.group))
         ways = {part.id: (at, *map(_at, part.via), _at(part.goal)) for part in event.parts}
         places.update({name: (at, way[-1]) for name, way in ways.items()})
-        return OrderMark(number, event, at, (event.group,), tuple(ways), ways)
-    names = tuple(dict.fromkeys(name for pattern in event.groups for name in expand(pattern, list(places))))
+        return OrderMark(number, event, at, event.group, ways)
+    names = [name for pattern in event.groups for name in expand(pattern, list(places))]
     inside = tuple((x, y) for x, y in queue_places(event, SLOTS) if 0 <= x <= world[0] and 0 <= y <= world[1])
     ways = {} if event.goal is None else {"served": (event.at, _at(event.goal))}
     places.update({name: (event.at, way[-1]) for way in ways.values() for name in names})
-    return OrderMark(number, event, event.at, names, names, ways, inside)
+    return OrderMark(number, event, event.at, names[0], ways, inside)
 
 
 def svg(scenario: Scenario) -> str:
-    """Returns an SVG drawing of a scenario: the plan with starts, ways and goals, and beneath it the script."""
+    """Returns an SVG drawing of a scenario: the plan with starts, ways and goals, and beneath it the orders."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    orders = order_marks(scenario)
-    colour, (lines, touched) = _colours(scenario, orders), _lines(scenario, orders)
+    places = {name: (_at(group.start), _at(group.goal)) for group in scenario.group for name in group_names(group)}
+    orders = [_mark(k, event, places, scenario.world.size) for k, event in enumerate(scenario.event, 1)]
+    colour = _colours(scenario, orders)
     width, depth = scenario.world.size
     tall = min(TALLEST, (WIDTH - 0.6) * depth / width)
-    rows = max(row for _, row, *_ in lines) + 1
-    script = tall + 1.2  # inches from the top to the script, and to its words
-    said = script + ROW * (rows + 0.5)
-    height = said + ROW * len(orders) + 0.1
+    script = tall + 1.2  # inches from the top to the script
+    height = script + ROW * (len(orders) + 1)
+    texts: list[tuple[float, float, str, dict[str, Any]]] = [
+        (0.03, 0.25, scenario.name, {"size": 13, "weight": "bold"}),
+        (0.03, 0.5, describe.cut(scenario.about, 140), {"color": GREY}),
+        (0.03, script - 0.05, "Script", {"weight": "bold"}),
+    ]
+    for k, mark in enumerate(orders, 1):
+        words = f"{mark.event.id}: {describe.order(mark.event)} — {describe.trigger(mark.event.when)}"
+        texts.append((0.065, script + ROW * k, describe.cut(words, 128), {"va": "center"}))
     with rc_context(STYLE):
         figure, out = Figure((WIDTH, height)), io.StringIO()
-
-        def axes(top: float, bottom: float, left: float) -> Any:
-            return figure.add_axes((left / WIDTH, 1 - bottom / height, 1 - 2 * left / WIDTH, (bottom - top) / height))
-
-        for y, text, style in (
-            (0.25, scenario.name, {"size": 13, "weight": "bold"}),
-            (0.5, describe.cut(scenario.about, 140), {"color": GREY}),
-            (script - 0.05, "Script", {"weight": "bold"}),
-        ):
-            figure.text(0.03, 1 - y / height, text, **style)
-        plan = axes(0.7, 0.7 + tall, (WIDTH - tall * width / depth) / 2)
+        for x, down, words, style in texts:
+            figure.text(x, 1 - down / height, words, **style)
+        wide = tall * width / depth
+        plan = figure.add_axes(((WIDTH - wide) / 2 / WIDTH, 1 - (0.7 + tall) / height, wide / WIDTH, tall / height))
         _draw_world(plan, scenario)
         _draw_orders(plan, scenario, orders, colour)
-        _draw_script(axes(script, said, 0.95), scenario, lines, touched, rows, colour)
-        for k, mark in enumerate(orders):
-            y = 1 - (said + 0.1 + ROW * k) / height
-            _number(figure, (0.04, y), mark.number)
-            text = f"{mark.event.id}: {describe.order(mark.event)} — {describe.trigger(mark.event.when)}"
-            figure.text(0.065, y, describe.cut(text, 128), va="center")
+        for k, mark in enumerate(orders, 1):
+            _number(figure, (0.04, 1 - (script + ROW * k) / height), mark.number)
         figure.savefig(out, format="svg", metadata={"Date": None})
     return out.getvalue()
 
@@ -197,7 +185,7 @@ def _draw_orders(axes: Any, scenario: Scenario, orders: list[OrderMark], colour:
         axes.plot(*points[-1], "o", ms=10, mfc="none", mec=colour[group.id])
     for mark in orders:
         for name, way in mark.ways.items():
-            c = colour.get(name, colour[mark.before[0]])
+            c = colour.get(mark.group if name == "served" else name, GREY)
             _draw_way(axes, way, c, lw=2, alpha=0.9, ls="--")
             if name != "served":
                 _label(axes, way[-1], name, c, 6)
@@ -242,77 +230,17 @@ def _draw_start(axes: Any, group: GroupSpec, colour: str, lift: int) -> None:
     reach = 0.0 if n == 1 else 0.75 / (2 * math.sin(math.pi / n))
     for angle in 2.4 + np.arange(n) * math.tau / n:
         axes.add_patch(Circle((x + reach * math.cos(angle), y + reach * math.sin(angle)), 0.22, fc=colour, ec="white"))
-    words = f"{_with_copies(group)} ({people:.2g})"
+    copies = f" ×{group.repeat}" if group.repeat > 1 else ""
+    words = f"{group.id}{copies} ({people:.2g})"
     _label(axes, (x, y + reach + 0.22), words, colour, 4 + 12 * lift)
 
 
-def _with_copies(group: GroupSpec) -> str:
-    return f"{group.id} ×{group.repeat}" if group.repeat > 1 else group.id
-
-
 def _colours(scenario: Scenario, orders: list[OrderMark]) -> dict[str, str]:
+    names = [[group.id, *group_names(group)] for group in scenario.group] + [
+        [name] for mark in orders for name in mark.ways
+    ]
     named: dict[str, str] = {}
-    for k, group in enumerate(scenario.group):
-        named.update(dict.fromkeys([group.id, *group_names(group)], COLOURS[k % len(COLOURS)]))
-    for k, name in enumerate(name for mark in orders for name in mark.after if name not in named):
-        named.setdefault(name, COLOURS[(len(scenario.group) + k) % len(COLOURS)])
+    for k, some in enumerate(names):
+        for name in some:
+            named.setdefault(name, COLOURS[k % len(COLOURS)])
     return named
-
-
-ScriptLine = tuple[str, int, float, float, float]
-
-
-def _draw_script(
-    axes: Any, scenario: Scenario, lines: list[ScriptLine], touched: dict[int, list[int]], rows: int,
-    colour: dict[str, str],
-) -> None:  # fmt: skip
-    """Draws the lines of groups over the numbers of the orders."""
-    from matplotlib.patches import PathPatch
-    from matplotlib.path import Path
-
-    axes.set_axis_off()
-    axes.set(xlim=(0, max(len(touched), 4) + 0.8), ylim=(rows, -0.5))
-    for k, group in enumerate(scenario.group):
-        axes.text(-0.08, k, _with_copies(group), color=colour[group.id], ha="right", va="center")
-    for name, row, start, end, to in lines:
-        bend = end - min(0.4, end - start)
-        points = [(start, row), (bend, row), ((bend + end) / 2, row), ((bend + end) / 2, to), (end, to)]
-        path = Path(points, [Path.MOVETO, Path.LINETO, *[Path.CURVE4] * 3])
-        axes.add_patch(PathPatch(path, fill=False, ec=colour[name], lw=3.7, capstyle="round", clip_on=False))
-        if start > 0 and end - start > 0.5:
-            _label(axes, (start + 0.35, row), name, colour[name], 4)
-    for number, marked in touched.items():
-        axes.plot([number] * len(marked), marked, "o", mfc=DARK, mec="white", ms=6)
-        _number(axes, (number, marked[0]), number)
-
-
-def _lines(scenario: Scenario, orders: list[OrderMark]) -> tuple[list[ScriptLine], dict[int, list[int]]]:
-    """Returns the lines of groups (name, row, from order, to order, row at its end), and the rows that each order
-    concerns.
-    """
-    rows = {group.id: k for k, group in enumerate(scenario.group)}
-    row_of = {name: group.id for group in scenario.group for name in group_names(group)}
-    since = dict.fromkeys(rows, 0.0)
-    lines: list[ScriptLine] = []
-    at: dict[int, list[int]] = {}
-    for mark in orders:
-        if mark.before == mark.after:
-            at[mark.number] = [rows[name] for name in dict.fromkeys(row_of.get(n, n) for n in mark.before)]
-            continue
-        ending = [name for name in mark.before if name in since]
-        taken = {rows[name] for name in since if name not in ending}
-        home = rows[ending[0]] if ending else next(row for row in range(10_000) if row not in taken)
-        at[mark.number] = [home]
-        for name in mark.before:
-            row = rows[row_of.get(name, name)]
-            start = since.pop(name) if name in ending else mark.number - 0.4
-            # One group of a `repeat` branches off; the line of the others goes on.
-            lines.append((name, row, start, mark.number, home))
-        free = (row for row in range(home, 10_000) if row not in taken)
-        for name in mark.after:
-            rows[name], since[name] = next(free), mark.number
-            if rows[name] != home:
-                lines.append((name, home, mark.number, mark.number + 0.3, rows[name]))
-                since[name] = mark.number + 0.3
-    end = len(orders) + 0.6
-    return lines + [(name, rows[name], start, end, rows[name]) for name, start in since.items()], at

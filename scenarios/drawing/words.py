@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from scenarios.loading.toml_files import toml_value
 from scenarios.schema.scenario import GroupSpec, MergeOrder, Scenario, ScriptOrder, SplitOrder, Stop, When
 from scenarios.schema.values import Distribution, Point, Value
 
@@ -110,23 +111,15 @@ def order(event: ScriptOrder) -> str:
 
 
 def sensor(scenario: Scenario) -> list[str]:
-    """Returns lines about the scenario's sensor: detection, noise, visibility, and each occlusion."""
+    """Returns lines about the scenario's sensor: how often it detects, and the keys that differ from the defaults."""
     s = scenario.sensor
-    edges = f"{s.box_noise.scale * s.box_noise.foot[1]:.1%} of the height on the feet of boxes"
-    error = f"{s.noise_m:g} m on points"
-    points = {"foot": "points under their feet", "seen": f"{error}, more where feet are hidden", "own": error}[s.points]
-    chance = f"visibility^{s.occlusion_power:g}" if s.by_visibility is None else "a curve of visibility"
-    lasting = s.persistence or s.miss_memory
+    changed = s.model_dump(exclude_defaults=True, exclude={"detect_prob", "clutter_rate", "hide"})
+    rate = f"{s.clutter_rate:g} false alarms per frame"
     lines = [
-        f"detects {s.detect_prob:.0%} of fully visible people, {s.clutter_rate:g} false alarms per frame"
-        + (f", each for {s.false_alarms.life:g} s" if s.false_alarms is not None and s.false_alarms.life else ""),
-        f"noise {edges} ({s.box}), {points}",
-        f"nobody less visible than {s.min_visibility:.0%}; chance × {chance}"
-        + (f"; half at a height of {s.small_px:g} px" if s.small_px else "")
-        + (f"; misses persist{f' ({s.persistence:g})' if s.persistence else ''}" if lasting else ""),
+        f"detects {s.detect_prob:.0%} of fully visible people, {rate}",
+        *(f"{k} = {toml_value(v)}" for k, v in changed.items()),
     ]
-    lines += [f"hides {h.group or 'everybody'} from {h.start:g} to {h.end:g} s" for h in s.hide]
-    return lines
+    return lines + [f"hides {h.group or 'everybody'} from {h.start:g} to {h.end:g} s" for h in s.hide]
 
 
 def text(scenario: Scenario) -> str:

@@ -24,12 +24,8 @@ BODY = 0.2  # m: least distance from a person's middle to a wall or pillar (the 
 def check(scenario: Scenario, file: str | Path = "") -> None:
     """Raises InputError, naming `file`, for the first thing in the scenario that cannot work."""
     try:
-        _check_world(scenario)
-        _check_groups(scenario)
-        _check_amounts(scenario)
-        _check_sensor(scenario)
-        _check_points(scenario)
-        _check_script(scenario)
+        for part in (_check_world, _check_groups, _check_amounts, _check_sensor, _check_points, _check_script):
+            part(scenario)
     except InputError as error:
         raise error.replaced(file=file) from None
 

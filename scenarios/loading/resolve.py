@@ -24,14 +24,7 @@ from scenarios.errors import InputError
 from scenarios.limits import REPEATS
 from scenarios.loading import toml_files
 from scenarios.loading.checks import check
-
-# isort: off
-# fmt: off
-from scenarios.loading.toml_files import (
-    CATALOGUE, SUITES, Table, did_you_mean, dump, names, parse, suite_names, toml_value,
-)
-# fmt: on
-# isort: on
+from scenarios.loading.toml_files import CATALOGUE, SUITES, Table, did_you_mean, dump, names, suite_names
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import ObservationSpec, Scenario
 from scenarios.schema.sensor import Sensor
@@ -57,13 +50,13 @@ def sensor_settings(path: str | Path) -> tuple[str, ...]:
     Raises:
         InputError: The file does not exist.
     """
-    return tuple(f"sensor.{key}={toml_value(v)}" for key, v in sensor_table(path).items())
+    return tuple(f"sensor.{key}={toml_files.toml_value(v)}" for key, v in sensor_table(path).items())
 
 
 def sensor_table(path: str | Path) -> Table:
     """Returns the keys given in the file's [sensor] table with their values, without defaults."""
     path = Path(path)
-    table = parse(path)
+    table = toml_files.parse(path, "check the path, or make one with `flockscope fit sensor`")
     validate(table, path, model=SensorFile)
     given: Table = table["sensor"]
     return given
@@ -73,7 +66,7 @@ def dump_sensor(sensor: Sensor, about: str = "") -> str:
     """Returns the text of a profile file with all keys of a sensor; `about` becomes comment lines at the top."""
     table = sensor.model_dump(mode="python", exclude_none=True)
     lines = [f"# {line}".rstrip() for line in about.splitlines()]
-    rows = [f"{key} = {toml_value(v)}" for key, v in table.items() if key != "hide" or v]
+    rows = [f"{key} = {toml_files.toml_value(v)}" for key, v in table.items() if key != "hide" or v]
     return "\n".join([*lines, "schema = 1", "", "[sensor]", *rows, ""])
 
 
@@ -110,9 +103,9 @@ def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
 
 def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
     """Returns camera, sensor, light and picture of a TOML file (None: all defaults), with settings applied."""
-    file = Path(path) if path is not None else ""
-    table, places = toml_files.apply_settings({} if path is None else toml_files.parse(Path(path)), tuple(set), file)
-    return validate(table, file, places, model=ObservationSpec)
+    table = {} if path is None else toml_files.parse(Path(path), "check --camera: a TOML file with [camera]")
+    table, places = toml_files.apply_settings(table, tuple(set), path or "")
+    return validate(table, path or "", places, model=ObservationSpec)
 
 
 class SuiteEntry(Model):
@@ -140,7 +133,7 @@ class Suite(Model):
 
 def read_suite(path: Path) -> Suite:
     """Returns the content of a suite file, with an entry of `repeat = n` expanded to name-1 … name-n."""
-    suite = validate(parse(path), path, model=Suite)
+    suite = validate(toml_files.parse(path), path, model=Suite)
     entries = tuple(each for entry in suite.entry for each in entry.expanded())
     counts = Counter(entry.name for entry in entries)
     twice = next((name for name, count in counts.items() if count > 1), None)

@@ -84,9 +84,9 @@ def find(name: str | Path, beside: Path | None = None) -> Path:
     raise InputError(file=text, got="no such file", expected="a scenario file", remedy=remedy)
 
 
-def parse(path: Path) -> Table:
-    """Returns the content of a TOML file, without applying `extends`."""
-    body = read_regular(path, TOML_BYTES, "check the path and its permissions")
+def parse(path: Path, remedy: str = "check the path and its permissions") -> Table:
+    """Returns the content of a TOML file, without applying `extends`. remedy: if it cannot be read."""
+    body = read_regular(path, TOML_BYTES, remedy)
     try:
         return parse_toml(body.decode("utf-8-sig"), path)
     except UnicodeDecodeError as error:
@@ -117,10 +117,7 @@ def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
 
 def merge(below: Table, above: Table) -> Table:
     """Returns the table `above` merged over `below`, as the module says."""
-    merged = dict(below)
-    for key, value in above.items():
-        merged[key] = _merge_value(key, below.get(key), value)
-    return merged
+    return {**below, **{key: _merge_value(key, below.get(key), value) for key, value in above.items()}}
 
 
 def _merge_value(key: str, below: Any, above: Any) -> Any:
@@ -128,23 +125,16 @@ def _merge_value(key: str, below: Any, above: Any) -> Any:
         whole = key == "when" or (bool(above) and above.keys() <= DISTRIBUTION_KEYS)
         return above if whole else merge(below, above)
     if _has_ids(below) and _has_ids(above):
-        return _merge_by_id(below, above)
+        rows = list(below)
+        for row in above:
+            place = next((k for k, old in enumerate(below) if old["id"] == row["id"]), len(rows))
+            rows[place : place + 1] = [merge(rows[place], row) if place < len(rows) else row]
+        return rows
     return above
 
 
 def _has_ids(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and all(isinstance(row, dict) and "id" in row for row in value)
-
-
-def _merge_by_id(below: list[Table], above: list[Table]) -> list[Table]:
-    rows = list(below)
-    for row in above:
-        place = next((k for k, old in enumerate(below) if old["id"] == row["id"]), None)
-        if place is None:
-            rows.append(row)
-        else:
-            rows[place] = merge(rows[place], row)
-    return rows
 
 
 def dump(scenario: BaseModel, defaults: bool = True) -> str:
@@ -153,16 +143,13 @@ def dump(scenario: BaseModel, defaults: bool = True) -> str:
     defaults: False leaves out the keys that have their default value.
     """
     table = scenario.model_dump(mode="python", by_alias=True, exclude_none=True, exclude_defaults=not defaults)
-    flat: Table = {}
+    tables = {key: v for key, v in table.items() if isinstance(v, dict)}
+    arrays = {key: v for key, v in table.items() if isinstance(v, tuple) and v and isinstance(v[0], dict)}
     blocks = []
-    for key, value in table.items():
-        if isinstance(value, dict):
-            blocks.append(f"[{key}]\n" + _lines(value))
-        elif isinstance(value, tuple) and value and isinstance(value[0], dict):
-            blocks += [f"[[{key}]]\n" + _lines(row) for row in value]
-        else:
-            flat[key] = value
-    return "\n".join([_lines(flat), *blocks])
+    for key in (key for key in table if key in tables or key in arrays):
+        blocks += [f"[{key}]\n" + _lines(tables[key])] if key in tables else []
+        blocks += [f"[[{key}]]\n" + _lines(row) for row in arrays.get(key, ())]
+    return "\n".join([_lines({key: v for key, v in table.items() if key not in tables | arrays}), *blocks])
 
 
 def _lines(table: dict[str, Any]) -> str:
@@ -232,36 +219,31 @@ def parse_value(value: str, text: str) -> Any:
     return table["value"]
 
 
-def _put(table: Table, steps: list[str], value: Any, text: str, file: object) -> KeyPath:
-    """Sets the value in the table; returns the path of its key, with ids replaced by indices."""
-    here: Any = table
-    path: list[str | int] = []
-    while True:
-        if isinstance(here, dict):
-            step, steps = steps[0], steps[1:]
-            path.append(step)
-            if not steps:
-                here[step] = value
-                return tuple(path)
-            here = here.setdefault(step, {})
-        elif isinstance(here, list):
-            index, steps = _index(here, steps, value, text, file)
-            path.append(index)
-            if not steps:
-                here[index : index + 1] = [_with_id(here, index, value)]
-                return tuple(path)
-            here = here[index]
-        else:
-            key = ".".join(map(str, path))
-            got, remedy = f"{key} = {here!r}, which has no {steps[0]!r}", f"set {key} itself"
-            raise InputError(file=file, place=place_of(text), got=got, expected="a key that exists", remedy=remedy)
+def _put(here: Any, steps: list[str], value: Any, text: str, file: object, path: KeyPath = ()) -> KeyPath:
+    """Sets the value in a table or array; returns the path of its key, with ids replaced by indices."""
+    if not isinstance(here, dict | list):
+        key = ".".join(map(str, path))
+        got, remedy = f"{key} = {here!r}, which has no {steps[0]!r}", f"set {key} itself"
+        raise InputError(file=file, place=place_of(text), got=got, expected="a key that exists", remedy=remedy)
+    step: Any = steps[0]
+    rest = steps[1:]
+    if isinstance(here, list):
+        step, rest = _index(here, steps, value, text, file)
+    if rest:
+        inside = here.setdefault(step, {}) if isinstance(here, dict) else here[step]
+        return _put(inside, rest, value, text, file, (*path, step))
+    if isinstance(here, dict):
+        here[step] = value
+    else:
+        here[step : step + 1] = [_with_id(here, step, value)]
+    return (*path, step)
 
 
 def _index(rows: list[Any], steps: list[str], value: Any, text: str, file: object) -> tuple[int, list[str]]:
     """Returns the index in the array that the first steps name, by index or id, and the steps after them."""
     if re.fullmatch("[0-9]{1,9}", steps[0]) and int(steps[0]) < len(rows):
         return int(steps[0]), steps[1:]
-    ids = {str(row["id"]): k for k, row in reversed(list(enumerate(rows))) if isinstance(row, dict) and "id" in row}
+    ids = {str(rows[k]["id"]): k for k in reversed(range(len(rows))) if isinstance(rows[k], dict) and "id" in rows[k]}
     # Ids may have dots; the longest wins, and an existing index wins over an id.
     for n in range(len(steps), 0, -1):
         name = ".".join(steps[:n])

@@ -14,13 +14,12 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, is_number
 from scenarios.loading.toml_files import KeyPath, Table, did_you_mean, place_of
 
-# words for what pydantic expects, by its kind of error
-EXPECTED = {
-    "float_type": "a number, or a distribution such as { normal = [1.3, 0.2] }",
-    "literal_error": "a point [x, y] in metres, or ",
-    "string_pattern_mismatch": "a name: a letter, then letters, digits, '_', '.' or '-'",
-}
 TAGS = {"number", "distribution", "point", "word"}  # of the discriminators of values, in pydantic's locations
+# our words for those of pydantic's messages
+WORDS = {
+    "^(Input should be |Value error, )": "", "a valid tuple": "a list", "String should match pattern": "a name like",
+    r"a valid dictionary or instance of \w+": "a table",
+}  # fmt: skip
 
 M = typing.TypeVar("M", bound=BaseModel)
 
@@ -30,75 +29,47 @@ def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None 
 
     places: texts of `--set` by path, as of `apply_settings`; an error at or below such a path names the setting.
     """
-    for path, number in _numbers(table):
-        if abs(number) > COORDINATE:
-            raise InputError(
-                file=file, place=_place(path, table, places or {}), got=number,
-                expected=f"a number within {COORDINATE:g}", remedy="correct the value",
-            )  # fmt: skip
+
+    def wrong(path: KeyPath, got: object, expected: str, remedy: str) -> InputError:
+        place = _place(path, table, places or {})
+        return InputError(file=file, place=place, got=got, expected=expected, remedy=remedy)
+
+    def plain(value: Any, path: KeyPath = ()) -> Any:
+        if isinstance(value, dict):
+            return {key: plain(inner, (*path, key)) for key, inner in value.items()}
+        if isinstance(value, list):  # pydantic's strict mode takes no list for a tuple
+            return tuple(plain(inner, (*path, k)) for k, inner in enumerate(value))
+        if is_number(value) and abs(value) > COORDINATE:
+            raise wrong(path, value, f"a number within {COORDINATE:g}", "correct the value")
+        return value
+
     try:
-        return model.model_validate(_tuples(table), strict=True)
+        return model.model_validate(plain(table), strict=True)
     except ValidationError as error:
-        raise input_error(error, table, file, places or {}) from None
-
-
-def _numbers(value: Any, path: KeyPath = ()) -> typing.Iterator[tuple[KeyPath, float]]:
-    """Yields every finite number in a table with its path."""
-    if isinstance(value, dict | list):
-        for key, inner in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from _numbers(inner, (*path, key))
-    elif is_number(value):
-        yield path, value
-
-
-def _tuples(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _tuples(v) for key, v in value.items()}
-    # pydantic's strict mode takes no list for a tuple.
-    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
-
-
-def input_error(error: ValidationError, table: Table, file: object, places: dict[KeyPath, str]) -> InputError:
-    """Returns the error for the first problem that pydantic found, and says how many more there are."""
-    found = list(error.errors(include_url=False))
+        found = list(error.errors(include_url=False))
     # Unknown keys come first, because a misspelt key explains a missing one.
     first = min(found, key=lambda e: (e["type"] != "unknown_key", e["type"] == "too_short" and len(found) > 1))
     path = tuple(s for k, s in enumerate(first["loc"]) if s not in TAGS and not (k == 2 and first["loc"][0] == "event"))
-    if first["type"] == "unknown_key":
-        path += (first["ctx"]["key"],)
-    elif first["type"].startswith("union_tag"):
-        path += ("type",)
-    got, expected, remedy = _words(first, path)
     more = f" ({len(found) - 1} more problem{'s' * (len(found) > 2)})" if len(found) > 1 else ""
-    return InputError(file=file, place=_place(path, table, places), got=got, expected=expected, remedy=remedy + more)
+    path, got, expected, remedy = _words(first, path)
+    raise wrong(path, got, expected, remedy + more)
 
 
-def _words(error: Any, path: KeyPath) -> tuple[str, str, str]:
-    """Returns what was found, what was expected and a remedy."""
-    kind, message, ctx, got = error["type"], str(error["msg"]), error.get("ctx", {}), _show(error["input"])
+def _words(error: Any, path: KeyPath) -> tuple[KeyPath, str, str, str]:
+    """Returns the place, what was found, what was expected and a remedy."""
+    kind, ctx, got = error["type"], error.get("ctx", {}), _show(error["input"])
     if kind == "problem":
-        return ctx["got"], ctx["expected"], ctx["remedy"]
+        return path, ctx["got"], ctx["expected"], ctx["remedy"]
     if kind == "unknown_key":
-        key = str(ctx["key"])
-        return f"unknown key {key!r}", "a known key", did_you_mean(key, ctx["known"])
+        return (*path, ctx["key"]), f"unknown key {ctx['key']!r}", "a known key", did_you_mean(ctx["key"], ctx["known"])
     if kind == "missing" and isinstance(path[-1], int):
-        return got, f"at least {path[-1] + 1} numbers", "correct the list"
+        return path, got, f"at least {path[-1] + 1} numbers", "correct the list"
     if kind == "missing":
-        return "nothing", f"the key {str(path[-1])!r}", "add it"
-    if kind == "union_tag_not_found":
-        return "an event without `type`", "one of 'merge', 'split', 'queue'", "add `type`"
-    if kind == "union_tag_invalid":
-        return repr(ctx["tag"]), f"one of {ctx['expected_tags']}", "correct `type`"
-    if kind in ("too_short", "too_long"):
-        limit = ctx.get("min_length", ctx.get("max_length"))
-        return got, f"at {'least' if kind == 'too_short' else 'most'} {limit} items", "correct the list"
-    message = re.sub("^(Input should be |Value error, )", "", message)
-    if kind == "literal_error" and "word" in error["loc"]:
-        return got, EXPECTED[kind] + message, "correct the value"
-    if kind == "string_pattern_mismatch" or (kind == "float_type" and "number" in error["loc"]):
-        return got, EXPECTED[kind], "correct the value"
-    message = re.sub(r"a valid dictionary or instance of \w+", "a table", message.replace("a valid tuple", "a list"))
-    return got, message, "correct the value"
+        return path, "nothing", f"the key {str(path[-1])!r}", "add it"
+    expected = error["msg"]
+    for theirs, ours in WORDS.items():
+        expected = re.sub(theirs, ours, expected)
+    return path, got, expected, "correct the value"
 
 
 def _show(value: Any) -> str:
@@ -111,16 +82,14 @@ def _show(value: Any) -> str:
 
 def _place(path: KeyPath, table: Table, places: dict[KeyPath, str]) -> str:
     """Returns the setting that made the value at a path, else the path as a dotted key; rows appear by their id."""
-    for n in range(len(path), 0, -1):
-        if path[:n] in places:
-            return place_of(places[path[:n]])
+    given = [places[path[:n]] for n in range(len(path), 0, -1) if path[:n] in places]
+    if given:
+        return place_of(given[0])
     here: Any = table
     steps = []
     for step in path:
-        if isinstance(here, list) and isinstance(step, int) and step < len(here):
-            here = here[step]
-        else:
-            here = here.get(step) if isinstance(here, dict) else None
+        inside = step in here if isinstance(here, dict) else isinstance(here, list) and step in range(len(here))
+        here = here[step] if inside else None
         named = isinstance(step, int) and isinstance(here, dict) and isinstance(here.get("id"), str)
         steps.append(here["id"] if named else str(step))
     return ".".join(steps)

@@ -125,10 +125,17 @@ class Distribution(Model):
         return max(0.0, above - (0.0 if math.isinf(low) else self._below(low, strictly=True)))
 
 
+def _kind(value: Any) -> str | None:
+    if isinstance(value, dict | Distribution):
+        return "distribution"
+    return "number" if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
 # Discriminators, so that pydantic reports the errors of one kind of value alone.
+EXPECTED = "a number, or a distribution such as {{ normal = [1.3, 0.2] }}"
 Value = Annotated[
     Annotated[float, Tag("number")] | Annotated[Distribution, Tag("distribution")],
-    Discriminator(lambda value: "distribution" if isinstance(value, dict | Distribution) else "number"),
+    Discriminator(_kind, custom_error_type="no_value", custom_error_message=EXPECTED),
 ]
 Point = tuple[Value, Value]
 

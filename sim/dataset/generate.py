@@ -6,7 +6,6 @@ The stored bytes depend on scenario, seed and versions only, not on the workers.
 
 from __future__ import annotations
 
-import socket
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -14,7 +13,6 @@ from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any, TypedDict, Unpack, cast
-from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, shortened
 from scenarios.loading.resolve import Entry, resolve
@@ -24,7 +22,7 @@ from scenarios.schema.scenario import ObservationSpec
 from sim.clock import check_stride
 from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
 from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
-from sim.io.files.atomic import PARTIAL, lock_folder, remove_partials, write_file
+from sim.io.files.atomic import lock_folder, remove_partials, write_file
 from sim.io.files.own_files import is_side_file, output_path, output_paths
 from sim.io.store import sequence_folder
 from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest
@@ -32,34 +30,9 @@ from sim.streams import check_streams
 from sim.types import Camera, Sequence
 from sim.workers.pool import WorkerOptions, start_workers
 
-MOST = 3  # differences that are named; the others are counted
+MOST = 4  # differences that are named; the others are counted
 LONGEST = 40  # characters of a value
-
-
-def differences(stored: Table, wanted: Table) -> str:
-    """Returns the entries that differ between two tables, as "camera.fps 10 → 5, duration 20 → 30"."""
-    before, after = (dict(_flat("", table)) for table in (stored, wanted))
-    keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
-    words = [f"{key} {_word(before.get(key))} → {_word(after.get(key))}" for key in keys[:MOST]]
-    return ", ".join(words + [f"{len(keys) - MOST} more"] * (len(keys) > MOST))
-
-
-def _flat(prefix: str, value: Any) -> list[tuple[str, Any]]:
-    if isinstance(value, dict):
-        dot = "." if prefix else ""
-        return [pair for key, inner in value.items() for pair in _flat(f"{prefix}{dot}{key}", inner)]
-    if isinstance(value, list) and any(isinstance(inner, dict) for inner in value):
-        return [pair for k, inner in enumerate(value) for pair in _flat(f"{prefix}[{k}]", inner)]
-    return [(prefix, value)]
-
-
-def _word(value: Any) -> str:
-    text = ",".join(map(str, value)) if isinstance(value, list) else str(value)
-    text = text.removesuffix(".0") if isinstance(value, float) else text
-    return "none" if value is None or not text else shortened(text, LONGEST)
-
-
-MARKER_TIMEOUT = 5.0  # s that a shared file system may take to show one machine the file of another
+SHARED_DELAY = 5.0  # s that a shared file system may take to show one machine the file of another
 
 
 @dataclass(frozen=True)
@@ -73,9 +46,6 @@ class SequenceJob:
     streams: tuple[str, ...] = ()
     images: str = "jpg"  # their file type, "jpg", "png" or "mp4"
     stride: int = 1  # N stores every N-th frame of the camera
-    # a file that a worker must see before it starts, because it would otherwise write to another file system; None for
-    # local workers
-    marker: Path | None = None
 
     @property
     def name(self) -> str:
@@ -93,42 +63,53 @@ class JobOutcome:
 
 def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
     """Returns the manifest in the job's folder, None without one; raises InputError if it is another sequence's."""
-    if not job.folder.exists():
+    folder = job.folder
+    if not folder.exists():
         return None
-    inside = job.folder.is_dir() and any(not is_side_file(path.name) for path in job.folder.iterdir())
-    if not job.folder.is_dir() or (inside and not is_own_sequence(job.folder)):
-        raise InputError(
-            file=job.folder, got="something that flockscope did not write", expected="a stored sequence, or nothing",
-            remedy="choose another --out, or move it away",
-        )  # fmt: skip
-    path = job.folder / MANIFEST
-    if not path.exists():
+    inside = [path for path in folder.iterdir() if not is_side_file(path.name)] if folder.is_dir() else [folder]
+    if inside and not is_own_sequence(folder):
+        got, expected = "something that flockscope did not write", "a stored sequence, or nothing"
+        raise InputError(file=folder, got=got, expected=expected, remedy="choose another --out, or move it away")
+    if not (folder / MANIFEST).exists():
         return None
     try:
-        manifest = read_manifest(job.folder)
+        manifest = read_manifest(folder)
     except InputError as error:
         # An invalid manifest does not tell what the folder holds.
         raise error.replaced(remedy="delete that folder, or choose another --out") from None
     scenario = dump(job.entry.scenario)
     wanted = {**identity(scenario, job.seed, job.entry.repeat, job.streams, job.images), "stride": job.stride}
-    manifest = {"stride": 1, **manifest}
-    different = {key: value for key, value in wanted.items() if manifest.get(key) != value}
-    if different:
+    stored = {key: manifest.get(key, 1 if key == "stride" else None) for key in wanted}
+    if stored != wanted:
+        got = f"another sequence (stored → asked for: {_differences(job, stored, wanted)})"
         expected = "the same scenario, version, streams and images, or an empty place"
-        raise InputError(
-            file=job.folder, got=f"another sequence (stored → asked for: {_differences(job, manifest, different)})",
-            expected=expected, remedy="choose another --out, or delete that folder",
-        )  # fmt: skip
+        raise InputError(file=folder, got=got, expected=expected, remedy="choose another --out, or delete that folder")
     return manifest
 
 
-def _differences(job: SequenceJob, manifest: dict[str, Any], different: dict[str, Any]) -> str:
-    settings = ""
-    if "scenario_hash" in different:
-        with suppress(InputError):
-            settings = differences(parse(job.folder / "scenario.toml"), parse_toml(dump(job.entry.scenario)))
-    others = {key: value for key, value in different.items() if key != "scenario_hash" or not settings}
-    return ", ".join(filter(None, [settings, differences({key: manifest.get(key) for key in others}, others)]))
+def _differences(job: SequenceJob, stored: Table, wanted: Table) -> str:
+    """Returns what differs, as "camera.fps 10 → 5, duration 20 → 30"; the scenario's keys come first."""
+    if stored["scenario_hash"] != wanted["scenario_hash"]:
+        with suppress(InputError):  # of an unreadable scenario only the hashes are known
+            mine, same = parse_toml(dump(job.entry.scenario)), {"scenario_hash": None}
+            stored, wanted = parse(job.folder / "scenario.toml") | stored | same, mine | wanted | same
+    before, after = _flat("", stored), _flat("", wanted)
+    keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
+    words = [f"{key} {_word(before.get(key))} → {_word(after.get(key))}" for key in keys[:MOST]]
+    return ", ".join(words + [f"{len(keys) - MOST} more"] * (len(keys) > MOST))
+
+
+def _flat(place: str, value: Any) -> Table:
+    if isinstance(value, list) and any(isinstance(inner, dict) for inner in value):
+        value = dict(enumerate(value))
+    if not isinstance(value, dict):
+        return {place: value}
+    return {key: v for step, inner in value.items() for key, v in _flat(f"{place}.{step}".strip("."), inner).items()}
+
+
+def _word(value: Any) -> str:
+    text = ",".join(map(str, value)) if isinstance(value, list) else "none" if value is None else str(value)
+    return shortened(text.removesuffix(".0") or "none", LONGEST)
 
 
 def is_stored(job: SequenceJob) -> bool:
@@ -159,24 +140,17 @@ def simulate_and_store(job: SequenceJob) -> None:
             raise
         raise error.replaced(file=entry.file or error.file or job.name) from error
     except Exception as error:
-        raise WorkError(
-            file=job.name, got=f"{type(error).__name__}: {error}", expected="a sequence",
-            remedy="report it with the scenario and seed",
-        ) from error  # fmt: skip
+        got, remedy = f"{type(error).__name__}: {error}", "report it with the scenario and seed"
+        raise WorkError(file=job.name, got=got, expected="a sequence", remedy=remedy) from error
 
 
 def run_job(job: SequenceJob) -> JobOutcome:
     """Makes the job's sequence unless it is stored undamaged; errors are in the outcome, not raised."""
     try:
-        if job.marker is not None:
-            _wait_for_marker(job.marker)
         if not is_stored(job):
             simulate_and_store(job)
     except FlockscopeError as error:
-        fatal = isinstance(error.__cause__, OSError)
-        if fatal and job.marker is not None:
-            error = error.replaced(place=f"on {socket.gethostname()}")
-        return JobOutcome(error, fatal)
+        return JobOutcome(error, isinstance(error.__cause__, OSError))
     return JobOutcome()
 
 
@@ -185,15 +159,17 @@ def lost_job(job: SequenceJob, error: WorkError) -> JobOutcome:
     return JobOutcome(error.replaced(file=job.name))
 
 
-def _wait_for_marker(marker: Path) -> None:
-    end = time.monotonic() + MARKER_TIMEOUT
-    while not marker.exists():
-        if time.monotonic() > end:
-            raise InputError(
-                file=marker.parent, got="another folder, or none", expected="the one that the command writes to",
-                remedy="choose an --out that all machines share under the same path",
-            ) from FileNotFoundError(marker)  # fmt: skip
-        time.sleep(MARKER_TIMEOUT / 20)
+def _missing(job: SequenceJob) -> JobOutcome | None:
+    """Returns the outcome of a sequence that a worker has made, but on another file system than this one."""
+    for _ in range(20):
+        if (job.folder / MANIFEST).is_file():
+            return None
+        time.sleep(SHARED_DELAY / 20)
+    error = WorkError(
+        file=job.folder, got="nothing, though a worker has made it", expected="a folder that all machines share",
+        remedy="choose an --out that all machines share under the same path",
+    )  # fmt: skip
+    return JobOutcome(error, fatal=True)
 
 
 LEFT_OUT = 0.05  # greatest share of sequences that may be left out because an order of their script did not come true
@@ -205,9 +181,7 @@ Progress = Callable[[int, int, str], None]  # called as progress(sequences done,
 class Folders(list[Path]):
     """The folders of the sequences made; `left_out` has the error of each whose script did not come true, by name."""
 
-    def __init__(self, folders: Iterable[Path], left_out: dict[str, OrderError]) -> None:
-        super().__init__(folders)
-        self.left_out = left_out
+    left_out: dict[str, OrderError]
 
 
 class Stored(TypedDict, total=False):
@@ -252,34 +226,23 @@ def generate(
     output_paths(folder, [entry.name for entry in found], source="entries")
     for entry in found:
         check_stride(stride, entry.scenario.camera.fps)
-    jobs = [
-        SequenceJob(output_path(folder, entry.name, f"-s{seed:05d}"), entry, seed, streams, images, stride)
-        for entry in found
-        for seed in seeds
-    ]
+    paths = [(output_path(folder, e.name, f"-s{seed:05d}"), e, seed) for e, seed in product(found, seeds)]
+    jobs = [SequenceJob(*job, streams, images, stride) for job in paths]
     with _dataset(root, folder):
         for job in jobs:
             stored_manifest(job)
         errors = _run_jobs(jobs, workers, progress)
         try:
-            complete = write_seqmap(root, split)
+            write_seqmap(root, split)
         except FlockscopeError as error:
             errors["seqmaps"] = error
     unfulfilled = {name: error for name, error in errors.items() if isinstance(error, OrderError)}
-    if len(unfulfilled) <= LEFT_OUT * len(jobs):
-        errors = {name: error for name, error in errors.items() if name not in unfulfilled}
-    else:
-        unfulfilled = {}
-    made = [job for job in jobs if job.name not in unfulfilled]
-    for job in made if not errors else ():
-        if job.name not in complete:
-            errors[job.name] = WorkError(
-                file=job.folder, got="nothing, though a worker has made it",
-                expected="a folder that all machines share", remedy="run again, or choose another --out",
-            )  # fmt: skip
-    if errors:
-        raise _summary(errors, len(jobs))
-    return Folders((job.folder for job in made), unfulfilled)
+    if len(errors) > len(unfulfilled) or len(unfulfilled) > LEFT_OUT * len(jobs):
+        many = len(unfulfilled) > LEFT_OUT * len(jobs)
+        raise _summary({name: e for name, e in errors.items() if many or name not in unfulfilled}, len(jobs))
+    folders = Folders(job.folder for job in jobs if job.name not in unfulfilled)
+    folders.left_out = unfulfilled
+    return folders
 
 
 @contextmanager
@@ -296,13 +259,10 @@ def _dataset(root: Path, folder: Path) -> Iterator[None]:
 def _run_jobs(jobs: list[SequenceJob], workers: WorkerOptions, progress: Progress | None) -> dict[str, FlockscopeError]:
     errors: dict[str, FlockscopeError] = {}
     with start_workers(min(workers.count, max(1, len(jobs))), workers.cluster) as run:
-        if jobs and workers.cluster is not None:
-            # A worker starts a job only if it sees this file: else it would write to another file system.
-            marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
-            write_file(marker, b"")
-            jobs = [replace(job, marker=marker) for job in jobs]
         done = run(run_job, jobs, ahead=QUEUED_JOBS, on_loss=lost_job)
         for count, (job, outcome) in enumerate(done, 1):
+            if outcome.error is None and workers.cluster is not None:
+                outcome = _missing(job) or outcome
             if outcome.error is not None:
                 errors[job.name] = outcome.error
             if outcome.fatal:
@@ -312,26 +272,24 @@ def _run_jobs(jobs: list[SequenceJob], workers: WorkerOptions, progress: Progres
     return {job.name: errors[job.name] for job in jobs if job.name in errors}
 
 
-def write_seqmap(root: Path, split: str) -> set[str]:
-    """Writes ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of complete sequences; returns their names."""
+def write_seqmap(root: Path, split: str) -> None:
+    """Writes ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of complete sequences."""
     folder = root / f"flockscope-{split}"
     complete = sorted(p.parent.name for p in folder.glob(f"*/{MANIFEST}") if not p.parent.name.startswith("."))
     if complete:
         write_file(root / "seqmaps" / f"flockscope-{split}.txt", "\n".join(["name", *complete, ""]).encode())
-    return {*complete}
 
 
 def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
-    first, *_ = errors.values()
-    if len(errors) == 1:
+    first, *others = errors.values()
+    if not others:
         return first
-    others = ", ".join(list(errors)[1:6]) + (", …" if len(errors) > 6 else "")
     # One text for all failures: that of the first, and the names of some others.
-    kind = type(first) if len({type(e) for e in errors.values()}) == 1 else WorkError
-    return kind(
-        file=first.file, place=first.place, got=f"{first.got} (and {len(errors) - 1} more of {total}: {others})",
-        expected=first.expected, remedy=first.remedy + ("" if len(errors) == total else "; the others are kept"),
-    )  # fmt: skip
+    names = ", ".join(list(errors)[1:6]) + (", …" if len(others) > 5 else "")
+    got, kept = f"{first.got} (and {len(others)} more of {total}: {names})", "; the others are kept"
+    kind = type(first) if {type(e) for e in others} == {type(first)} else WorkError
+    remedy = first.remedy + ("" if len(errors) == total else kept)
+    return kind(**first.as_dict() | {"got": got, "remedy": remedy})
 
 
 @dataclass(frozen=True)
@@ -360,10 +318,9 @@ def store_replays(
     folder, cut = root / f"flockscope-{split}", options.cut
     output_paths(folder, [replay_name(recording.name, cut) for recording in recordings], source="recordings")
     if split in TUNING_SPLITS and any(is_real(recording) for recording in recordings):
-        raise InputError(
-            place="--seeds", got=f"{seeds.start} ({split})", expected="seeds from 20000 (test) on, for real motion",
-            remedy="choose other seeds: nothing is tuned on recordings",
-        )  # fmt: skip
+        got, expected = f"{seeds.start} ({split})", "seeds from 20000 (test) on, for real motion"
+        remedy = "choose other seeds: nothing is tuned on recordings"
+        raise InputError(place="--seeds", got=got, expected=expected, remedy=remedy)
     streams = check_streams(options.streams, options.images)
     made: list[Path] = []
     with _dataset(root, folder):

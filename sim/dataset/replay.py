@@ -30,6 +30,7 @@ from scenarios.schema.values import Model, NonNegative, Positive
 from sim.crowd.heading import facings, headings
 from sim.dataset.splits import is_real
 from sim.hashing import canonical_hash
+from sim.io.formats.labels import centres
 from sim.rng import draw, rng
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.sequence import observe
@@ -81,11 +82,15 @@ def _inside(times: Array, t: Array) -> Bools:
     return np.asarray((t >= times[0] - 1e-9) & (t <= times[-1] + 1e-9))
 
 
+def _rows_of(frame: Ints, id: Ints, one: int) -> Ints:
+    rows = np.flatnonzero(id == one)
+    return np.asarray(rows[np.argsort(frame[rows])])
+
+
 def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: float) -> list[Segment]:
     from scipy.interpolate import CubicSpline
 
-    rows = np.flatnonzero(id == one)
-    rows = rows[np.argsort(frame[rows])]
+    rows = _rows_of(frame, id, one)
     cuts = np.flatnonzero(np.diff(frame[rows]) > GAP * rate) + 1
     made: list[Segment] = []
     for part in np.split(rows, cuts):
@@ -140,8 +145,7 @@ def nearest_row(frame: Ints, id: Ints, people: Ints, rate: float, t: Array) -> I
     """
     out = np.zeros((len(t), len(people)), np.int64)
     for column, one in enumerate(people):
-        rows = np.flatnonzero(id == one)
-        rows = rows[np.argsort(frame[rows])]
+        rows = _rows_of(frame, id, int(one))
         times = (frame[rows] - 1) / rate
         after = np.clip(np.searchsorted(times, t), 1, max(len(rows) - 1, 1))
         before = after - 1
@@ -224,9 +228,8 @@ def replay(
     if not isinstance(source, Sequence):
         found = open_source(source, images=False)
         if len(found) != 1:
-            raise InputError(
-                file=source, got=f"{len(found)} sequences", expected="one", remedy="give the path of one of them"
-            )
+            remedy = "give the path of one of them"
+            raise InputError(file=source, got=f"{len(found)} sequences", expected="one", remedy=remedy)
         source = found[0]
     view = camera if isinstance(camera, ObservationSpec) else load_observation(camera)
     return resolve_replay(source, view, seed, cut=cut, calibration=calibration, streams=streams)[0]
@@ -261,11 +264,14 @@ def resolve_replay(
 def _labels(source: Sequence) -> Truth:
     truth = source.truth
     if truth is None or not len(truth.id):
-        raise InputError(
-            file=source.source.get("path", source.name), got="no labelled people", expected="trajectories",
-            remedy="give a BIWI folder, a CAVIAR file, a MOTChallenge folder with gt, or a generated sequence",
-        )  # fmt: skip
+        remedy = "give a BIWI folder, a CAVIAR file, a MOTChallenge folder with gt, or a generated sequence"
+        raise _wrong(source, "", "no labelled people", "trajectories", remedy)
     return truth
+
+
+def _wrong(source: Sequence, place: str, got: str, expected: str, remedy: str) -> InputError:
+    file = source.source.get("path", source.name)
+    return InputError(file=file, place=place, got=got, expected=expected, remedy=remedy)
 
 
 def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None) -> Array:
@@ -276,10 +282,8 @@ def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None)
     """
     if truth.pos is not None:
         if calibration is not None:
-            raise InputError(
-                file=source.source.get("path", source.name), place="--calibration", got="a calibration",
-                expected="none for labels that are on the ground already", remedy="leave it out",
-            )  # fmt: skip
+            expected = "none for labels that are on the ground already"
+            raise _wrong(source, "--calibration", "a calibration", expected, "leave it out")
         return truth.pos
     assert truth.box is not None, "labels have positions or boxes"
     camera = calibration or source.camera
@@ -288,13 +292,9 @@ def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None)
 
         return foot_points(truth.box, np.zeros(len(truth.box)), camera)
     if source.source.get("kind") in FLAT:
-        centre = truth.box[:, :2] + truth.box[:, 2:] / 2
-        return np.asarray(np.stack([centre[:, 0], -centre[:, 1]], axis=1) / truth.px_per_m)
-    raise InputError(
-        file=source.source.get("path", source.name), got="labels in the image alone",
-        expected="places on the ground",
-        remedy="give its calibration with --calibration FILE; without one it cannot be replayed",
-    )  # fmt: skip
+        return np.asarray(centres(truth.box) * (1, -1) / truth.px_per_m)
+    remedy = "give its calibration with --calibration FILE; without one it cannot be replayed"
+    raise _wrong(source, "", "labels in the image alone", "places on the ground", remedy)
 
 
 def _calibrated(calibration: Camera | str | Path | None, source: Sequence) -> Camera | None:
@@ -302,27 +302,21 @@ def _calibrated(calibration: Camera | str | Path | None, source: Sequence) -> Ca
 
     if calibration is None or isinstance(calibration, Camera):
         return calibration
-    return scaled_to_image(
-        read_calibration(Path(calibration)), source.image_size, Path(str(source.source.get("path", "")))
-    )
+    path = Path(str(source.source.get("path", "")))
+    return scaled_to_image(read_calibration(Path(calibration)), source.image_size, path)
 
 
 def _moving(places: Array, truth: Truth, source: Sequence, fps: float, cut: Cut) -> Trajectories:
-    file, whole = source.source.get("path", source.name), (truth.length - 1) / truth.fps
+    place, whole = "--start, --duration", (truth.length - 1) / truth.fps
     last = whole if cut.duration is None else min(whole, cut.start + cut.duration - 1 / fps)
     if not 0 <= cut.start <= last <= cut.start + LONGEST:
         part = "the rest" if cut.duration is None else f"{cut.duration:g} s"
-        raise InputError(
-            file=file, place="--start, --duration", got=f"{cut.start:g} s, {part}",
-            expected=f"a part of its {whole:.1f} s, of an hour at most", remedy="correct --start or --duration",
-        )  # fmt: skip
+        expected = f"a part of its {whole:.1f} s, of an hour at most"
+        raise _wrong(source, place, f"{cut.start:g} s, {part}", expected, "correct --start or --duration")
     known = np.isfinite(places).all(axis=1)
     moving = resample(truth.frame[known], truth.id[known], places[known], truth.fps, fps, cut.start, last)
     if not len(moving.id):
-        got = f"nobody from {cut.start:g} to {last:g} s"
-        raise InputError(
-            file=file, place="--start, --duration", got=got, expected="people", remedy="choose another part"
-        )
+        raise _wrong(source, place, f"nobody from {cut.start:g} to {last:g} s", "people", "choose another part")
     return moving
 
 

@@ -28,10 +28,8 @@ def split_of(seeds: range) -> str:
         if low <= min(seeds) < high:
             if max(seeds) < high:
                 return name
-            raise InputError(
-                place="seeds", got=f"{seeds.start}:{seeds.stop}", expected=f"a range inside {low}:{high} ({name})",
-                remedy=f"end the range at {high} or begin it there",
-            )  # fmt: skip
+            got, remedy = f"{seeds.start}:{seeds.stop}", f"end the range at {high} or begin it there"
+            raise InputError(place="seeds", got=got, expected=f"a range inside {low}:{high} ({name})", remedy=remedy)
     raise AssertionError("every seed has a split")
 
 

@@ -81,12 +81,10 @@ def open_source(
         of_boxes if boxes is None else BoxOptions(),
     )  # fmt: skip
     sequences = _open(path, options)
-    if boxes is None:
-        return sequences
-    if len(sequences) > 1:
+    if boxes is not None and len(sequences) > 1:
         got, remedy = f"{len(sequences)} sequences", "give one of them"
         raise InputError(place="--boxes", got=got, expected="one sequence", remedy=remedy)
-    return [with_boxes(sequences[0], Path(boxes), of_boxes)]
+    return sequences if boxes is None else [with_boxes(sequences[0], Path(boxes), of_boxes)]
 
 
 def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
@@ -97,14 +95,12 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
         return [_open_file(path, options)]
     found = list(_find(path, DEPTH))
     if not found:
+        got, remedy = "a folder without sequences", "check the path"
         if any(next(path.glob(pattern), None) for pattern in ("run.json", "*/run.json")):
-            raise InputError(
-                file=path, got="tracks, what `flockscope track` wrote", expected=KINDS,
-                remedy="give the sequence or dataset first, then the tracks: swap the arguments",
-            )  # fmt: skip
-        loose = sum(p.suffix.lower() in PICTURES for p in path.iterdir() if not is_hidden(p)) > 1
-        got = "a folder of pictures, without img1" if loose else "a folder without sequences"
-        remedy = f"move the pictures to {path / 'img1'}" if loose else "check the path"
+            got = "tracks, what `flockscope track` wrote"
+            remedy = "give the sequence or dataset first, then the tracks: swap the arguments"
+        elif sum(p.suffix.lower() in PICTURES for p in path.iterdir() if not is_hidden(p)) > 1:
+            got, remedy = "a folder of pictures, without img1", f"move the pictures to {path / 'img1'}"
         raise InputError(file=path, got=got, expected=KINDS, remedy=remedy)
     return _distinct([_open_folder(p, options) for p in found])
 
@@ -112,17 +108,13 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
 def _distinct(sequences: list[Sequence]) -> list[Sequence]:
     # MOTChallenge folders may share a name in seqinfo.ini; their folders do not.
     count = Counter(s.name for s in sequences)
-    answers = []
-    for each in sequences:
+    for k, each in enumerate(sequences):
         if count[each.name] > 1 and each.source["kind"] == "mot":
             folder = Path(each.source["path"])
-            text = (
-                f"{folder / 'seqinfo.ini'}: name: {each.name} is the name of {count[each.name]} sequences; it is called"
-            )
-            warnings.warn(f"{text} {folder.name}, as its folder", stacklevel=3)
-            each = replace(each, name=folder.name)
-        answers.append(each)
-    return answers
+            words = f"is the name of {count[each.name]} sequences; it is called {folder.name}, as its folder"
+            warnings.warn(f"{folder / 'seqinfo.ini'}: name: {each.name} {words}", stacklevel=3)
+            sequences[k] = replace(each, name=folder.name)
+    return sequences
 
 
 def holds_sequences(folder: Path) -> bool:
@@ -150,9 +142,8 @@ def split_and_name(folder: Path) -> str:
 def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     suffix = path.suffix.lower()
     if suffix == ".xml":
-        options.reject(
-            path, "a CAVIAR recording", "its truth is in the image, without pictures", "camera background box_options"
-        )
+        why = "its truth is in the image, without pictures"
+        options.reject(path, "a CAVIAR recording", why, "camera background box_options")
         return caviar.open_file(path, options)
     if path.name == "obsmat.txt":
         return _open_folder(path.parent, options)

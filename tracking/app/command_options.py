@@ -66,7 +66,7 @@ class ScenariosOptions:
 
     name: str | None = ARGUMENT("Scenario, *.toml file or suite to explain.", None)
     settings: list[str] = SET()
-    out: Path | None = option("Write a drawing of plan and script.", None, metavar="FILE.svg")
+    out: Path | None = option("Write a drawing of the plan, with the orders.", None, metavar="FILE.svg")
     schema: bool = option("List every key of a scenario file.", False)
 
 

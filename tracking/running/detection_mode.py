@@ -154,18 +154,12 @@ def perfect(truth: FrameTruth) -> Detections:
 
 
 def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
-    from pydantic import ValidationError
-
     from scenarios.loading.resolve import SensorFile
-    from scenarios.loading.validation import input_error
+    from scenarios.loading.validation import validate
     from sim.detector.sense import sense
     from sim.scene.visibility import with_visibility
 
-    table = {"sensor": PERFECT_SENSOR | SEES_ALL | _nested(sensor)}
-    try:
-        spec = SensorFile.model_validate(table).sensor
-    except ValidationError as error:
-        raise input_error(error, table, "", {}) from None
+    spec = validate({"sensor": PERFECT_SENSOR | SEES_ALL | _nested(sensor)}, model=SensorFile).sensor
     if spec.box == "visible" or spec.by_visibility or spec.occlusion_power or spec.min_visibility:
         truth = with_visibility(truth, sequence.image_size)
     hides_groups, load_people = any(hide.group is not None for hide in spec.hide), sequence.load_people

@@ -25,7 +25,7 @@ from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
 from sim.io.store.seal import read_whole_manifest
 from sim.streams import file_name
-from sim.types import Array, Ints, Sequence, Truth
+from sim.types import Array, Ints, Sequence
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
 # names of folders that divide recordings into splits
@@ -53,21 +53,18 @@ def coco(source: str | Path, out: str | Path, *, person_class: int | str | None 
             another program.
     """
     source, out = Path(source), Path(out)
-    sequences = [
-        s for s in open_source(source, person_class=person_class) if s.truth is not None and s.truth.box is not None
-    ]
+    every = open_source(source, person_class=person_class)
+    sequences = [s for s in every if s.truth is not None and s.truth.box is not None]
     if not sequences:
-        raise InputError(
-            file=source, got="no labelled boxes", expected="a dataset with boxes", remedy="give a generated dataset"
-        )
+        expected, remedy = "a dataset with boxes", "give a generated dataset"
+        raise InputError(file=source, got="no labelled boxes", expected=expected, remedy=remedy)
     root = source if source.is_dir() else source.parent
     splits: dict[str, list[Sequence]] = {}
     for sequence in sequences:
         splits.setdefault(_split(sequence, root), []).append(sequence)
     paths = [out if len(splits) == 1 else out.with_name(f"{out.stem}-{split}{out.suffix}") for split in splits]
-    for some in splits.values():
+    for path, some in zip(paths, splits.values(), strict=True):
         output_paths("", [s.name for s in some], source=source)
-    for path in paths:
         if path != out:
             refuse_foreign_file(path)
     for path, some in zip(paths, splits.values(), strict=True):
@@ -93,11 +90,14 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
     videos, images, annotations = [], list[str](), list[str]()
     for k, sequence in enumerate(sequences, 1):
         about = {"id": k, "name": sequence.name, "fps": sequence.fps, "length": sequence.length}
-        videos.append(json_text({**about, **_size(sequence)}))
-        for index, row in _images(sequence, root):
-            images.append(json_text({"id": len(images) + 1, **row, "video_id": k, "frame": index}))
+        size, files = _size(sequence), _picture_files(sequence)
+        shape = {"width": size[0], "height": size[1]}
+        videos.append(json_text({**about, **shape}))
+        for index in files or range(1, (sequence.length or 0) + 1):
+            name = {"file_name": Path(os.path.relpath(files[index], root)).as_posix()} if files else {}
+            images.append(json_text({"id": len(images) + 1, **name, **shape, "video_id": k, "frame": index}))
             shared = {"image_id": len(images), "video_id": k, "category_id": 1}
-            for found in _annotations(sequence, index):
+            for found in _annotations(sequence, size, index):
                 annotations.append(json_text({"id": len(annotations) + 1, **shared, **found}))
     lists = {"videos": videos, "images": images, "annotations": annotations}
     blocks = [f'"{name}": [\n' + ",\n".join(rows) + "\n]" for name, rows in lists.items()]
@@ -105,30 +105,20 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
     return "{" + ",\n".join([*head, *blocks]) + "}\n"
 
 
-def _truth(sequence: Sequence) -> tuple[Truth, Array]:
-    truth = sequence.truth
-    assert truth is not None
-    assert truth.box is not None
-    return truth, truth.box
-
-
-def _size(sequence: Sequence) -> dict[str, int]:
+def _size(sequence: Sequence) -> tuple[int, int]:
     if sequence.image_size is not None:
-        return {"width": sequence.image_size[0], "height": sequence.image_size[1]}
+        return sequence.image_size
     # Without pictures, the extent of the boxes is the size.
-    box = _truth(sequence)[1]
+    box = _boxes(sequence)
     edges = box[:, :2] + box[:, 2:]
     right, bottom = np.ceil(edges[np.isfinite(edges).all(axis=1)].max(axis=0, initial=1)).astype(int).tolist()
-    return {"width": right, "height": bottom}
+    return right, bottom
 
 
-def _images(sequence: Sequence, root: Path) -> Iterator[tuple[int, dict[str, Any]]]:
-    size, files = _size(sequence), _picture_files(sequence)
-    for index in range(1, (sequence.length or 0) + 1):
-        if not files:
-            yield index, size
-        elif index in files:
-            yield index, {"file_name": Path(os.path.relpath(files[index], root)).as_posix(), **size}
+def _boxes(sequence: Sequence) -> Array:
+    assert sequence.truth is not None
+    assert sequence.truth.box is not None
+    return sequence.truth.box
 
 
 def _picture_files(sequence: Sequence) -> dict[int, Path]:
@@ -143,8 +133,9 @@ def _picture_files(sequence: Sequence) -> dict[int, Path]:
     return {index: folder / file_name("left", images, index) for index in range(1, (sequence.length or 0) + 1)}
 
 
-def _annotations(sequence: Sequence, index: int) -> Iterator[dict[str, Any]]:
-    (truth, boxes), size = _truth(sequence), tuple(_size(sequence).values())
+def _annotations(sequence: Sequence, size: tuple[int, int], index: int) -> Iterator[dict[str, Any]]:
+    truth, boxes = sequence.truth, _boxes(sequence)
+    assert truth is not None
     counts: dict[int, list[int]] | None = None
     for row in range(*truth.rows(index).indices(len(boxes))):
         box = [round(v, 2) for v in boxes[row].tolist()]

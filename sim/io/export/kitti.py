@@ -67,10 +67,8 @@ def _export(folder: Path, target: Path) -> None:
     stored = StoredPictures(folder, read_whole_manifest(folder))
     missing = [name for name in ("left", "right") if name not in stored.streams]
     if missing:
-        raise InputError(
-            file=folder, got=f"no stream {' or '.join(missing)}", expected="left and right",
-            remedy="generate it with --streams left,right,disparity",
-        )  # fmt: skip
+        remedy = "generate it with --streams left,right,disparity"
+        raise InputError(file=folder, got=f"no stream {' or '.join(missing)}", expected="left and right", remedy=remedy)
     write_file(target / "calib.txt", calibration(read_camera(folder / "camera.json")).encode())
     about = stored.manifest["sequence"]
     times = "".join(f"{k / about['fps']:.6e}\n" for k in range(about["length"]))

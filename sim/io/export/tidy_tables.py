@@ -33,7 +33,7 @@ from scenarios.limits import COORDINATE
 from sim.arrays import no_ids
 from sim.geometry.polygons import cross
 from sim.io.files.atomic import write_file
-from sim.io.files.numeric_text import is_number_text
+from sim.io.files.numeric_text import number_or_nan
 from sim.io.files.own_files import refuse_foreign_file
 from sim.io.files.tables import parquet_bytes
 from sim.io.formats.labels import differentiate
@@ -176,8 +176,7 @@ def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[st
     """
     if form in TEXTS:
         name, beginning = TEXTS[form]
-        text = _trajnet if form == "trajnet" else _pedpy
-        body = text(tables, _places_in_metres(tables, folder), facts["fps"])
+        body = _people_text(tables, folder, form, facts["fps"])
         _refuse_foreign(folder / name, beginning)
         write_file(folder / name, body.encode())
         return [folder / name]
@@ -199,44 +198,34 @@ def _refuse_foreign(path: Path, beginning: bytes | None) -> None:
     refuse_foreign_file(path)
 
 
-Rows = list[tuple[int, int, float, float]]  # frame, id, x, y
-
-
-def _places_in_metres(tables: TidyTables, folder: Path) -> Rows:
-    columns = tables.people.columns
+def _people_text(tables: TidyTables, folder: Path, form: Form, fps: float) -> str:
+    columns, stays = tables.people.columns, tables.people_summary.columns
     if "x_m" not in columns:
-        raise InputError(
-            file=folder, got="people in the image, px", expected="positions on the ground, m",
-            remedy="track with --camera, or from points",
-        )  # fmt: skip
-    return list(zip(*(columns[name].tolist() for name in ("frame", "id", "x_m", "y_m")), strict=True))
-
-
-def _trajnet(tables: TidyTables, rows: Rows, fps: float) -> str:
-    stays = tables.people_summary.columns
-    spans = zip(*(np.asarray(stays[name]).tolist() for name in ("id", "start_frame", "end_frame")), strict=True)
-    scenes = [
-        {"scene": {"id": k, "p": p, "s": first, "e": last, "fps": fps}} for k, (p, first, last) in enumerate(spans)
-    ]
-    tracks = [{"track": {"f": f, "p": p, "x": round(x, 4), "y": round(y, 4)}} for f, p, x, y in rows]
-    return "".join(json.dumps(line) + "\n" for line in [*scenes, *tracks])
-
-
-def _pedpy(tables: TidyTables, rows: Rows, fps: float) -> str:
-    head = f"# framerate: {fps:g}\n# id\tframe\tx/m\ty/m\n"
-    return head + "".join(f"{p}\t{f}\t{x:.4f}\t{y:.4f}\n" for f, p, x, y in rows)
+        got, expected = "people in the image, px", "positions on the ground, m"
+        raise InputError(file=folder, got=got, expected=expected, remedy="track with --camera, or from points")
+    rows = list(zip(*(columns[name].tolist() for name in ("frame", "id", "x_m", "y_m")), strict=True))
+    if form == "pedpy":
+        lines = [
+            f"# framerate: {fps:g}",
+            "# id\tframe\tx/m\ty/m",
+            *(f"{p}\t{f}\t{x:.4f}\t{y:.4f}" for f, p, x, y in rows),
+        ]
+    else:
+        spans = zip(*(np.asarray(stays[name]).tolist() for name in ("id", "start_frame", "end_frame")), strict=True)
+        scenes = ({"scene": {"id": k, "p": p, "s": s, "e": e, "fps": fps}} for k, (p, s, e) in enumerate(spans))
+        tracks = ({"track": {"f": f, "p": p, "x": round(x, 4), "y": round(y, 4)}} for f, p, x, y in rows)
+        lines = list(map(json.dumps, (*scenes, *tracks)))
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _csv(table: pyarrow.Table) -> bytes:
     import pyarrow as pa
     from pyarrow import csv
 
-    columns = [
-        pa.array([" ".join(map(str, ids)) for ids in column.to_pylist()], pa.string())
-        if pa.types.is_list(column.type)
-        else column
-        for column in table.columns
-    ]
+    columns = list(table.columns)
+    for k, column in enumerate(columns):
+        if pa.types.is_list(column.type):
+            columns[k] = pa.array([" ".join(map(str, ids)) for ids in column.to_pylist()], pa.string())
     sink = pa.BufferOutputStream()
     # pyarrow would quote the header.
     options = csv.WriteOptions(include_header=False, quoting_style="needed")
@@ -371,10 +360,9 @@ def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:
     columns["events"] = _per(minute(starts), minutes)
     for name, corners in rows.places.items():
         if len(corners) == LINE:
-            ways = crossings(rows.frame, rows.id, rows.pos, corners, downwards=rows.unit == "px")
-            columns |= {
-                f"{name}_to_{side}": _per(minute(k), minutes) for side, k in zip(("left", "right"), ways, strict=True)
-            }
+            left, right = crossings(rows.frame, rows.id, rows.pos, corners, downwards=rows.unit == "px")
+            columns[f"{name}_to_left"] = _per(minute(left), minutes)
+            columns[f"{name}_to_right"] = _per(minute(right), minutes)
         else:
             there = inside(rows.pos, corners)
             columns[f"{name}_people"] = distinct(rows.frame[there], rows.id[there])
@@ -392,16 +380,15 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
     Raises InputError if a text is none.
     """
     found: dict[str, Array] = {}
-    expected = {"--line": "NAME=x1,y1,x2,y2", "--zone": "NAME=x1,y1,x2,y2,x3,y3,…"}
+    forms = {"--line": "NAME=x1,y1,x2,y2", "--zone": "NAME=x1,y1,x2,y2,x3,y3,…"}
     for option, text in [*(("--line", text) for text in lines), *(("--zone", text) for text in zones)]:
         name, _, cells = text.partition("=")
-        values = [float(cell) if is_number_text(cell) else np.inf for cell in cells.split(",")]
+        values = list(map(number_or_nan, cells.split(",")))
         count = len(values) == 4 if option == "--line" else len(values) >= 6 and len(values) % 2 == 0
         if not name.isidentifier() or name in found or not count or not np.max(np.abs(values)) <= COORDINATE:
-            raise InputError(
-                place=option, got=repr(text), expected=f"{expected[option]}, each name once",
-                remedy="write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image",
-            )  # fmt: skip
+            got, expected = repr(text), f"{forms[option]}, each name once"
+            remedy = "write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image"
+            raise InputError(place=option, got=got, expected=expected, remedy=remedy)
         found[name] = np.reshape(values, (-1, 2))
     return found
 
@@ -414,14 +401,12 @@ def crossings(frame: Ints, id: Ints, pos: Array, line: Array, downwards: bool) -
     order = np.lexsort((frame, id))
     frame, pos = frame[order], pos[order, :2]
     same = np.diff(id[order]) == 0
-    a, b = pos[:-1][same], pos[1:][same]
-    first, along = line[0], line[1] - line[0]
-    before, after = cross(along, a - first) > 0, cross(along, b - first) > 0
+    a, b, when = pos[:-1][same], pos[1:][same], frame[1:][same]
+    along, step = line[1] - line[0], b - a
+    before, after = cross(along, a - line[0]) > 0, cross(along, b - line[0]) > 0
     # The ends of the line are on different sides of the step, too.
-    step = b - a
     hits = (before != after) & ((cross(step, line[0] - a) > 0) != (cross(step, line[1] - a) > 0))
     left = after != downwards
-    when = frame[1:][same]
     return when[hits & left], when[hits & ~left]
 
 

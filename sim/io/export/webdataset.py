@@ -7,13 +7,10 @@ or not at all, with a .json beside it that describes it. index.json, written las
 
 from __future__ import annotations
 
-import hashlib
 import io
 import re
 import tarfile
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -28,53 +25,13 @@ from sim.io.source import sequence_folders, split_and_name
 from sim.io.store.seal import MANIFEST, read_whole_manifest
 
 BLOCK = 512  # bytes: a tar holds whole blocks
-
-# name of a file in the tar, its size in bytes, and a call that reads its content
-Member = tuple[str, int, Callable[[], bytes]]
-
-
-@dataclass(frozen=True)
-class SequenceItem:
-    """A stored sequence to pack."""
-
-    folder: Path  # where it is stored
-    manifest: dict[str, Any]  # the content of its manifest.json
-
-    @property
-    def name(self) -> str:
-        """The name <split>/<sequence>."""
-        return split_and_name(self.folder)
-
-    def members(self) -> Iterator[Member]:
-        """Yields the members of the tar: all files, the manifest first."""
-        key = self.name.replace(".", "%2E")  # webdataset ends a key at its first dot
-        stored, path = StoredPictures(self.folder, self.manifest), self.folder / MANIFEST
-        yield f"{key}.{MANIFEST}", path.stat().st_size, path.read_bytes
-        for name, facts in self.manifest["files"].items():
-            yield f"{key}.{name.replace('/', '.')}", facts["bytes"], partial(stored.body, name)
-
-    def tar_bytes(self) -> int:
-        """Returns how many bytes the members add to a tar."""
-        total = 0
-        for name, size, _ in self.members():
-            letters = len(name.encode())
-            # A name of more than 100 bytes is a member of its own.
-            total += BLOCK + _whole(letters + 1) if letters > tarfile.LENGTH_NAME else 0
-            total += BLOCK + _whole(size)
-        return total
-
-
-def _whole(size: int) -> int:
-    return -(-size // BLOCK) * BLOCK
-
-
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
-RECORD = tarfile.RECORDSIZE
 INDEX = "index.json"
 INDEX_MARKS: Marks = {"content_hash": str, "shards": list}
 SHARD_MARKS: Marks = {"manifests": str, "sequences": dict}  # what every index.json, and every .json of a shard, has
 
 Progress = Callable[[int, int, str], None]
+Packed = tuple[Path, str, str]  # the folder of a sequence, the hash of its manifest, and that of its content
 
 
 def webdataset(
@@ -91,17 +48,17 @@ def webdataset(
     Returns:
         The index: format, content_hash, and shards, the content of the .json beside each shard.
     """
-    root, shards = Path(out), list(_shards(_items(Path(source)), shard_size))
+    root, shards, done = Path(out), _shards(Path(source), shard_size), list[dict[str, Any]]()
+    plan = [_facts(number, some) for number, some in enumerate(shards)]
     with lock_folder(root):
         remove_partials(root)
-        plan = [_facts(number, some) for number, some in enumerate(shards)]
         _reject_other_shards(root, plan)
-        for number, (facts, some) in enumerate(zip(plan, shards, strict=True), 1):
-            plan[number - 1] = _complete_shard(root, facts) or _write_shard(root, facts, some)
+        for facts, some in zip(plan, shards, strict=True):
+            done.append(_complete_shard(root, facts) or _write_shard(root, facts, some))
             if progress is not None:
-                progress(number, len(plan), facts["name"])
+                progress(len(done), len(plan), facts["name"])
         hashes = {name: value for facts in plan for name, value in facts["sequences"].items()}
-        index = {"format": tables.FORMAT, "content_hash": hashing.dataset_hash(hashes), "shards": plan}
+        index = {"format": tables.FORMAT, "content_hash": hashing.dataset_hash(hashes), "shards": done}
         write_file(root / INDEX, tables.json_document(index))
     return index
 
@@ -117,32 +74,38 @@ def size_of(text: str) -> int:
     return size
 
 
-def _items(source: Path) -> list[SequenceItem]:
-    folders = sequence_folders(source, "generated")
-    found = sorted((SequenceItem(p, read_whole_manifest(p)) for p in folders), key=lambda item: item.name)
-    twice = next((a.name for a, b in pairwise(found) if a.name == b.name), None)
+def _shards(source: Path, size: int) -> list[list[Packed]]:
+    """Returns the consecutive sequences of each shard, as many as fit into a tar of `size` bytes, at least one."""
+    folders = sorted(sequence_folders(source, "generated"), key=split_and_name)
+    twice = next((a for a, b in pairwise(map(split_and_name, folders)) if a == b), None)
     if twice is not None:
         raise InputError(file=source, got=f"two sequences {twice}", expected="unique names", remedy="export them apart")
-    return found
-
-
-def _shards(items: list[SequenceItem], size: int) -> Iterator[list[SequenceItem]]:
-    """Yields the consecutive sequences of each shard, as many as fit into a tar of `size` bytes, at least one."""
-    some: list[SequenceItem] = []
-    full = 0
-    for item in items:
-        more = item.tar_bytes()
-        if some and -(-(full + more + 2 * BLOCK) // RECORD) * RECORD > size:  # a tar ends with two empty blocks
-            yield some
-            some, full = [], 0
-        some.append(item)
+    shards: list[list[Packed]] = []
+    full = size
+    for folder in folders:
+        manifest = read_whole_manifest(folder)  # not kept: those of a large dataset would fill the memory
+        bytes_of = {name: facts["bytes"] for name, facts in manifest["files"].items()}
+        bytes_of[MANIFEST] = (folder / MANIFEST).stat().st_size
+        more = 0
+        for name, count in bytes_of.items():
+            # A header before each file, and two more blocks with its name if that is long.
+            long = len(f"{_key(folder)}.{name}".encode()) > tarfile.LENGTH_NAME
+            more += BLOCK * ((3 if long else 1) + -(-count // BLOCK))
+        if full + more > size:
+            shards.append([])
+            full = 2 * BLOCK + tarfile.RECORDSIZE  # the end of a tar, at most
+        shards[-1].append((folder, manifest["sha256"], manifest["content_hash"]))
         full += more
-    yield some
+    return shards
 
 
-def _facts(number: int, items: list[SequenceItem]) -> dict[str, Any]:
-    manifests = hashing.canonical_hash([item.manifest["sha256"] for item in items])
-    hashes = {item.name: item.manifest["content_hash"] for item in items}
+def _key(folder: Path) -> str:
+    return split_and_name(folder).replace(".", "%2E")  # webdataset ends a key at its first dot
+
+
+def _facts(number: int, some: list[Packed]) -> dict[str, Any]:
+    manifests = hashing.canonical_hash([sha256 for _, sha256, _ in some])
+    hashes = {split_and_name(folder): content for folder, _, content in some}
     return {"name": f"shard-{number:06d}.tar", "manifests": manifests, "sequences": hashes}
 
 
@@ -156,10 +119,8 @@ def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
         beside = path.with_suffix(".json")
         facts = wanted.get(path.name)
         if facts is None or (beside.is_file() and not facts.items() <= tables.read_json(beside).items()):
-            raise InputError(
-                file=path, got="a shard of another export", expected="one of this dataset, size and kind, or none",
-                remedy="choose another --out, or delete that folder",
-            )  # fmt: skip
+            got, remedy = "a shard of another export", "choose another --out, or delete that folder"
+            raise InputError(file=path, got=got, expected="one of this dataset, size and kind, or none", remedy=remedy)
 
 
 def _complete_shard(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
@@ -167,28 +128,28 @@ def _complete_shard(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
     if not path.is_file() or not path.with_suffix(".json").is_file():
         return None
     there = tables.read_json(path.with_suffix(".json"))
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    return there if digest == there.get("sha256") else None
+    return there if hashing.file_hash(path) == there.get("sha256") else None
 
 
-def _write_shard(root: Path, facts: dict[str, Any], items: list[SequenceItem]) -> dict[str, Any]:
+def _write_shard(root: Path, facts: dict[str, Any], some: list[Packed]) -> dict[str, Any]:
     path = root / facts["name"]
     # The .json stands for a whole tar.
     path.with_suffix(".json").unlink(missing_ok=True)
     with new_file(path) as beside:
-        _tar(beside, (member for item in items for member in item.members()))
-        with beside.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        with tarfile.open(beside, "w", format=tarfile.GNU_FORMAT) as tar:
+            for name, body in (member for folder, *_ in some for member in _members(folder)):
+                info = tarfile.TarInfo(name)
+                info.size = len(body)
+                tar.addfile(info, io.BytesIO(body))
+        digest = hashing.file_hash(beside)
     done = {**facts, "bytes": path.stat().st_size, "sha256": digest}
     write_file(path.with_suffix(".json"), tables.json_document(done))
     return done
 
 
-def _tar(path: Path, members: Iterable[Member]) -> None:
-    with tarfile.open(path, "w", format=tarfile.GNU_FORMAT) as tar:
-        for name, _, read in members:
-            body = read()
-            info = tarfile.TarInfo(name)
-            info.size = len(body)
-            tar.addfile(info, io.BytesIO(body))
+def _members(folder: Path) -> Iterator[tuple[str, bytes]]:
+    """Yields name and content of each file of a sequence as it stands in the tar, the manifest first."""
+    stored = StoredPictures(folder, read_whole_manifest(folder))
+    yield f"{_key(folder)}.{MANIFEST}", (folder / MANIFEST).read_bytes()
+    for name in stored.manifest["files"]:
+        yield f"{_key(folder)}.{name.replace('/', '.')}", stored.body(name)

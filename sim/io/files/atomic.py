@@ -14,7 +14,7 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from uuid import uuid4
@@ -26,66 +26,49 @@ _held: ContextVar[frozenset[Path]] = ContextVar("held", default=frozenset())
 
 
 @contextmanager
-def lock_folder(root: Path) -> Iterator[None]:
-    """Creates the folder `root` and holds its lock for the block; InputError at once if somebody else holds it."""
-    made = [p for p in (root, *root.parents) if not p.exists()]
-    try:
-        with _lock(root):
+def lock_folder(root: Path, held: bool = False) -> Iterator[None]:
+    """Creates the folder `root` and holds its lock for the block; InputError at once if somebody else holds it.
+
+    held: True does nothing inside another block of this thread for the same folder.
+    """
+    if held and root.resolve() in _held.get():
+        yield
+        return
+    with _folders(root, root):
+        descriptor = os.open(root, os.O_RDONLY)
+        try:
+            with suppress(OSError):  # NFS cannot lock folders
+                try:
+                    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    got, remedy = "another run that writes here", "wait, or choose another --out"
+                    raise InputError(file=root, got=got, expected="one at a time", remedy=remedy) from None
             token = _held.set(_held.get() | {root.resolve()})
             try:
                 yield
             finally:
                 _held.reset(token)
-                with suppress(OSError):  # only who holds the lock may remove what others would lock
-                    for folder in made:
-                        folder.rmdir()
-    except OSError as error:
-        raise write_error(root, error) from error
-
-
-def hold_lock(root: Path) -> AbstractContextManager[None]:
-    """Returns `lock_folder(root)`, or a block without effect inside one of this thread for the same folder."""
-    return nullcontext() if root.resolve() in _held.get() else lock_folder(root)
+        finally:
+            os.close(descriptor)
 
 
 @contextmanager
-def _lock(root: Path) -> Iterator[None]:
-    while True:
+def _folders(root: Path, file: Path) -> Iterator[None]:
+    """Makes a folder and those above it for the block, and removes those that stayed empty; OSErrors are of `file`."""
+    made = [p for p in (root, *root.parents) if not p.exists()]
+    try:
         root.mkdir(parents=True, exist_ok=True)
-        try:
-            descriptor = os.open(root, os.O_RDONLY)
-        except FileNotFoundError:  # removed by who held its lock
-            continue
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(descriptor)
-            raise InputError(
-                file=root, got="another run that writes here", expected="one at a time",
-                remedy="wait, or choose another --out",
-            ) from None  # fmt: skip
-        except OSError:  # NFS cannot lock folders
-            break
-        if _is_folder(descriptor, root):
-            break
-        os.close(descriptor)
-    try:
         yield
+    except OSError as error:
+        raise write_error(file, error) from error
     finally:
-        os.close(descriptor)
-
-
-# Whoever held the lock may have removed the folder, and another may stand at its path now.
-def _is_folder(descriptor: int, root: Path) -> bool:
-    try:
-        return os.path.samestat(os.fstat(descriptor), os.stat(root))
-    except FileNotFoundError:
-        return False
+        with suppress(OSError):
+            for folder in made:
+                folder.rmdir()
 
 
 PARTIAL = ".partial-"  # beginning of temporary names
-# all of a temporary name: with the name of the target, or the marker of a cluster's run
-OURS = re.compile(re.escape(PARTIAL) + r"(?:(.*)-[0-9a-f]{12}|[0-9a-f]{32})", re.DOTALL)
+OURS = re.compile(re.escape(PARTIAL) + r"(.*)-[0-9a-f]{12}", re.DOTALL)  # all of a temporary name, with its target's
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -105,25 +88,17 @@ def staged_path(target: Path) -> Iterator[Path]:
     """Yields a random temporary path beside the target, for the block to rename; what is left there is deleted."""
     # Two machines that share a disk may have the same process id, so the name is random.
     partial = target.parent / f"{PARTIAL}{target.name}-{uuid4().hex[:12]}"
-    made = [p for p in (target.parent, *target.parent.parents) if not p.exists()]
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        yield partial
-    except OSError as error:
-        raise write_error(target, error) from error
-    finally:
-        _remove(partial)
-        # The parents that were made here are removed again if they stayed empty.
-        with suppress(OSError):
-            for folder in made:
-                folder.rmdir()
+    with _folders(target.parent, target):
+        try:
+            yield partial
+        finally:
+            _remove(partial)
 
 
 def write_file(target: Path, content: bytes) -> None:
     """Writes `content` to the file `target`, which appears complete or not at all; an existing file is replaced."""
-    with staged_path(target) as partial:
+    with new_file(target) as partial:
         partial.write_bytes(content)
-        os.replace(partial, target)
 
 
 @contextmanager

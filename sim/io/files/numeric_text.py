@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -20,8 +22,6 @@ from sim.types import Array, Bools, Ints
 
 NAME_THEM = "name the columns in the first line, as frame,id,x,y or frame,id,left,top,width,height"
 
-# More than 18 digits may not fit into 64 bits.
-WHOLE = re.compile("[-+]?[0-9]{1,18}")
 LARGEST = 2**52  # whole numbers pass through float64
 CORRECT = "remove or correct it"
 
@@ -82,71 +82,77 @@ def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def whole_number(text: str) -> int:
-    """Returns the whole number that a cell stands for: ASCII digits, perhaps with a sign and blanks around."""
-    if not WHOLE.fullmatch(text.strip()):
-        raise ValueError(f"{text!r} is no whole number")
-    return int(text)
+@dataclass(frozen=True)
+class TextRows:
+    """The rows of a text: its lines that are neither blank nor comments. Cells are apart by commas or blanks."""
+
+    file: Path
+    text: tuple[str, ...]  # of each row
+    line: Ints  # (N,) line number of each row, from 1
+
+    @property
+    def separator(self) -> str | None:
+        """A comma if the first row has one; None: blanks."""
+        return "," if self.text and "," in self.text[0] else None
+
+    def cells(self) -> Iterator[list[str]]:
+        """Yields the cells of each row."""
+        separator = self.separator
+        return (line.split(separator) for line in self.text)
+
+    def words(self, column: int, first: int = 0) -> list[str]:
+        """Returns the cells of a column (from 0) of the rows from `first` on, without quotes."""
+        return [row[column].strip().strip('"') for row in islice(self.cells(), first, None) if len(row) > column]
+
+    def numbers(
+        self, columns: tuple[int, int], also: int | None = None, *, first: int = 0, layout: str = "",
+        use: list[int] | None = None,
+    ) -> NumericTable:  # fmt: skip
+        """Returns the numbers of the rows from `first` on.
+
+        columns: (least, greatest) number of columns, and `also` another one. use: the columns to read, from 0, of which
+        only these must hold numbers; None: all.
+        """
+        rows, (low, high) = TextRows(self.file, self.text[first:], self.line[first:]), columns
+        if not rows.text:
+            return NumericTable(self.file, np.zeros((0, low)), rows.line, layout)
+        width = len(rows.text[0].split(rows.separator))
+        if not low <= width <= high:
+            use = None  # the columns are others than those named: an error below
+        fits = range(low, high + 1) if use is not None else (width,)
+        try:
+            text = io.StringIO("\n".join(rows.text))
+            values = np.loadtxt(text, delimiter=rows.separator, comments=None, ndmin=2, dtype=np.float64, usecols=use)
+            if use is not None and not {len(cells) for cells in rows.cells()} <= {*fits}:
+                raise ValueError("lines of different lengths")
+        except ValueError:
+            raise rows._first_bad(fits, use) from None
+        table = NumericTable(self.file, values, rows.line, layout)
+        if use is None and not low <= width <= high and width != also:
+            span = (str(low) if low == high else f"{low} to {high}") + ("" if also is None else f" or {also}")
+            remedy = layout and f"the columns are {layout}"
+            table.reject(np.ones(len(values), bool), f"{span} columns", remedy, remedy)
+        table.reject(~np.isfinite(values).all(axis=1), "finite numbers", CORRECT)
+        return table
+
+    def _first_bad(self, fits: Container[int], use: list[int] | None) -> InputError:
+        width = len(next(self.cells()))
+        for number, line, cells in zip(self.line, self.text, self.cells(), strict=True):
+            read = [cells[k] for k in use] if use is not None and len(cells) in fits else cells
+            bad = [repr(cell.strip()) for cell in read if not is_number_text(cell)]
+            if bad or len(cells) not in fits:
+                got, expected = f"{len(cells)} columns", f"{width} columns, as in the first line"
+                got, expected = (bad[0], "a number") if bad else (got, expected)
+                remedy = f"remove the lines that begin with #, and {NAME_THEM}" if line.startswith("#") else CORRECT
+                return InputError(file=self.file, place=f"line {number}", got=got, expected=expected, remedy=remedy)
+        return InputError(file=self.file, got="unreadable numbers", expected="rows of numbers", remedy="check the file")
 
 
-def read_numbers(
-    path: Path, columns: tuple[int, int], also: int | None = None, *, header: bool = False, layout: str = "",
-    use: list[int] | None = None, comments: bool = False,
-) -> NumericTable:  # fmt: skip
-    """Reads a text's rows of numbers, separated by commas if the first line has one, else by blanks.
-
-    columns: (least, greatest) number of columns, and `also` another one. header: True skips the first line. use: the
-    columns to read, from 0, of which only these must hold numbers; None: all. comments: True skips lines with #.
-    """
-    lines_of_text = enumerate(read_text(path).splitlines(), 1)
-    numbered = [(k, line) for k, line in lines_of_text if line.strip() and not (comments and line[:1] == "#")][header:]
-    if not numbered:
-        return NumericTable(path, np.zeros((0, columns[0])), np.zeros(0, np.int64), layout)
-    lines = np.array([k for k, _ in numbered], np.int64)
-    separator = "," if "," in numbered[0][1] else None
-    width, (low, high) = len(numbered[0][1].split(separator)), columns
-    if use is not None and width != low:
-        use = None  # the columns are others than those named: an error below
-    try:
-        text = io.StringIO("\n".join(line for _, line in numbered))
-        values = np.loadtxt(text, delimiter=separator, comments=None, ndmin=2, dtype=np.float64, usecols=use)
-        if use is not None and any(len(line.split(separator)) != width for _, line in numbered):
-            raise ValueError("lines of different lengths")
-    except ValueError:
-        raise _first_bad_line(path, numbered, separator, use) from None
-    rows = NumericTable(path, values, lines, layout)
-    if use is None and not low <= values.shape[1] <= high and values.shape[1] != also:
-        span = (str(low) if low == high else f"{low} to {high}") + ("" if also is None else f" or {also}")
-        remedy = layout and f"the columns are {layout}"
-        rows.reject(np.ones(len(lines), bool), f"{span} columns", remedy, remedy)
-    rows.reject(~np.isfinite(values).all(axis=1), "finite numbers", CORRECT)
-    return rows
-
-
-def read_words(path: Path, column: int) -> list[str]:
-    """Returns the cells of a column below the first line, in lower case; [] if all are numbers."""
-    lines = [line for line in read_text(path).splitlines() if line.strip()][1:]
-    rows = [line.split("," if "," in lines[0] else None) for line in lines]
-    cells = [row[column].strip().strip('"').lower() for row in rows if len(row) > column]
-    return [] if all(map(is_number_text, cells)) else cells
-
-
-def _first_bad_line(
-    path: Path, numbered: list[tuple[int, str]], separator: str | None, use: list[int] | None
-) -> InputError:
-    width = len(numbered[0][1].split(separator))
-    for k, line in numbered:
-        cells = line.split(separator)
-        read = cells if use is None or len(cells) != width else [cells[k] for k in use]
-        bad = next((c for c in read if not is_number_text(c)), None)
-        if bad is not None or len(cells) != width:
-            got = repr(bad.strip()) if bad is not None else f"{len(cells)} columns"
-            expected = "a number" if bad is not None else f"{width} columns, as in the first line"
-            remedy = CORRECT
-            if line.startswith("#"):
-                remedy = f"remove the lines that begin with #, and {NAME_THEM}"
-            return InputError(file=path, place=f"line {k}", got=got, expected=expected, remedy=remedy)
-    return InputError(file=path, got="unreadable numbers", expected="rows of numbers", remedy="check the file")
+def read_rows(path: Path, comments: bool = False) -> TextRows:
+    """Returns the rows of a text. comments: True leaves out the lines that begin with #."""
+    numbered = enumerate(read_text(path).splitlines(), 1)
+    found = [(k, line) for k, line in numbered if line.strip() and not (comments and line[:1] == "#")]
+    return TextRows(path, tuple(line for _, line in found), np.array([k for k, _ in found], np.int64))
 
 
 def is_number_text(cell: str) -> bool:
@@ -163,6 +169,12 @@ def read_number(text: str) -> float:
     if "_" in text or not text.strip().isascii():
         raise ValueError(f"{text!r} is no number")
     return float(text)
+
+
+def whole_or_number(text: str) -> int | float | str:
+    """Returns the whole or other number that a cell stands for, else the text itself."""
+    whole = re.fullmatch("[-+]?[0-9]{1,18}", text.strip())  # more digits may not fit into 64 bits
+    return int(text) if whole else read_number(text) if is_number_text(text) else text
 
 
 def number_or_nan(text: str | None) -> float:

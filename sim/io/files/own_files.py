@@ -17,6 +17,7 @@ import struct
 import unicodedata
 import zlib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path, PurePath
 
 from scenarios.errors import InputError, is_control
@@ -86,10 +87,8 @@ def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
 def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
     """Raises InputError if there is a file at `path` that is not ours: only our own files are replaced unasked."""
     if path.exists() and not is_ours(path, marks):
-        raise InputError(
-            file=path, got="a file that flockscope did not write", expected="its own file, or none",
-            remedy="move it away, or choose another --out",
-        )  # fmt: skip
+        got, expected = "a file that flockscope did not write", "its own file, or none"
+        raise InputError(file=path, got=got, expected=expected, remedy="move it away, or choose another --out")
 
 
 def _picture(path: Path) -> bool:
@@ -100,11 +99,9 @@ def _picture(path: Path) -> bool:
 def _video(path: Path) -> bool:
     import av
 
-    try:
-        with av.open(str(path), metadata_errors="ignore") as container:
-            return container.metadata.get("comment") == GENERATOR
-    except av.FFmpegError:
-        return False
+    with suppress(av.FFmpegError), av.open(str(path), metadata_errors="ignore") as container:
+        return container.metadata.get("comment") == GENERATOR
+    return False
 
 
 LONGEST = 200  # bytes of a file name made from a label: 255 less temporary prefixes and our suffixes
@@ -118,12 +115,8 @@ def file_name(label: str) -> str:
     Different labels may give one name.
     """
     name = "".join("_" if c in FORBIDDEN or is_control(c) else c for c in label)
-    if name[:1] in ("", "."):
-        name = "_" + name[1:]
-    if name[-1] in (".", " "):
-        name = name[:-1] + "_"
-    if RESERVED.fullmatch(name):
-        name = "_" + name
+    name = re.sub(r"^(\.|$)|[. ]$", "_", name)
+    name = "_" + name if RESERVED.fullmatch(name) else name
     body = name.encode()
     if len(body) <= LONGEST:
         return name
@@ -145,10 +138,8 @@ def output_paths(folder: str | Path, labels: Iterable[str], ending: str = "", so
         key = unicodedata.normalize("NFC", path.name).casefold()
         if key in seen:
             both = f"the name {label!r} twice" if label == seen[key] else f"the names {seen[key]!r} and {label!r}"
-            raise InputError(
-                file=source, got=f"{both}, for one {path.name}", expected="unique names",
-                remedy="rename one, or take one at a time",
-            )  # fmt: skip
+            got = f"{both}, for one {path.name}"
+            raise InputError(file=source, got=got, expected="unique names", remedy="rename one, or take one at a time")
         seen[key] = label
         paths.append(path)
     return paths

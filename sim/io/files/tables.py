@@ -52,7 +52,7 @@ KEY = b"flockscope"
 REDO = "run the command that made it again"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Column:
     """A column of a Parquet table to write."""
 
@@ -123,12 +123,9 @@ def table_bytes(columns: Iterable[Column], facts: dict[str, Any]) -> bytes:
     """Returns a Parquet file as bytes; `facts` is metadata in its schema. Equal content gives equal bytes."""
     import pyarrow as pa
 
-    columns = list(columns)
-    arrays = [_arrow(c) for c in columns]
-    schema = pa.schema(
-        [pa.field(c.name, a.type, metadata={"unit": c.unit}) for c, a in zip(columns, arrays, strict=True)]
-    )
-    return parquet_bytes(pa.Table.from_arrays(arrays, schema=schema), facts)
+    arrays = {c: _arrow(c) for c in columns}
+    schema = pa.schema([pa.field(c.name, a.type, metadata={"unit": c.unit}) for c, a in arrays.items()])
+    return parquet_bytes(pa.Table.from_arrays(list(arrays.values()), schema=schema), facts)
 
 
 def parquet_bytes(table: Any, facts: Mapping[str, Any]) -> bytes:
@@ -166,11 +163,10 @@ def read_table(path: Path) -> StoredTable:
         reason = f"no readable Parquet ({(str(error).splitlines() or [type(error).__name__])[0]})"
         raise InputError(file=path, got=reason, expected="a whole Parquet file", remedy=REDO) from None
     facts = parse_json(metadata, path, REDO)
-    columns = dict(zip(table.column_names, table.columns, strict=True))
     found = StoredTable(path, {}, facts)
     found.reject(not isinstance(facts, dict), "schema", "no JSON object", "a JSON object")
     found.reject(facts.get("format") != FORMAT, "schema", f"format {facts.get('format')}", f"format {FORMAT}")
-    for name, column in columns.items():
+    for name, column in zip(table.column_names, table.columns, strict=True):
         found.reject(column.null_count > 0, name, "empty cells", "none")
         found.columns[name] = column.to_numpy()
     return found

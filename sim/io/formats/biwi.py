@@ -17,7 +17,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_numbers, read_text
+from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_rows, read_text
 from sim.io.formats.labels import labelled_sequence, labelled_truth_fields, require_size
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.types import Ints, Sequence, Truth
@@ -69,9 +69,8 @@ def read_groups(path: Path) -> dict[int, int]:
         name = min(earlier, default=max(label.values(), default=0) + 1)
         # Lines that share a person become one group, with the lowest label.
         if earlier:
-            warnings.warn(
-                f"{path}: line {number}: shares a person with an earlier line; taken as one group", stacklevel=2
-            )
+            text = f"{path}: line {number}: shares a person with an earlier line; taken as one group"
+            warnings.warn(text, stacklevel=2)
         for person in [p for p, g in label.items() if g in earlier] + sorted(members):
             label[person] = name
     return label
@@ -89,7 +88,7 @@ def labels_of(path: Path, id: Ints) -> Ints:
 def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     """Returns (rows of obsmat.txt, our frames (R,), person ids (R,)), sorted by (frame, id)."""
     path = folder / "obsmat.txt"
-    rows = read_numbers(path, (8, 8), layout="frame id x z y vx vz vy")
+    rows = read_rows(path).numbers((8, 8), layout="frame id x z y vx vz vy")
     if not len(rows.line):
         raise InputError(file=path, got="no line", expected="people: frame id x z y vx vz vy", remedy="restore it")
     raw, id = rows.integers(0, "frame"), rows.integers(1, "id")

@@ -34,7 +34,7 @@ PARTS = {
     "Intrinsic": ("focal", "kappa1", "cx", "cy", "sx"),
     "Extrinsic": ("tx", "ty", "tz", "rx", "ry", "rz"),
 }
-LARGEST = 1e9  # mm or px: absolute value of a number
+SMALLEST, LARGEST = 1e-9, 1e9  # mm or px: least value above 0, and greatest absolute value of a number
 POSITIVE = ("width", "height", "dpx", "dpy", "focal", "sx")
 
 
@@ -57,14 +57,15 @@ def _values(path: Path) -> dict[str, float]:
     for part, name in ((part, name) for part, names in PARTS.items() for name in names):
         element = root.find(part)
         text = None if element is None else element.get(name)
-        found[name] = value = number_or_nan(text)
-        if not abs(value) <= LARGEST or (name in POSITIVE and value <= 0):
-            expected = "a number above 0" if name in POSITIVE else f"a number within {LARGEST:g}"
-            raise InputError(
-                file=path, place=f"{part} {name}", got="nothing" if text is None else repr(text), expected=expected,
-                remedy="complete the calibration",
-            )  # fmt: skip
+        found[name] = number_or_nan(text)
+        if not (SMALLEST if name in POSITIVE else -LARGEST) <= found[name] <= LARGEST:
+            expected = f"a number {'above 0, ' if name in POSITIVE else ''}within {LARGEST:g}"
+            raise _wrong(path, f"{part} {name}", "nothing" if text is None else repr(text), expected)
     return found
+
+
+def _wrong(path: Path, place: str, got: str, expected: str, remedy: str = "correct the calibration") -> InputError:
+    return InputError(file=path, place=place, got=got, expected=expected, remedy=remedy)
 
 
 def _rotation(rx: float, ry: float, rz: float) -> Array:
@@ -86,25 +87,18 @@ def read_opencv_yaml(path: Path) -> Camera:
     found = _opencv_numbers(path)
     missing = [key for key in KEYS if key not in found]
     if missing:
-        raise InputError(
-            file=path, place=", ".join(missing), got="nothing", expected=f"the keys {', '.join(KEYS)}",
-            remedy="add them: see Calibration in docs/reference/formats.md",
-        )  # fmt: skip
+        raise _wrong(path, ", ".join(missing), "nothing", f"the keys {', '.join(KEYS)}", "add them")
     for key, shape in KEYS.items():
         if found[key].size != math.prod(shape) or not (np.abs(found[key]) <= COORDINATE).all():
-            expected = f"numbers of shape {shape} within {COORDINATE:g}" if shape else f"a number within {COORDINATE:g}"
-            got = f"{found[key].size} numbers"
-            raise InputError(file=path, place=key, got=got, expected=expected, remedy="correct it")
+            raise _wrong(path, key, f"{found[key].size} numbers", f"{math.prod(shape)} within {COORDINATE:g}")
     width, height, left, right, rotation, position = (found[key].reshape(shape) for key, shape in KEYS.items())
     fx, fy = float(left[0, 0]), float(left[1, 1])
     apart = np.abs(left - right)
     apart[0, 3] = 0
     if not (fx > 0 and apart.max() <= SAME * fx and right[0, 3] < 0):
-        expected = "P1 and P2 equal but for P2[0, 3] < 0"
-        raise InputError(file=path, place="P2", got="another pair", expected=expected, remedy="rectify the pair")
+        raise _wrong(path, "P2", "another pair", "P1 and P2 equal but for P2[0, 3] < 0", "rectify the pair")
     if width % 1 or height % 1:
-        got, expected = f"{width:g}×{height:g}", "whole numbers of px"
-        raise InputError(file=path, place="image_width", got=got, expected=expected, remedy="correct it")
+        raise _wrong(path, "image_width", f"{width:g}×{height:g}", "whole numbers of px")
     camera = Camera(
         kind="pinhole", image=(int(width), int(height)), focal_px=(fx, fy),
         # OpenCV's pixel coordinates begin at the centre of the first pixel, ours at its corner.
@@ -138,40 +132,31 @@ def _opencv_numbers(path: Path) -> dict[str, Array]:
     return found
 
 
-PERSON, SMALLEST = 1.7, 2.0  # a person's height, m, and the least px that it must have in the picture
+PERSON, SMALLEST_PERSON = 1.7, 2.0  # a person's height, m, and the least px that it must have in the picture
 WIDEST, WIDEST_SHARE = 2.0, 0.25  # m, and share of the height: a longer baseline is not in metres
 SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios of calibration and recording
 
 
 def read_calibration(path: Path) -> Camera:
     """Returns the camera of a calibration file: Tsai's .xml, OpenCV's .yml of a rectified pair, or camera.json."""
-    require_regular(path, "check --camera: a camera.json, or Tsai's calibration as .xml")
-    if path.suffix.lower() == ".toml":
+    expected = "a camera.json, or Tsai's calibration as .xml"
+    require_regular(path, f"check --camera: {expected}")
+    kind = path.suffix.lower()
+    if kind == ".toml":
         remedy = "give the recording's calibration; a TOML file describes a view for `flockscope replay --camera`"
-        raise InputError(
-            file=path, place="--camera", got="a TOML file", expected="a camera.json, or Tsai's calibration as .xml",
-            remedy=remedy,
-        )  # fmt: skip
-    if path.suffix.lower() in (".yml", ".yaml"):
-        camera = read_opencv_yaml(path)
-    else:
-        camera = read_tsai(path) if path.suffix.lower() == ".xml" else read_camera(path)
-    return _require_metres(camera, path)
-
-
-def _require_metres(camera: Camera, path: Path) -> Camera:
+        raise _wrong(path, "--camera", "a TOML file", expected, remedy)
+    readers = {".yml": read_opencv_yaml, ".yaml": read_opencv_yaml, ".xml": read_tsai}
+    camera = readers.get(kind, read_camera)(path)
     height = float(camera.position[2])
     # From so high, a person right below would be smaller than 2 px in any direction of view.
     person = camera.focal_px[1] * PERSON / height if camera.kind == "pinhole" else np.inf
-    if person < SMALLEST:
+    if person < SMALLEST_PERSON:
         got = f"height {height:g} m, from where a person is {person:.2g} px tall"
-        raise InputError(file=path, place="position", got=got, expected="metres", remedy="give all lengths in metres")
-    if camera.baseline > max(WIDEST, height * WIDEST_SHARE):
-        raise InputError(
-            file=path, place="baseline", got=f"{camera.baseline:g} m, {height:g} m above the ground",
-            expected=f"metres, up to {max(WIDEST, height * WIDEST_SHARE):g} m",
-            remedy="give T, and P2 made from it, in metres: divide by 1000 if they are in mm",
-        )  # fmt: skip
+        raise _wrong(path, "position", got, "metres", "give all lengths in metres")
+    widest = max(WIDEST, height * WIDEST_SHARE)
+    if camera.baseline > widest:
+        remedy = "give T, and P2 made from it, in metres: divide by 1000 if they are in mm"
+        raise _wrong(path, "baseline", f"{camera.baseline:g} m", f"metres, up to {widest:g} m at this height", remedy)
     return camera
 
 
@@ -184,10 +169,8 @@ def scaled_to_image(
     x, y = image[0] / camera.image[0], image[1] / camera.image[1]
     # It may be calibrated with the stored pixels or with square ones.
     if all(abs(x / y / ratio - 1) > SHAPE_TOLERANCE for ratio in (1.0, float(aspect))):
-        raise InputError(
-            file=path, place="--camera", got="a calibration for {}×{} px".format(*camera.image),
-            expected="one for {}×{} px, or of that shape".format(*image), remedy="give this recording's calibration",
-        )  # fmt: skip
+        got, expected = "a calibration for {}×{} px".format(*camera.image), "one for {}×{} px, or of that shape"
+        raise _wrong(path, "--camera", got, expected.format(*image), "give this recording's calibration")
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     return camera.replace(
         image=image,

@@ -19,7 +19,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import number_or_nan, person_ids, xml_root
+from sim.io.files.numeric_text import NumericTable, number_or_nan, person_ids, xml_root
 from sim.io.formats.labels import CHORD, differentiate, labelled_sequence, labelled_truth_fields, require_size
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.scene.visibility import scale_of_all_boxes, scale_of_first_boxes
@@ -29,6 +29,7 @@ from sim.types import Array, Ints, Sequence, Truth
 FPS = 25.0
 LAST_ID = 10**15 - 1  # ids pass through float64
 IMAGE_SIZE = (384, 288)
+SMALLEST = 1e-6  # px: least width and height of a box
 
 
 @dataclass(frozen=True)
@@ -51,58 +52,39 @@ class CaviarRecording:
 
 def read_xml(path: Path) -> CaviarRecording:
     """Reads the people and groups of the CAVIAR file (CVML) `path`; our frame is the file's + 1."""
-    root = _root(path)
-    rows: list[tuple[float, ...]] = []
-    listed, labelled, hypotheses = set[int](), False, root.find("frame/objectlist/object/hypothesislist") is not None
-    for element in root.iterfind("frame"):
-        index = int(_number(path, "frame", element, "number", FRAMES - 1)) + 1
-        listed.add(index)
-        labelled = labelled or element.find("grouplist") is not None
-        label = _labels(path, index, element)
-        for person in element.iterfind("objectlist/object"):
-            rows.append(_row(path, index, person, label))
-    if not listed:
-        raise InputError(
-            file=path, got="no <frame> in <dataset>", expected="a CAVIAR file (CVML) with frames",
-            remedy="give another file",
-        )  # fmt: skip
-    table = np.array(sorted(rows), np.float64).reshape(-1, 7)
-    frame, id, label_ = (table[:, k].astype(np.int64) for k in range(3))
-    again = repeated_ids(frame, id)
-    if again.any():
-        k = int(np.argmax(again))
-        raise InputError(
-            file=path, place=f"frame {frame[k] - 1}", got=f"object {id[k]} twice", expected="each id once in a frame",
-            remedy="remove one of the two",
-        )  # fmt: skip
-    last = max(listed)
-    require_size(path, last, id)
-    name = root.get("name", path.stem)
-    centre, size = table[:, 3:5], table[:, 5:7]
-    inside = bool(((centre >= 0) & (centre <= IMAGE_SIZE)).all())
-    return CaviarRecording(
-        name, last, np.array(sorted(listed)), frame, id, label_, centre, size, labelled, hypotheses and inside
-    )
-
-
-def _root(path: Path) -> ET.Element:
     root = xml_root(path, "a CAVIAR file (CVML)", "fetch the file again")
-    if root.tag != "dataset":
-        raise InputError(file=path, got=f"<{root.tag}>", expected="<dataset> (CAVIAR)", remedy="give another file")
-    return root
+    if root.tag != "dataset" or root.find("frame") is None:
+        got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
+        raise InputError(file=path, got=got, expected="<dataset> of CAVIAR (CVML)", remedy="give another file")
+    rows: list[tuple[float, ...]] = []
+    listed = set[int]()
+    for element in root.iterfind("frame"):
+        index = int(_number(path, "frame", element, "number", 0, FRAMES - 1, whole=True)) + 1
+        listed.add(index)
+        label = _labels(path, index, element)
+        rows += [_row(path, index, person, label) for person in element.iterfind("objectlist/object")]
+    values = np.array(sorted(rows), np.float64).reshape(-1, 7)
+    table = NumericTable(path, values, values[:, 0].astype(np.int64) - 1, unit="frame")
+    frame, id, label_ = (values[:, k].astype(np.int64) for k in range(3))
+    table.reject(repeated_ids(frame, id), "each id once in a frame", "remove one of the two")
+    require_size(path, max(listed), id)
+    centre, size = values[:, 3:5], values[:, 5:7]
+    own = root.find("frame/objectlist/object/hypothesislist") is not None
+    return CaviarRecording(
+        root.get("name", path.stem), max(listed), np.array(sorted(listed)), frame, id, label_, centre, size,
+        root.find("frame/grouplist") is not None, own and bool(((centre >= 0) & (centre <= IMAGE_SIZE)).all()),
+    )  # fmt: skip
 
 
-def _number(path: Path, place: str, element: ET.Element, key: str, largest: int = 0) -> float:
-    """Returns the attribute `key`, a whole number from 0 to `largest` if that is given."""
+def _number(
+    path: Path, place: str, element: ET.Element, key: str, low: float = -COORDINATE, high: float = COORDINATE,
+    whole: bool = False,
+) -> float:  # fmt: skip
     value = number_or_nan(element.get(key))
-    if largest and value % 1:
-        value = float("nan")
-    if not (0 if largest else -COORDINATE) <= value <= (largest or COORDINATE):
-        raise InputError(
-            file=path, place=f"{place}: {element.tag} {key}", got=repr(element.get(key)),
-            expected=f"a whole number from 0 to {largest}" if largest else f"a number within {COORDINATE:g}",
-            remedy="correct it",
-        )  # fmt: skip
+    if not low <= value <= high or (whole and value % 1):
+        expected = f"a {'whole ' if whole else ''}number from {low:g} to {high:.0f}"
+        got, remedy = repr(element.get(key)), "correct it"
+        raise InputError(file=path, place=f"{place}: {element.tag} {key}", got=got, expected=expected, remedy=remedy)
     return value
 
 
@@ -115,24 +97,20 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
             continue
         if members & label.keys():
             warnings.warn(f"{path}: frame {index - 1}: a person in two groups; the first holds", stacklevel=3)
-        number = int(_number(path, f"frame {index - 1}", group, "id", LAST_ID))
+        number = int(_number(path, f"frame {index - 1}", group, "id", 0, LAST_ID, whole=True))
         label.update({m: number for m in sorted(members) if m not in label})
     return label
 
 
 def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> tuple[float, ...]:
     """Returns (frame, id, label, centre x, centre y, width, height), px; label -1 for alone."""
-    place = f"frame {index - 1}"
-    id, box = int(_number(path, place, person, "id", LAST_ID)), person.find("box")
+    place, box = f"frame {index - 1}", person.find("box")
+    id = int(_number(path, place, person, "id", 0, LAST_ID, whole=True))
+    place += f": object {id}"
     if box is None:
         raise InputError(file=path, place=place, got="an object without box", expected="a box", remedy="add it")
-    x, y, w, h = (_number(path, place, box, key) for key in ("xc", "yc", "w", "h"))
-    if w <= 0 or h <= 0:
-        raise InputError(
-            file=path, place=f"{place}: object {id}", got=f"size {w:g}x{h:g}", expected="a size above 0",
-            remedy="correct or remove the box",
-        )  # fmt: skip
-    return (index, id, label.get(id, -1), x, y, w, h)
+    x, y = (_number(path, place, box, key) for key in ("xc", "yc"))
+    return (index, id, label.get(id, -1), x, y, *(_number(path, place, box, key, SMALLEST) for key in ("w", "h")))
 
 
 def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> Truth:
@@ -178,7 +156,14 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     the last frame of these boxes.
     """
     found, px_per_m = read_xml(path), options.px_per_m
-    rate = options.fps or _frame_rate(path, found)
+    rate = options.fps or FPS
+    if options.fps is None and not found.caviar:
+        got, expected = "labels without frame rate, not of CAVIAR's recordings", "the frames per second of the video"
+        raise InputError(file=path, place="--fps", got=got, expected=expected, remedy="give --fps")
+    if options.fps is None:
+        # The text names no path, so that a command over many recordings prints it once.
+        words = f"CAVIAR's recordings are taken at {FPS:g} fps, with pictures of {IMAGE_SIZE[0]}×{IMAGE_SIZE[1]} px"
+        warnings.warn(f"{words} (--fps says otherwise)", stacklevel=3)
     scale, learned = scale_of_first_boxes(found.frame, found.size.max(axis=1)) if px_per_m is None else (px_per_m, 0)
 
     sequence = labelled_sequence(
@@ -186,18 +171,6 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         **({"px_per_m_frames": learned} if learned else {}),
     )  # fmt: skip
     return replace(sequence, image_size=IMAGE_SIZE if found.caviar else None)
-
-
-def _frame_rate(path: Path, found: CaviarRecording) -> float:
-    if not found.caviar:
-        raise InputError(
-            file=path, place="--fps", got="labels without frame rate, not of CAVIAR's recordings",
-            expected="the frames per second of the video", remedy="give --fps",
-        )  # fmt: skip
-    # The text names no path, so that a command over many recordings prints it once.
-    words = f"CAVIAR's recordings are taken at {FPS:g} fps, with pictures of {IMAGE_SIZE[0]}×{IMAGE_SIZE[1]} px"
-    warnings.warn(f"{words} (--fps says otherwise)", stacklevel=4)
-    return FPS
 
 
 def is_caviar(path: Path) -> bool:

@@ -46,17 +46,24 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     found = mot_text.detections_of_table(table, options)
     if not len(found.frame):
         raise InputError(file=path, got="no box", expected="the boxes of a detector", remedy="check the file")
-    found = replace(found, frame=_frames_of_pictures(found.frame, sequence))
+    # Boxes may be numbered like picture files that are counted otherwise.
+    origin, step = sequence.source.get("numbering", (1, 1))
+    before, rest = np.divmod(found.frame - origin, step)
+    if found.frame.max() > (sequence.length or np.inf) and not rest.any() and before.min() >= 0:
+        found = replace(found, frame=before + 1)
     if found.plane != "image" or found.box is None:
         raise InputError(file=path, got="points", expected="boxes, px", remedy="give the detector's boxes")
     last = int(found.frame.max())
     if sequence.length is not None and last > sequence.length:
-        raise InputError(
-            file=path, got=f"frame {last}", expected=f"at most {sequence.length}, the frames of {sequence.name}",
-            remedy="give the boxes of this recording; frames count from 1",
-        )  # fmt: skip
+        got, expected = f"frame {last}", f"at most {sequence.length}, the frames of {sequence.name}"
+        remedy = "give the boxes of this recording; frames count from 1"
+        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
     if sequence.image_size is not None:
-        _check_size(path, found.box, sequence.image_size)
+        far = np.quantile(found.box[:, :2] + found.box[:, 2:], 0.95, axis=0)
+        if (far > OUTSIDE * np.array(sequence.image_size)).any():
+            got, remedy = "boxes that end at {:.0f}, {:.0f} px".format(*far), "if they are of another size, --box-scale"
+            expected = "boxes in pictures of {} × {} px".format(*sequence.image_size)
+            raise InputError(file=path, got=got, expected=expected, remedy=remedy)
 
     def joined(frames: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
         for frame in frames():
@@ -67,14 +74,6 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
         sequence, frames=lambda: joined(sequence.frames), bare=None if bare is None else lambda: joined(bare),
         has_detections=True, source=source,
     )  # fmt: skip
-
-
-def _frames_of_pictures(number: Ints, sequence: Sequence) -> Ints:
-    """Returns the frames of boxes (N,), which may be numbered like picture files that are counted otherwise."""
-    origin, step = sequence.source.get("numbering", (1, 1))
-    before, rest = np.divmod(number - origin, step)
-    like_files = number.max() > (sequence.length or np.inf) and not rest.any() and before.min() >= 0
-    return before + 1 if like_files else number
 
 
 def _frames_at(path: Path, sequence: Sequence, seconds: Array) -> Ints:
@@ -100,23 +99,12 @@ def _frames_at(path: Path, sequence: Sequence, seconds: Array) -> Ints:
     return np.where(fits, k + 1, 0)
 
 
-def _check_size(path: Path, box: Array, size: tuple[int, int]) -> None:
-    far = np.quantile(box[:, :2] + box[:, 2:], 0.95, axis=0) / size
-    if (far > OUTSIDE).any():
-        x, y = far * size
-        got, expected = f"boxes that end at {x:.0f}, {y:.0f} px", "boxes in pictures of {} × {} px".format(*size)
-        remedy = "if the detector saw another picture size, give --box-scale"
-        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
-
-
 def _coco_results(path: Path) -> NumericTable:
     """Returns frame, -1, left, top, width, height, score and category of each result."""
     results = parse_json(read_text(path), path, "check the file")
     if not isinstance(results, list):
-        raise InputError(
-            file=path, got="no list", expected="a list of COCO results",
-            remedy="give the detector's results, with image_id, category_id, bbox and score",
-        )  # fmt: skip
+        remedy = "give the detector's results, with image_id, category_id, bbox and score"
+        raise InputError(file=path, got="no list", expected="a list of COCO results", remedy=remedy)
     rows = [_row(path, k, each) for k, each in enumerate(results, 1)]
     values = np.array(rows, np.float64).reshape(-1, 8)
     return NumericTable(path, values, np.arange(1, len(rows) + 1), COLUMNS, unit="result")
@@ -128,8 +116,6 @@ def _row(path: Path, number: int, result: Any) -> tuple[float, ...]:
             row = (frame, -1, x, y, w, h, score, category)
             if all(map(is_number, row)):
                 return row
-    raise InputError(
-        file=path, place=f"result {number}", got=json.dumps(result)[:80],
-        expected="image_id (a frame, from 1), category_id, bbox [left, top, width, height] and score, numbers",
-        remedy="correct the result",
-    )  # fmt: skip
+    got, remedy = json.dumps(result)[:80], "correct the result"
+    expected = "image_id (a frame, from 1), category_id, bbox [left, top, width, height] and score, numbers"
+    raise InputError(file=path, place=f"result {number}", got=got, expected=expected, remedy=remedy)

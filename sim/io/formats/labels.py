@@ -24,6 +24,11 @@ from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, Frame, GroupEvent, Groups, Ints, Sequence, Truth
 
 
+def centres(box: Array) -> Array:
+    """Returns the middles (R, 2) of boxes (R, 4) left, top, width, height."""
+    return np.asarray(box[:, :2] + box[:, 2:] / 2)
+
+
 def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
     """Returns rows (R, …) as an array (T, P, …), people by ascending id, nan where a person has no row.
 

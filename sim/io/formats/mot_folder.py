@@ -53,21 +53,21 @@ def read_seqinfo(path: Path) -> SeqInfo:
         raise InputError(file=path, got=got, expected="[Sequence]", remedy="correct the name of the section")
     section = dict(parser["Sequence"]) if parser.sections() else {}
 
-    def number(key: str, low: float, high: float, whole: bool = True) -> float | None:
+    def number(key: str, low: float, high: float, whole: bool = True) -> Any:
         text = section.get(key.lower())
-        value = None if text is None else number_or_nan(text)
-        if value is not None and not (low <= value <= high and (not whole or value == round(value))):
+        value = number_or_nan(text)
+        if text is not None and not (low <= value <= high and (not whole or value == round(value))):
             expected = f"a {'whole ' if whole else ''}number from {low:g} to {high:g}"
             raise InputError(file=path, place=key, got=repr(text), expected=expected, remedy="correct it")
-        return value
+        return None if text is None else int(value) if whole else value
 
     length, w, h = (number(k, 1, high) for k, high in (("seqLength", FRAMES), ("imWidth", SIDE), ("imHeight", SIDE)))
-    size = None if w is None or h is None else (int(w), int(h))
+    size = None if w is None or h is None else (w, h)
     if size is not None and not fits_picture(*size):
         got = "{}×{} px".format(*size)
         raise InputError(file=path, place="imWidth, imHeight", got=got, expected=PICTURE_SIZES, remedy="correct them")
     name, rate = section.get("name", path.parent.name), number("frameRate", *FRAME_RATES, whole=False)
-    return SeqInfo(name, rate, None if length is None else int(length), size, section.get("imdir", "img1"))
+    return SeqInfo(name, rate, length, size, section.get("imdir", "img1"))
 
 
 def frame_rate(given: float | None, found: float | None = None) -> float:
@@ -103,9 +103,19 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     if not length:
         expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
         raise InputError(file=path, got="nothing that tells its length", expected=expected, remedy="complete it")
-    _refuse_beyond(path, pictures, length)
+    beyond = [file.name for frame, file in pictures.files.items() if frame > length]
+    if beyond and len(pictures.files) <= length:
+        got, expected = f"{beyond[0]} among {len(pictures.files)} pictures", f"frames 1 to {length}"
+        remedy = "rename the pictures: each gets the number of its frame, or correct seqLength"
+        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
+    if beyond:
+        warnings.warn(f"{path}: {len(beyond)} pictures beyond frame {length} (seqLength) are not read", stacklevel=2)
     seen = pictures.first_size() if images else None
-    size = _picture_size(path / "seqinfo.ini", info.image_size, seen)
+    size = info.image_size or seen
+    if seen is not None and size != seen:
+        got, expected = "{} × {}".format(*size or ()), "{} × {}, the size of the pictures".format(*seen)
+        ini, remedy = path / "seqinfo.ini", "correct it, or restore the pictures"
+        raise InputError(file=ini, place="imWidth, imHeight", got=got, expected=expected, remedy=remedy)
     doubt = "" if found is None or found.box is None or size is None else size_doubt(found.box, size)
     if doubt:
         warnings.warn(f"{det}: {doubt}", stacklevel=2)
@@ -117,13 +127,13 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         for index in range(1, length + 1):
             yield Frame(index, (index - 1) / rate, detections=None if found is None else found.at(index, rate))
 
-    def frames() -> Iterator[Frame]:
+    def shown(folder: PictureFolder, name: str) -> Iterator[Image | None]:
         every = range(1, length + 1)
-        shown = fill_gaps(pictures.read(every, seen), length, path.name)
-        other = (
-            fill_gaps(right.read(every, seen), length, f"{path.name}, right") if right.files else repeat(None, length)
-        )
-        for frame, picture, beside in zip(bare(), shown, other, strict=True):
+        return fill_gaps(folder.read(every, seen), length, name) if folder.files else repeat(None, length)
+
+    def frames() -> Iterator[Frame]:
+        both = shown(pictures, path.name), shown(right, f"{path.name}, right")
+        for frame, picture, beside in zip(bare(), *both, strict=True):
             yield frame.replace(image=picture, right=beside)
 
     def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
@@ -132,9 +142,8 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     def truth() -> Truth:
         return mot_text.read_truth(gt, info.name, rate, length, options.scale, of_boxes.person_class)
 
-    shown: dict[str, Any] = {} if choice is None else {"background": str(choice)}
-    if pictures.numbering is not None:
-        shown["numbering"] = astuple(pictures.numbering)
+    more: dict[str, Any] = {} if choice is None else {"background": str(choice)}
+    more |= {} if pictures.numbering is None else {"numbering": astuple(pictures.numbering)}
     return Sequence(
         name=info.name, fps=rate, length=length, frames=frames if images and pictures.files else bare, bare=bare,
         load_truth=truth if gt.is_file() else None,
@@ -142,7 +151,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         px_per_m=options.scale, has_images=images and bool(pictures.files),
         has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
-        source={"kind": "mot", "path": str(path), **of_boxes.given(), **shown},
+        source={"kind": "mot", "path": str(path), **of_boxes.given(), **more},
     )  # fmt: skip
 
 
@@ -159,27 +168,6 @@ def _info(path: Path) -> SeqInfo:
 def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
     texts = is_present(path / "gt" / "gt.txt") or is_present(path / "det" / "det.txt")
     return find_pictures(path / info.image_dir, info.length, (lambda: _labelled_frames(path)) if texts else None)
-
-
-def _refuse_beyond(path: Path, pictures: PictureFolder, length: int) -> None:
-    beyond = [file for frame, file in pictures.files.items() if frame > length]
-    if beyond and len(pictures.files) <= length:
-        raise InputError(
-            file=path, got=f"{beyond[0].name} among {len(pictures.files)} pictures", expected=f"frames 1 to {length}",
-            remedy="rename the pictures: each gets the number of its frame, or correct seqLength",
-        )  # fmt: skip
-    if beyond:
-        warnings.warn(f"{path}: {len(beyond)} pictures beyond frame {length} (seqLength) are not read", stacklevel=3)
-
-
-def _picture_size(ini: Path, stated: tuple[int, int] | None, seen: tuple[int, int] | None) -> tuple[int, int] | None:
-    if stated is not None and seen is not None and stated != seen:
-        raise InputError(
-            file=ini, place="imWidth, imHeight", got="{} × {}".format(*stated),
-            expected="{} × {}, the size of the pictures".format(*seen), remedy="correct it, or restore the pictures",
-        )  # fmt: skip
-    # One of the two may be unknown.
-    return stated or seen
 
 
 def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
@@ -213,6 +201,5 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
 
 def _labelled_frames(path: Path) -> Ints:
-    texts = [text for text in (path / "det" / "det.txt", path / "gt" / "gt.txt") if text.is_file()]
-    frames = [read_table(text, boxless=True).frame for text in texts]
-    return np.unique(np.concatenate([np.zeros(0, np.int64), *frames]))
+    texts = filter(is_present, (path / "det" / "det.txt", path / "gt" / "gt.txt"))
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *(read_table(text, boxless=True).frame for text in texts)]))

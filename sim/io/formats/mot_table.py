@@ -12,7 +12,7 @@ Other programs write corners, shares of the picture, or leave the ids out, so th
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Set
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NoReturn
@@ -20,7 +20,7 @@ from typing import NoReturn
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.numeric_text import CORRECT, NumericTable, is_number_text, read_numbers, read_text, read_words
+from sim.io.files.numeric_text import CORRECT, NumericTable, TextRows, is_number_text, read_rows
 from sim.io.formats.options import BoxScale
 from sim.types import Array, Bools, Ints
 
@@ -135,6 +135,14 @@ NAMES = {
     "y": ("y", *(f"y_{unit}" for unit in UNITS)),
 }
 
+# columns of which a text has a box, the first four that it has all of
+BOXES = (
+    ("left", "top", "width", "height"), ("left", "top", "right", "bottom"), ("cx", "cy", "width", "height"),
+    ("x", "y", "width", "height"),
+)  # fmt: skip
+
+MEANINGS = {name: meaning for meaning, names in NAMES.items() for name in names}
+
 # further names of a column of classes in words, if PEOPLE are among these: it may hold anything else
 WORD_NAMES = ("label", "name", "class_name")
 
@@ -148,102 +156,96 @@ EXPECTED = (
 )
 
 
-def column_names(path: Path) -> list[str] | None:
+def column_names(text: TextRows) -> list[str] | None:
     """Returns the names in the first line of a text, in lower case; None if a cell of it is a number."""
-    line = next((line for line in read_text(path).splitlines() if line.strip()), "")
+    line = text.text[0] if text.text else ""
     if ";" in line:
-        raise InputError(
-            file=path, place="line 1", got=line[:80], expected="columns apart by commas, blanks or tabs",
-            remedy="replace the semicolons, and write decimals with a point",
-        )  # fmt: skip
-    cells = [cell.strip().strip('"').lower() for cell in line.split("," if "," in line else None)]
+        got, expected = line[:80], "columns apart by commas, blanks or tabs"
+        remedy = "replace the semicolons, and write decimals with a point"
+        raise InputError(file=text.file, place="line 1", got=got, expected=expected, remedy=remedy)
+    cells = [cell.strip().strip('"').lower() for cell in line.split(text.separator)]
     return cells if any(cells) and not line.startswith("#") and not any(map(is_number_text, cells)) else None
 
 
-def read_named(path: Path, names: list[str], frames_at: FramesAt | None = None) -> tuple[NumericTable, Ints | None]:
+def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> tuple[NumericTable, Ints | None]:
     """Reads a text with named columns as 8 or 10 columns of a MOTChallenge text, or as 4: frame, id, x, y in m.
 
     frames_at: frames of times, if a column of times may stand in place of one of frames; rows of no frame are left out.
     Returns the rows, and the labels of a column `group`, (N,), -1 for alone; None without that column.
     """
     found: dict[str, int] = {}
-    word_column, words = _words_for_classes(path, names)
+    word_column, words = _words_for_classes(text, names)
     for k, name in enumerate(names):
-        if words and name in NAMES["class"]:
-            continue
-        meaning = next((key for key, some in NAMES.items() if name in some), None)
+        meaning = MEANINGS.get(name)
         if meaning == "time" and (frames_at is None or not set(NAMES["frame"]).isdisjoint(names)):
             continue
         if meaning in found:
-            _refuse(path, names)
-        if meaning is not None:
+            _refuse(text.file, names)
+        if meaning is not None and not (words and meaning == "class"):
             found[meaning] = k
-    use, count = list(found.values()), len(names)
-    rows = read_numbers(path, (count, count), header=True, layout="those that line 1 names", use=use)
+    count = len(names)
+    rows = text.numbers((count, count), first=1, layout="those that line 1 names", use=list(found.values()))
+    column: dict[str, Column] = dict(zip(found, rows.values.T, strict=False))
     if words:
         classes, code = np.unique(words, return_inverse=True)
-        rows = replace(rows, values=np.column_stack([rows.values, code]), classes=tuple(classes.tolist()))
-        found["class"] = word_column
-        use.append(word_column)
-    if "time" in found and frames_at is not None:
-        found["frame"] = found.pop("time")
-        k = use.index(found["frame"])
-        numbers = frames_at(rows.values[:, k])
-        rows.values[:, k] = numbers
-        rows = replace(rows, values=rows.values[numbers > 0], line=rows.line[numbers > 0])
-
-    def column(name: str, default: float = -1.0) -> Column:
-        return rows.values[:, use.index(found[name])] if name in found else np.full(len(rows.line), default)
-
-    have, id = found.keys(), column("id")
-    if "frame" not in have:
-        _refuse(path, names)
-    frame = column("frame")
-    units = [names[found[axis]].partition("_")[2] for axis in "xy" if axis in found]
-    ground = [column(axis) * UNITS.get(unit, 1.0) for axis, unit in zip("xy", units, strict=False)]
-    if have >= {"id", "x", "y"} and not have & {"width", "height", "left", "cx"}:
-        columns = [frame, id, *ground]
-    elif have >= {"id", "left", "top", "width", "height"} and "class" not in have and len(units) == 2 and all(units):
-        box = (column(name) for name in ("left", "top", "width", "height"))
-        columns = [frame, id, *box, column("score", 1.0), *ground, np.zeros_like(frame)]
-    else:
-        left, top, w, h = _box(column, have) or _refuse(path, names)
-        columns = [frame, id, left, top, w, h, column("score", 1.0), column("class")]
-    unused = [name for k, name in enumerate(names) if name and k not in found.values()]
+        rows, column["class"] = replace(rows, classes=tuple(classes.tolist())), code.astype(float)
+    if "time" in column and frames_at is not None:
+        column["frame"] = frames_at(column.pop("time")).astype(float)
+        seen = column["frame"] > 0
+        rows, column = replace(rows, line=rows.line[seen]), {name: v[seen] for name, v in column.items()}
+    if "frame" not in column:
+        _refuse(text.file, names)
+    columns = _in_order(column, {axis: names[found[axis]].partition("_")[2] for axis in "xy" if axis in column})
+    if columns is None:
+        _refuse(text.file, names)
+    unused = [name for k, name in enumerate(names) if name and k not in (*found.values(), word_column)]
     if unused:
-        warnings.warn(f"{path}: line 1: columns that are not used: {', '.join(unused)}", stacklevel=4)
-    if frame.min(initial=1) == 0:
-        columns[0] = frame + 1
-        warnings.warn(f"{path}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
-    group = replace(rows, values=column("group")[:, None]).integers(0, "group") if "group" in have else None
-    return replace(rows, values=np.stack(columns, axis=1)), group
+        warnings.warn(f"{text.file}: line 1: columns that are not used: {', '.join(unused)}", stacklevel=4)
+    if column["frame"].min(initial=1) == 0:
+        columns[0] = columns[0] + 1
+        warnings.warn(f"{text.file}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
+    rows = replace(rows, values=np.stack(columns, axis=1))
+    return rows, replace(rows, values=column["group"][:, None]).integers(0, "group") if "group" in column else None
 
 
-def _words_for_classes(path: Path, names: list[str]) -> tuple[int, list[str]]:
+def _words_for_classes(text: TextRows, names: list[str]) -> tuple[int, list[str]]:
     """Returns the column that holds classes in words, and its cells; -1 and [] without one."""
     for k, name in enumerate(names):
-        words = read_words(path, k) if name in (*NAMES["class"], *WORD_NAMES) else []
-        if words and (name in NAMES["class"] or not set(PEOPLE).isdisjoint(words)):
+        known = name in (*NAMES["class"], *WORD_NAMES)
+        words = [word.lower() for word in text.words(k, first=1)] if known else []
+        if not all(map(is_number_text, words)) and (name in NAMES["class"] or not set(PEOPLE).isdisjoint(words)):
             return k, words
     return -1, []
 
 
-def _box(column: Callable[[str], Column], have: Set[str]) -> tuple[Column, Column, Column, Column] | None:
-    w, h = column("width"), column("height")
-    if have >= {"left", "top", "width", "height"}:
-        return column("left"), column("top"), w, h
-    if have >= {"left", "top", "right", "bottom"}:
-        return column("left"), column("top"), column("right") - column("left"), column("bottom") - column("top")
-    if have >= {"cx", "cy", "width", "height"}:
-        return column("cx") - w / 2, column("cy") - h / 2, w, h
-    return (column("x"), column("y"), w, h) if have >= {"x", "y", "width", "height"} else None
+def _in_order(column: dict[str, Column], units: dict[str, str]) -> list[Column] | None:
+    """Returns the columns of a MOTChallenge text, or frame, id, x, y in m; None if there is no box and no position."""
+    frame, have = column["frame"], column.keys()
+    column = {
+        "id": np.full_like(frame, -1.0),
+        "class": np.full_like(frame, -1.0),
+        "score": np.ones_like(frame),
+        **column,
+    }
+    ground = [column[axis] * UNITS.get(unit, 1.0) for axis, unit in units.items()]
+    if have >= {"id", "x", "y"} and not have & {"width", "height", "left", "cx"}:
+        return [frame, column["id"], *ground]
+    form = next((form for form in BOXES if have >= {*form}), None)
+    if form is None:
+        return None
+    left, top, w, h = (column[name] for name in form)
+    if "right" in form:
+        w, h = w - left, h - top
+    if "cx" in form:
+        left, top = left - w / 2, top - h / 2
+    metres = form == BOXES[0] and "id" in have and "class" not in have and len(units) == 2 and all(units.values())
+    last = [*ground, np.zeros_like(frame)] if metres else [column["class"]]
+    return [frame, column["id"], left, top, w, h, column["score"], *last]
 
 
 def _refuse(path: Path, names: list[str]) -> NoReturn:
-    raise InputError(
-        file=path, place="line 1", got=f"columns {','.join(names)}", expected=EXPECTED,
-        remedy="rename the columns",
-    )  # fmt: skip
+    got = f"columns {','.join(names)}"
+    raise InputError(file=path, place="line 1", got=got, expected=EXPECTED, remedy="rename the columns")
 
 
 GROUND_COLUMNS = 4  # columns of a text of ground positions alone: frame, id, x, y
@@ -263,6 +265,15 @@ class MotTable:
     rest: Array  # (N, 0 to 4) the columns after the box: confidence or flag; then class and visibility, or x, y, z in m
     group: Ints | None = None  # (N,) labels of a column `group`, -1 for alone
 
+    @property
+    def on_ground(self) -> bool:
+        """True for a text of positions alone."""
+        return bool(self.rows.values.shape[1] == GROUND_COLUMNS)
+
+    def scores(self) -> Array:
+        """Returns column 7 (N,), a confidence or flag; 1 without it."""
+        return self.rest[:, 0] if self.rest.shape[1] else np.ones(len(self.frame))
+
     def boxes(self) -> Array:
         """Returns the boxes of the rows that have one, (B, 4)."""
         return self.box[~self.without_box()]
@@ -281,11 +292,12 @@ def read_table(
     length: the last frame allowed. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors that make the
     boxes pixels. frames_at: as `read_named` takes it. Rows stay in the order of the file.
     """
-    named = column_names(path)
+    text = read_rows(path)
+    named = column_names(text)
     if named is not None:
-        rows, group = read_named(path, named, frames_at)
+        rows, group = read_named(text, named, frames_at)
         return table_of_rows(rows, length, boxless, box_scale, group)
-    rows = read_numbers(path, (6, 10), also=GROUND_COLUMNS, layout=LAYOUT)
+    rows = text.numbers((6, 10), also=GROUND_COLUMNS, layout=LAYOUT)
     reject_missing_ids(rows)
     return table_of_rows(rows, length, boxless, box_scale)
 

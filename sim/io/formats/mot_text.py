@@ -26,8 +26,8 @@ from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.biwi import labels_of
-from sim.io.formats.labels import CHORD, differentiate, labelled_truth_fields, require_size
-from sim.io.formats.mot_table import GROUND_COLUMNS, PEOPLE, MotTable, corner_doubt, read_table, require_pixels
+from sim.io.formats.labels import CHORD, centres, differentiate, labelled_truth_fields, require_size
+from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, read_table, require_pixels
 from sim.io.formats.options import BoxOptions, Classes
 from sim.scene.visibility import scale_of_all_boxes
 from sim.truth.group_hulls import box_groups
@@ -63,29 +63,25 @@ def ground_positions(table: MotTable) -> Array | None:
 
 
 def _known(table: MotTable) -> tuple[Bools | None, str]:
-    if table.rest.shape[1] < 4:
-        return None, ""
-    xyz, known = table.rest[:, 1:4], np.asarray(table.rest[:, 3] != -1)
+    """Returns which rows have a ground position (N,), None if none is one, and what speaks against metres."""
+    known = np.asarray(table.rest[:, 3] != -1) if table.rest.shape[1] > 3 else np.zeros(0, bool)
     if not known.any():
         return None, ""
-    if table.rows.values.shape[1] != GROUND_COLUMNS and not _vouched(table):
-        alone = len(known) == len(np.unique(table.frame))
-        same = len(known) > 1 and bool((xyz == xyz[0]).all())
-        # All rows equal: a category, or a value that stands for "unknown".
-        if same and (not alone or bool((xyz == np.round(xyz)).all())):
-            return None, ""
-        doubt = _doubt(table, known)
-        if doubt:
-            return None, doubt
-    return known, ""
+    if table.on_ground or _vouched(table):
+        return known, ""
+    xyz, alone = table.rest[:, 1:4], len(known) == len(np.unique(table.frame))
+    # All rows equal: a category, or a value that stands for "unknown".
+    if len(known) > 1 and (xyz == xyz[0]).all() and (not alone or (xyz == np.round(xyz)).all()):
+        return None, ""
+    doubt = _doubt(table, known)
+    return (None, doubt) if doubt else (known, "")
 
 
 def require_metres(table: MotTable, fps: float) -> None:
     """Raises InputError if a text of positions alone cannot be in metres: it has no boxes to use instead."""
-    if table.rows.values.shape[1] != GROUND_COLUMNS or _vouched(table):
+    if not table.on_ground or _vouched(table):
         return
-    first, second = _steps(table.frame, table.id)
-    speed = _pace(table.rest[:, 1:3], table.frame, first, second) * fps
+    speed = _pace(table.rest[:, 1:3], table.frame, *_steps(table.frame, table.id)) * fps
     if len(speed) >= ENOUGH and np.median(speed) > FAST:
         raise InputError(
             file=table.rows.file, place="columns x, y", got=f"half of the steps faster than {np.median(speed):.3g} m/s",
@@ -157,13 +153,8 @@ CLASSES = range(1, 14)  # classes of MOTChallenge. A text with another class has
 def unscored_rows(table: MotTable, people: Bools, name: str, person_class: Classes | None) -> Unscored | None:
     """Returns the labelled rows beside `people` (N,), sorted by frame; None if no distractor is among them."""
     found = classes_of(table, person_class is not None)
-    if (
-        found is None
-        or table.rows.classes
-        or table.rest.shape[1] > LABEL_COLUMNS
-        or person_class not in (None, PEDESTRIANS)
-        or not np.isin(found, CLASSES).all()
-    ):
+    usual = not table.rows.classes and table.rest.shape[1] <= LABEL_COLUMNS and person_class in (None, PEDESTRIANS)
+    if found is None or not usual or not np.isin(found, CLASSES).all():
         return None
     mot20 = any(each.startswith(MOT20) for each in (name, table.rows.file.resolve().parent.parent.name))
     distractor = np.isin(found, MOT20_DISTRACTORS if mot20 else DISTRACTORS)
@@ -190,19 +181,16 @@ def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
     """
     keep, file = np.asarray(table.id >= 0), table.rows.file
     if len(keep) and not keep.any():
-        raise InputError(
-            file=file, place="column 2", got=f"negative ids in all {len(keep)} rows", expected="ids from 0",
-            remedy="give each person an id",
-        )  # fmt: skip
-    flag = table.rest[:, 0] if table.rest.shape[1] else np.ones(len(keep))
+        got, remedy = f"negative ids in all {len(keep)} rows", "give each person an id"
+        raise InputError(file=file, place="column 2", got=got, expected="ids from 0", remedy=remedy)
+    flag = table.scores()
     # Column 7 of another text may be a confidence.
     if file.name == LABELS or (np.isin(flag, (0, 1, -1)).all() and flag.any()):
         keep &= flag != 0
         if len(keep) and not keep.any():
-            raise InputError(
-                file=file, place="column 7", got=f"0 in all {len(keep)} rows, which leaves nobody",
-                expected="another flag than 0 for people", remedy="write 1 in column 7 of rows that count",
-            )  # fmt: skip
+            got, expected = f"0 in all {len(keep)} rows, which leaves nobody", "another flag than 0 for people"
+            remedy = "write 1 in column 7 of rows that count"
+            raise InputError(file=file, place="column 7", got=got, expected=expected, remedy=remedy)
     elif (flag == 0).all() and len(keep):
         text = f"{file}: column 7 is 0 in all {len(keep)} rows; it is taken as a confidence, and all rows count"
         warnings.warn(text, stacklevel=2)
@@ -213,10 +201,8 @@ def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
 def require_classes(table: MotTable, person_class: Classes | None) -> None:
     """Raises InputError if the user named the class of people, and the text has no classes."""
     if person_class is not None and classes_of(table, True) is None:
-        raise InputError(
-            file=table.rows.file, place="--class", got="no classes", expected="a column class, or classes in column 8",
-            remedy="leave --class out",
-        )  # fmt: skip
+        got, expected = "no classes", "a column class, or classes in column 8"
+        raise InputError(file=table.rows.file, place="--class", got=got, expected=expected, remedy="leave --class out")
 
 
 def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bools:
@@ -233,10 +219,8 @@ def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bool
     others = [f"{n} rows of class {each}" for each, n in zip(name, counts, strict=True) if n]
     said, people_are = ", ".join(others[:SHOWN]) + ", …" * (len(others) > SHOWN), " or ".join(wanted)
     if not people.any():
-        raise InputError(
-            file=file, place="classes", got=said, expected=f"people, of class {people_are}",
-            remedy="name the classes of people with --class",
-        )  # fmt: skip
+        remedy = "name the classes of people with --class"
+        raise InputError(file=file, place="classes", got=said, expected=f"people, of class {people_are}", remedy=remedy)
     if others and person_class is None:
         text = f"{file}: {said} are left out; people are class {people_are} (--class says otherwise)"
         warnings.warn(text, stacklevel=3)
@@ -245,17 +229,14 @@ def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bool
 
 def classes_of(table: MotTable, named: bool) -> Array | None:
     """Returns column 8 (N,) if it holds classes, else None. named: True if the user named one (--class)."""
-    if table.rest.shape[1] < 2 or table.rows.values.shape[1] == GROUND_COLUMNS:
+    if table.rest.shape[1] < 2 or table.on_ground or (table.rest[:, 1] == -1).all():
         return None
     column = table.rest[:, 1]
-    if (column == -1).all():
-        return None
     if table.rest.shape[1] < 4:
         return column
-    if (column < 0).any() or (column != np.round(column)).any():
-        return None
+    whole = (column >= 0).all() and (column == np.round(column)).all()
     # If columns 8 to 10 are no metres, column 8 may be a category, as in VisDrone.
-    return column if named or (table.rest[:, 3] == -1).all() or _one_for_each(table, column) else None
+    return column if whole and (named or (table.rest[:, 3] == -1).all() or _one_for_each(table, column)) else None
 
 
 def _one_for_each(table: MotTable, column: Array) -> bool:
@@ -291,17 +272,6 @@ def unit_scores(score: Array) -> tuple[Array, str]:
     mapped = 1 / (1 + np.exp(-np.clip((score - c) / d, -500, 500)))
     span = f"scores from {score.min():g} to {score.max():g}"
     return mapped, f"{span} are mapped into 0 to 1 by 1 / (1 + exp(-(score - {c:g}) / {d:g}))"
-
-
-def _good_scores(path: Path, score: Array, least: float | None) -> Bools:
-    """Returns flags (N,) of scores that are not below the least one. Raises InputError if none is left."""
-    good = np.asarray(score >= (-np.inf if least is None else least))
-    if len(score) and not good.any():
-        raise InputError(
-            file=path, place="--min-score", got=least, expected=f"at most {score.max():g}, the greatest score",
-            remedy="lower it",
-        )  # fmt: skip
-    return good
 
 
 # remedy if most rows have the id of another row of their frame
@@ -341,13 +311,16 @@ def detections_of_table(table: MotTable, options: BoxOptions) -> DetectionTable:
     boxless = _reject_placeless(table, ground)
     path, rows = table.rows.file, np.argsort(table.frame, kind="stable")
     rows = rows[of_class(table, np.ones(len(rows), bool), options.person_class)[rows]]
-    raw = table.rest[rows, 0] if table.rest.shape[1] else np.ones(len(rows))
+    raw = table.scores()[rows]
     score, mapped = unit_scores(raw)
     if mapped:
         warnings.warn(f"{path}: {mapped}", stacklevel=3)
     plane: Plane = "image" if ground is None or np.isnan(ground).any() else "ground"
-    pos = ground[:, :2] if plane == "ground" and ground is not None else table.box[:, :2] + table.box[:, 2:] / 2
-    good = _good_scores(path, raw, options.min_score)
+    pos = ground[:, :2] if plane == "ground" and ground is not None else centres(table.box)
+    good = raw >= (-np.inf if options.min_score is None else options.min_score)
+    if len(raw) and not good.any():
+        got, expected = options.min_score, f"at most {raw.max():g}, the greatest score"
+        raise InputError(file=path, place="--min-score", got=got, expected=expected, remedy="lower it")
     rows, score = rows[good], score[good]
     box = None if boxless.any() else table.box[rows]
     return DetectionTable(table.frame[rows], table.id[rows], plane, pos[rows], box, score)
@@ -415,23 +388,16 @@ def truth_of_table(
         z=None if place is None else place[:, 2],
         labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip
-    label = _labels(table, order)
-    return truth if label is None else _labelled(truth, label, table.rows.file)
+    path = group_file(table.rows.file)
+    if table.group is not None:
+        table.rows.reject(table.group < -1, "groups from 0, or -1 for alone", "correct the group")
+        return _labelled(truth, table.group[order], path)
+    return _labelled(truth, labels_of(path, id), path) if is_present(path) else truth
 
 
 def group_file(path: Path) -> Path:
     """Returns where the groups of a text are: groups.txt beside gt.txt, NAME.groups.txt beside another NAME.txt."""
     return path.with_name("groups.txt" if path.name == LABELS else f"{path.stem}.groups.txt")
-
-
-def _labels(table: MotTable, order: Ints) -> Ints | None:
-    if table.group is not None:
-        table.rows.reject(table.group < -1, "groups from 0, or -1 for alone", "correct the group")
-        return table.group[order]
-    path = group_file(table.rows.file)
-    if not is_present(path):
-        return None
-    return labels_of(path, table.id[order])
 
 
 def _labelled(truth: Truth, label: Ints, file: Path) -> Truth:
@@ -443,10 +409,9 @@ def _labelled(truth: Truth, label: Ints, file: Path) -> Truth:
     rows, fps, length = (truth.frame, truth.id, label), truth.fps, truth.length
     if truth.pos is not None and truth.vel is not None and np.isfinite(truth.pos).all():
         return truth.replace(**labelled_truth_fields(*rows, truth.pos, truth.vel, fps=fps, length=length))
-    box = truth.box
-    assert box is not None, "a row without box has a position"
-    pos = box[:, :2] + box[:, 2:] / 2
+    assert truth.box is not None, "a row without box has a position"
+    pos = centres(truth.box)
     vel = differentiate(truth.frame, truth.id, pos, fps, CHORD)
     known = labelled_truth_fields(*rows, pos, vel, fps=fps, length=length, px_per_m=truth.px_per_m)
-    shapes = box_groups(*rows, pos, vel, box, 1, length)
+    shapes = box_groups(*rows, pos, vel, truth.box, 1, length)
     return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))

@@ -9,7 +9,7 @@ from typing import Any
 
 from scenarios.errors import InputError
 from scenarios.limits import PICTURE_SIDE
-from sim.io.files.numeric_text import is_number_text
+from sim.io.files.numeric_text import number_or_nan
 from sim.io.pictures.background_sample import BackgroundChoice
 from sim.types import Camera
 
@@ -67,12 +67,11 @@ NO_OPTIONS = RecordingOptions()
 def parse_box_scale(text: str) -> BoxScale:
     """Returns the factors of x and y that a text such as "2" or "1920,1080" names."""
     cells = text.split(",")
-    factors = [float(cell) if is_number_text(cell) else float("nan") for cell in cells]
+    factors = list(map(number_or_nan, cells))
     if len(cells) > 2 or not all(0 < f <= PICTURE_SIDE for f in factors):
-        raise InputError(
-            place="--box-scale", got=repr(text), expected=f"X or X,Y, above 0, at most {PICTURE_SIDE}",
-            remedy="give pixels of the picture per unit of the boxes",
-        )  # fmt: skip
+        got, expected = repr(text), f"X or X,Y, above 0, at most {PICTURE_SIDE}"
+        remedy = "give pixels of the picture per unit of the boxes"
+        raise InputError(place="--box-scale", got=got, expected=expected, remedy=remedy)
     return factors[0], factors[-1]
 
 
@@ -81,6 +80,5 @@ def parse_classes(given: int | str) -> Classes:
     classes = tuple(cell.strip().lower() for cell in str(given).split(","))
     if all(classes):
         return classes
-    raise InputError(
-        place="--class", got=repr(given), expected="classes apart by commas, as 1,2 or person", remedy="correct it"
-    )
+    expected = "classes apart by commas, as 1,2 or person"
+    raise InputError(place="--class", got=repr(given), expected=expected, remedy="correct it")

@@ -13,6 +13,7 @@ have a score as the 18th. People are of the types in PEOPLE, and are read with t
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from dataclasses import replace
@@ -24,7 +25,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, is_number
 from scenarios.reading import parse_json
-from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, is_number_text, read_numbers, read_text
+from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_nan, read_rows, read_text
 from sim.io.formats.biwi import frame_numbers
 from sim.io.formats.labels import labelled_sequence, require_size
 from sim.io.formats.mot_table import table_of_rows
@@ -57,7 +58,7 @@ def layout_of(path: Path) -> str | None:
     if comments:
         return "pedpy" if any(PEDPY.match(line) for line in comments) else None
     cells = lines[0].split() if lines else []
-    numbers = [is_number_text(cell) for cell in cells[:4]]
+    numbers = [not math.isnan(number_or_nan(cell)) for cell in cells[:4]]
     if len(cells) == 4 and all(numbers):
         return "eth"
     return "kitti" if len(cells) in KITTI_CELLS and numbers == [True, True, False, True] else None
@@ -90,19 +91,19 @@ def _counted(rows: NumericTable) -> NumericTable:
 
 
 def _read_eth(path: Path, fps: float | None) -> People:
-    return _counted(read_numbers(path, (4, 4), layout="frame id x y")), None
+    return _counted(read_rows(path).numbers((4, 4), layout="frame id x y")), None
 
 
 def _read_pedpy(path: Path, fps: float | None) -> People:
     comments = "\n".join(line for line in read_text(path).splitlines() if line.startswith("#"))
     rates = {rate.rstrip(".") for rate in FRAMERATE.findall(comments)}
-    values = {float(rate) if is_number_text(rate) else float("nan") for rate in rates}
+    values = {number_or_nan(rate) for rate in rates}
     stated = values.pop() if len(values) == 1 else None
     if not is_number(fps or stated, *FRAME_RATES):
         expected = "frames per second from {:g} to {:g}".format(*FRAME_RATES)
         got = " and ".join(sorted(rates)) or "none"
         raise InputError(file=path, place="# framerate", got=got, expected=expected, remedy="correct it, or give --fps")
-    rows = read_numbers(path, (4, 12), layout="id frame x y z", comments=True)
+    rows = read_rows(path, comments=True).numbers((4, 12), layout="id frame x y z")
     raw = rows.integers(1, "frame")
     centimetres = X_IN_CM.search(comments) or (IN_CM.search(comments) and not X_IN_M.search(comments))
     pos = rows.values[:, 2:4] * (0.01 if centimetres else 1.0)
@@ -110,37 +111,34 @@ def _read_pedpy(path: Path, fps: float | None) -> People:
 
 
 def _read_ndjson(path: Path, fps: float | None) -> People:
-    rows, lines, rates = [], [], set[float]()
-    for number, line in enumerate(read_text(path).splitlines(), 1):
-        if not line.strip():
-            continue
-        track, rate = _json_row(path, number, line)
-        if track is not None:
-            rows.append(track)
-            lines.append(number)
-        elif rate is not None:
-            rates.add(rate)
-            if len(rates) > 1:
-                raise _bad(path, number, f"fps {rate:g}", f"{min(rates - {rate}):g}, as in earlier scenes")
+    text, kept, rows, rates = read_rows(path), list[int](), list[list[float]](), set[float]()
+    for number, line in zip(text.line.tolist(), text.text, strict=True):
+        match _json(path, number, line):
+            case {"track": {"f": f, "p": p, "x": x, "y": y}} if all(map(_is_place, (f, p, x, y))):
+                rows.append([f, p, x, y])
+                kept.append(number)
+            case {"scene": {"fps": rate}} if is_number(rate, *FRAME_RATES):
+                if not rates <= {rate}:
+                    raise _bad(path, number, f"fps {rate:g}", f"{rates.pop():g}, as in earlier scenes")
+                rates.add(float(rate))
+            case {"scene": dict() as scene} if "fps" not in scene:
+                pass
+            case _:
+                expected = '{"track": {"f", "p", "x", "y"}} of numbers, or {"scene": {…, "fps"}}'
+                raise _bad(path, number, line.strip()[:80], expected)
     values = np.array(rows, np.float64).reshape(-1, 4)
-    rows_of_file = NumericTable(path, values, np.array(lines, np.int64), "f, p, x, y")
-    return _counted(rows_of_file), next(iter(rates), None)
+    return _counted(NumericTable(path, values, np.array(kept, np.int64), "f, p, x, y")), next(iter(rates), None)
 
 
-def _json_row(path: Path, number: int, line: str) -> tuple[list[float] | None, float | None]:
-    """Returns (frame, person, x, y) of a line with a track, or the frame rate of one with a scene."""
+def _is_place(value: object) -> bool:
+    return is_number(value, -LARGEST, LARGEST)
+
+
+def _json(path: Path, number: int, line: str) -> object:
     try:
-        value = parse_json(line, path)
+        return parse_json(line, path)
     except InputError as error:
         raise _bad(path, number, error.got, "a JSON object") from None
-    match value:
-        case {"track": {"f": f, "p": p, "x": x, "y": y}} if all(is_number(v, -LARGEST, LARGEST) for v in (f, p, x, y)):
-            return [float(v) for v in (f, p, x, y)], None
-        case {"scene": {"fps": fps}} if is_number(fps, *FRAME_RATES):
-            return None, float(fps)
-        case {"scene": dict() as scene} if "fps" not in scene:
-            return None, None
-    raise _bad(path, number, line.strip()[:80], '{"track": {"f", "p", "x", "y"}} of numbers, or {"scene": {…, "fps"}}')
 
 
 def _bad(path: Path, number: int, got: object, expected: str) -> InputError:
@@ -148,20 +146,17 @@ def _bad(path: Path, number: int, got: object, expected: str) -> InputError:
 
 
 def _read_kitti(path: Path, fps: float | None) -> People:
-    numbered = [(k, line.split()) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
-    for number, cells in numbered:
-        if len(cells) not in KITTI_CELLS or not all(map(is_number_text, [*cells[:2], *cells[6:10]])):
-            raise _bad(path, number, " ".join(cells)[:80], f"{KITTI_CELLS[0]} cells, {KITTI_LAYOUT}")
-    people = [(k, cells) for k, cells in numbered if cells[2] in PEOPLE]
-    if not people:
-        got = ", ".join(sorted({cells[2] for _, cells in numbered}))
+    text = read_rows(path)
+    rows = text.numbers(KITTI_CELLS, layout=KITTI_LAYOUT, use=[0, 1, 6, 7, 8, 9])
+    kinds = np.array(text.words(2))
+    people = np.isin(kinds, PEOPLE)
+    if not people.any():
+        got = ", ".join(np.unique(kinds).tolist())
         raise InputError(file=path, got=got, expected=" or ".join(PEOPLE), remedy="give labels of people")
-    values = np.array([[*cells[:2], *cells[6:10]] for _, cells in people], float)
-    rows = NumericTable(path, values, np.array([k for k, _ in people]), KITTI_LAYOUT)
-    rows.reject(~np.isfinite(values).all(axis=1), "finite numbers", CORRECT)
-    rows.reject(values[:, 0] < 0, "frames from 0", "correct the frame")
-    first, corner = values[:, :1] + 1, values[:, 2:4]
-    return replace(rows, values=np.hstack([first, values[:, 1:4], values[:, 4:] - corner])), KITTI_FPS
+    rows = replace(rows, values=rows.values[people], line=rows.line[people])
+    rows.reject(rows.values[:, 0] < 0, "frames from 0", "correct the frame")
+    frame, id, corner, far = np.hsplit(rows.values, (1, 2, 4))
+    return replace(rows, values=np.hstack([frame + 1, id, corner, far - corner])), KITTI_FPS
 
 
 LAYOUTS = {"trajnet": _read_ndjson, "eth": _read_eth, "pedpy": _read_pedpy, "kitti": _read_kitti}

@@ -54,25 +54,23 @@ class BackgroundChoice:
             return self
         if self.asked:
             got = f"a recording of {length} frames" if length < self.count else f"pictures of {width}×{height} px"
-            raise InputError(
-                file=path, place="--background", got=got, expected=f"{self.count} or more that fit into 2 GB",
-                remedy=f"ask for {min(length, most)} or fewer, or give a longer recording",
-            )  # fmt: skip
+            expected = f"{self.count} or more that fit into 2 GB"
+            remedy = f"ask for {min(length, most)} or fewer, or give a longer recording"
+            raise InputError(file=path, place="--background", got=got, expected=expected, remedy=remedy)
         return replace(self, count=min(self.count, length, most))
 
     def empty(self, size: tuple[int, int] | None) -> Image:
         """Returns the picture of the empty place, which must be `size` (width, height) px; None: any."""
         assert self.picture is not None
         picture = read_picture(self.picture)
-        if picture is None:
-            got = "no picture that can be read" if self.picture.is_file() else "no such file"
-            expected, remedy = "a JPG or PNG of the empty place", "check the path, or store the picture anew"
-            raise InputError(file=self.picture, place="--background", got=got, expected=expected, remedy=remedy)
-        if size not in (None, size_of(picture)):
+        if picture is not None and size in (None, size_of(picture)):
+            return picture
+        got = "no picture that can be read" if self.picture.is_file() else "no such file"
+        expected, remedy = "a JPG or PNG of the empty place", "check the path, or store the picture anew"
+        if picture is not None:
             got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px, as the recording".format(*size or ())
             remedy = "give a picture of the same camera in the same size"
-            raise InputError(file=self.picture, place="--background", got=got, expected=expected, remedy=remedy)
-        return picture
+        raise InputError(file=self.picture, place="--background", got=got, expected=expected, remedy=remedy)
 
     def indices(self, length: int) -> list[int]:
         """Returns the frames of the sample, from 1 and ascending, of a recording of `length` frames."""
@@ -90,10 +88,8 @@ def parse_choice(text: str | None) -> BackgroundChoice:
     if found is None and Path(text).suffix.lower() in SUFFIXES:
         return BackgroundChoice(picture=Path(text))
     if found is None or int(found[2]) < 1:
-        raise InputError(
-            place="--background", got=text, expected="first:N or spread:N, N frames, or a picture (JPG, PNG)",
-            remedy="for instance first:50",
-        )  # fmt: skip
+        expected = "first:N or spread:N, N frames, or a picture (JPG, PNG)"
+        raise InputError(place="--background", got=text, expected=expected, remedy="for instance first:50")
     return BackgroundChoice("first" if found[1] == "first" else "spread", int(found[2]), True)
 
 
@@ -118,10 +114,9 @@ class BackgroundSample:
                 found = np.empty((len(wanted), *picture.shape), np.uint8)
             found[count - 1] = picture
         if not count:
-            raise InputError(
-                file=self.path, got="no readable picture in the background sample", expected="at least one",
-                remedy="choose other frames: --background first:N or spread:N",
-            )  # fmt: skip
+            got, expected = "no readable picture in the background sample", "at least one"
+            remedy = "choose other frames: --background first:N or spread:N"
+            raise InputError(file=self.path, got=got, expected=expected, remedy=remedy)
         if 2 * count < len(wanted):
             words = f"only {count} of the {len(wanted)} frames of the background sample have a readable picture"
             remedy = "number the pictures 1, 2, 3, …, or choose other frames with --background"

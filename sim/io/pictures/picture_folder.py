@@ -15,6 +15,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from scenarios.limits import FRAMES, fits_picture
-from scenarios.reading import refuse_irregular
+from scenarios.reading import is_present
 from sim.io.files.own_files import is_hidden
 from sim.types import Image, Ints
 
@@ -96,21 +97,22 @@ def frames_of(folder: Path, files: list[Path], numbering: Numbering | None) -> d
         return {frame: path for frame, (_, path) in enumerate(ordered, 1)}
     numbers = _numbers(keys)
     if files and numbers is None:
-        raise InputError(
-            file=folder, got=files[0].name, expected="names with frame numbers", remedy="rename the pictures"
-        )
+        raise _wrong(folder, files[0].name, "names with frame numbers")
     found: dict[int, Path] = {}
     for number, path in sorted(zip(numbers or (), files, strict=True)):
-        frame, rest = divmod(number - numbering.origin, numbering.step)
-        frame += 1
-        if frame in found:
-            got = f"{found[frame].name} and {path.name}"
-            raise InputError(file=folder, got=got, expected="one picture of each frame", remedy="remove one of the two")
-        if rest or not 1 <= frame <= FRAMES:
+        before, rest = divmod(number - numbering.origin, numbering.step)
+        if before + 1 in found:
+            got = f"{found[before + 1].name} and {path.name}"
+            raise _wrong(folder, got, "one picture of each frame", "remove one of the two")
+        if rest or not 0 <= before < FRAMES:
             expected = f"frames up to {FRAMES}, numbered from {numbering.origin} in steps of {numbering.step}"
-            raise InputError(file=folder, got=path.name, expected=expected, remedy="rename the pictures")
-        found[frame] = path
+            raise _wrong(folder, path.name, expected)
+        found[before + 1] = path
     return found
+
+
+def _wrong(folder: Path, got: str, expected: str, remedy: str = "rename the pictures") -> InputError:
+    return InputError(file=folder, got=got, expected=expected, remedy=remedy)
 
 
 def _key(path: Path) -> Key:
@@ -119,18 +121,14 @@ def _key(path: Path) -> Key:
 
 
 def _refuse_odd_names(folder: Path, files: list[Path], keys: list[Key]) -> None:
-    counts = Counter(words for words, numbers in keys if numbers)
-    if not counts:
-        return
-    usual, count = counts.most_common(1)[0]
-    odd = [path.name for path, (words, _) in zip(files, keys, strict=True) if words != usual]
-    if count > 1 and odd:
-        example = next(path.name for path, (words, _) in zip(files, keys, strict=True) if words == usual)
+    counts = Counter(words for words, numbers in keys if numbers).most_common(1)
+    usual, odd = list[str](), list[str]()
+    for path, (words, _) in zip(files, keys, strict=True):
+        (usual if counts and words == counts[0][0] else odd).append(path.name)
+    if len(usual) > 1 and odd:
         more = f" and {len(odd) - 1} more" if len(odd) > 1 else ""
-        raise InputError(
-            file=folder, got=f"{odd[0]}{more} beside {example}", expected="names that differ in their numbers only",
-            remedy="move copies and other pictures elsewhere",
-        )  # fmt: skip
+        got, expected = f"{odd[0]}{more} beside {usual[0]}", "names that differ in their numbers only"
+        raise _wrong(folder, got, expected, "move copies and other pictures elsewhere")
 
 
 def _numbers(keys: list[Key]) -> list[int] | None:
@@ -138,10 +136,9 @@ def _numbers(keys: list[Key]) -> list[int] | None:
         return None
     columns = list(zip(*(numbers for _, numbers in keys), strict=True))
     varying = [column for column in columns if len(set(column)) > 1]
-    if len(varying) > 1:
-        return None
-    found = list((varying or columns[-1:])[0])
-    return None if max(found) - min(found) >= SPARSE * len(found) else found
+    found = (varying or columns[-1:])[0]
+    stamps = len(varying) > 1 or max(found) - min(found) >= SPARSE * len(found)
+    return None if stamps else list(found)
 
 
 def _labelled_numbering(folder: Path, found: Ints, length: int | None, labels: Ints) -> Numbering:
@@ -162,11 +159,9 @@ def _labelled_numbering(folder: Path, found: Ints, length: int | None, labels: I
     # Both readings are possible.
     doubtful = low == 0 or (low > 1 and last <= span) or (low == 1 and last == count < span)
     if doubtful or last < low or first > high:
-        raise InputError(
-            file=folder, got=f"{count} pictures numbered {low} to {high}, and labels of frames {first} to {last}",
-            expected="pictures and labels with the same numbers",
-            remedy="rename the pictures: each gets the number of its labels, from 000001",
-        )  # fmt: skip
+        got = f"{count} pictures numbered {low} to {high}, and labels of frames {first} to {last}"
+        remedy = "rename the pictures: each gets the number of its labels, from 000001"
+        raise _wrong(folder, got, "pictures and labels with the same numbers", remedy)
     return Numbering()
 
 
@@ -184,21 +179,17 @@ def fill_gaps(pairs: Iterable[tuple[int, Image]], length: int | None, place: str
     length: None: up to the last pair. The first missing frame causes a warning about the recording `place`.
     """
     shown, warned = 0, False
-    for number, picture in pairs:
+    # The end is a last pair without a picture.
+    for number, picture in chain(pairs, [((length or 0) + 1, None)]):
         for lost in range(shown + 1, number):
-            warned = warned or _warn_lost(place, lost)
+            if not warned:
+                text = f"{place}: frame {lost} has no readable picture; it and any others like it are lost frames"
+                warnings.warn(text, stacklevel=2)
+            warned = True
             yield None
         shown = max(shown, number)
-        yield picture
-    for lost in range(shown + 1, (length or 0) + 1):
-        warned = warned or _warn_lost(place, lost)
-        yield None
-
-
-def _warn_lost(place: str, frame: int) -> bool:
-    text = f"{place}: frame {frame} has no readable picture; it and any others like it are lost frames"
-    warnings.warn(text, stacklevel=3)
-    return True
+        if picture is not None:
+            yield picture
 
 
 def size_of(picture: NDArray[Any]) -> tuple[int, int]:
@@ -268,10 +259,8 @@ class PictureFolder:
     def read(self, frames: Iterable[int], size: tuple[int, int] | None) -> Iterator[tuple[int, Image]]:
         """Yields (frame, picture) of those `frames` whose picture can be read, all of this size, in px."""
         if size is None:
-            raise InputError(
-                file=self.folder, got=f"{len(self.files)} pictures, none of which can be read", expected="JPG or PNG",
-                remedy="restore the files",
-            )  # fmt: skip
+            got = f"{len(self.files)} pictures, none of which can be read"
+            raise _wrong(self.folder, got, "JPG or PNG", "restore the files")
         for k in frames:
             picture = read_picture(self.files[k]) if k in self.files else None
             if picture is not None:
@@ -293,7 +282,7 @@ def find_right_pictures(folder: Path, left: PictureFolder) -> PictureFolder:
     files = _picture_files(folder)
     if files and left.numbering is None and len(files) != len(left.files):
         got, expected = f"{len(files)} pictures without numbers", f"{len(left.files)}, as in {left.folder.name}"
-        raise InputError(file=folder, got=got, expected=expected, remedy="number the pictures of both cameras")
+        raise _wrong(folder, got, expected, "number the pictures of both cameras")
     return PictureFolder(folder, frames_of(folder, files, left.numbering), left.numbering)
 
 
@@ -301,6 +290,4 @@ def _picture_files(folder: Path) -> list[Path]:
     if not os.path.isdir(folder):
         return []
     found = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES and not is_hidden(p))
-    for path in found:
-        refuse_irregular(path)
-    return found
+    return [path for path in found if is_present(path)]

@@ -24,7 +24,7 @@ from sim.io.files.tables import Column, columns_of, read_table, table_bytes
 from sim.io.pictures import video_files
 from sim.io.pictures.picture_folder import require_size
 from sim.io.pictures.video_files import VideoWriter, write_video
-from sim.io.store.seal import REDO, file_facts, whole_file
+from sim.io.store.seal import REDO, check_file, file_facts
 from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
 
 JPG_QUALITY = 95
@@ -107,8 +107,7 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
             if pixels is not None:
                 known.append(pixels.replace(ids=np.zeros((0, 0), np.int64), disparity=None))
     files = {name: facts for output in outputs.values() for name, facts in output.files.items()}
-    for path in (folder / streams.file_name(name, images, 1) for name in movies):
-        files |= file_facts({path.name: path.read_bytes()})
+    files |= file_facts({(path := folder / streams.file_name(name, images, 1)).name: path for name in movies})
     if known and sequence.truth is not None:
         body = pixel_table(sequence.truth, known)
         atomic.write_inside(folder / TABLE, body)
@@ -119,15 +118,14 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
 
 def _picture(name: str, sequence: Sequence, frame: Frame, pixels: PixelTruth | None) -> NDArray[Any]:
     """Returns a frame's picture of a stream; InputError without one."""
-    if name == "left" and frame.image is not None:
-        return frame.image
-    if name == "right" and frame.right is not None:
-        return frame.right
+    picture: NDArray[Any] | None = {"left": frame.image, "right": frame.right}.get(name)
     if name == "ids" and pixels is not None:
-        return streams.encode_ids(pixels.ids)
+        picture = streams.encode_ids(pixels.ids)
     if name == "disparity" and pixels is not None and pixels.disparity is not None:
-        return streams.encode_disparity(pixels.disparity, sequence.camera)
-    raise _missing(sequence, name)
+        picture = streams.encode_disparity(pixels.disparity, sequence.camera)
+    if picture is None:
+        raise _missing(sequence, name)
+    return picture
 
 
 def _missing(sequence: Sequence, stream: str) -> InputError:
@@ -177,11 +175,18 @@ class StoredPictures:
 
     def body(self, name: str) -> bytes:
         """Returns the bytes of a file; raises InputError if they are not those that the manifest names."""
-        path, facts = self.folder / name, self.manifest["files"].get(name)
-        if facts is None:
+        path = self.folder / name
+        body = path.read_bytes() if path.is_file() else b""
+        self.check(name, body)
+        return body
+
+    def check(self, name: str, body: bytes | None = None) -> None:
+        """Raises InputError if a file is not the one that the manifest names. body: its content, if it was read."""
+        path, files = self.folder / name, self.manifest["files"]
+        if name not in files:
             got, expected = "a manifest that does not name it", "a file that manifest.json names"
             raise InputError(file=path, got=got, expected=expected, remedy=REDO)
-        return whole_file(path, facts)
+        check_file(path, files[name], body=body)
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
         """Returns picture `index` (from 1) of a stream of picture files: BGR, or codes of ids and disparity."""
@@ -208,7 +213,7 @@ class StoredPictures:
             return
         name, found = streams.file_name(stream, self.images, 1), 0
         path = self.folder / name
-        self.body(name)  # Compares its hash.
+        self.check(name)
         for found, (_, picture) in enumerate(
             video_files.decode_frames(path, video_files.index_packets(path), wanted), 1
         ):

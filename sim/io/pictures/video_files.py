@@ -25,6 +25,7 @@ import numpy as np
 from scenarios.errors import InputError, WorkError
 from scenarios.limits import FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.reading import require_regular
+from sim.io.pictures.picture_folder import require_size
 from sim.types import Array, Image
 
 COVER = "attached_pic"
@@ -68,10 +69,8 @@ class PacketIndex:
         ranks = self.ranks()
         if ranks is None:
             return None
-        group = np.cumsum(self.keys)
-        return {
-            int(g) for g, stamp in zip(group, self.stamps, strict=True) if stamp is not None and ranks[stamp] in wanted
-        }
+        group = np.cumsum(self.keys).tolist()
+        return {g for g, stamp in zip(group, self.stamps, strict=True) if stamp is not None and ranks[stamp] in wanted}
 
 
 @contextmanager
@@ -87,11 +86,10 @@ def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
         raise InputError(file=path, got=got, expected="a whole video file", remedy=REMEDY) from None
     with container:
         streams = [s for s in container.streams.video if COVER not in str(getattr(s, "disposition", "")).lower()]
-        if not streams:
-            raise InputError(file=path, got="no video stream", expected="a video stream", remedy=REMEDY)
+        if not streams or streams[0].codec_context is None:
+            got = "an unknown codec" if streams else "no video stream"
+            raise InputError(file=path, got=got, expected="a video stream, as of H.264", remedy=REMEDY)
         stream = streams[0]
-        if stream.codec_context is None:
-            raise InputError(file=path, got="an unknown codec", expected="H.264 or the like", remedy=REMEDY)
         width, height = stream.codec_context.width, stream.codec_context.height
         if not fits_picture(width, height) or not fits_picture(*square_size(width, height, _aspect(stream))):
             got = f"{width}×{height} px" + (f" of shape {aspect}" if (aspect := _aspect(stream)) != 1 else "")
@@ -116,8 +114,7 @@ def index_packets(path: Path) -> PacketIndex:
                 if p.size and not p.is_discard:
                     found.append((p.pts, bool(p.is_keyframe)))
                 if len(found) > FRAMES:
-                    got, expected = f"more than {FRAMES} frames", f"at most {FRAMES}"
-                    raise InputError(file=path, got=got, expected=expected, remedy="cut the video")
+                    raise InputError(file=path, got="more frames", expected=f"at most {FRAMES}", remedy="cut the video")
         except av.FFmpegError as error:
             broken = _reason(error)
         context = stream.codec_context
@@ -145,14 +142,6 @@ def _seconds(stream: Any) -> float:
     return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + float(found[3]) if found else 0.0
 
 
-def _demuxed(container: Any, stream: Any) -> Iterator[Any]:
-    """Yields the packets up to the first that cannot be read; the last, empty one flushes the decoder."""
-    import av
-
-    with suppress(av.FFmpegError):
-        yield from container.demux(stream)
-
-
 def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
     """Yields (frame, picture) in the order in which frames are shown, of all frames or those `wanted`."""
     ranks, last, count = index.ranks(), max(wanted or [0]), 0
@@ -170,17 +159,20 @@ def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = Non
 
 def _decoded(container: Any, stream: Any, groups: set[int] | None) -> Iterator[Any]:
     """Yields the decoded libav frames as shown, None for a packet that cannot be decoded, of these packet groups."""
+    import av
+
     group, running = 0, False
-    for packet in _demuxed(container, stream):
-        group += packet.is_keyframe
-        if packet.size and groups is not None and group not in groups:
-            if running:
+    # Up to the first packet that cannot be read; the last, empty one flushes the decoder.
+    with suppress(av.FFmpegError):
+        for packet in container.demux(stream):
+            group += packet.is_keyframe
+            if not packet.size or groups is None or group in groups:
+                running = True
+                yield from _decode_packet(stream, packet)
+            elif running:
                 yield from _decode_packet(stream, None)
                 stream.codec_context.flush_buffers()
-            running = False
-            continue
-        running = True
-        yield from _decode_packet(stream, packet)
+                running = False
 
 
 def _decode_packet(stream: Any, packet: Any) -> list[Any]:
@@ -226,11 +218,11 @@ def write_video(
     size: (width, height) px, both even. quality: x264's constant rate factor, lower is better. Raises OSError if the
     file cannot be written, and WorkError if the finished video lacks pictures.
     """
+    import av
+
     if size[0] % 2 or size[1] % 2:
-        raise InputError(
-            place="--images mp4", got="pictures of {}×{} px".format(*size), expected="an even width and height",
-            remedy="take --images jpg or png, or another camera.image",
-        )  # fmt: skip
+        got, remedy = "pictures of {}×{} px".format(*size), "take --images jpg or png, or another camera.image"
+        raise InputError(place="--images mp4", got=got, expected="an even width and height", remedy=remedy)
     path.write_bytes(b"")  # libav makes no file without pictures
     made = VideoWriter(path, size, fps, quality, comment)
     try:
@@ -238,22 +230,15 @@ def write_video(
         made.end()
     finally:
         made.close()
-    written = _pictures_in(path) if made.count else 0
-    if written != made.count:
-        raise WorkError(
-            file=path, got=f"{written} of {made.count} pictures in the finished video", expected="all of them",
-            remedy="free some room on the disk, then run it again",
-        )  # fmt: skip
-
-
-def _pictures_in(path: Path) -> int:
-    import av
-
-    try:
-        with av.open(str(path)) as container:
-            return sum(packet.size > 0 and not packet.is_corrupt for packet in container.demux(video=0))
-    except (av.FFmpegError, IndexError):
-        return 0
+    written = 0
+    with suppress(av.FFmpegError, IndexError), av.open(str(path)) as container:
+        written = sum(packet.size > 0 and not packet.is_corrupt for packet in container.demux(video=0))
+    if made.count and written != made.count:
+        got, remedy = (
+            f"{written} of {made.count} pictures in the finished video",
+            "free room on the disk, then run again",
+        )
+        raise WorkError(file=path, got=got, expected="all of them", remedy=remedy)
 
 
 class VideoWriter:
@@ -288,12 +273,7 @@ class VideoWriter:
         import cv2
 
         width, height = self._stream.width, self._stream.height
-        if picture.shape[:2] != (height, width):
-            raise InputError(
-                file=self._path, place=f"picture {self.count + 1}",
-                got="{1}×{0} px".format(*picture.shape), expected=f"{width}×{height} px, the size of the video",
-                remedy="give pictures of one size",
-            )  # fmt: skip
+        require_size(picture, (width, height), self._path, f"picture {self.count + 1}")
         planes = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2YUV_I420), np.uint8)
         frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
         frame.color_range, frame.colorspace = WRITTEN_RANGE, WRITTEN_COLOURS

@@ -10,19 +10,21 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Sequence as Series
+from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, INTEGER
 from sim.io.files import tables
-from sim.io.files.numeric_text import read_numbers, read_text, whole_number
-from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, StoredTable, columns_of, none_to_nan, validated
+from sim.io.files.numeric_text import read_number, read_rows, read_text, whole_or_number
+from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, Pair, StoredTable, columns_of, validated
 from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
@@ -54,19 +56,18 @@ class _Events(BaseModel):
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
     """Reads an events.json as pairs (event, frame whose tracks reported it, None if not stored)."""
     found = validated(path, tables.read_document(path), _Events, "correct the event").events
-    places = [(none_to_nan(e.pos[0]), none_to_nan(e.pos[1])) for e in found]
+    places = [(tables.none_to_nan(e.pos[0]), tables.none_to_nan(e.pos[1])) for e in found]
     fields = [e.model_dump(exclude={"frame", "pos"}) for e in found]
     return [(GroupEvent(**f, pos=pos), e.frame) for f, pos, e in zip(fields, places, found, strict=True)]
 
 
 def read_near(path: Path) -> Near:
     """Reads a near.csv."""
-    header = read_text(path).partition("\n")[0]
+    text = read_rows(path)
+    header = "".join(text.text[:1])
     if header != NEAR_COLUMNS:
-        raise InputError(
-            file=path, place="line 1", got=repr(header), expected=NEAR_COLUMNS, remedy="restore the header"
-        )
-    rows = read_numbers(path, (4, 4), header=True, layout=NEAR_COLUMNS)
+        raise _bad(path, 1, repr(header), NEAR_COLUMNS)
+    rows = text.numbers((4, 4), first=1, layout=NEAR_COLUMNS)
     start, end, a, b = (rows.integers(k, name) for k, name in enumerate(NEAR_COLUMNS.split(",")))
     wrong = (start < 1) | (end < start) | (end > FRAMES) | (np.minimum(a, b) < 0)
     expected = f"frames from 1 to {FRAMES}, start not after end, and two ids from 0 on"
@@ -97,7 +98,6 @@ def read_script(path: Path) -> tuple[Order, ...]:
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")
 EXTENT = ("extent_xx", "extent_xy", "extent_yx", "extent_yy")
 AXES = ("x", "y", "z")
-_Row = tuple[int, Ints, Array, float, Array]  # group's id, members, x and y, size, hull
 
 
 def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
@@ -169,17 +169,13 @@ def wkt(hull: Array, digits: int) -> str:
     return f"POLYGON (({', '.join([*points, points[0]])}))" if points else "POLYGON EMPTY"
 
 
-def parse_wkt(text: str) -> Array:
-    """Returns the vertices (V, 2) of a WKT POLYGON of one ring; raises ValueError for other texts."""
-    body = text.strip().removeprefix("POLYGON").strip()
-    if body == "EMPTY":
-        return np.zeros((0, 2))
-    if not (text.strip().startswith("POLYGON") and body.startswith("((") and body.endswith("))")):
-        raise ValueError("expected POLYGON ((…))")
-    ring = np.array([[float(v) for v in point.split()] for point in body[2:-2].split(",")])
-    if ring.ndim != 2 or ring.shape[1] != 2 or not np.isfinite(ring).all():
-        raise ValueError("points are pairs of finite numbers")
-    return ring[:-1] if len(ring) > 1 and np.array_equal(ring[0], ring[-1]) else ring
+def parse_wkt(text: str) -> list[list[float]]:
+    """Returns the vertices [x, y] of a WKT POLYGON of one ring; raises ValueError for other texts."""
+    body = re.fullmatch(r"\s*POLYGON\s*(?:EMPTY|\(\(([^()]*)\)\))\s*", text)
+    if body is None:
+        raise ValueError("POLYGON ((x y, …))")
+    ring = [[read_number(v) for v in point.split()] for point in (body[1] or "").split(",") if point.strip()]
+    return ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
 
 
 def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None] | None, first: int = 1) -> bytes:
@@ -191,29 +187,46 @@ def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([*CSV_COLUMNS, *(["hull_px"] if image is not None else [])])
-    for k in range(len(ground if ground is not None else image or ())):
-        here = None if ground is None else ground[k]
-        px = None if image is None else image[k]
-        pictured = {} if px is None else {int(g): wkt(h, 2) for g, h in zip(px.id, px.hull, strict=False)}
+    for frame, (here, px) in enumerate(zip_longest(ground or (), image or ()), first):
+        pictured = {} if px is None else {g: wkt(h, 2) for g, h in zip(px.id.tolist(), px.hull, strict=False)}
         if here is None:
             here = Groups.none() if px is None else px.replace(pos=np.full_like(px.pos, np.nan), hull=())
-        for row in _csv_rows(here):
-            writer.writerow([first + k, *row, *([pictured.get(row[0], "")] if image is not None else [])])
+        for k, id in enumerate(here.id.tolist()):
+            members = " ".join(map(str, here.members[k])) if len(here.members) else ""
+            hull = wkt(here.hull[k], 3) if len(here.hull) else ""
+            x, y, size = (_cell(v) for v in (here.pos[k, 0], here.pos[k, 1], here.size[k]))
+            more = [pictured.get(id, "")] if image is not None else []
+            writer.writerow([frame, id, members, x, y, hull, size, *more])
     return text.getvalue().encode()
-
-
-def _csv_rows(groups: Groups) -> list[tuple[int, str, str, str, str, str]]:
-    rows = []
-    for k, id in enumerate(groups.id):
-        members = " ".join(map(str, groups.members[k])) if len(groups.members) else ""
-        hull = wkt(groups.hull[k], 3) if len(groups.hull) else ""
-        x, y, size = (_cell(v) for v in (groups.pos[k, 0], groups.pos[k, 1], groups.size[k]))
-        rows.append((int(id), members, x, y, hull, size))
-    return rows
 
 
 def _cell(value: float) -> str:
     return "" if value != value else f"{value:.3f}".rstrip("0").rstrip(".")
+
+
+def _value(text: str) -> int | float | str | None:
+    value = whole_or_number(text)
+    return None if value in ("", "nan") or value != value else value
+
+
+def _ids(text: str | None) -> list[Any]:
+    return [whole_or_number(word) for word in (text or "").split()]
+
+
+def _hull(text: str | None) -> Any:
+    return parse_wkt(text) if text else ()
+
+
+class _GroupRow(BaseModel):
+    """A row of groups.csv."""
+
+    frame: Annotated[FrameNumber, BeforeValidator(_value)]
+    group: Annotated[Id, BeforeValidator(_value)]
+    members: Annotated[list[Id], BeforeValidator(_ids)]
+    x: Annotated[Number | None, BeforeValidator(_value)]
+    y: Annotated[Number | None, BeforeValidator(_value)]
+    hull: Annotated[tuple[Pair, ...], BeforeValidator(_hull)]
+    size: Annotated[Annotated[Number, Field(ge=0)] | None, BeforeValidator(_value)] = None
 
 
 def read_groups_csv(path: Path, length: int) -> list[Groups]:
@@ -222,45 +235,33 @@ def read_groups_csv(path: Path, length: int) -> list[Groups]:
     Velocities are 0, extents nan. Groups and members are sorted by id.
     """
     reader = csv.DictReader(io.StringIO(read_text(path)))
-    frames: dict[int, list[_Row]] = {}
+    frames: dict[int, dict[int, _GroupRow]] = {k: {} for k in range(1, length + 1)}
     try:
         wanted = [c for c in CSV_COLUMNS[:6] if c not in (reader.fieldnames or [])]
         if wanted:
             raise _bad(path, 1, f"no column {', '.join(wanted)}", ",".join(CSV_COLUMNS))
-        for row in reader:
-            frame, group = _row(path, reader.line_num, row, length)
-            if any(group[0] == other[0] for other in frames.setdefault(frame, [])):
-                got = f"group {group[0]} twice in frame {frame}"
-                raise _bad(path, reader.line_num, got, "each group once in a frame")
-            frames[frame].append(group)
+        for cells in reader:
+            given = {name: cell for name, cell in cells.items() if name and cell is not None}
+            row = validated(path, given, _GroupRow, "correct the line", f"line {reader.line_num}")
+            if row.frame > length or row.group in frames[row.frame]:
+                got, expected = f"group {row.group} in frame {row.frame}", f"frames to {length}, each group once in one"
+                raise _bad(path, reader.line_num, got, expected)
+            frames[row.frame][row.group] = row
     except csv.Error as error:
         raise _bad(path, reader.line_num, str(error), "cells of text") from None
     nobody = Groups.none()
-    return [_from_rows(sorted(frames[k], key=lambda r: r[0])) if k in frames else nobody for k in range(1, length + 1)]
+    return [_from_rows([rows[id] for id in sorted(rows)]) if rows else nobody for rows in frames.values()]
 
 
-def _row(path: Path, line: int, row: dict[str, str], length: int) -> tuple[int, _Row]:
-    try:
-        frame, id = whole_number(row["frame"]), whole_number(row["group"])
-        members = np.array(sorted({whole_number(m) for m in row["members"].split()}), np.int64)
-        pos = np.array([float(row["x"] or "nan"), float(row["y"] or "nan")])
-        size = float(row.get("size") or "nan")
-        hull = parse_wkt(row["hull"]) if row["hull"] else np.zeros((0, 2))
-    except (ValueError, TypeError, AttributeError) as error:
-        raise _bad(path, line, str(error), "frame,group,members,x,y,hull (WKT)") from None
-    if not 1 <= frame <= length or id < 0:
-        raise _bad(path, line, f"frame {frame}, group {id}", f"frames from 1 to {length}, groups from 0")
-    if members.min(initial=0) < 0 or size < 0 or (not np.isfinite(size) and row.get("size")):
-        raise _bad(path, line, f"members {row['members']}, size {row.get('size')}", "ids from 0, and a size from 0")
-    if max(abs(pos[~np.isnan(pos)]).max(initial=0), abs(hull).max(initial=0)) > COORDINATE:
-        raise _bad(path, line, "a coordinate that is too large", f"coordinates within {COORDINATE:g}")
-    return frame, (id, members, pos, size, hull)
-
-
-def _from_rows(rows: list[_Row]) -> Groups:
-    id, members, pos, size, hull = zip(*rows, strict=True)
+def _from_rows(rows: list[_GroupRow]) -> Groups:
     still, unknown = np.zeros((len(rows), 2)), np.full((len(rows), 2, 2), np.nan)
-    return Groups(np.array(id, np.int64), members, np.array(pos), still, unknown, np.array(size), hull)
+    return Groups(
+        np.array([row.group for row in rows], np.int64),
+        tuple(np.unique(np.array(row.members, np.int64)) for row in rows),
+        np.array([(row.x, row.y) for row in rows], np.float64), still, unknown,
+        np.array([row.size for row in rows], np.float64),
+        tuple(np.array(row.hull, np.float64).reshape(-1, 2) for row in rows),
+    )  # fmt: skip
 
 
 def _bad(path: Path, line: int, got: str, expected: str) -> InputError:

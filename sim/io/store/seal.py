@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Container, Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 
@@ -108,9 +109,10 @@ class _Run(_Sealed):
     px_per_m: Annotated[float, Field(strict=True)] | None = None
 
 
-def file_facts(files: Mapping[str, bytes]) -> dict[str, dict[str, Any]]:
-    """Returns what a seal states of each file, {"sha256", "bytes"} by name, sorted. files: content by name."""
-    return {name: {"sha256": hashing.file_hash(body), "bytes": len(body)} for name, body in sorted(files.items())}
+def file_facts(files: Mapping[str, bytes | Path]) -> dict[str, dict[str, Any]]:
+    """Returns what a seal states of each file, {"sha256", "bytes"} by name, sorted. files: contents or paths."""
+    sizes = {name: len(body) if isinstance(body, bytes) else body.stat().st_size for name, body in files.items()}
+    return {name: {"sha256": hashing.file_hash(body), "bytes": sizes[name]} for name, body in sorted(files.items())}
 
 
 def with_hash(document: dict[str, Any]) -> dict[str, Any]:
@@ -139,24 +141,23 @@ def damaged_files(
     """
     for name, facts in files.items():
         try:
-            whole_file(folder / name, facts, seal, remedy, name in size_only)
+            check_file(folder / name, facts, seal, remedy, name in size_only)
         except InputError as error:
             yield error
 
 
-def whole_file(
-    path: Path, facts: Mapping[str, Any], seal: str = MANIFEST, remedy: str = REDO, size_only: bool = False
-) -> bytes:
-    """Returns the bytes of a file, none if only its size is compared; InputError if it is not as a seal states."""
-    body, size = b"", None
-    try:
+def check_file(
+    path: Path, facts: Mapping[str, Any], seal: str = MANIFEST, remedy: str = REDO, size_only: bool = False,
+    body: bytes | None = None,
+) -> None:  # fmt: skip
+    """Raises InputError if a file is not as a seal states. body: its content; None: it is read in parts."""
+    size = None
+    with suppress(OSError):
         if path.is_file():  # a FIFO would block its reader
             size = path.stat().st_size
-            body = path.read_bytes() if size == facts["bytes"] and not size_only else b""
-    except OSError:
-        size = None
-    if size == facts["bytes"] and (size_only or hashing.file_hash(body) == facts["sha256"]):
-        return body
+            same = size == facts["bytes"]
+            if same and (size_only or hashing.file_hash(path if body is None else body) == facts["sha256"]):
+                return
     kind = "truncated" if size is not None and size < facts["bytes"] else "altered"
     got = "missing" if size is None else f"{kind}: {size} bytes"
     expected = f"the file of {facts['bytes']} bytes that {seal} names"
@@ -205,19 +206,16 @@ def read_whole_manifest(folder: Path) -> dict[str, Any]:
     for stream in manifest.get("streams", ()):
         count = BACKGROUNDS if stream == "background" else length
         wanted += [file_name(stream, images, k) for k in range(1, count + 1)]
-    missing = [name for name in wanted if name not in manifest["files"]]
-    if missing:
-        got = f"no {missing[0]}" + (f" and {len(missing) - 1} more" if len(missing) > 1 else "")
-        expected = "every file of the sequence"
+    expected = "every file of the sequence"
+    first, *more = [name for name in wanted if name not in manifest["files"]] or [""]
+    if first:
+        got = f"no {first}" + (f" and {len(more)} more" if more else "")
         raise InputError(file=folder / MANIFEST, place="files", got=got, expected=expected, remedy=REDO)
     # A stranger's dataset must not make an export read files elsewhere.
-    inside = folder.resolve()
-    for name in (MANIFEST, *manifest["files"]):
-        if not (folder / name).resolve().is_relative_to(inside):
-            raise InputError(
-                file=folder / name, got="a link that leads out of the sequence", expected="a file of the sequence",
-                remedy="export a copy that holds the files themselves (cp -rL)",
-            )  # fmt: skip
+    for path in (folder / name for name in (MANIFEST, *manifest["files"])):
+        if not path.resolve().is_relative_to(folder.resolve()):
+            got, remedy = "a link that leads out of the sequence", "export a copy that holds the files (cp -rL)"
+            raise InputError(file=path, got=got, expected=expected, remedy=remedy)
     return manifest
 
 
@@ -236,19 +234,15 @@ def run_folder(path: Path) -> Path | None:
 
 def reject_foreign(folder: Path) -> None:
     """Raises InputError if a file that is not ours, or a stored sequence, would be changed by a run here."""
+    expected, remedy = "a new folder, or one with a run", "choose another --out"
     for place in (folder.absolute(), *folder.absolute().parents):
         if is_ours(place / MANIFEST, MARKS):
-            raise InputError(
-                file=folder, got=f"a place inside the stored sequence {place.name}", expected="a folder of its own",
-                remedy="choose another --out",
-            )  # fmt: skip
-    found = [name for name in (RUN, EXACT, *NAMES) if (folder / name).exists()]
-    if found and not is_ours(folder / found[0], RUN_MARKS):
-        got = "a file of another program, or a damaged one"
-        raise InputError(
-            file=folder / found[0], got=got, expected="a new folder, or one with a run",
-            remedy="choose another --out, or move the file; delete a damaged run",
-        )  # fmt: skip
+            got = f"a place inside the stored sequence {place.name}"
+            raise InputError(file=folder, got=got, expected=expected, remedy=remedy)
+    found = [folder / name for name in (RUN, EXACT, *NAMES) if (folder / name).exists()]
+    if found and not is_ours(found[0], RUN_MARKS):
+        got, remedy = "a file of another program, or a damaged one", f"{remedy}, or move it; delete a damaged run"
+        raise InputError(file=found[0], got=got, expected=expected, remedy=remedy)
 
 
 def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
@@ -270,10 +264,10 @@ def read_run(folder: Path) -> dict[str, Any]:
 def run_problems(folder: Path, run: dict[str, Any]) -> Iterator[InputError]:
     """Yields an error for each file of a run that is missing, altered, or of another run."""
     yield from damaged_files(folder, run["files"], RUN, AGAIN)
-    for name in NAMES:
-        if name not in run["files"] and name != RUN and (folder / name).exists():
-            got, expected = f"a file that {RUN} does not name", "the files of one run"
-            yield InputError(file=folder / name, got=got, expected=expected, remedy=AGAIN)
+    got, expected = f"a file that {RUN} does not name", "the files of one run"
+    for path in (folder / name for name in NAMES if name not in run["files"] and name != RUN):
+        if path.exists():
+            yield InputError(file=path, got=got, expected=expected, remedy=AGAIN)
 
 
 def check_run(folder: Path) -> dict[str, Any]:
@@ -286,7 +280,5 @@ def check_run(folder: Path) -> dict[str, Any]:
 
 def tracked_hash(sequence: Sequence) -> str | None:
     """Returns the SHA-256 of the truth that was tracked; None for a sequence without labels."""
-    stated = sequence.source.get("truth_hash")
-    if stated is not None:
-        return str(stated)
-    return None if sequence.truth is None else hashing.labels_hash(sequence.truth)
+    stated: str | None = sequence.source.get("truth_hash")
+    return hashing.labels_hash(sequence.truth) if stated is None and sequence.truth is not None else stated

@@ -68,14 +68,12 @@ def _refuse_foreign(folder: Path, names: set[str]) -> bool:
     ours = names if is_own_sequence(folder) else set()
     with suppress(InputError):  # a damaged or missing manifest lists nothing
         ours = ours | read_manifest(folder)["files"].keys()
-    found = (path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir())
-    for path in [folder] if not folder.is_dir() else sorted(found):
+    found = sorted(path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir())
+    for path in found if folder.is_dir() else [folder]:
         inside = path.relative_to(folder)
         if inside.as_posix() not in ours and not is_side_file(inside):
-            raise InputError(
-                file=folder, got=f"{path}, a file that flockscope did not write", expected="its own files only",
-                remedy="move it away, or choose another --out",
-            )  # fmt: skip
+            got, expected = f"{path}, a file that flockscope did not write", "its own files only"
+            raise InputError(file=folder, got=got, expected=expected, remedy="move it away, or choose another --out")
     return False
 
 
@@ -118,13 +116,13 @@ def sequence_files(
 
 def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> bytes:
     # imDir is always img1, so that MOTChallenge tools accept it.
-    values = {"name": printable(sequence.name), "imDir": "img1", "frameRate": str(sequence.fps).removesuffix(".0")}
-    values["seqLength"] = str(length)
+    lines = ["[Sequence]", f"name={printable(sequence.name)}", "imDir=img1"]
+    lines += [f"frameRate={str(sequence.fps).removesuffix('.0')}", f"seqLength={length}"]
     if sequence.image_size is not None:
-        width, height = sequence.image_size
         suffix = ".png" if pictures.images == "png" else ".jpg"
-        values |= {"imWidth": str(width), "imHeight": str(height), "imExt": suffix}
-    return "\n".join(["[Sequence]", *(f"{key}={value}" for key, value in values.items()), ""]).encode()
+        lines += ["imWidth={}".format(*sequence.image_size), "imHeight={1}".format(*sequence.image_size)]
+        lines.append(f"imExt={suffix}")
+    return "\n".join([*lines, ""]).encode()
 
 
 def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -> Sequence:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
@@ -22,10 +23,10 @@ from pydantic import BaseModel
 from scenarios.errors import InputError
 from sim.arrays import repeated_ids
 from sim.io.files import tables
-from sim.io.files.atomic import hold_lock, replace_sealed
+from sim.io.files.atomic import lock_folder, replace_sealed
 from sim.io.files.tables import Column, Count, Rate, columns_of, table_bytes
-from sim.io.formats.labels import chords
-from sim.io.formats.mot_table import MotTable, read_table, require_pixels
+from sim.io.formats.labels import centres, chords
+from sim.io.formats.mot_table import read_table, require_pixels
 from sim.io.formats.mot_text import ground_positions, of_class, reject_duplicate_ids, require_metres, unit_scores
 from sim.io.formats.options import BoxScale, Classes
 from sim.io.store import group_files
@@ -92,19 +93,17 @@ def flatten(every: list[Tracks]) -> RunRows:
     d = 3 if plane == "space" else 2
     counts = [len(t.id) for t in every]
 
-    def join(parts: list[Any], empty: Any) -> Any:
-        return np.concatenate([empty, *parts])
+    def joined(values: Iterable[Any], *shape: int, kind: type = np.float64) -> Any:
+        return np.concatenate([np.zeros((0, *shape), kind), *values])
 
-    ids = np.zeros(0, np.int64)
-    no_box = [np.full((len(t.id), 4), np.nan) if t.box is None else t.box for t in every]
     return RunRows(
         plane, unit, np.repeat(np.array([t.index for t in every], np.int64), counts),
-        join([t.id for t in every], ids), join([t.group for t in every], ids),
-        join([t.pos for t in every], np.zeros((0, d))), join([t.vel for t in every], np.zeros((0, d))),
-        join([t.cov for t in every], np.zeros((0, 2 * d, 2 * d))), join(no_box, np.zeros((0, 4))),
+        joined((t.id for t in every), kind=np.int64), joined((t.group for t in every), kind=np.int64),
+        joined((t.pos for t in every), d), joined((t.vel for t in every), d),
+        joined((t.cov for t in every), 2 * d, 2 * d),
+        joined((np.full((len(t.id), 4), np.nan) if t.box is None else t.box for t in every), 4),
         np.repeat(np.array([t.box is None for t in every], bool), counts),
-        join([scores_or_ones(t.score, len(t.id)) for t in every], np.zeros(0)),
-        join([t.measured for t in every], np.zeros(0, bool)),
+        joined(scores_or_ones(t.score, len(t.id)) for t in every), joined((t.measured for t in every), kind=bool),
     )  # fmt: skip
 
 
@@ -188,18 +187,12 @@ def _groups(path: Path, first: int, count: int) -> list[Groups | None]:
     table.reject(stated != (first, count), "schema", got, expected)
     found = group_files.read_groups(table)
     for index, some in enumerate(found, first):
-        fault = None if some is None else _group_fault(some)
-        table.reject(fault is not None, f"frame {index}", str(fault), "unique ids from 0 and finite places")
+        if some is not None:
+            once = len(np.unique(some.id)) == len(some.id) and some.id.min(initial=0) >= 0
+            known = all(np.isfinite(place).all() for place in (some.pos, *some.hull))
+            got = "a place that is NaN or infinite" if once else "a group below 0, or a second time"
+            table.reject(not (once and known), f"frame {index}", got, "unique ids from 0 and finite places")
     return found
-
-
-def _group_fault(groups: Groups) -> str | None:
-    if len(groups.id) and groups.id.min() < 0:
-        return f"group {groups.id.min()}"
-    if len(np.unique(groups.id)) != len(groups.id):
-        return "a group a second time"
-    places = [groups.pos, *groups.hull]
-    return None if all(np.isfinite(place).all() for place in places) else "NaN or infinity in a place or hull"
 
 
 def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["measured", "projected", "none"]:
@@ -236,7 +229,10 @@ def read_track_text(
     """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
     require_pixels(table.rows, table.boxes())
-    _reject_empty(table, length)
+    if not len(table.frame):
+        if length is None:
+            raise InputError(file=path, got="no row", expected="tracks", remedy="check that it was written")
+        warnings.warn(f"{path}: no row, so nobody was tracked", stacklevel=3)
     table.rows.reject(
         table.id < 0, "ids from 0", "give each track an id", "these are detections: `flockscope track` them first"
     )
@@ -250,52 +246,36 @@ def read_track_text(
     if ground is not None:
         remedy = "complete the line, or write z = -1 in all"
         table.rows.reject(np.isnan(ground[:, 0]), "a ground position (z other than -1), as in other lines", remedy)
-    pos = _centres(table)[order] if ground is None else ground[order][:, :2]
+    else:
+        table.rows.reject(table.without_box(), "a box, or a ground position in every line", "complete the lines")
+    pos = (centres(table.box) if ground is None else ground[:, :2])[order]
     box = None if table.without_box().any() else table.box[order]
-    score = unit_scores(table.rest[:, 0] if table.rest.shape[1] else np.ones(len(table.id)))[0][order]
+    score = unit_scores(table.scores())[0][order]
     plane: Plane = "image" if ground is None else "ground"
     vel, count = chords(frame, id, pos, fps), length or int(frame.max(initial=0))
     cuts = np.searchsorted(frame, np.arange(1, count + 2)).tolist()
 
-    def arrays(a: int, b: int) -> tuple[Array | Ints | None, ...]:
+    @lru_cache(maxsize=1)  # most frames of sparse texts are empty: they share their arrays
+    def arrays(a: int, b: int) -> tuple[Any, ...]:
         some = (id[a:b], np.full(b - a, -1, np.int64), pos[a:b], vel[a:b], np.full((b - a, 4, 4), np.nan))
         return *some, None if box is None else box[a:b], score[a:b]
 
-    # Most frames of sparse texts are empty: they share their arrays.
-    nobody = Tracks(0, 0.0, plane, "person", *arrays(0, 0))  # type: ignore[arg-type]
-    none = (nobody.id, nobody.group, nobody.pos, nobody.vel, nobody.cov, nobody.box, nobody.score)
-    return [
-        Tracks(k + 1, k / fps, plane, "person", *(none if a == b else arrays(a, b)))  # type: ignore[arg-type]
-        for k, (a, b) in enumerate(pairwise(cuts))
-    ]
-
-
-def _reject_empty(table: MotTable, length: int | None) -> None:
-    if len(table.frame):
-        return
-    if length is None:
-        raise InputError(file=table.rows.file, got="no row", expected="tracks", remedy="check that it was written")
-    warnings.warn(f"{table.rows.file}: no row, so nobody was tracked", stacklevel=4)
-
-
-def _centres(table: MotTable) -> Array:
-    table.rows.reject(table.without_box(), "a box, or a ground position in every line", "complete the lines")
-    return table.box[:, :2] + table.box[:, 2:] / 2
+    frames = enumerate(pairwise(cuts))
+    return [Tracks(k + 1, k / fps, plane, "person", *arrays(a, b)) for k, (a, b) in frames]
 
 
 def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
-    """Returns copies of one tracker's tracks with the groups of a groups.csv.
+    """Returns the list, with the groups of a groups.csv in one tracker's tracks.
 
     A person in two groups gets the one with the higher id. Members without a track stay in the groups.
     """
     every = group_files.read_groups_csv(path, len(found))
-    answers = []
-    for tracks, groups in zip(found, every, strict=True):
+    for k, (tracks, groups) in enumerate(zip(found, every, strict=True)):
         group = tracks.group.copy()
-        for k, members in zip(groups.id, groups.members, strict=True):
-            group[np.isin(tracks.id, members)] = k
-        answers.append(tracks.replace(group=group, groups=groups))
-    return answers
+        for name, members in zip(groups.id, groups.members, strict=True):
+            group[np.isin(tracks.id, members)] = name
+        found[k] = tracks.replace(group=group, groups=groups)
+    return found
 
 
 def write_tracks(
@@ -321,7 +301,7 @@ def write_tracks(
     """
     folder = Path(folder)
     files = tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info, pairs=pairs)
-    with hold_lock(folder):
+    with lock_folder(folder, held=True):
         reject_foreign(folder)
         replace_sealed(folder, files, RUN, NAMES)
     return folder
@@ -389,10 +369,8 @@ def read_checked_tracks(
         return _with_events(read_track_table(folder), folder)
     text = folder / "tracks.txt" if path.is_dir() else path
     if not text.is_file():
-        raise InputError(
-            file=path, got="no tracks", expected="tracks.parquet, tracks.txt or a MOTChallenge text",
-            remedy="give the folder that `flockscope track` made",
-        )  # fmt: skip
+        got, expected = "no tracks", "tracks.parquet, tracks.txt or a MOTChallenge text"
+        raise InputError(file=path, got=got, expected=expected, remedy="give the folder that `flockscope track` made")
     found = read_track_text(text, 25.0 if fps is None else fps, length, person_class, box_scale)
     if not whole:
         return found
@@ -409,9 +387,7 @@ def _with_events(found: list[Tracks], folder: Path) -> list[Tracks]:
     for k, (event, frame) in enumerate(group_files.read_events(path)):
         at = next(index for index in (frame, event.emitted, event.end) if index is not None)
         if not first <= at <= last:
-            raise InputError(
-                file=path, place=f"events[{k}]", got=f"an event reported in frame {at}",
-                expected=f"a frame from {first} to {last}, as the tracks have", remedy="correct the event",
-            )  # fmt: skip
+            got, expected = f"an event reported in frame {at}", f"a frame from {first} to {last}, as the tracks have"
+            raise InputError(file=path, place=f"events[{k}]", got=got, expected=expected, remedy="correct the event")
         by_frame.setdefault(at, []).append(event)
     return [t.replace(events=tuple(by_frame[t.index])) if t.index in by_frame else t for t in found]

@@ -16,14 +16,7 @@ from pydantic import BaseModel
 
 from scenarios.reading import is_present
 from sim.io.files import tables
-
-# isort: off
-# fmt: off
-from sim.io.files.tables import (
-    Column, Count, FrameNumber, Rate, Scale, StoredTable, columns_of, read_table, table_bytes,
-)
-# fmt: on
-# isort: on
+from sim.io.files.tables import Column, Count, FrameNumber, Rate, Scale, StoredTable, columns_of, read_table
 from sim.io.store import group_files
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Detections, Groups, Ints, Order, Scene, Truth
@@ -68,7 +61,7 @@ def _table(truth: Truth) -> bytes:
         "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": tables.plain(truth.px_per_m),
         "labelled": None if truth.labelled is None else spans(truth.labelled),
     }  # fmt: skip
-    return table_bytes(columns, facts)
+    return tables.table_bytes(columns, facts)
 
 
 def _order(order: Order) -> dict[str, Any]:
@@ -190,7 +183,7 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     # An alarm at the picture's edge may be a box without width.
     shown = np.full((len(score), 4), np.nan) if box is None else np.c_[box[:, :2], np.maximum(box[:, 2:], 0.01)]
     text = mot_text(frame, np.full(len(frame), -1), shown, rest)
-    return {"det/det.parquet": table_bytes(columns, facts), "det/det.txt": text}
+    return {"det/det.parquet": tables.table_bytes(columns, facts), "det/det.txt": text}
 
 
 def scores_or_ones(score: Array, rows: int) -> Array:

@@ -38,9 +38,7 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise InputError(
-            file=folder, got="no folder", expected="a generated dataset, a sequence, or tracks", remedy="check the path"
-        )
+        raise _problem(folder, "no folder", "a generated dataset, a sequence, or tracks", "check the path")
     if seal.is_sequence(folder):
         return _sequence(folder)
     if is_run(folder):
@@ -50,8 +48,7 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
     found = [_problem(path, "left by an interrupted run", "no such file or folder") for path in partial]
     found += _seqmaps(folder) if sequences or not runs else ()
     if not sequences and not runs and not found:
-        expected = "a generated dataset, or tracks"
-        raise InputError(file=folder, got="no sequences", expected=expected, remedy="check the path")
+        raise _problem(folder, "no sequences", "a generated dataset, or tracks", "check the path")
     checks = [*map(_sequence, sequences), *map(_run, runs)]
     return found + [problem for problems in checks for problem in problems]
 
@@ -67,10 +64,8 @@ def _inside(root: Path, kind: Callable[[Path], bool]) -> list[Path]:
 
 def content_hash(folder: str | Path) -> str:
     """Returns the SHA-256 of a generated dataset or sequence, by its manifests; exports contain the same."""
-    found = {
-        split_and_name(p): seal.read_manifest(p)["content_hash"] for p in sequence_folders(Path(folder), "generated")
-    }
-    return hashing.dataset_hash(found)
+    folders = sequence_folders(Path(folder), "generated")
+    return hashing.dataset_hash({split_and_name(p): seal.read_manifest(p)["content_hash"] for p in folders})
 
 
 def _problem(path: Path, got: object, expected: object, remedy: str = seal.REDO) -> InputError:
@@ -86,9 +81,8 @@ def _seqmaps(root: Path) -> Iterator[InputError]:
                 yield _problem(path, "missing", "the list of the split's sequences")
             continue
         listed = set(path.read_text(encoding="utf-8").splitlines()[1:])
-        there = {
-            p.name for p in split.iterdir() if p.is_dir() and not (p.name.startswith(PARTIAL) or is_side_file(p.name))
-        }
+        folders = {p.name for p in split.iterdir() if p.is_dir()}
+        there = {name for name in folders if not (name.startswith(PARTIAL) or is_side_file(name))}
         for name in sorted(listed - there):
             yield _problem(split / name, "missing", f"a sequence, as {path.name} says")
         for name in sorted(there - listed):
@@ -125,9 +119,9 @@ def _extra(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
 
 def _content(folder: Path, manifest: dict[str, Any]) -> Iterator[FlockscopeError]:
     text = (folder / "scenario.toml").read_text(encoding="utf-8")
-    truth = truth_files.read_truth(folder) if (folder / "gt/truth.parquet").is_file() else None
-    exact = folder / "det" / "det.parquet"
-    detections = truth_files.read_detections(exact) if exact.is_file() else []
+    has, exact = manifest["files"], folder / "det" / "det.parquet"
+    truth = truth_files.read_truth(folder) if "gt/truth.parquet" in has else None
+    detections = truth_files.read_detections(exact) if "det/det.parquet" in has else []
     name = hashing.truth_hash(text, manifest["seed"], manifest["repeat"], truth)
     if name != manifest["truth_hash"]:
         yield _problem(folder / seal.MANIFEST, "another truth_hash", name)

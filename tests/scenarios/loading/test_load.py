@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 
 import scenarios
 from scenarios.errors import InputError
-from scenarios.loading.resolve import dump, dump_sensor, load, names, resolve, sensor_settings
+from scenarios.loading.resolve import dump, dump_sensor, load, load_observation, names, resolve, sensor_settings
 from scenarios.loading.toml_files import CATALOGUE
 from scenarios.schema.sensor import BoxNoise, FalseAlarms, Hide, Memory, Sensor
 
@@ -153,6 +154,14 @@ def test_syntax_error_has_its_line(tmp_path: Path) -> None:
     assert "no such file" in error_of(tmp_path / "none.toml").got
     (tmp_path / "folder.toml").mkdir()
     error_of(tmp_path / "folder.toml")
+
+
+@pytest.mark.parametrize(
+    ("read", "words"), [(sensor_settings, "flockscope fit sensor"), (load_observation, "--camera")]
+)
+def test_missing_files_have_a_remedy(tmp_path: Path, read: Callable[[Path], object], words: str) -> None:
+    with pytest.raises(InputError, match=f"none.toml: got No such file.*{words}"):
+        read(tmp_path / "none.toml")
 
 
 def test_a_byte_order_mark_is_no_content(tmp_path: Path) -> None:

@@ -84,7 +84,6 @@ def test_complete_sequences_are_kept_and_others_redone(tmp_path, simulate):
     (tmp_path / "flockscope-train" / ".partial-x-s00001-0123456789ab").mkdir()
     (tmp_path / "flockscope-train" / ".partial-x-s00002-0123456789ab").mkdir()
     (tmp_path / "seqmaps" / ".partial-flockscope-train.txt-0123456789ab").write_text("name")
-    (tmp_path / ".partial-0123456789abcdef0123456789abcdef").write_text("")
     simulate.asked.clear()
     generate([Entry("x", scenario())], range(3), tmp_path)
     assert simulate.made == [0, 1]

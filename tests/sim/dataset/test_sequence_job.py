@@ -10,7 +10,6 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import Entry
-from sim.dataset import generate as jobs
 from sim.dataset.generate import JobOutcome, SequenceJob, is_stored, run_job, stored_manifest
 from sim.io.files import atomic
 from tests.fake_simulator import FakeSimulator, scenario
@@ -64,20 +63,6 @@ def test_of_two_who_make_it_at_once_the_first_counts(
     assert len(others) == (1 + late) * len(whole)
 
 
-def test_who_does_not_see_the_mark_writes_nothing(
-    job: SequenceJob, made: FakeSimulator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(jobs, "MARKER_TIMEOUT", 0.0)
-    elsewhere = SequenceJob(job.folder, job.entry, job.seed, marker=tmp_path / "mark")
-    outcome = run_job(elsewhere)
-    assert outcome.fatal
-    assert isinstance(outcome.error, InputError)
-    assert "another folder, or none" in str(outcome.error)
-    assert not job.folder.parent.exists()
-    (tmp_path / "mark").write_text("")
-    assert run_job(elsewhere) == JobOutcome()
-
-
 @pytest.mark.parametrize("name", ["", "thesis.tex", "a/b/thesis.tex"])
 def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: FakeSimulator, name: str) -> None:
     """Before: a folder or file with the name of the sequence was deleted. name: "" for a file."""
@@ -94,7 +79,7 @@ DIFFERENCES = [
     ({"camera": {"fps": 5}}, {}, "camera.fps 10 → 5)"),
     ({"duration": 3.0, "camera": {"fps": 5}}, {"streams": ("left",)}, "duration 20 → 3, camera.fps 10 → 5, "
      "streams none → left,background, images none → jpg)"),
-    ({"group": [{"id": "b", "start": [1, 1], "goal": [2, 2]}]}, {}, "group[0].id a → b)"),
+    ({"group": [{"id": "b", "start": [1, 1], "goal": [2, 2]}]}, {}, "group.0.id a → b)"),
     ({}, {"stride": 4}, "stride 1 → 4)"),
 ]  # fmt: skip
 
