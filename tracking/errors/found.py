@@ -56,18 +56,14 @@ class FoundError:
 
     def facts(self, fps: float) -> dict[str, Any]:
         """Returns the error as values for JSON: frames from 1, seconds, ids, cause and words."""
-        error = self.error
-        who: dict[str, Any] = (
-            {"of": "groups", "people": list(error.people), "others": list(error.others), "before": None, "after": None}
-            if isinstance(error, GroupError)
-            else {
-                "of": "people", "people": [] if error.person is None else [error.person], "others": [],
-                "before": error.before, "after": error.after,
-            }
-        )  # fmt: skip
+        error, of_group = self.error, isinstance(self.error, GroupError)
+        people = error.people if isinstance(error, GroupError) else () if error.person is None else (error.person,)
         return {
             "kind": error.kind, "start": error.start, "end": error.end,
-            "seconds": (error.end - error.start + 1) / fps, "who": self.who, **who,
+            "seconds": (error.end - error.start + 1) / fps, "who": self.who,
+            "of": "groups" if of_group else "people", "people": list(people),
+            "others": list(getattr(error, "others", ())), "before": getattr(error, "before", None),
+            "after": getattr(error, "after", None),
             "cause": self.cause.name, "detail": self.cause.text, "cost": self.cost,
         }  # fmt: skip
 

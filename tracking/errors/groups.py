@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 
@@ -226,18 +227,11 @@ def _span(rows: FrameRows, stretch: list[int]) -> tuple[int, int]:
 
 def _stretches(rows: FrameRows, states: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str, list[int]]]:
     """Yields id, state and rows of each stretch of frames in which a group is in one state; states: by row."""
-    open_: dict[int, tuple[int, str, list[int]]] = {}
-    for row, state in states:
-        frame, id = int(rows.frame[row]), int(rows.id[row])
-        last = open_.get(id)
-        if last is None or (last[0] + 1, last[1]) != (frame, state):
-            if last is not None:
-                yield id, last[1], last[2]
-            last = frame, state, []
-        last[2].append(row)
-        open_[id] = frame, state, last[2]
-    for id, (_, state, stretch) in open_.items():
-        yield id, state, stretch
+    ordered = sorted((int(rows.id[row]), int(rows.frame[row]), row, state) for row, state in states)
+    # in consecutive frames of one id, the frame less the place in the list is the same
+    keyed = groupby(enumerate(ordered), key=lambda item: (item[1][0], item[1][3], item[1][1] - item[0]))
+    for (id, state, _), stretch in keyed:
+        yield id, state, [row for _, (_, _, row, _) in stretch]
 
 
 def _named(error: GroupError, of: Memberships, events: Sequence[GroupEvent], reach: float) -> GroupError:

@@ -29,7 +29,8 @@ from scenarios.errors import InputError
 from sim.hashing import ENGINE
 from sim.types import Array, DetectionMode
 from tracking.environment.episode_cache import Source, sources
-from tracking.stress.axes import Axis, BreakingPoint, breaking_point, curve
+from tracking.stats import mean_interval
+from tracking.stress.axes import Axis, BreakingPoint, breaking_point
 from tracking.stress.episodes import ORACLE, OracleTask, PlayScenes, Store
 from tracking.tuning.parallel_episodes import EpisodeTask
 from tracking.tuning.tuned_tracker import TunedTracker
@@ -237,7 +238,7 @@ class Sweep:
 
     def _bend(self, name: str) -> bool:
         """Adds a value where the curve is steepest."""
-        steps = np.abs(np.diff(curve(self.scores(name))))
+        steps = np.abs(np.diff(mean_interval(self.scores(name))[0]))
         return bool(np.isfinite(steps).any()) and self._insert(int(np.nanargmax(steps)) + 1)
 
     def _insert(self, k: int) -> bool:

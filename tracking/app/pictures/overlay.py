@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -16,7 +17,7 @@ from sim.io.files.atomic import new_file
 from sim.io.files.own_files import GENERATOR
 from sim.io.pictures.video_files import write_video
 from sim.types import Frame, Image, Sequence, Tracks
-from tracking.app.replay_page.video import even_size, refuse_source
+from tracking.app.replay_page.video import even_size, refuse_source, shown_pictures
 from tracking.drawing.canvas import Canvas
 from tracking.drawing.layer_painting import draw_banner, draw_captions, letter_size, paint_layer
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
@@ -25,7 +26,6 @@ from tracking.running.run import grouped
 LOW = 400  # px: pictures less high than this are shown at twice their size.
 
 BANNER_HEIGHT = 32
-GREY = (128, 128, 128)
 
 
 def write_overlay(
@@ -47,8 +47,15 @@ def write_overlay(
     path = Path(out)
     refuse_source(sequence, path)
     layers = _layers(sequence, tracks, truth is not None)
-    with new_file(path) as partial:
-        _write(partial, sequence, layers, step)
+    pictures = overlay_pictures(sequence, layers)
+    first = next(pictures, None)
+    if first is None:
+        raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
+    size = first.shape[1], first.shape[0]
+    with new_file(path) as partial, write_video(partial, size, sequence.fps, comment=GENERATOR) as video:
+        for picture in chain([first], pictures):
+            video.add(picture)
+            step(sequence.name)
     return path
 
 
@@ -66,41 +73,23 @@ def _layers(sequence: Sequence, tracks: SequenceOf[Tracks] | None, with_truth: b
     return layers
 
 
-def _write(path: Path, sequence: Sequence, layers: SequenceOf[Layer], step: Callable[[str], None]) -> None:
-    pictures = overlay_pictures(sequence, layers)
-    first = next(pictures, None)
-    if first is None:
-        raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
-    with write_video(path, (first.shape[1], first.shape[0]), sequence.fps, comment=GENERATOR) as video:
-        video.add(first)
-        step(sequence.name)
-        for picture in pictures:
-            video.add(picture)
-            step(sequence.name)
-
-
 def overlay_pictures(sequence: Sequence, layers: SequenceOf[Layer]) -> Iterator[Image]:
     """Yields the video's pictures, BGR uint8, one per frame, of even width and height."""
-    last: Image | None = None
-    for frame in sequence:
-        if frame.image is not None:
-            last = frame.image
-        body = _drawn(last, sequence, frame.index, layers)
+    for frame, picture in shown_pictures(sequence):
+        body = _drawn(picture, sequence.fps, frame.index, layers)
         banner = np.zeros((BANNER_HEIGHT, body.shape[1], 3), np.uint8)
         draw_banner(banner, banner_words(sequence, frame, layers), _warnings(sequence, frame), 0.55)
         yield even_size(np.concatenate([banner, body]))
 
 
-def _drawn(picture: Image | None, sequence: Sequence, index: int, layers: SequenceOf[Layer]) -> Image:
-    assert sequence.image_size is not None, "pictures have a size"
-    width, height = sequence.image_size
-    shown = np.full((height, width, 3), GREY, np.uint8) if picture is None else picture
-    factor = 2 if height < LOW else 1
-    image = np.array(cv2.resize(shown, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR), np.uint8)
-    canvas = Canvas(image, factor, np.zeros(2), np.array([width, height], float), upwards=False)
+def _drawn(picture: Image, fps: float, index: int, layers: SequenceOf[Layer]) -> Image:
+    factor = 2 if len(picture) < LOW else 1
+    image = np.array(cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR), np.uint8)
+    size = np.array(picture.shape[1::-1], float)
+    canvas = Canvas(image, factor, np.zeros(2), size, upwards=False)
     for layer in layers:
-        paint_layer(canvas, layer, index, sequence.fps)
-    draw_captions(image, layers[-1], index, sequence.fps, letter_size(canvas))
+        paint_layer(canvas, layer, index, fps)
+    draw_captions(image, layers[-1], index, fps, letter_size(canvas))
     return image
 
 

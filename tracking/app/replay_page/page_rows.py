@@ -120,8 +120,10 @@ class PageRows:
 
     def ordered(self, rows: Ints) -> PageRows:
         """Returns some rows in this order."""
-        columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "plane"}
-        return replace(self, **{name: None if column is None else column[rows] for name, column in columns.items()})
+        names = [field.name for field in fields(self) if field.name != "plane"]
+        columns: dict[str, Any] = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        cut: dict[str, Any] = {name: column[rows] for name, column in columns.items()}
+        return replace(self, **cut)
 
 
 def rows_of_truth(truth: Truth) -> PageRows:
