@@ -9,11 +9,10 @@ import numpy as np
 from bokeh.core.types import ID
 from bokeh.embed import json_item
 from bokeh.models import ColumnDataSource, HoverTool
-from bokeh.models.annotations import Legend, Whisker
+from bokeh.models.annotations import Legend
 from bokeh.plotting import figure
 from bokeh.resources import Resources
 
-from sim.types import Array
 from tracking.app.report.content import Curves, Json, Report
 from tracking.errors.found import CauseRow
 
@@ -33,8 +32,6 @@ def scripts() -> str:
 def charts(report: Report) -> Json:
     """Returns the charts of a report by the id of the element that they fill."""
     found: dict[str, Any] = {}
-    if report.ranking:
-        found["chart-ranking"] = _ranking(report.ranking, report.by)
     if report.curves:
         found["chart-curves"] = _curves(report.curves, report.by)
     if report.causes:
@@ -53,29 +50,6 @@ def _figure(height: int, **given: Any) -> Any:
 def colour(k: int) -> str:
     """Returns the colour of the k-th tracker."""
     return COLOURS[k % len(COLOURS)]
-
-
-def _ranking(rows: SequenceOf[Json], by: str) -> Any:
-    names = [row["run"] for row in rows]
-    values = {key: np.array([row[key] for row in rows], float) for key in ("mean", "low", "high")}
-    data = {key: np.where(np.isfinite(value), value, values["mean"]) for key, value in values.items()}
-    ends = _range(np.concatenate([*values.values()]))
-    plot = _figure(70 + 30 * len(rows), y_range=names[::-1], x_range=ends, x_axis_label=by)
-    trackers = sorted(row["run"] for row in rows if row["rank"])
-    fills = [colour(trackers.index(row["run"])) if row["rank"] else GREY for row in rows]
-    ranks = [row["rank"] or "oracle" for row in rows]
-    source = ColumnDataSource({"name": names, **data, "fill": fills, "rank": ranks})
-    plot.add_layout(Whisker(base="name", lower="low", upper="high", dimension="width", source=source))
-    dots = plot.scatter("mean", "name", size=11, color="fill", source=source)
-    tips = [("", "@name"), ("rank", "@rank"), (by, "@mean{0.000} (@low{0.000} to @high{0.000})")]
-    plot.add_tools(HoverTool(renderers=[dots], tooltips=tips))
-    return plot
-
-
-def _range(values: Array) -> tuple[float, float]:
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    room = 0.06 * (high - low) or 0.01
-    return low - room, high + room
 
 
 def _curves(curves: Curves, by: str) -> Any:

@@ -47,7 +47,7 @@ def test_all_parts_stand_in_the_page() -> None:
     parts = ("ranking", "scenes", "curves", "matrices", "moments", "causes", "sequences", "failures")
     assert [id for id in parts if f'<section id="{id}">' in page] == list(parts)
     charts = json.loads(re.findall(r'id="charts">(.*?)</script>', page, re.DOTALL)[0])
-    assert list(charts) == ["chart-ranking", "chart-curves", "chart-causes"]
+    assert list(charts) == ["chart-curves", "chart-causes"]
     assert all(f'id="{id}"' in page for id in charts)
     assert "no scene, blob" in page, "an empty cell says why"
 
