@@ -14,6 +14,7 @@ from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -235,17 +236,11 @@ def ellipses(extent: Array) -> Array:
 
 
 def simplified(hull: Array, least: float) -> Array:
-    """Returns a convex polygon (V, 2) without the corners nearer than `least` to the line through their neighbours."""
-    for odd in (1, 0):  # every other corner at a time, so that no two neighbours go at once
-        n = len(hull)
-        if n > 3:
-            before, after = np.roll(hull, 1, axis=0), np.roll(hull, -1, axis=0)
-            along, out = after - before, hull - before
-            area = np.abs(along[:, 0] * out[:, 1] - along[:, 1] * out[:, 0])
-            flat = area < least * np.hypot(along[:, 0], along[:, 1])
-            candidates = np.arange(n) % 2 == odd
-            candidates[-1] &= n % 2 == 0  # with an odd number of corners the last is a neighbour of the first
-            hull = hull[~(flat & candidates)]
+    """Returns a convex polygon (V, 2) without corners nearer than `least` to what is left, by Douglas and Peucker."""
+    if len(hull) > 3:
+        corners = hull.astype(np.float32)
+        kept = (corners[:, None] == cv2.approxPolyDP(corners, least, closed=True)[:, 0]).all(axis=2).any(axis=1)
+        hull = hull[kept] if kept.sum() > 2 else hull
     return hull if len(hull) <= MAX_CORNERS else hull[:: math.ceil(len(hull) / MAX_CORNERS)]
 
 
