@@ -10,7 +10,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ import numpy as np
 
 from sim.io.files.atomic import write_file
 from sim.io.store.truth_files import spans
-from sim.types import Array, Camera, GroupEvent, Near, Scene, Sequence, Tracks
+from sim.types import Array, GroupEvent, Near, Sequence, Tracks
 from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
 from tracking.app.replay_page.video import PageVideo
 from tracking.drawing.plan_view import plan_area
@@ -130,8 +130,8 @@ def page_data(
         "zoomed": span is not None,
         "image": sequence.image_size or _image_size(both),
         "bounds": _bounds(sequence, both),
-        "scene": scene_json(sequence.scene),
-        "camera": camera_json(sequence.camera),
+        "scene": plain(sequence.scene),
+        "camera": plain(sequence.camera),
         "truth": encoded.get("truth"),
         "tracks": encoded.get("tracks"),
         "other": None if other is None else {"tracker": _tracker(other), "tracks": encoded.get("other")},
@@ -186,7 +186,7 @@ def _image_size(both: list[PageRows]) -> list[int] | None:
 def _bounds(sequence: Sequence, both: list[PageRows]) -> list[float] | None:
     points = [part for rows in both if rows.plane == "ground" for part in _points(rows)]
     area = plan_area(sequence.scene, np.concatenate([np.zeros((0, 2)), *points]))
-    return None if area is None else _round(np.concatenate(area), 2)
+    return None if area is None else np.concatenate(area).round(2).tolist()
 
 
 def _points(rows: PageRows) -> list[Array]:
@@ -223,37 +223,12 @@ def _detections(sequence: Sequence, low: int, high: int) -> Json | None:
     }
 
 
-def scene_json(scene: Scene | None) -> Json | None:
-    """Returns the scene for the page, in m, as a JSON object; None without a scene."""
-    if scene is None:
-        return None
-    return {
-        "size": _round(scene.size),
-        "walls": _round(scene.walls.reshape(-1, 4)),
-        "pillars": _round(scene.pillars),
-        "doors": _round(scene.doors.reshape(-1, 4)),
-        "service": _round(scene.service),
-        "stairs": [[*_round(s.foot), *_round(s.head), s.width, s.rise, s.steps, s.landing] for s in scene.stairs],
-        "wallHeight": scene.wall_height,
-        "pillarHeight": scene.pillar_height,
-    }
-
-
-def camera_json(camera: Camera | None) -> Json | None:
-    """Returns the camera for the page, which projects ground and walls with it, as a JSON object."""
-    if camera is None:
-        return None
-    return {
-        "kind": camera.kind,
-        "f": _round(camera.focal_px),
-        "c": _round(camera.centre_px),
-        "C": _round(camera.position, 4),
-        "R": _round(camera.rotation, 6),
-        "scale": None if math.isnan(camera.px_per_m) else camera.px_per_m,
-        "k": camera.radial,
-    }
-
-
-def _round(values: Any, digits: int = 3) -> list[Any]:
-    listed: list[Any] = np.round(np.asarray(values, float), digits).tolist()
-    return listed
+def plain(value: Any) -> Any:
+    """Returns arrays, numbers, and tuples and dataclasses of them, as JSON has them: with 6 digits, None for nan."""
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, tuple):
+        return [plain(one) for one in value]
+    if isinstance(value, float):
+        return None if math.isnan(value) else round(value, 6)
+    return np.round(value, 6).tolist() if isinstance(value, np.ndarray) else value
