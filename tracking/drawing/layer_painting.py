@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from sim.types import Array, GroupEvent, Image
-from tracking.drawing.canvas import FLOOR, INK, TRAIL_SECONDS, Canvas, Colour, ascii_only, box_corners, colour, text
+from tracking.drawing.canvas import FLOOR, TRAIL_SECONDS, Canvas, Colour, ascii_only, box_corners, colour, text
 from tracking.drawing.layers import FrameMarks, GroupMark, Layer
 
 CAPTION_SECONDS = 2.5  # s for which an event's caption is shown.
@@ -128,13 +128,10 @@ def draw_captions(image: Image, layer: Layer, index: int, fps: float, size: floa
         y -= draw_label(image, event_words(event, layer.prefix), (6, y), size * 1.25, kind_colour(event.kind)) + 3
 
 
-def draw_banner(image: Image, words: str, warnings: list[str], size: float) -> None:
-    """Fills the whole image and writes a line of text on it, warnings on red at its right."""
+def draw_banner(image: Image, words: str, warning: str, size: float) -> None:
+    """Fills the whole image and writes a line of text on it, and a warning on red at its right if there is one."""
     image[:] = FLOOR
     y = image.shape[0] * 0.5 + 9 * size
-    cv2.putText(image, ascii_only(words), (6, round(y)), cv2.FONT_HERSHEY_SIMPLEX, size, INK, 1, cv2.LINE_AA)
-    x = float(image.shape[1] - 4)
-    for warning in warnings:
-        (width, _), _ = cv2.getTextSize(warning, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
-        x -= width + 10
-        draw_label(image, warning, (x, y + 6), size, colour(ALARM))
+    text(image, words, (6, y), size)
+    if warning:
+        draw_label(image, warning, (image.shape[1], y + 6), size, colour(ALARM))

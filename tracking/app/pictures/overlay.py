@@ -78,7 +78,7 @@ def overlay_pictures(sequence: Sequence, layers: SequenceOf[Layer]) -> Iterator[
     for frame, picture in shown_pictures(sequence):
         body = _drawn(picture, sequence.fps, frame.index, layers)
         banner = np.zeros((BANNER_HEIGHT, body.shape[1], 3), np.uint8)
-        draw_banner(banner, banner_words(sequence, frame, layers), _warnings(sequence, frame), 0.55)
+        draw_banner(banner, banner_words(sequence, frame, layers), _warning(sequence, frame), 0.55)
         yield even_size(np.concatenate([banner, body]))
 
 
@@ -101,7 +101,7 @@ def banner_words(sequence: Sequence, frame: Frame, layers: SequenceOf[Layer]) ->
     return f"{sequence.name}   frame {frame.index}{of}   {frame.t:.2f} s{count}"
 
 
-def _warnings(sequence: Sequence, frame: Frame) -> list[str]:
-    lost = ["lost frame"] if frame.image is None else []
+def _warning(sequence: Sequence, frame: Frame) -> str:
     empty = frame.detections is None or not len(frame.detections.pos)
-    return lost + (["no detections"] if sequence.has_detections and empty else [])
+    lacks = {"lost frame": frame.image is None, "no detections": sequence.has_detections and empty}
+    return ", ".join(words for words, holds in lacks.items() if holds)
