@@ -24,14 +24,16 @@ def candidate(name: str, scenario: str, score: float) -> content.Played:
 
 def full(name: str) -> content.Report:
     """A report with all parts, in which trackers, scenes and errors have this name."""
-    cells = [content.HeatCell(0.5, 0.8), content.HeatCell(math.nan, math.nan, f"no scene, {name}")]
+    empty = replace(candidate(name, name, math.nan), best=math.nan, why=f"no scene, {name}")
     ends = [0.8, None, 0.2], [1, None, 0.4]
     curve = {"mean": [0.9, None, 0.3], "low": ends[0], "high": ends[1], "break": {"at": 0.6, "low": 0.5, "high": 1.0}}
     rows = [
         {"run": "oracle", "rank": "", "mean": 0.9, "low": math.nan, "high": math.nan},
         {"run": name, "rank": "1", "mean": 0.8, "low": 0.7, "high": 0.9, "MOTA": 0.5},
     ]
-    maps = [content.HeatMap(name, columns, {name: cells}) for columns in ((name, "b"), ("1", "2"))]
+    runs = [candidate(name, name, 0.4), candidate(name, name, 0.6), empty]
+    every = [zip([name] * 3, columns, runs, strict=True) for columns in ((name, name, "b"), ("1", "1", "2"))]
+    maps = [content.heat_map(name, cells) for cells in every]
     return content.Report(
         name, name, "HOTA", rows, [name], maps[0],
         content.Curves(name, name, [1, 0.8, 0.4], {name: curve}, [name]), maps[1:],
@@ -50,6 +52,7 @@ def test_all_parts_stand_in_the_page() -> None:
     assert list(charts) == ["chart-curves", "chart-causes"]
     assert all(f'id="{id}"' in page for id in charts)
     assert "no scene, blob" in page, "an empty cell says why"
+    assert page.count("56 %<small>0.500") == 2, "means, as a share of the oracle's 0.9"
 
 
 def test_parts_without_content_are_left_out() -> None:
