@@ -55,7 +55,7 @@ DETAILS: tuple[Pattern, ...] = (
     ("event", EACH, ("parts", "via", "groups"), EACH),
 )  # fmt: skip
 TIMES: tuple[Pattern, ...] = (
-    ("group", EACH, "stops", EACH, "until", EACH), ("event", EACH, "when", "time"),
+    ("group", EACH, "enter"), ("group", EACH, "stops", EACH, "until", EACH), ("event", EACH, "when", "time"),
     ("sensor", "hide", EACH, ("start", "end")), ("light", "switch", EACH, "at"),
 )  # fmt: skip
 
@@ -194,13 +194,12 @@ def _second_later(table: Table) -> Table:
     """Returns a scene that begins a second later."""
 
     def earlier(time: Any) -> Any:
-        return max(round(time - 1.0, DECIMALS), 0.0) if _numbers(time) else time
+        return min(time, max(round(time - 1.0, DECIMALS), 0.0)) if _numbers(time) else time
 
     table["duration"] = round(table["duration"] - 1.0, 6)
     for group in table["group"]:
         if group["enter"] <= 0:
             _walk(group)
-        group["enter"] = min(group["enter"], earlier(group["enter"]))
     for path in [path for pattern in TIMES for path in _paths(table, pattern)]:
         _changed(table, path, earlier)
     return table
@@ -255,8 +254,11 @@ def people(scenario: Scenario) -> list[Piece]:
     """Returns the people after the first of each group, and its copies after the first."""
     pieces = []
     for k, group in enumerate(scenario.group):
-        drawn, least = isinstance(group.size, Distribution), _least(group.size)
-        pieces += [Piece(("group", k, "size"), partial(_fewer, least))] * (least - 1 + drawn)
+        size = ("group", k, "size")
+        if isinstance(group.size, Distribution):
+            pieces.append(_set(_least(group.size), *size))
+        else:
+            pieces += [Piece(size, lambda now: round(now) - 1)] * (round(group.size) - 1)
         pieces += [Piece(("group", k, "repeat"), lambda now: now - 1)] * (group.repeat - 1)
     return pieces
 
@@ -264,10 +266,6 @@ def people(scenario: Scenario) -> list[Piece]:
 def _least(size: Value) -> int:
     low = bounds(size)[0]
     return max(1, round(low)) if math.isfinite(low) else 1
-
-
-def _fewer(least: int, size: Any) -> int:
-    return round(size) - 1 if _numbers(size) else least
 
 
 STAGES: tuple[Stage, ...] = (

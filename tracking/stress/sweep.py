@@ -94,18 +94,10 @@ class Sweep:
         """Plays until the breaking points are known, or the budget is spent."""
         self.check_scenes()
         self.values = list(product(*(axis.spread(FIRST_VALUES) for axis in self.plan.axes)))
-        self.seeds = self._first_seeds()
+        self._add_seeds(self.plan.start)
         self.play_values()
         while not self.spent() and self._refine():
             self.play_values()
-
-    def _first_seeds(self) -> int:
-        """Returns how many seeds are played at once: `start`, or as many as the budget allows, at least 1."""
-        if self.plan.episodes is None:
-            return self.plan.start
-        scenes = len(sources(self.plan.scenarios, self.plan.seeds[:1], self.plan.settings))
-        each = len(self.trackers) * len(self.values) * scenes
-        return min(self.plan.start, max(1, self.plan.episodes // each))
 
     @property
     def played(self) -> int:
@@ -217,13 +209,13 @@ class Sweep:
         """Adds a value or seeds where least is known; returns False if nothing is left to do."""
         if len(self.plan.axes) != 1:
             limited = self.plan.episodes is not None or self.plan.minutes is not None
-            return (limited or not self.plan.axes) and self._more_seeds()
+            return (limited or not self.plan.axes) and self._add_seeds(self.seeds)
         for name, point in sorted(self.breaks().items(), key=lambda item: -_width(item[1])):
             if np.isfinite(point.at):
-                if point.high - point.low > NARROW and (self._narrow(point) or self._more_seeds()):
+                if point.high - point.low > NARROW and (self._narrow(point) or self._add_seeds(self.seeds)):
                     return True
             elif np.isfinite(point.low):
-                if self._more_seeds():
+                if self._add_seeds(self.seeds):
                     return True
             elif len(self.values) < FIRST_VALUES + 2 and self._bend(name):
                 return True
@@ -249,13 +241,15 @@ class Sweep:
         self.values.insert(k, (middle,))
         return True
 
-    def _more_seeds(self) -> bool:
-        """Doubles the seeds, or takes as many more as the budget of episodes allows."""
-        more = min(self.seeds, len(self.plan.seeds) - self.seeds)
+    def _add_seeds(self, more: int) -> bool:
+        """Adds seeds, or as many as the budget of episodes allows, at first at least one; returns True if it did."""
+        more = min(more, len(self.plan.seeds) - self.seeds)
         if self.plan.episodes is not None:
-            each = len(self.trackers) * len(self.values) * len(self._scenes(self.values[0])) // self.seeds
+            scenes = len(sources(self.plan.scenarios, self.plan.seeds[:1], self.plan.settings))
+            each = len(self.trackers) * len(self.values) * scenes
             more = min(more, (self.plan.episodes - self.played) // each)
-        self.seeds += max(more, 0)
+        more = max(more, 0 if self.seeds else 1)
+        self.seeds += more
         return more > 0
 
 
