@@ -27,8 +27,8 @@ def bare(length: int, starts: dict[int, str]) -> Truth:
 
 
 def test_onsets_come_first_and_gaps_are_filled() -> None:
-    layer = layer_of_truth(bare(200, {50: "merge", 120: "split", 60: "enter"}))
-    chosen = contact_sheet.choose_frames(layer, 200, 10.0, 8)
+    truth = bare(200, {50: "merge", 120: "split", 60: "enter"})
+    chosen = contact_sheet.choose_frames(layer_of_truth(truth), 200, 10.0, 8)
     assert {50, 120} <= set(chosen)
     assert len(set(chosen)) == 8
     assert max(np.diff([1, *chosen, 200])) < 45
@@ -53,9 +53,8 @@ def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_p
     """moved: the tracks are, and are drawn in place of the truth."""
     tracks = None if moved is None else [t.replace(pos=t.pos + moved) for t in people_as_tracks(truth)]
     path = contact_sheet.write_sheet(sequence, tmp_path / "new" / "sheet.png", 1, tracks)
-    plan = layer_of_truth(truth, plan=True)
-    if tracks is not None:
-        plan = layer_of_tracks(grouped(tracks, sequence), None, None, plan=True)
+    shown = () if tracks is None else grouped(tracks, sequence)
+    plan = layer_of_tracks(shown, None, None, plan=True) if shown else layer_of_truth(truth, plan=True)
     (index,) = contact_sheet.choose_frames(plan, truth.length, truth.fps, 1)
     (part,) = contact_sheet.views(sequence, [plan, plan], [index])
     picture = cv2.imread(str(path))
