@@ -19,6 +19,8 @@ from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.grouping.known_people import people_as_tracks
 from tracking.running.run import grouped
 
+NO_LAYER = Layer("true", "G", {})
+
 
 def bare(length: int, starts: dict[int, str]) -> Truth:
     events = tuple(GroupEvent(kind, k, k, None, (1,), (1,), (1,), (0.0, 0.0)) for k, kind in sorted(starts.items()))
@@ -27,8 +29,8 @@ def bare(length: int, starts: dict[int, str]) -> Truth:
 
 
 def test_onsets_come_first_and_gaps_are_filled() -> None:
-    truth = bare(200, {50: "merge", 120: "split", 60: "enter"})
-    chosen = contact_sheet.choose_frames(layer_of_truth(truth), 200, 10.0, 8)
+    layer = layer_of_truth(bare(200, {50: "merge", 120: "split", 60: "enter"}))
+    chosen = contact_sheet.choose_frames(layer, 200, 10.0, 8)
     assert {50, 120} <= set(chosen)
     assert len(set(chosen)) == 8
     assert max(np.diff([1, *chosen, 200])) < 45
@@ -53,8 +55,7 @@ def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_p
     """moved: the tracks are, and are drawn in place of the truth."""
     tracks = None if moved is None else [t.replace(pos=t.pos + moved) for t in people_as_tracks(truth)]
     path = contact_sheet.write_sheet(sequence, tmp_path / "new" / "sheet.png", 1, tracks)
-    shown = () if tracks is None else grouped(tracks, sequence)
-    plan = layer_of_tracks(shown, None, None, plan=True) if shown else layer_of_truth(truth, plan=True)
+    plan = layer_of_tracks(grouped(tracks, sequence), None, None, True) if tracks else layer_of_truth(truth, True)
     (index,) = contact_sheet.choose_frames(plan, truth.length, truth.fps, 1)
     (part,) = contact_sheet.views(sequence, [plan, plan], [index])
     picture = cv2.imread(str(path))
@@ -75,9 +76,8 @@ def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) ->
 def test_each_panel_shows_its_frame(tmp_path: Path) -> None:
     """Without labels too: frames spread over the recording."""
     bare = sequence(60)
-    layer = Layer("true", "G", {})
-    chosen = contact_sheet.choose_frames(layer, 60, 10.0, 4)
-    (part,) = contact_sheet.views(bare, [layer], chosen)
+    chosen = contact_sheet.choose_frames(NO_LAYER, 60, 10.0, 4)
+    (part,) = contact_sheet.views(bare, [NO_LAYER], chosen)
     for index in chosen:
         area = np.zeros((SIZE[1] * 4, SIZE[0] * 4, 3), np.uint8)
         part.draw(area, index, 10.0)
