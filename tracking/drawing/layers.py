@@ -13,13 +13,15 @@ from functools import partial
 
 import numpy as np
 
-from sim.geometry.polygons import convex_hull, footprint_hull
+from sim.geometry.polygons import convex_hull
 from sim.io.store.track_files import upright_boxes
 from sim.io.store.truth_files import with_ground_height
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
 from tracking.drawing.canvas import box_corners
 
 BOX_MARGIN = 5.0  # px between members' boxes and the outline of their group.
+
+FOOTPRINT = 0.3  # m that a group's outline keeps from its members on a plan.
 
 HIDDEN = 0.2  # A person whose visible share is below this gets a thin box.
 
@@ -184,13 +186,11 @@ def _outlined(group: Ints, box: Array, at: Array) -> tuple[GroupMark, ...]:
     """Returns a mark for each group with two or more known boxes, or places if no box is known, by increasing id."""
     boxed = np.isfinite(box[:, 0])
     known = boxed if boxed.any() else np.isfinite(at[:, 0])
-    corners = box_corners(box + BOX_MARGIN * np.array([-1, -1, 2, 2]))
+    outlines = box_corners(box + BOX_MARGIN * np.array([-1, -1, 2, 2]))
+    if not boxed.any():
+        outlines = at[:, None] + FOOTPRINT * UNIT_CIRCLE[::2]
     found = [(g, (group == g) & known) for g in np.unique(group[group >= 0]).tolist()]
-    return tuple(
-        GroupMark(g, convex_hull(corners[own].reshape(-1, 2)) if boxed.any() else footprint_hull(at[own]))
-        for g, own in found
-        if own.sum() > 1
-    )
+    return tuple(GroupMark(g, convex_hull(outlines[own].reshape(-1, 2))) for g, own in found if own.sum() > 1)
 
 
 def _plane(points: Array) -> Array:
