@@ -45,8 +45,9 @@ from tracking.environment.episode_cache import Source
 from tracking.oracle import oracle
 from tracking.running.tracker_registry import find
 from tracking.scoring.evaluation import Scorer, people_scores
+from tracking.stats import mean_interval
 from tracking.stress import failures, minimize
-from tracking.stress.axes import AXES, Axis, breaking_point, crossing, curve
+from tracking.stress.axes import AXES, Axis, breaking_point, crossing
 from tracking.stress.episodes import OracleTask, Outcome, Store, Tasks
 from tracking.stress.reductions import difficulties
 from tracking.stress.search import Failure, search, worst
@@ -176,7 +177,7 @@ def measured(weakness: Weakness, folder: Path) -> float:
     middle, axis = coarse.breaks()["t"].at, weakness.axis
     shares = [0.0, *np.clip(np.linspace(middle - 0.15, middle + 0.15, FINE), 0, 1).tolist()]
     fine = sweep_of(weakness, TRUE_SEEDS, 0, folder)
-    mean = curve(at_values(fine, [axis.at(share) for share in shares], len(TRUE_SEEDS)))
+    mean = mean_interval(at_values(fine, [axis.at(share) for share in shares], len(TRUE_SEEDS)))[0]
     return axis.at(crossing(fine.way, mean - SHARE * mean[0]))
 
 

@@ -1,15 +1,23 @@
-"""Draws a layer on a canvas: boxes with ids, trails, ellipses, groups; and captions of events and a banner of facts."""
+"""Draws a layer on a canvas: boxes or discs with ids, trails, ellipses, groups; captions of events and a banner."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from sim.types import Array, GroupEvent, Image
-from tracking.drawing.canvas import FLOOR, INK, TRAIL_SECONDS, Canvas, Colour, ascii_only, box_corners, colour
-from tracking.drawing.layers import GroupMark, Layer
+from tracking.drawing.canvas import (
+    FLOOR,
+    TRAIL_SECONDS,
+    Canvas,
+    Colour,
+    ascii_only,
+    box_corners,
+    colour,
+    text,
+    text_width,
+)
+from tracking.drawing.layers import FrameMarks, GroupMark, Layer
 
 CAPTION_SECONDS = 2.5  # s for which an event's caption is shown.
 
@@ -17,21 +25,15 @@ CAPTIONS = 6  # Captions in a picture at most.
 
 MANY = 60  # Ids of people are left out of frames with more people than this; of more groups only the first are named.
 
+FOOT = 0.22  # m: radius of the disc of somebody without a box.
+
+LEAST_RADIUS = 5.0  # px
+
 PLAIN_INK = (250, 250, 250)
 ALARM = 6  # The id whose colour marks what a frame lacks, and events of unknown kind.
 
 # The id whose colour an event's kind has.
 KIND_COLOUR = {"merge": 0, "split": 1, "cross": 3, "queue": 2, "form": 4, "dissolve": 5, "enter": 7, "leave": 9}
-
-
-@dataclass(frozen=True)
-class LayerStyle:
-    """How a layer is drawn."""
-
-    # thin white boxes (and rings for people without a box) only, no trails, ellipses, ids or groups; for the truth
-    # under tracks
-    plain: bool = False
-    rim: bool = True  # boxes have a light edge; without effect on plain and dashed boxes
 
 
 def kind_colour(kind: str) -> Colour:
@@ -52,91 +54,68 @@ def event_words(event: GroupEvent, prefix: str = "G") -> str:
     return f"{event.kind} {listed(event.before)} -> {listed(event.after)}"
 
 
-def paint_layer(canvas: Canvas, layer: Layer, index: int, fps: float, style: LayerStyle = LayerStyle()) -> None:
+def paint_layer(canvas: Canvas, layer: Layer, index: int, fps: float) -> None:
     """Draws frame `index` (from 1) of a layer on a canvas, in place; unknown (nan) marks are skipped."""
     marks = layer.at(index)
-    groups = () if style.plain else marks.groups
+    groups = () if layer.plain else marks.groups
     for group in groups:
         _paint_group(canvas, group, colour(group.id))
-    if not style.plain:
+    if not layer.plain:
         for identity, points in layer.trails(index, round(TRAIL_SECONDS * fps)):
             canvas.line(points, colour(identity), 2)
+    radius = max(FOOT * canvas.scale, LEAST_RADIUS)
     for k, identity in enumerate(marks.id.tolist()):
-        ink = PLAIN_INK if style.plain else colour(identity)
-        ring = marks.ellipse[k]
-        if not style.plain and np.isfinite(ring).all() and _fits(canvas, ring):
-            canvas.line(ring, ink, 1, closed=True)
+        ink = PLAIN_INK if layer.plain else colour(identity)
+        if not layer.plain:
+            _paint_ring(canvas, marks.ellipse[k], ink)
         if np.isfinite(marks.box[k]).all():
-            _paint_box(canvas, marks.box[k], ink, style, dashed=bool(marks.hidden[k]))
+            corners, thin = box_corners(marks.box[k]), layer.plain or bool(marks.hidden[k])
+            if not thin:
+                canvas.line(corners, FLOOR, 4, closed=True)
+            canvas.line(corners, ink, 1 if thin else 2, closed=True)
         elif np.isfinite(marks.at[k]).all():
-            canvas.disc(marks.at[k], 5, ink, 2)
-    if not style.plain:
-        _paint_ids(canvas, layer, index)
-        for group in groups[:MANY]:
-            _paint_group_id(canvas, layer.prefix, group)
+            canvas.disc(marks.at[k], radius, ink, 2 if layer.plain else -1)
+    for group in groups[:MANY]:
+        _paint_group_id(canvas, layer.prefix, group)
+    if not layer.plain and len(marks.id) <= MANY and not marks.whole_groups:
+        _paint_ids(canvas, marks, radius)
 
 
 def _paint_group(canvas: Canvas, group: GroupMark, ink: Colour) -> None:
     if len(group.hull):
         canvas.fill(canvas.map(group.hull), ink, 0.18)
         canvas.line(group.hull, ink, 2, closed=True)
-    if len(group.extent):
-        _paint_dots(canvas, group.extent, ink)
+    _paint_ring(canvas, group.extent, ink)
     if len(group.motion) == 2:
         canvas.arrow(group.motion, FLOOR, 4)
         canvas.arrow(group.motion, ink, 2)
 
 
-def _paint_dots(canvas: Canvas, ring: Array, ink: Colour) -> None:
+def _paint_ids(canvas: Canvas, marks: FrameMarks, radius: float) -> None:
+    size, at = letter_size(canvas), canvas.map(marks.at)
+    apart = np.nan_to_num(np.hypot(*(at[:, None] - at).transpose(2, 0, 1)), nan=np.inf)
+    np.fill_diagonal(apart, np.inf)
+    nearest = at[apart.argmin(axis=1)] if len(at) else at
+    for identity, corner, (x, y), other in zip(
+        marks.id.tolist(), canvas.map(marks.box[:, :2]), at, nearest, strict=True
+    ):
+        words, ink = str(identity), colour(identity)
+        if np.isfinite(corner).all():
+            draw_label(canvas.image, words, corner - 1, size, ink)
+        elif np.isfinite(x + y):  # on the side where nobody is near
+            left = x + radius + 3 if other[0] <= x else x - radius - 3 - text_width(words, 0.66, 2)
+            text(canvas.image, words, (left, y + 7), 0.66, ink, 2)
+
+
+def _paint_ring(canvas: Canvas, ring: Array, ink: Colour) -> None:
     # a ring as large as the image says that the place is as good as unknown
-    ends = np.concatenate([ring, ring[:1]])
-    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(ends, axis=0).T))]
-    if not _fits(canvas, ring):
-        return
-    places = np.linspace(0.0, along[-1], max(int(along[-1] * canvas.scale / 7), 8), endpoint=False)
-    dots = np.stack([np.interp(places, along, ends[:, axis]) for axis in (0, 1)], axis=1)
-    for radius, tone in ((2.4, FLOOR), (1.5, ink)):
-        for at in dots:
-            canvas.disc(at, radius, tone)
-
-
-def _fits(canvas: Canvas, ring: Array) -> bool:
-    return bool((np.ptp(ring, axis=0) * canvas.scale < canvas.image.shape[1::-1]).all())
-
-
-def _paint_box(canvas: Canvas, box: Array, ink: Colour, style: LayerStyle, dashed: bool) -> None:
-    corners = box_corners(box)
-    if dashed:
-        for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-            _paint_dashes(canvas, a, b, ink)
-        return
-    if style.rim and not style.plain:
-        canvas.line(corners, FLOOR, 4, closed=True)
-    canvas.line(corners, ink, 1 if style.plain else 2, closed=True)
-
-
-def _paint_dashes(canvas: Canvas, a: Array, b: Array, ink: Colour) -> None:
-    count = max(int(np.hypot(*(b - a)) * canvas.scale / 8), 1)
-    for k in range(count):
-        ends = a + (b - a) * np.array([[k / count], [(k + 0.5) / count]])
-        canvas.line(ends, ink, 1)
-
-
-def _paint_ids(canvas: Canvas, layer: Layer, index: int) -> None:
-    marks = layer.at(index)
-    if len(marks.id) > MANY or marks.whole_groups:
-        return
-    top = np.where(np.isfinite(marks.box[:, :2]), marks.box[:, :2], marks.at)
-    size = letter_size(canvas)
-    for identity, at in zip(marks.id.tolist(), canvas.map(top), strict=True):
-        if np.isfinite(at).all():
-            draw_label(canvas.image, str(identity), (at[0] - 1, at[1] - 1), size, colour(identity))
+    known = len(ring) > 0 and np.isfinite(ring).all()
+    if known and (np.ptp(ring, axis=0) * canvas.scale < canvas.image.shape[1::-1]).all():
+        canvas.line(ring, ink, 1, closed=True)
 
 
 def _paint_group_id(canvas: Canvas, prefix: str, group: GroupMark) -> None:
-    points = canvas.map(
-        next(points for points in (group.hull, group.extent, group.motion, np.zeros((1, 2))) if len(points))
-    )
+    points = canvas.map(next(part for part in (group.hull, group.extent, group.motion, np.zeros(2)) if len(part)))
     x, y = points[points[:, 1].argmax()]
     words = f"{prefix}{group.id}" + (f" ~{round(group.size, 1):g}" if np.isfinite(group.size) else "")
     size = letter_size(canvas)
@@ -145,10 +124,10 @@ def _paint_group_id(canvas: Canvas, prefix: str, group: GroupMark) -> None:
 
 def letter_size(canvas: Canvas) -> float:
     """Returns cv2's font scale that suits the canvas."""
-    return float(np.clip(canvas.image.shape[0] / 1200, 0.42, 0.9))
+    return float(np.clip(canvas.image.shape[1] / 1600, 0.42, 0.9))
 
 
-def draw_label(image: Image, words: str, at: tuple[float, float], size: float, ink: Colour) -> int:
+def draw_label(image: Image, words: str, at: tuple[float, float] | Array, size: float, ink: Colour) -> int:
     """Writes light words on a rectangle, kept inside the image, in place, and returns its height in px."""
     words = ascii_only(words)
     (width, height), baseline = cv2.getTextSize(words, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
@@ -166,13 +145,10 @@ def draw_captions(image: Image, layer: Layer, index: int, fps: float, size: floa
         y -= draw_label(image, event_words(event, layer.prefix), (6, y), size * 1.25, kind_colour(event.kind)) + 3
 
 
-def draw_banner(image: Image, words: str, warnings: list[str], size: float) -> None:
-    """Fills the whole image and writes a line of text on it, warnings on red at its right."""
+def draw_banner(image: Image, words: str, warning: str, size: float) -> None:
+    """Fills the whole image and writes a line of text on it, and a warning on red at its right if there is one."""
     image[:] = FLOOR
     y = image.shape[0] * 0.5 + 9 * size
-    cv2.putText(image, ascii_only(words), (6, round(y)), cv2.FONT_HERSHEY_SIMPLEX, size, INK, 1, cv2.LINE_AA)
-    x = float(image.shape[1] - 4)
-    for warning in warnings:
-        (width, _), _ = cv2.getTextSize(warning, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
-        x -= width + 10
-        draw_label(image, warning, (x, y + 6), size, colour(ALARM))
+    text(image, words, (6, y), size)
+    if warning:
+        draw_label(image, warning, (image.shape[1], y + 6), size, colour(ALARM))

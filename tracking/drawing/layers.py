@@ -1,7 +1,7 @@
-"""What to draw over a picture: a layer holds boxes, trails, ellipses, groups and events of truth or of one
-tracker.
+"""What to draw over a picture or on a plan: a layer holds boxes or places, trails, ellipses, groups and events of truth
+or of one tracker.
 
-Layers are computed from `Truth` or `Tracks` here, in px; `layer_painting` draws them."""
+Layers are computed from `Truth` or `Tracks` here, over pictures in px, on plans in m; `layer_painting` draws them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ from tracking.drawing.canvas import box_corners
 
 BOX_MARGIN = 5.0  # px between members' boxes and the outline of their group.
 
-HIDDEN = 0.2  # A person whose visible share is below this gets a dashed box.
+FOOTPRINT = 0.3  # m that a group's outline keeps from its members on a plan.
+
+HIDDEN = 0.2  # A person whose visible share is below this gets a thin box.
 
 NOT_CAPTIONED = ("enter", "leave")  # Kinds of events without a caption.
 
@@ -37,7 +39,7 @@ NO_POINTS = np.zeros((0, 2))
 
 @dataclass(frozen=True, eq=False)
 class GroupMark:
-    """One group in one frame, in px.
+    """One group in one frame, in px or m.
 
     id: of the group. hull: (V, 2) polygon round the members. The other fields are known only of a group that is tracked
     as a whole. extent: (32, 2), points of the ellipse that holds 99 % of the group by the covariance of its members.
@@ -54,12 +56,13 @@ class GroupMark:
 
 @dataclass(frozen=True, eq=False)
 class FrameMarks:
-    """What is drawn of one layer in one frame: N people, or N groups if `whole_groups`, in px.
+    """What is drawn of one layer in one frame: N people, or N groups if `whole_groups`, in px or m.
 
     id: (N,) of people or groups. box: (N, 4) left, top, width, height. at: (N, 2) x, y, the point that trails follow.
     ellipse: (N, 32, 2), points of the ellipse that holds the position with 95 % probability. Rows of these three are
-    nan where unknown. hidden: (N,) True for true people of whom less than 20 % is visible, never for tracks. groups:
-    marks of the groups in the frame. whole_groups: True if the tracker tracks groups, not people.
+    nan where unknown, and all boxes on a plan. hidden: (N,) True for true people of whom less than 20 % is visible,
+    never for tracks. groups: marks of the groups in the frame. whole_groups: True if the tracker tracks groups, not
+    people.
     """
 
     id: Ints
@@ -70,10 +73,8 @@ class FrameMarks:
     groups: tuple[GroupMark, ...] = ()
     whole_groups: bool = False
 
-    @classmethod
-    def none(cls) -> FrameMarks:
-        """Returns the marks of a frame without people and groups: zero rows."""
-        return cls(np.zeros(0, np.int64), np.zeros((0, 4)), NO_POINTS, np.zeros((0, 32, 2)), np.zeros(0, bool))
+
+NOBODY = FrameMarks(np.zeros(0, np.int64), np.zeros((0, 4)), NO_POINTS, np.zeros((0, 32, 2)), np.zeros(0, bool))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,17 +84,19 @@ class Layer:
     name: "true" or "tracked". prefix: letter before group ids, "G" for the truth, "T" for tracks. frames: the marks by
     frame number, counted from 1; a frame may be missing. events: pairs (frame, event); the frame is that in which the
     event becomes known: for tracks that in which it was emitted (its first frame if that is unknown), for the truth its
-    first frame.
+    first frame. plain: True if thin white boxes are drawn only (rings for people without a box), no trails, ellipses,
+    ids or groups; for the truth under tracks.
     """
 
     name: str
     prefix: str
     frames: dict[int, FrameMarks]
-    events: tuple[tuple[int, GroupEvent], ...] = field(default=())
+    events: tuple[tuple[int, GroupEvent], ...] = ()
+    plain: bool = False
 
     def at(self, index: int) -> FrameMarks:
         """Returns the marks of frame `index`, from 1; none if the layer has no such frame."""
-        return self.frames.get(index, FrameMarks.none())
+        return self.frames.get(index, NOBODY)
 
     def trails(self, index: int, past: int) -> Iterator[tuple[int, Array]]:
         """Returns (id, points (K, 2)) of each unbroken trail that ends in frame `index`, the newest point first."""
@@ -113,47 +116,50 @@ class Layer:
         return [event for _, event in sorted(recent, key=lambda pair: -pair[0])]
 
 
-def layer_of_truth(truth: Truth) -> Layer:
-    """Returns the layer of the truth over pictures, in px."""
-    frames = {}
-    for index in range(1, truth.length + 1):
+def layer_of_truth(truth: Truth, plan: bool = False) -> Layer:
+    """Returns the layer of the truth over pictures, in px, or on a plan, in m; it has no frames without such labels."""
+    frames, known = {}, truth.pos if plan else truth.box
+    for index in range(1, truth.length + 1) if known is not None else ():
         now = truth.at(index)
-        if now.box is None or not len(now.id):
-            continue
-        ellipse = np.full((len(now.id), 32, 2), np.nan)
+        nan = np.full((len(now.id), 4), np.nan)
+        box, pos = (nan if plan or now.box is None else now.box), (nan[:, :2] if now.pos is None else now.pos)
+        at, ellipse = pos if plan else _feet(box), np.full((len(now.id), len(UNIT_CIRCLE), 2), np.nan)
         hidden = now.visibility < HIDDEN
-        frames[index] = FrameMarks(now.id, now.box, _feet(now.box), ellipse, hidden, _box_hulls(now.group, now.box))
+        frames[index] = FrameMarks(now.id, box, at, ellipse, hidden, _outlined(now.group, box, at))
     return Layer("true", "G", frames, tuple((e.start, e) for e in truth.events or ()))
 
 
-def layer_of_tracks(tracks: SequenceOf[Tracks], camera: Camera | None, scene: Scene | None) -> Layer:
-    """Returns the layer of one tracker's output over pictures, in px; positions on the ground are projected."""
-    frames = {t.index: _marks_in_picture(t, camera, scene) for t in tracks}
-    return Layer("tracked", "T", frames, _emitted(tracks))
+def layer_of_tracks(
+    tracks: SequenceOf[Tracks], camera: Camera | None, scene: Scene | None, plan: bool = False
+) -> Layer:
+    """Returns the layer of one tracker's output over pictures, in px, or on a plan, in m.
+
+    Over pictures, positions on the ground are projected; on a plan they must be on the ground.
+    """
+    frames = {t.index: _marks(t, camera, scene, plan) for t in tracks}
+    events = tuple((e.start if e.emitted is None else e.emitted, e) for t in tracks for e in t.events)
+    return Layer("tracked", "T", frames, events)
 
 
-def _emitted(tracks: SequenceOf[Tracks]) -> tuple[tuple[int, GroupEvent], ...]:
-    return tuple((e.start if e.emitted is None else e.emitted, e) for t in tracks for e in t.events)
-
-
-def _marks_in_picture(t: Tracks, camera: Camera | None, scene: Scene | None) -> FrameMarks:
-    n, to_picture = len(t.id), partial(_in_picture, plane=t.plane, camera=camera, scene=scene)
+def _marks(t: Tracks, camera: Camera | None, scene: Scene | None, plan: bool) -> FrameMarks:
+    n, same = len(t.id), plan or t.plane == "image"
+    to_drawing = _plane if same else partial(_in_picture, camera=camera, scene=scene)
+    box, ellipses = np.full((n, 4), np.nan), np.full((n, len(UNIT_CIRCLE), 2), np.nan)
     if t.unit == "group":
-        return _whole_groups_in_picture(t, to_picture)
-    box = t.box if t.box is not None else np.full((n, 4), np.nan)
-    if t.box is None and t.plane != "image" and camera is not None:
+        groups = _whole_groups(t, to_drawing)
+        at = np.array([g.motion[0] if len(g.motion) else [np.nan, np.nan] for g in groups]).reshape(n, 2)
+        return FrameMarks(t.id, box, at, ellipses, np.zeros(n, bool), groups, whole_groups=True)
+    if t.box is not None and not plan:
+        box = t.box
+    elif not same and camera is not None:
         box = upright_boxes(camera, with_ground_height(t.pos, scene))
     at = _feet(box)
-    if t.plane == "image":
-        at = np.where(np.isfinite(at), at, t.pos)
-    return FrameMarks(t.id, box, at, _ellipses(t, to_picture), np.zeros(n, bool), _box_hulls(t.group, box))
-
-
-def _whole_groups_in_picture(t: Tracks, to_picture: Callable[[Array], Array]) -> FrameMarks:
-    n, groups = len(t.id), _whole_groups(t, to_picture)
-    at = np.array([g.motion[0] if len(g.motion) else [np.nan, np.nan] for g in groups]).reshape(n, 2)
-    no_box, no_ellipse = np.full((n, 4), np.nan), np.full((n, len(UNIT_CIRCLE), 2), np.nan)
-    return FrameMarks(t.id, no_box, at, no_ellipse, np.zeros(n, bool), groups, whole_groups=True)
+    if same:
+        at = np.where(np.isfinite(at), at, t.pos[:, :2])
+    for k, cov in enumerate(t.cov[:, :2, :2]):
+        if len(points := to_drawing(ellipse(t.pos[k, :2], cov, SIGMA_95))):
+            ellipses[k] = points
+    return FrameMarks(t.id, box, at, ellipses, np.zeros(n, bool), _outlined(t.group, box, at))
 
 
 def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[GroupMark, ...]:
@@ -176,33 +182,29 @@ def _feet(box: Array) -> Array:
     return np.asarray(box[:, :2] + box[:, 2:] * np.array([0.5, 1.0]))
 
 
-def _box_hulls(group: Ints, box: Array) -> tuple[GroupMark, ...]:
-    """Returns a mark for each group with two or more known boxes, by increasing id."""
-    names = np.unique(group[group >= 0])
-    box = box + BOX_MARGIN * np.array([-1, -1, 2, 2])
-    found = [(int(g), box[(group == g) & np.isfinite(box[:, 0])]) for g in names]
-    return tuple(GroupMark(g, convex_hull(box_corners(own).reshape(-1, 2))) for g, own in found if len(own) > 1)
+def _outlined(group: Ints, box: Array, at: Array) -> tuple[GroupMark, ...]:
+    """Returns a mark for each group with two or more known boxes, or places if no box is known, by increasing id."""
+    boxed = np.isfinite(box[:, 0])
+    known = boxed if boxed.any() else np.isfinite(at[:, 0])
+    outlines = box_corners(box + BOX_MARGIN * np.array([-1, -1, 2, 2]))
+    if not boxed.any():
+        outlines = at[:, None] + FOOTPRINT * UNIT_CIRCLE[::2]
+    found = [(g, (group == g) & known) for g in np.unique(group[group >= 0]).tolist()]
+    return tuple(GroupMark(g, convex_hull(outlines[own].reshape(-1, 2))) for g, own in found if own.sum() > 1)
 
 
-def _in_picture(points: Array, plane: str, camera: Camera | None, scene: Scene | None) -> Array:
-    """Returns points (K, 2 or 3) of a tracker's plane as (K, 2) px, or (0, 2) if one of them cannot be seen."""
-    if plane == "image" or not len(points):
-        return points
-    if camera is None:
+def _plane(points: Array) -> Array:
+    return points[:, :2]
+
+
+def _in_picture(points: Array, camera: Camera | None, scene: Scene | None) -> Array:
+    """Returns points (K, 2 or 3) on the ground or in space as (K, 2) px, or (0, 2) if one of them cannot be seen."""
+    if camera is None or not len(points):
         return NO_POINTS
     from sim.scene.camera import project
 
     uv, depth = project(camera, with_ground_height(points, scene))
     return uv if (depth > 0).all() and np.isfinite(uv).all() else NO_POINTS
-
-
-def _ellipses(t: Tracks, to_drawing: Callable[[Array], Array]) -> Array:
-    found = np.full((len(t.id), len(UNIT_CIRCLE), 2), np.nan)
-    for k, cov in enumerate(t.cov[:, :2, :2]):
-        points = to_drawing(ellipse(t.pos[k, :2], cov, SIGMA_95))
-        if len(points):
-            found[k] = points
-    return found
 
 
 def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:

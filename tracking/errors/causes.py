@@ -21,6 +21,7 @@ A cause is a fact of the truth, not a proof. The first that holds is named:
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,10 +70,11 @@ class Facts:
     fps: float
     alarms: tuple[Ints, Array]  # frames (A,) and places (A, 2), as pos, of the detector's false alarms
 
-    def rows(self, frame: int) -> Ints:
-        """Returns the rows of a frame."""
-        low, high = np.searchsorted(self.frame, (frame, frame + 1))
-        return np.arange(low, high)
+    def rows(self, first: int, last: int | None = None, ids: Iterable[int] | None = None) -> Ints:
+        """Returns the rows from one frame to another, of that frame alone without another; ids: of these people."""
+        low, high = np.searchsorted(self.frame, (first, (first if last is None else last) + 1)).tolist()
+        kept = slice(None) if ids is None else np.isin(self.id[low:high], [*ids])
+        return np.arange(low, high)[kept]
 
     def change_of_light(self, frame: int) -> Cause | None:
         """Returns the change of brightness in the second before and after a frame as a cause, None if it is small."""
@@ -93,10 +95,12 @@ class Facts:
         least = gaps[self.frame[rows][:, None] == frame[near]].min(initial=np.inf)
         return Cause("clutter", f"{least:.2f} m from a false alarm") if least < reach else None
 
-    def row(self, frame: int, id: int) -> int:
-        """Returns the row of a person in a frame, -1 if not there."""
-        found = self.rows(frame)[self.id[self.rows(frame)] == id]
-        return int(found[0]) if len(found) else NOBODY
+    def nearest(self, at: Array, frame: int, without: int = NOBODY) -> tuple[float, int] | None:
+        """Returns the distance, m, and the row of the person nearest to a place in a frame, None without anybody."""
+        people = self.rows(frame)
+        people = people[people != without]
+        d = np.hypot(*(self.pos[people] - at).T) / self.metre
+        return (float(d.min()), int(people[np.argmin(d)])) if len(d) else None
 
 
 def cause_of_person(error: PersonError, of: Facts) -> Cause:
@@ -116,22 +120,16 @@ def cause_of_person(error: PersonError, of: Facts) -> Cause:
         return light
     if error.kind == "late" and frames < CONFIRMED:
         return Cause("tracker")
-    around = _around(error, of)
+    around = of.rows(max(error.start - round(AROUND * of.fps), 1), error.end, [error.person])
     during = range(error.start, error.end + 1)
     if error.kind == "switch" and (clutter := of.false_alarm(around, during, NEAR)) is not None:
         return clutter
-    near = _nearest(around, of)
-    if near is not None and near[0] < NEAR:
-        return Cause("near", f"{near[0]:.2f} m from person {near[1]}")
+    others = (of.nearest(of.pos[row], int(of.frame[row]), row) for row in around.tolist())
+    distance, other = min((one for one in others if one is not None), default=(np.inf, NOBODY))
+    if distance < NEAR:
+        return Cause("near", f"{distance:.2f} m from person {of.id[other]}")
     turn = _turn(around, of)
     return Cause("turned", f"turned by {np.rad2deg(turn):.0f}°") if turn > TURN else Cause("tracker")
-
-
-def _around(error: PersonError, of: Facts) -> Ints:
-    """Returns the person's rows in the second before the error, and in it."""
-    first = error.start - round(AROUND * of.fps)
-    rows = (of.row(frame, error.person or 0) for frame in range(max(first, 1), error.end + 1))
-    return np.array([row for row in rows if row != NOBODY], np.int64)
 
 
 def _hidden_by(rows: Ints, of: Facts) -> str:
@@ -150,18 +148,6 @@ def _hidden_by(rows: Ints, of: Facts) -> str:
     return f" by person {who}" if who is not None and covered[who] > 0 else ""
 
 
-def _nearest(rows: Ints, of: Facts) -> tuple[float, int] | None:
-    """Returns the least distance to another person over some rows of one person, m, and that person."""
-    best: tuple[float, int] | None = None
-    for row in rows.tolist():
-        others = of.rows(int(of.frame[row]))
-        others = others[others != row]
-        d = np.hypot(*(of.pos[others] - of.pos[row]).T) / of.metre
-        if len(d) and (best is None or d.min() < best[0]):
-            best = float(d.min()), int(of.id[others[np.argmin(d)]])
-    return best
-
-
 def _turn(rows: Ints, of: Facts) -> float:
     """Returns the largest change of direction over the rows, rad; a person who hardly moves does not turn."""
     if of.vel is None or len(rows) < 2:
@@ -175,26 +161,21 @@ def _turn(rows: Ints, of: Facts) -> float:
 
 def cause_of_ghost(error: PersonError, matched: MatchedPeople, place: Array, of: Facts) -> Cause:
     """Returns the cause of a ghost; place (S, 2): of the tracked rows, as `Facts.pos`."""
-    rows = np.array(error.rows, np.int64)
-    est, nearest = matched.pairs.est, []
-    for row in rows.tolist():
-        people = of.rows(int(est.frame[row]))
-        d = np.hypot(*(of.pos[people] - place[row]).T) / of.metre
-        if len(d):
-            k = int(np.argmin(d))
-            nearest.append((float(d[k]), int(of.id[people[k]]), bool(matched.track[people[k]] == NOBODY)))
+    frames = matched.pairs.est.frame
+    found = (of.nearest(place[row], int(frames[row])) for row in error.rows)
+    nearest = sorted(one for one in found if one is not None)
     owner = _owner(error, matched, of)
-    if owner is not None and of.row(error.start, owner) == NOBODY:
+    if owner is not None and not len(of.rows(error.start, ids=[owner])):
         return Cause("left", f"person {owner} is gone")
     if (light := of.change_of_light(error.start)) is not None:
         return light
     if not nearest:
         return Cause("clutter")
-    distance, who, free = sorted(nearest)[len(nearest) // 2]
-    if free and distance < DISPLACED:
-        return Cause("displaced", f"{distance:.2f} m from person {who}, who is not tracked")
+    distance, row = nearest[len(nearest) // 2]
+    if matched.track[row] == NOBODY and distance < DISPLACED:
+        return Cause("displaced", f"{distance:.2f} m from person {of.id[row]}, who is not tracked")
     if distance < DOUBLE:
-        return Cause("double", f"{distance:.2f} m from person {who}, who is tracked")
+        return Cause("double", f"{distance:.2f} m from person {of.id[row]}, who is tracked")
     return Cause("clutter", f"{distance:.1f} m from anybody")
 
 
@@ -208,7 +189,7 @@ def _owner(error: PersonError, matched: MatchedPeople, of: Facts) -> int | None:
 def cause_of_group(error: GroupError, of: Facts) -> Cause:
     """Returns the cause of an error of a group, from the middle of its time."""
     frame = (error.start + error.end) // 2
-    rows = np.array([row for id in error.people if (row := of.row(frame, id)) != NOBODY], np.int64)
+    rows = of.rows(frame, ids=error.people)
     return (
         _places_of_group(error, rows, frame, of)
         or of.false_alarm(rows, range(frame, frame + 1), BESIDE)
@@ -225,8 +206,8 @@ def _places_of_group(error: GroupError, rows: Ints, frame: int, of: Facts) -> Ca
     np.fill_diagonal(gaps, np.inf)
     if error.group is not None and gaps.min(axis=1).max() > APART:
         return Cause("apart", f"{gaps.min(axis=1).max():.1f} m from the next member")
-    others = [row for id in error.others if (row := of.row(frame, id)) != NOBODY]
-    if others:
+    others = of.rows(frame, ids=error.others)
+    if len(others):
         d = np.hypot(*(of.pos[rows][:, None] - of.pos[others][None]).transpose(2, 0, 1)).min() / of.metre
         if d < BESIDE:
             return Cause("beside", f"{d:.1f} m from others")

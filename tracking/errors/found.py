@@ -23,13 +23,11 @@ from tracking.errors.people import PersonError, matched_people, person_errors
 from tracking.errors.repairs import SHOWN, ComparedPeople, ComparedRun, scores
 from tracking.oracle import named_detections
 from tracking.running.run import TrackingRun
-from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.evaluation import MatchedSides
 from tracking.scoring.group_and_event_scores import TrackedGroups, compared_events, tracked_groups
-from tracking.scoring.people_and_groups import Surface
 from tracking.scoring.people_comparison import Similarity, from_pixels
 from tracking.scoring.position_errors import REACH
-from tracking.scoring.rows import FrameRows, find_rows
+from tracking.scoring.rows import find_rows
 
 EVERY = 10**9  # costs of all errors
 
@@ -56,18 +54,14 @@ class FoundError:
 
     def facts(self, fps: float) -> dict[str, Any]:
         """Returns the error as values for JSON: frames from 1, seconds, ids, cause and words."""
-        error = self.error
-        who: dict[str, Any] = (
-            {"of": "groups", "people": list(error.people), "others": list(error.others), "before": None, "after": None}
-            if isinstance(error, GroupError)
-            else {
-                "of": "people", "people": [] if error.person is None else [error.person], "others": [],
-                "before": error.before, "after": error.after,
-            }
-        )  # fmt: skip
+        error, of_group = self.error, isinstance(self.error, GroupError)
+        people = error.people if isinstance(error, GroupError) else () if error.person is None else (error.person,)
         return {
             "kind": error.kind, "start": error.start, "end": error.end,
-            "seconds": (error.end - error.start + 1) / fps, "who": self.who, **who,
+            "seconds": (error.end - error.start + 1) / fps, "who": self.who,
+            "of": "groups" if of_group else "people", "people": list(people),
+            "others": list(getattr(error, "others", ())), "before": getattr(error, "before", None),
+            "after": getattr(error, "after", None),
             "cause": self.cause.name, "detail": self.cause.text, "cost": self.cost,
         }  # fmt: skip
 
@@ -140,7 +134,7 @@ def find_errors(
             file=sequence.name, got="groups without members, and no scale of the image", expected="px_per_m",
             remedy="state it with --px-per-m",
         )  # fmt: skip
-    run, place = _compared_run(compared[0], tracked)
+    run, (_, place, _) = _compared_run(compared[0], tracked), _places(compared[0])
     of = _facts(sequence, compared[0], None if seen is None else compared[1], from_pixels(tracks))
     found = [FoundError(*one, None) for one in _with_causes(compared[0], tracked, run, place, of)]
     whole = scores(run) if costs or causes else {}
@@ -190,50 +184,33 @@ def _by_cause(
     return rows, {k: 1 - value for k, value in last.items()}
 
 
-def _compared_run(compared: MatchedSides, tracked: TrackedGroups) -> tuple[ComparedRun, Array]:
-    """Returns the run as it is repaired, and the positions of tracked rows (S, 2)."""
-    sides = compared.sides
+def _compared_run(compared: MatchedSides, tracked: TrackedGroups) -> ComparedRun:
+    """Returns the run as it is repaired."""
+    sides, nobody = compared.sides, np.zeros(len(tracked.counted), bool)
     person = sides.mapping if tracked.named else np.arange(len(sides.true.rows))
-    true = (
-        tracked.counted.keep(np.zeros(len(tracked.counted), bool))
-        if compared.groups is None
-        else compared.groups.groups
-    )
+    true = tracked.counted.keep(nobody) if compared.groups is None else compared.groups.groups
     groups = Memberships(true, tracked.counted, sides.true.rows, person, tracked.named)
-    true_pos, pos = _positions(compared)
     if compared.people is None:
-        return ComparedRun(groups, None), pos
-    pairs, boxes = compared.people, compared.similarity == "boxes"
-    true_place, place = (sides.true.box, sides.est.box) if boxes else (true_pos, pos)
-    assert true_place is not None
-    assert place is not None
-
-    def compare(rows: FrameRows, places: Array) -> Pairs:
-        assert true_place is not None
-        if boxes:
-            return box_pairs(pairs.true, rows, true_place, places)
-        return point_pairs(pairs.true, rows, true_place, places, REACH * _metre(compared))
-
-    return ComparedRun(groups, ComparedPeople(matched_people(pairs), true_place, place, compare)), pos
+        return ComparedRun(groups, None)
+    true_place, place, metre = _places(compared)
+    reach: float | None = REACH * metre
+    if compared.similarity == "boxes":
+        assert sides.true.box is not None
+        assert sides.est.box is not None
+        true_place, place, reach = sides.true.box, sides.est.box, None
+    return ComparedRun(groups, ComparedPeople(matched_people(compared.people), true_place, place, reach))
 
 
-def _positions(compared: MatchedSides) -> tuple[Array, Array]:
-    """Returns the positions of true (R, 2) and tracked rows (S, 2) where they are compared."""
-    sides, surface = compared.sides, _surface(compared)
+def _places(compared: MatchedSides) -> tuple[Array, Array, float]:
+    """Returns the positions of true (R, 2) and tracked rows (S, 2) where they are compared, and their unit per m."""
+    sides, surface = compared.sides, compared.sides.surface
+    if compared.people is not None:
+        surface = "ground" if compared.similarity == "ground" else "image"
+    metre = 1.0 if surface == "ground" else sides.truth.px_per_m
     true, est = sides.true.positions_on(surface, "ground"), sides.est.positions_on(surface, sides.plane)
     assert true is not None
     assert est is not None
-    return true, est
-
-
-def _surface(compared: MatchedSides) -> Surface:
-    if compared.people is None:
-        return compared.sides.surface
-    return "ground" if compared.similarity == "ground" else "image"
-
-
-def _metre(compared: MatchedSides) -> float:
-    return 1.0 if _surface(compared) == "ground" else compared.sides.truth.px_per_m
+    return true, est, metre
 
 
 def _facts(sequence: Sequence, compared: MatchedSides, seen: MatchedSides | None, pixels: bool) -> Facts:
@@ -244,11 +221,11 @@ def _facts(sequence: Sequence, compared: MatchedSides, seen: MatchedSides | None
     if seen is not None:
         rows = seen.sides.est.rows
         detected, false = find_rows(rows, sides.true.rows) >= 0, find_rows(sides.true.rows, rows) < 0
-        alarms = rows.frame[false], _positions(seen)[1][false]
+        alarms = rows.frame[false], _places(seen)[1][false]
     light = sequence.load_light() if pixels and sequence.load_light is not None else None
-    truth, kept = sides.truth, sides.inside[sides.truth.frame]
+    truth, kept, (pos, _, metre) = sides.truth, sides.inside[sides.truth.frame], _places(compared)
     vel, truncation, box = (None if a is None else a[kept] for a in (truth.vel, truth.truncation, truth.box))
     return Facts(
-        truth.frame[kept], truth.id[kept], _positions(compared)[0], _metre(compared), vel, truth.visibility[kept],
-        truncation, box, detected, light, truth.fps, alarms,
+        truth.frame[kept], truth.id[kept], pos, metre, vel, truth.visibility[kept], truncation, box, detected, light,
+        truth.fps, alarms,
     )  # fmt: skip

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 
@@ -58,78 +58,40 @@ class GroupError:
     false: tuple[int, ...] = ()  # rows of estimated groups that should not be there
 
 
-@dataclass(frozen=True, eq=False)
 class Memberships:
     """Who is in which group in the labelled frames, on both sides, as the scores of groups count them.
 
     The R rows of true and S rows of tracked people are those of all scored frames. Where the tracker names no members,
     the true people stand for the tracked ones.
+
+    Attributes: true: G groups, members are rows of true people. est: H groups, members are rows of tracked people;
+    memberships are sorted by group. people: the R true people. person: (S,) true row of each tracked row, -1 none.
+    persons: the same with -1 as last element, for a member who is not among the people. named: False if the tracker
+    names no members. track: (R,) tracked row of each true row, -1 none. true_group: (R + 1,) row of the true group of
+    each true row, -1 for none and as last element. shared: the numbers of common people; parts: for each true group,
+    the estimated groups with some of its people, and how many. found: the rows of true groups that are found, each with
+    the most similar estimated group; finders: the rows of these. true_members, members: the rows of people of each true
+    and each estimated group. states: the state of each true group, (G,).
     """
 
-    true: GroupRows  # G groups, members are rows of true people
-    est: GroupRows  # H groups, members are rows of tracked people; memberships are sorted by group
-    people: FrameRows  # the R true people
-    person: Ints  # (S,) true row of each tracked row, -1 none
-    named: bool  # False if the tracker names no members
-
-    def persons(self, member: Ints) -> Ints:
-        """Returns the true rows of tracked rows, -1 none."""
-        return np.append(self.person, -1)[member]
-
-    @cached_property
-    def track(self) -> Ints:
-        """The tracked row of each true row, (R,), -1 none."""
-        track = np.full(len(self.people), -1, np.int64)
-        track[self.person[self.person >= 0]] = np.flatnonzero(self.person >= 0)
-        return track
-
-    @cached_property
-    def true_group(self) -> Ints:
-        """The row of the true group of each true row, -1 for none and as last element, (R + 1,)."""
-        return group_of_person(self.true, len(self.people))
-
-    @cached_property
-    def shared(self) -> SharedMembers:
-        """The numbers of common people."""
-        return shared_members(self.true, self.est, self.persons(self.est.member), len(self.people))
-
-    @cached_property
-    def parts(self) -> list[dict[int, int]]:
-        """For each true group, the estimated groups with some of its people, and how many."""
-        parts: list[dict[int, int]] = [{} for _ in range(len(self.true))]
+    def __init__(self, true: GroupRows, est: GroupRows, people: FrameRows, person: Ints, named: bool) -> None:
+        self.true, self.est, self.people, self.person, self.named = true, est, people, person, named
+        self.persons = np.append(person, -1)
+        self.track = np.full(len(people), -1, np.int64)
+        self.track[person[person >= 0]] = np.flatnonzero(person >= 0)
+        self.true_group = group_of_person(true, len(people))
+        self.shared = shared_members(true, est, self.persons[est.member], len(people))
+        self.parts: list[dict[int, int]] = [{} for _ in range(len(true))]
         for key, count in zip(self.shared.key.tolist(), self.shared.count.tolist(), strict=True):
-            i, j = divmod(key, self.shared.width)
-            parts[i][j] = count
-        return parts
-
-    @cached_property
-    def found(self) -> dict[int, int]:
-        """The rows of true groups that are found, each with the most similar estimated group."""
-        n, m = self.true.count.tolist(), self.est.count.tolist()
-        return {
+            self.parts[key // self.shared.width][key % self.shared.width] = count
+        n, m = true.count.tolist(), est.count.tolist()
+        self.found = {
             i: max(self.parts[i].items(), key=lambda part: part[1] / (n[i] + m[part[0]] - part[1]))[0]
-            for i in np.flatnonzero(groups_found(self.true, self.est, self.shared)).tolist()
+            for i in np.flatnonzero(groups_found(true, est, self.shared)).tolist()
         }
-
-    @cached_property
-    def finders(self) -> set[int]:
-        """The rows of estimated groups that find a true one."""
-        return set(self.found.values())
-
-    @cached_property
-    def true_members(self) -> list[list[int]]:
-        """The true rows of the people of each true group."""
-        return _split(self.true.of, self.true.member, len(self.true))
-
-    @cached_property
-    def members(self) -> list[list[int]]:
-        """The tracked rows of the members of each estimated group, -1 for one who is not among the people."""
-        return _split(self.est.of, self.est.member, len(self.est))
-
-    @cached_property
-    def states(self) -> list[str]:
-        """The state of each true group, (G,)."""
-        return [self._state(i) for i in range(len(self.true))]
+        self.finders = set(self.found.values())
+        self.true_members, self.members = (_split(side.of, side.member, len(side)) for side in (true, est))
+        self.states = [self._state(i) for i in range(len(true))]
 
     def _state(self, i: int) -> str:
         n = len(self.true_members[i])
@@ -155,12 +117,12 @@ class Memberships:
 
     def _groups_in(self, j: int) -> set[int]:
         """Returns the rows of true groups with people in an estimated group."""
-        return set(self.true_group[self.persons(np.array(self.members[j], np.int64))].tolist()) - {-1}
+        return set(self.true_group[self.persons[self.members[j]]].tolist()) - {-1}
 
     def astray(self, j: int) -> list[int]:
         """Returns an estimated group's memberships of people in no true group, or in one that is found elsewhere."""
         first, after = np.searchsorted(self.est.of, (j, j + 1)).tolist()
-        groups = self.true_group[self.persons(self.est.member[first:after])].tolist()
+        groups = self.true_group[self.persons[self.est.member[first:after]]].tolist()
         return [k for k, i in enumerate(groups, first) if i < 0 or self.found.get(i, j) != j]
 
 
@@ -226,18 +188,11 @@ def _span(rows: FrameRows, stretch: list[int]) -> tuple[int, int]:
 
 def _stretches(rows: FrameRows, states: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str, list[int]]]:
     """Yields id, state and rows of each stretch of frames in which a group is in one state; states: by row."""
-    open_: dict[int, tuple[int, str, list[int]]] = {}
-    for row, state in states:
-        frame, id = int(rows.frame[row]), int(rows.id[row])
-        last = open_.get(id)
-        if last is None or (last[0] + 1, last[1]) != (frame, state):
-            if last is not None:
-                yield id, last[1], last[2]
-            last = frame, state, []
-        last[2].append(row)
-        open_[id] = frame, state, last[2]
-    for id, (_, state, stretch) in open_.items():
-        yield id, state, stretch
+    ordered = sorted((int(rows.id[row]), int(rows.frame[row]), row, state) for row, state in states)
+    # in consecutive frames of one id, the frame less the place in the list is the same
+    keyed = groupby(enumerate(ordered), key=lambda item: (item[1][0], item[1][3], item[1][1] - item[0]))
+    for (id, state, _), stretch in keyed:
+        yield id, state, [row for _, (_, _, row, _) in stretch]
 
 
 def _named(error: GroupError, of: Memberships, events: Sequence[GroupEvent], reach: float) -> GroupError:

@@ -18,13 +18,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby
 from typing import Literal
 
 import numpy as np
 
 from sim.types import Ints
 from tracking.scoring.candidate_pairs import Pairs
+from tracking.scoring.rows import FrameRows
 from tracking.scoring.track_scores import clear_matches
 
 PersonKind = Literal["switch", "fragment", "miss", "late", "ghost"]
@@ -69,38 +70,37 @@ def person_errors(matched: MatchedPeople) -> list[PersonError]:
 
 def _errors_of_people(matched: MatchedPeople) -> Iterator[PersonError]:
     true, est = matched.pairs.true, matched.pairs.est
+    found = np.where(matched.track == NOBODY, NOBODY, np.append(est.id, NOBODY)[matched.track])
     for person, rows in _by_id(true.id):
         before: int | None = None
-        gap: list[int] = []
-        for row in rows:
-            j = matched.track[row]
-            if j == NOBODY:
-                gap.append(row)
+        gap: tuple[int, ...] = ()
+        for track, of_track in groupby(rows, key=lambda row: int(found[row])):
+            stretch = tuple(of_track)
+            if track == NOBODY:
+                gap = stretch
                 continue
-            after, frame = int(est.id[j]), int(true.frame[row])
-            if before is not None and after != before:
-                start = int(true.frame[gap[0]]) if gap else frame
-                yield PersonError("switch", start, frame, tuple(gap), person, before, after)
+            frame = int(true.frame[stretch[0]])
+            span = _span(true, gap) if gap else (frame, frame)
+            if before not in (None, track):
+                yield PersonError("switch", span[0], frame, gap, person, before, track)
             elif gap:
-                kind: PersonKind = "late" if before is None else "fragment"
-                span = int(true.frame[gap[0]]), int(true.frame[gap[-1]])
-                yield PersonError(kind, *span, tuple(gap), person, before, after)
-            before, gap = after, []
+                yield PersonError("late" if before is None else "fragment", *span, gap, person, before, track)
+            before, gap = track, ()
         if gap:
-            yield PersonError("miss", int(true.frame[gap[0]]), int(true.frame[gap[-1]]), tuple(gap), person, before)
+            yield PersonError("miss", *_span(true, gap), gap, person, before)
 
 
 def _ghosts(matched: MatchedPeople) -> Iterator[PersonError]:
     est = matched.pairs.est
     for track, rows in _by_id(est.id):
-        alone = [row for row in rows if matched.person[row] == NOBODY]
-        place = {row: k for k, row in enumerate(rows)}
-        cuts = [k for k, row in enumerate(alone) if k == 0 or place[row] != place[alone[k - 1]] + 1]
-        for a, b in pairwise([*cuts, len(alone)]):
-            stretch = tuple(alone[a:b])
-            yield PersonError(
-                "ghost", int(est.frame[stretch[0]]), int(est.frame[stretch[-1]]), stretch, None, None, track
-            )
+        for person, of_person in groupby(rows, key=lambda row: int(matched.person[row]) == NOBODY):
+            if person:
+                stretch = tuple(of_person)
+                yield PersonError("ghost", *_span(est, stretch), stretch, None, None, track)
+
+
+def _span(rows: FrameRows, stretch: tuple[int, ...]) -> tuple[int, int]:
+    return int(rows.frame[stretch[0]]), int(rows.frame[stretch[-1]])
 
 
 def _by_id(id: Ints) -> Iterator[tuple[int, list[int]]]:

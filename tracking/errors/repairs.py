@@ -8,7 +8,7 @@ swapped tracks is repaired alone. A wrong lineage has no repair and no cost: non
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.errors.groups import UNSEEN, GroupError, Memberships, group_f1
 from tracking.errors.people import NOBODY, MatchedPeople, PersonError
-from tracking.scoring.candidate_pairs import Pairs
+from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.group_scores import shared_members
 from tracking.scoring.people_and_groups import GroupRows, bare_groups
 from tracking.scoring.rows import FrameRows
@@ -35,7 +35,12 @@ class ComparedPeople:
     matched: MatchedPeople
     true_place: Array  # (R, D): positions or boxes by which people are compared
     place: Array  # (S, D)
-    pairs: Callable[[FrameRows, Array], Pairs]  # tracked rows and places: the candidate pairs with the truth
+    reach: float | None  # by which points are matched, in units of their places; None: they are boxes
+
+    def pairs(self, rows: FrameRows, place: Array) -> Pairs:
+        """Returns the candidate pairs of the truth with other tracked rows, at places (K, D)."""
+        given = self.matched.pairs.true, rows, self.true_place, place
+        return box_pairs(*given) if self.reach is None else point_pairs(*given, self.reach)
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,8 +58,8 @@ class Axis:
         return float(round(value)) if self.whole else value
 
 
-def _key(*keys: str) -> Settings:
-    return lambda value: [f"{key}={value:.10g}" for key in keys]
+def _key(key: str) -> Settings:
+    return lambda value: [f"{key}={value:.10g}"]
 
 
 def _noise(value: float) -> list[str]:
@@ -124,13 +124,6 @@ class BreakingPoint:
     high: float
 
 
-def curve(scores: Array) -> Array:
-    """Returns the mean over scenes (V,) of scores (P, V), nan where unknown; nan for a value without any."""
-    known = np.isfinite(scores)
-    count = known.sum(axis=0)
-    return np.where(count > 0, np.where(known, scores, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
-
-
 def crossing(way: Array, height: Array) -> float:
     """Returns where a curve first falls to 0, linear between its values (V,); inf if it does not."""
     known = np.isfinite(height)
@@ -148,7 +141,7 @@ def crossing(way: Array, height: Array) -> float:
 def breaking_point(way: Array, scores: Array, share: float) -> BreakingPoint:
     """Returns where the curve of scores (P, V) at `way` (V,), ascending from 0, falls to a share of its easy value."""
     easy = scores[:, :1]
-    if not curve(easy) > 0:
+    if not mean_interval(easy)[0] > 0:
         return BreakingPoint(NEVER, NEVER, NEVER)
     at, low, high = (crossing(way, end) for end in mean_interval(scores - share * easy))
     if not np.isfinite(at):

@@ -79,22 +79,19 @@ def play_scene(tasks: Tasks) -> list[Outcome]:
         _ = opened.truth
     except FlockscopeError as error:
         return [Outcome({}, left_out=error.line())] * len(tasks)
-    played = (play_task(t) if isinstance(t, EpisodeTask) else play_oracle(t, opened) for t in tasks)
-    return [_outcome(result) for result in played]
+    return [_outcome(play_task(task)) if isinstance(task, EpisodeTask) else play_oracle(task, opened) for task in tasks]
 
 
-def play_oracle(task: OracleTask, opened: OpenedSource) -> Episode | FlockscopeError:
-    """Returns the episode of the oracle, as `tracking.comparison.compare_one` scores it."""
+def play_oracle(task: OracleTask, opened: OpenedSource) -> Outcome:
+    """Returns the scores of the oracle, as `tracking.comparison.compare_one` scores it."""
     sequence, mode = opened.sequence, task.detections
     frames = () if mode == "image" else sequence.without_pictures()
     kind = input_kind(find(task.tracker).needs, mode, sequence, frames)
     try:
-        run = oracle(sequence, {"detections": mode, "input": kind})
-        scores = opened.judge.scorer.evaluate(run)
+        scores = opened.judge.scorer.evaluate(oracle(sequence, {"detections": mode, "input": kind}))
     except FlockscopeError as error:
-        return error
-    known = {key: value for key, value in scores.items() if value == value}
-    return Episode(task.source.name, task.source.seed, scores["objective"], known, len(run), 0.0, 0.0)
+        return _outcome(error)
+    return Outcome({key: value for key, value in scores.items() if value == value}, frames=sequence.length or 0)
 
 
 def _outcome(result: Episode | FlockscopeError) -> Outcome:

@@ -62,7 +62,6 @@ class Search:
     episodes: int | None = None  # budget
     minutes: float | None = None
     report: Callable[[str], None] = lambda text: None
-    stages: Sequence[Stage] = STAGES
     trail: list[Scenario] = field(default_factory=list)
     guard: list[int] = field(default_factory=list)
     required: int = 0
@@ -151,7 +150,7 @@ class Search:
         changed = True
         while changed:
             changed = self._fix()
-            for stage in self.stages:
+            for stage in STAGES:
                 changed |= self._reduce(stage)
         self.complete = True
 

@@ -17,9 +17,10 @@ What names a group or an order that is gone goes with it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+import operator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -45,19 +46,30 @@ SIZES = ("fps", "image", "kind")  # of the camera: no default is easier than ano
 OBSTACLES = ("doors", "walls", "pillars", "stairs", "service")  # doors before the walls that they lie in
 DECIMALS = 2  # of places, times and speeds that are no longer drawn
 
+Path = tuple[str | int, ...]  # of a value in the table of a scenario
+Pattern = tuple[str | tuple[str, ...], ...]  # Paths: EACH stands for all elements of a list, a tuple for several keys.
+EACH = "*"
+DETAILS: tuple[Pattern, ...] = (
+    ("sensor", "hide", EACH), ("light", "switch", EACH), ("group", EACH, ("stops", "via"), EACH),
+    ("event", EACH, "parts", EACH, "size"),  # before the part itself
+    ("event", EACH, ("parts", "via", "groups"), EACH),
+)  # fmt: skip
+TIMES: tuple[Pattern, ...] = (
+    ("group", EACH, "enter"), ("group", EACH, "stops", EACH, "until", EACH), ("event", EACH, "when", "time"),
+    ("sensor", "hide", EACH, ("start", "end")), ("light", "switch", EACH, "at"),
+)  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Piece:
     """A value in the table of a scenario, () the whole table, and the function that takes something away from it."""
 
-    path: tuple[str | int, ...]
+    path: Path
     change: Callable[[Any], Any]
 
-    def words(self, table: Table) -> str:
+    def words(self, table: Any) -> str:
         """Returns the key, and the value that it has in a table if that is short."""
-        value: Any = table
-        for step in self.path:
-            value = value[step]
+        value = reduce(operator.getitem, self.path, table)
         key = ".".join(map(str, self.path))
         return key if isinstance(value, dict | list) else f"{key} = {value}"
 
@@ -74,17 +86,34 @@ def without(scenario: Scenario, pieces: Iterable[Piece]) -> Scenario | None:
     """Returns the scenario without some pieces, None if nothing valid is left."""
     table = table_of(scenario)
     for piece in pieces:
-        if not piece.path:
-            table = piece.change(table)
-            continue
-        *way, last = piece.path
-        here: Any = table
-        for step in way:
-            here = here[step]
-        here[last] = piece.change(here[last])
+        table = _changed(table, piece.path, piece.change)
     table = _compact(table)
     _drop_dangling(table)
     return _valid(table)
+
+
+def _changed(table: Any, path: Path, change: Callable[[Any], Any]) -> Any:
+    """Returns the table with the value at `path` changed in place."""
+    if not path:
+        return change(table)
+    table[path[0]] = _changed(table[path[0]], path[1:], change)
+    return table
+
+
+def _paths(value: Any, pattern: Pattern) -> Iterator[Path]:
+    if not pattern:
+        yield ()
+        return
+    first, rest = pattern[0], pattern[1:]
+    named = (first,) if isinstance(first, str) else first
+    for key in range(len(value)) if first == EACH else [key for key in named if key in value]:
+        yield from ((key, *path) for path in _paths(value[key], rest))
+
+
+def _each(patterns: Iterable[Pattern], scenario: Scenario) -> list[Piece]:
+    """Returns the values that some patterns name."""
+    table = table_of(scenario)
+    return [_set(GONE, *path) for pattern in patterns for path in _paths(table, pattern)]
 
 
 def _valid(table: Table) -> Scenario | None:
@@ -107,17 +136,15 @@ def _drop_dangling(table: Table) -> None:
     end = table["duration"]
     table["group"] = [group for group in table["group"] if not _begins_after(group["enter"], end)]
     alive = [name for group in table["group"] for name in _names(group)]
-    known, kept = [*alive], list[str]()
-    events = []
+    known, kept = [*alive], list[Table]()
     for event in table.get("event", []):
-        when = event["when"]
+        when, made = event["when"], _made(event)
         after, near = when.get("after"), when.get("reach", {}).get("group")
-        fires = after in [None, *kept] and near in [None, *alive] and not _begins_after(when.get("time"), end)
-        if fires and _takes(event, alive):
-            kept.append(event["id"])
-            events.append(event)
-            known += [event["into"]] if "into" in event else [part["id"] for part in event.get("parts", [])]
-    table["event"] = events
+        fires = after in [None, *(one["id"] for one in kept)] and near in [None, *alive]
+        if fires and not _begins_after(when.get("time"), end) and _takes(event, alive, made):
+            kept.append(event)
+            known += made
+    table["event"] = kept
     hides = table["sensor"].get("hide", [])
     table["sensor"]["hide"] = [hide for hide in hides if hide.get("group") in [*known, None]]
 
@@ -130,22 +157,21 @@ def _names(group: Table) -> list[str]:
     return [group["id"]] if group["repeat"] == 1 else [f"{group['id']}-{k + 1}" for k in range(group["repeat"])]
 
 
-def _takes(event: Table, alive: list[str]) -> bool:
+def _made(event: Table) -> list[str]:
+    """Returns the groups that an order makes of its groups, none if they stay."""
+    return [event["into"]] if "into" in event else [part["id"] for part in event.get("parts", [])]
+
+
+def _takes(event: Table, alive: list[str], made: list[str]) -> bool:
     """Returns True if an order has groups; leaves out those that are gone, and changes the list of existing groups."""
-    if event["type"] == "split":
-        if event["group"] not in alive:
-            return False
-        alive.remove(event["group"])
-        alive += [part["id"] for part in event["parts"]]
-        return True
-    event["groups"] = [pattern for pattern in event["groups"] if set(expand(pattern, alive)) & {*alive}]
-    if event["type"] == "queue":
-        return bool(event["groups"])
-    if len(event["groups"]) < 2:
+    given = event.get("groups", [event.get("group")])
+    groups = [pattern for pattern in given if set(expand(pattern, alive)) & {*alive}]
+    if len(groups) < (2 if "into" in event else 1):
         return False
-    for name in event["groups"]:
+    event |= {"groups": groups} if "groups" in event else {}
+    for name in groups if made else ():
         alive.remove(name)
-    alive.append(event["into"])
+    alive += made
     return True
 
 
@@ -168,21 +194,14 @@ def _second_later(table: Table) -> Table:
     """Returns a scene that begins a second later."""
 
     def earlier(time: Any) -> Any:
-        return max(round(time - 1.0, DECIMALS), 0.0) if _numbers(time) else time
+        return min(time, max(round(time - 1.0, DECIMALS), 0.0)) if _numbers(time) else time
 
     table["duration"] = round(table["duration"] - 1.0, 6)
     for group in table["group"]:
         if group["enter"] <= 0:
             _walk(group)
-        group["enter"] = min(group["enter"], earlier(group["enter"]))
-        for stop in group.get("stops", []):
-            stop["until"] = [earlier(time) for time in stop["until"]]
-    for event in table.get("event", []):
-        event["when"] |= {key: earlier(event["when"][key]) for key in event["when"].keys() & {"time"}}
-    for hide in table["sensor"].get("hide", []):
-        hide |= {key: earlier(hide[key]) for key in ("start", "end")}
-    for switch in table["light"]["switch"]:
-        switch["at"] = earlier(switch["at"])
+    for path in [path for pattern in TIMES for path in _paths(table, pattern)]:
+        _changed(table, path, earlier)
     return table
 
 
@@ -201,48 +220,45 @@ def _walk(group: Table) -> None:
 
 def script(scenario: Scenario) -> list[Piece]:
     """Returns the orders, the last one first, and the groups."""
-    orders = [_gone("event", k) for k in reversed(range(len(scenario.event)))]
-    return orders + [_gone("group", k) for k in range(len(scenario.group))]
-
-
-def obstacles(scenario: Scenario) -> list[Piece]:
-    """Returns all immobile things."""
-    return [_gone("world", key, k) for key in OBSTACLES for k in range(len(getattr(scenario.world, key)))]
+    return [*reversed(_each([("event", EACH)], scenario)), *_each([("group", EACH)], scenario)]
 
 
 def difficulties(scenario: Scenario) -> list[Piece]:
     """Returns the keys that do not have their easiest value, or their default if no other value is easier."""
-    pieces = [_gone(key) for key in LAYOUT if getattr(scenario, key) != Scenario.model_fields[key].default]
-    for name in EASED:
-        part = getattr(scenario, name)
-        easy = type(part).model_validate(EASIEST.get(name, {}))
-        for key in _keys(name, part):
-            if getattr(part, key) != getattr(easy, key):
-                pieces.append(_set(EASIEST[name][key], name, key) if key in EASIEST.get(name, {}) else _gone(name, key))
-    return pieces
+    layout = [key for key in LAYOUT if getattr(scenario, key) != Scenario.model_fields[key].default]
+    keys = [(easiest, name, key) for name, key, easiest, now, easy, _ in _eased(scenario) if now != easy]
+    return [*(_set(GONE, key) for key in layout), *(_set(*one) for one in keys)]
 
 
 def defaults(scenario: Scenario) -> list[Piece]:
     """Returns the keys with an easiest value that have neither this one nor their default."""
-    pieces = []
-    for name in EASIEST:
-        part = getattr(scenario, name)
-        easy, usual = type(part).model_validate(EASIEST[name]), type(part)()
-        others = (k for k in EASIEST[name] if getattr(part, k) not in (getattr(easy, k), getattr(usual, k)))
-        pieces += [_gone(name, key) for key in others]
-    return pieces
+    return [
+        _set(GONE, name, key)
+        for name, key, easiest, now, easy, usual in _eased(scenario)
+        if easiest is not GONE and now not in (easy, usual)
+    ]
 
 
-def _keys(name: str, part: Any) -> list[str]:
-    return [key for key in type(part).model_fields if name != "camera" or key not in SIZES]
+def _eased(scenario: Scenario) -> Iterator[tuple[str, str, Any, Any, Any, Any]]:
+    """Yields the keys that can be eased: part, key, easiest value (GONE: the default), and what part, easy part and
+    default part have."""
+    for name in EASED:
+        part, easiest = getattr(scenario, name), EASIEST.get(name, {})
+        easy, usual = type(part).model_validate(easiest), type(part)()
+        for key in type(part).model_fields:
+            if name != "camera" or key not in SIZES:
+                yield name, key, easiest.get(key, GONE), *(getattr(one, key) for one in (part, easy, usual))
 
 
 def people(scenario: Scenario) -> list[Piece]:
     """Returns the people after the first of each group, and its copies after the first."""
     pieces = []
     for k, group in enumerate(scenario.group):
-        drawn, least = isinstance(group.size, Distribution), _least(group.size)
-        pieces += [Piece(("group", k, "size"), partial(_fewer, least))] * (least - 1 + drawn)
+        size = ("group", k, "size")
+        if isinstance(group.size, Distribution):
+            pieces.append(_set(_least(group.size), *size))
+        else:
+            pieces += [Piece(size, lambda now: round(now) - 1)] * (round(group.size) - 1)
         pieces += [Piece(("group", k, "repeat"), lambda now: now - 1)] * (group.repeat - 1)
     return pieces
 
@@ -252,29 +268,10 @@ def _least(size: Value) -> int:
     return max(1, round(low)) if math.isfinite(low) else 1
 
 
-def _fewer(least: int, size: Any) -> int:
-    return round(size) - 1 if _numbers(size) else least
-
-
-def details(scenario: Scenario) -> list[Piece]:
-    """Returns the parts of which a group, an order and the sensor can do without some."""
-    pieces = [_gone("sensor", "hide", k) for k in range(len(scenario.sensor.hide))]
-    pieces += [_gone("light", "switch", k) for k in range(len(scenario.light.switch))]
-    for k, group in enumerate(scenario.group):
-        pieces += [_gone("group", k, key, n) for key in ("stops", "via") for n in range(len(getattr(group, key)))]
-    for k, event in enumerate(scenario.event):
-        sized = (n for n, part in enumerate(getattr(event, "parts", ())) if part.size is not None)
-        pieces += [_gone("event", k, "parts", n, "size") for n in sized]  # before the part itself
-        for key in ("parts", "via", "groups"):
-            pieces += [_gone("event", k, key, n) for n in range(len(getattr(event, key, ())))]
-    return pieces
-
-
-STAGES: tuple[Stage, ...] = (script, seconds, beginning, obstacles, difficulties, defaults, people, details)
-
-
-def _gone(*path: str | int) -> Piece:
-    return _set(GONE, *path)
+STAGES: tuple[Stage, ...] = (
+    script, seconds, beginning, partial(_each, [("world", OBSTACLES, EACH)]), difficulties, defaults, people,
+    partial(_each, DETAILS),
+)  # fmt: skip
 
 
 def _set(value: Any, *path: str | int) -> Piece:

@@ -29,7 +29,8 @@ from scenarios.errors import InputError
 from sim.hashing import ENGINE
 from sim.types import Array, DetectionMode
 from tracking.environment.episode_cache import Source, sources
-from tracking.stress.axes import Axis, BreakingPoint, breaking_point, curve
+from tracking.stats import mean_interval
+from tracking.stress.axes import Axis, BreakingPoint, breaking_point
 from tracking.stress.episodes import ORACLE, OracleTask, PlayScenes, Store
 from tracking.tuning.parallel_episodes import EpisodeTask
 from tracking.tuning.tuned_tracker import TunedTracker
@@ -93,18 +94,10 @@ class Sweep:
         """Plays until the breaking points are known, or the budget is spent."""
         self.check_scenes()
         self.values = list(product(*(axis.spread(FIRST_VALUES) for axis in self.plan.axes)))
-        self.seeds = self._first_seeds()
+        self._add_seeds(self.plan.start)
         self.play_values()
         while not self.spent() and self._refine():
             self.play_values()
-
-    def _first_seeds(self) -> int:
-        """Returns how many seeds are played at once: `start`, or as many as the budget allows, at least 1."""
-        if self.plan.episodes is None:
-            return self.plan.start
-        scenes = len(sources(self.plan.scenarios, self.plan.seeds[:1], self.plan.settings))
-        each = len(self.trackers) * len(self.values) * scenes
-        return min(self.plan.start, max(1, self.plan.episodes // each))
 
     @property
     def played(self) -> int:
@@ -216,13 +209,13 @@ class Sweep:
         """Adds a value or seeds where least is known; returns False if nothing is left to do."""
         if len(self.plan.axes) != 1:
             limited = self.plan.episodes is not None or self.plan.minutes is not None
-            return (limited or not self.plan.axes) and self._more_seeds()
+            return (limited or not self.plan.axes) and self._add_seeds(self.seeds)
         for name, point in sorted(self.breaks().items(), key=lambda item: -_width(item[1])):
             if np.isfinite(point.at):
-                if point.high - point.low > NARROW and (self._narrow(point) or self._more_seeds()):
+                if point.high - point.low > NARROW and (self._narrow(point) or self._add_seeds(self.seeds)):
                     return True
             elif np.isfinite(point.low):
-                if self._more_seeds():
+                if self._add_seeds(self.seeds):
                     return True
             elif len(self.values) < FIRST_VALUES + 2 and self._bend(name):
                 return True
@@ -237,7 +230,7 @@ class Sweep:
 
     def _bend(self, name: str) -> bool:
         """Adds a value where the curve is steepest."""
-        steps = np.abs(np.diff(curve(self.scores(name))))
+        steps = np.abs(np.diff(mean_interval(self.scores(name))[0]))
         return bool(np.isfinite(steps).any()) and self._insert(int(np.nanargmax(steps)) + 1)
 
     def _insert(self, k: int) -> bool:
@@ -248,13 +241,15 @@ class Sweep:
         self.values.insert(k, (middle,))
         return True
 
-    def _more_seeds(self) -> bool:
-        """Doubles the seeds, or takes as many more as the budget of episodes allows."""
-        more = min(self.seeds, len(self.plan.seeds) - self.seeds)
+    def _add_seeds(self, more: int) -> bool:
+        """Adds seeds, or as many as the budget of episodes allows, at first at least one; returns True if it did."""
+        more = min(more, len(self.plan.seeds) - self.seeds)
         if self.plan.episodes is not None:
-            each = len(self.trackers) * len(self.values) * len(self._scenes(self.values[0])) // self.seeds
+            scenes = len(sources(self.plan.scenarios, self.plan.seeds[:1], self.plan.settings))
+            each = len(self.trackers) * len(self.values) * scenes
             more = min(more, (self.plan.episodes - self.played) // each)
-        self.seeds += max(more, 0)
+        more = max(more, 0 if self.seeds else 1)
+        self.seeds += more
         return more > 0
 
 

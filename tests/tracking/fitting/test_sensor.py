@@ -16,8 +16,9 @@ from sim.detector.sense import sense
 from sim.sequence import simulate
 from sim.types import Detections, Frame, Sequence, Truth
 from tests.hand_made import with_rows
-from tracking.app.pictures.contact_sheet import choose_frames, sheet_picture
+from tracking.app.pictures.contact_sheet import choose_frames, write_sheet
 from tracking.app.pictures.overlay import write_overlay
+from tracking.drawing.layers import layer_of_truth
 from tracking.fitting.detection_matching import MatchedRecording, match_detections, match_sequence
 from tracking.fitting.error_statistics import error_statistics, simulated_detections
 from tracking.fitting.false_alarms import fit_false_alarms
@@ -177,7 +178,7 @@ def test_a_recording_without_frames():
     matched = match_detections(EMPTY, [], (64, 48))
     assert fit_false_alarms([matched]) == (0.0, None)
     assert all(np.isnan(v) for v in error_statistics([matched]).values())
-    assert choose_frames(EMPTY, 8) == []
+    assert choose_frames(layer_of_truth(EMPTY), 0, 10.0, 8) == []
 
 
 def test_boxes_without_scores():
@@ -193,5 +194,5 @@ def test_pictures_of_a_sequence_without_frames(tmp_path):
     with pytest.raises(InputError, match="no frame"):
         write_overlay(nothing, None, tmp_path / "o.mp4")
     with pytest.raises(InputError, match="no frame"):
-        sheet_picture(nothing, EMPTY)
+        write_sheet(nothing, tmp_path / "s.png")
     assert not list(tmp_path.iterdir())

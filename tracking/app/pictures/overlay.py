@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Literal
 
@@ -15,18 +17,15 @@ from sim.io.files.atomic import new_file
 from sim.io.files.own_files import GENERATOR
 from sim.io.pictures.video_files import write_video
 from sim.types import Frame, Image, Sequence, Tracks
-from tracking.app.replay_page.video import even_size, refuse_source
+from tracking.app.replay_page.video import even_size, refuse_source, shown_pictures
 from tracking.drawing.canvas import Canvas
-from tracking.drawing.layer_painting import LayerStyle, draw_banner, draw_captions, letter_size, paint_layer
+from tracking.drawing.layer_painting import draw_banner, draw_captions, letter_size, paint_layer
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.running.run import grouped
-
-Layers = list[tuple[Layer, LayerStyle]]  # What is drawn over the picture, the lowest first.
 
 LOW = 400  # px: pictures less high than this are shown at twice their size.
 
 BANNER_HEIGHT = 32
-GREY = (128, 128, 128)
 
 
 def write_overlay(
@@ -48,71 +47,61 @@ def write_overlay(
     path = Path(out)
     refuse_source(sequence, path)
     layers = _layers(sequence, tracks, truth is not None)
-    with new_file(path) as partial:
-        _write(partial, sequence, layers, step)
+    pictures = overlay_pictures(sequence, layers)
+    first = next(pictures, None)
+    if first is None:
+        raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
+    size = first.shape[1], first.shape[0]
+    with new_file(path) as partial, write_video(partial, size, sequence.fps, comment=GENERATOR) as video:
+        for picture in chain([first], pictures):
+            video.add(picture)
+            step(sequence.name)
     return path
 
 
-def _layers(sequence: Sequence, tracks: SequenceOf[Tracks] | None, with_truth: bool) -> Layers:
-    layers = Layers()
+def _layers(sequence: Sequence, tracks: SequenceOf[Tracks] | None, with_truth: bool) -> list[Layer]:
+    """Returns what is drawn over the pictures, the lowest first."""
+    layers = []
     if tracks is None or with_truth:
         if sequence.truth is None:
             got = "a sequence without labels" if tracks is not None else "neither tracks nor labels"
             remedy = "leave --truth out" if tracks is not None else "give what `flockscope track` wrote"
             raise InputError(file=sequence.name, got=got, expected="something to draw", remedy=remedy)
-        layers.append((layer_of_truth(sequence.truth), LayerStyle(plain=tracks is not None)))
+        layers.append(replace(layer_of_truth(sequence.truth), plain=tracks is not None))
     if tracks is not None:
-        layers.append((layer_of_tracks(grouped(tracks, sequence), sequence.camera, sequence.scene), LayerStyle()))
+        layers.append(layer_of_tracks(grouped(tracks, sequence), sequence.camera, sequence.scene))
     return layers
 
 
-def _write(path: Path, sequence: Sequence, layers: Layers, step: Callable[[str], None]) -> None:
-    pictures = overlay_pictures(sequence, layers)
-    first = next(pictures, None)
-    if first is None:
-        raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
-    with write_video(path, (first.shape[1], first.shape[0]), sequence.fps, comment=GENERATOR) as video:
-        video.add(first)
-        step(sequence.name)
-        for picture in pictures:
-            video.add(picture)
-            step(sequence.name)
-
-
-def overlay_pictures(sequence: Sequence, layers: Layers) -> Iterator[Image]:
+def overlay_pictures(sequence: Sequence, layers: SequenceOf[Layer]) -> Iterator[Image]:
     """Yields the video's pictures, BGR uint8, one per frame, of even width and height."""
-    last: Image | None = None
-    for frame in sequence:
-        if frame.image is not None:
-            last = frame.image
-        body = _drawn(last, sequence, frame.index, layers)
+    for frame, picture in shown_pictures(sequence):
+        body = _drawn(picture, sequence.fps, frame.index, layers)
         banner = np.zeros((BANNER_HEIGHT, body.shape[1], 3), np.uint8)
-        draw_banner(banner, banner_words(sequence, frame, layers), _warnings(sequence, frame), 0.55)
+        draw_banner(banner, banner_words(sequence, frame, layers), _warning(sequence, frame), 0.55)
         yield even_size(np.concatenate([banner, body]))
 
 
-def _drawn(picture: Image | None, sequence: Sequence, index: int, layers: Layers) -> Image:
-    assert sequence.image_size is not None, "pictures have a size"
-    width, height = sequence.image_size
-    shown = np.full((height, width, 3), GREY, np.uint8) if picture is None else picture
-    factor = 2 if height < LOW else 1
-    image = np.array(cv2.resize(shown, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR), np.uint8)
-    canvas = Canvas(image, factor, np.zeros(2), np.array([width, height], float), upwards=False)
-    for layer, style in layers:
-        paint_layer(canvas, layer, index, sequence.fps, style)
-    draw_captions(image, layers[-1][0], index, sequence.fps, letter_size(canvas))
+def _drawn(picture: Image, fps: float, index: int, layers: SequenceOf[Layer]) -> Image:
+    factor = 2 if len(picture) < LOW else 1
+    image = np.array(cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR), np.uint8)
+    size = np.array(picture.shape[1::-1], float)
+    canvas = Canvas(image, factor, np.zeros(2), size, upwards=False)
+    for layer in layers:
+        paint_layer(canvas, layer, index, fps)
+    draw_captions(image, layers[-1], index, fps, letter_size(canvas))
     return image
 
 
-def banner_words(sequence: Sequence, frame: Frame, layers: Layers) -> str:
+def banner_words(sequence: Sequence, frame: Frame, layers: SequenceOf[Layer]) -> str:
     """Returns the banner's text: sequence, frame, time in s, and how many people or groups each layer has."""
     of = "" if sequence.length is None else f" of {sequence.length}"
-    marks = {layer.name: layer.at(frame.index) for layer, _ in layers}
+    marks = {layer.name: layer.at(frame.index) for layer in layers}
     count = "".join(f"   {name} {len(m.id)}{' groups' * m.whole_groups}" for name, m in marks.items())
     return f"{sequence.name}   frame {frame.index}{of}   {frame.t:.2f} s{count}"
 
 
-def _warnings(sequence: Sequence, frame: Frame) -> list[str]:
-    lost = ["lost frame"] if frame.image is None else []
+def _warning(sequence: Sequence, frame: Frame) -> str:
     empty = frame.detections is None or not len(frame.detections.pos)
-    return lost + (["no detections"] if sequence.has_detections and empty else [])
+    lacks = {"lost frame": frame.image is None, "no detections": sequence.has_detections and empty}
+    return ", ".join(words for words, holds in lacks.items() if holds)

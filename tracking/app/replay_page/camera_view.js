@@ -2,7 +2,7 @@
 
 // The px of a point in the world, as sim.scene.camera computes them; null if the camera cannot see it.
 function project(x, y, z) {
-  const { kind, f, c, C, R, scale, k } = data.camera;
+  const { kind, focal_px: f, centre_px: c, position: C, rotation: R, px_per_m: scale, radial: k } = data.camera;
   const p = [x - C[0], y - C[1], z - C[2]];
   const [a, b, d] = R.map(r => r[0] * p[0] + r[1] * p[1] + r[2] * p[2]);
   if (kind === "top") return [a * scale + c[0], b * scale + c[1]];
@@ -21,7 +21,7 @@ function distortion(q, k) {
 // The height of the ground in m, as sim.scene.terrain computes it: 0 except on stairs.
 function heightAt(x, y) {
   let height = 0;
-  for (const [fx, fy, hx, hy, width, rise, n, landing] of (data.scene || { stairs: [] }).stairs) {
+  for (const { foot: [fx, fy], head: [hx, hy], width, rise, steps: n, landing } of (data.scene || { stairs: [] }).stairs) {
     const length = Math.hypot(hx - fx, hy - fy), ex = (hx - fx) / length, ey = (hy - fy) / length;
     const along = (x - fx) * ex + (y - fy) * ey, across = Math.abs((y - fy) * ex - (x - fx) * ey);
     if (!(along > 0 && along <= length + landing && across <= width / 2)) continue;
@@ -49,10 +49,10 @@ function drawGround({ ctx, scale }) {
   for (let x = x0; x <= x1; x += step) worldLine(ctx, scale, [x, y0, 0], [x, y1, 0]);
   for (let y = y0; y <= y1; y += step) worldLine(ctx, scale, [x0, y, 0], [x1, y, 0]);
   if (!data.scene) return;
-  const { walls, wallHeight, pillars, pillarHeight } = data.scene;
+  const { walls, wall_height: wallHeight, pillars, pillar_height: pillarHeight } = data.scene;
   ctx.fillStyle = theme.thing;
   ctx.globalAlpha = 0.3;
-  for (const [a, b, c, d] of walls) fillWorld(ctx, scale, [[a, b, 0], [c, d, 0], [c, d, wallHeight], [a, b, wallHeight]]);
+  for (const [[a, b], [c, d]] of walls) fillWorld(ctx, scale, [[a, b, 0], [c, d, 0], [c, d, wallHeight], [a, b, wallHeight]]);
   ctx.globalAlpha = 0.55;
   for (const [x, y, r] of pillars) {
     const ringAt = z => Array.from({ length: 16 }, (_, k) => [x + r * Math.cos((k * Math.PI) / 8), y + r * Math.sin((k * Math.PI) / 8), z]);

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ import numpy as np
 
 from sim.io.files.atomic import write_file
 from sim.io.store.truth_files import spans
-from sim.types import Array, Camera, GroupEvent, Scene, Sequence, Tracks, Truth
+from sim.types import Array, GroupEvent, Near, Sequence, Tracks
 from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
 from tracking.app.replay_page.video import PageVideo
 from tracking.drawing.plan_view import plan_area
@@ -27,6 +27,7 @@ from tracking.errors.found import FoundError
 from tracking.running.run import grouped
 
 HERE = Path(__file__).parent
+EVER = 10**9  # after the last frame
 
 # The scripts of the page, in the order in which they run.
 SCRIPTS = (
@@ -103,53 +104,49 @@ def page_data(
 
     span: first and last frame that are shown; start: the frame that is shown first.
     """
-    truth = sequence.truth
-    true = None if truth is None else rows_of_truth(truth).within(span)
-    tracked, encoded = _encoded(run, sequence, span)
-    second, encoded_second = (None, None) if other is None else _encoded(other, sequence, span)
-    detections = _detections(sequence, span)
-    both = [rows for rows in (true, tracked, second) if rows is not None]
+    truth, (low, high) = sequence.truth, span or (1, EVER)
+
+    def side(rows: PageRows, events: Iterable[GroupEvent]) -> tuple[PageRows, Json]:
+        rows = rows.ordered(np.flatnonzero((rows.frame >= low) & (rows.frame <= high)))
+        return rows, encode_rows(rows, [e for e in events if e.start <= high and e.end >= low])
+
+    sides = {} if truth is None else {"truth": side(rows_of_truth(truth), truth.events or ())}
+    for name, shown in (("tracks", run), ("other", other)):
+        if shown is not None and shown.tracks is not None:
+            complete = grouped(shown.tracks, sequence)
+            sides[name] = side(rows_of_tracks(complete), [e for t in complete for e in t.events])
+    encoded = {name: found for name, (_, found) in sides.items()}
+    detections = _detections(sequence, low, high)
+    both = [rows for rows, _ in sides.values()]
     length = _length(sequence, both, detections)
     return {
         "name": sequence.name,
         "tracker": _tracker(run),
         "fps": sequence.fps,
         "length": length,
-        "from": 1 if span is None else span[0],
-        "to": length if span is None else span[1],
+        "from": low,
+        "to": length if span is None else high,
         "start": start,
         "zoomed": span is not None,
         "image": sequence.image_size or _image_size(both),
         "bounds": _bounds(sequence, both),
-        "scene": scene_json(sequence.scene),
-        "camera": camera_json(sequence.camera),
-        "truth": None if true is None or truth is None else encode_rows(true, _within(truth.events or (), span)),
-        "tracks": encoded,
-        "other": None if other is None else {"tracker": _tracker(other), "tracks": encoded_second},
+        "scene": plain(sequence.scene),
+        "camera": plain(sequence.camera),
+        "truth": encoded.get("truth"),
+        "tracks": encoded.get("tracks"),
+        "other": None if other is None else {"tracker": _tracker(other), "tracks": encoded.get("other")},
         "detections": detections,
         "background": None,
-        "unlabelled": _unlabelled(truth),
-        "near": _near_strangers(truth),
+        "unlabelled": [] if truth is None or truth.labelled is None else spans(~truth.labelled),
+        "near": [] if truth is None or truth.near is None else _near_strangers(truth.near),
         "scores": _scores(scores or {}),
         "errors": [
             {**one.facts(sequence.fps), "side": side}
             for side, shown in (("tracks", run), ("other", other))
             for one in (() if shown is None else shown.errors)
-            if span is None or (one.error.start <= span[1] and one.error.end >= span[0])
+            if one.error.start <= high and one.error.end >= low
         ],
     }
-
-
-def _encoded(run: Run, sequence: Sequence, span: tuple[int, int] | None) -> tuple[PageRows | None, Json | None]:
-    if run.tracks is None:
-        return None, None
-    complete = grouped(run.tracks, sequence)
-    rows = rows_of_tracks(complete).within(span)
-    return rows, encode_rows(rows, _within([e for t in complete for e in t.events], span))
-
-
-def _within(events: SequenceOf[GroupEvent], span: tuple[int, int] | None) -> list[GroupEvent]:
-    return [e for e in events if span is None or (e.start <= span[1] and e.end >= span[0])]
 
 
 def _scores(scores: Mapping[str, float]) -> list[list[str]]:
@@ -189,34 +186,26 @@ def _image_size(both: list[PageRows]) -> list[int] | None:
 def _bounds(sequence: Sequence, both: list[PageRows]) -> list[float] | None:
     points = [part for rows in both if rows.plane == "ground" for part in _points(rows)]
     area = plan_area(sequence.scene, np.concatenate([np.zeros((0, 2)), *points]))
-    return None if area is None else [round(float(v), 2) for corner in area for v in corner]
+    return None if area is None else np.concatenate(area).round(2).tolist()
 
 
 def _points(rows: PageRows) -> list[Array]:
-    return [rows.pos, *(rows.groups.hull if rows.groups is not None else ())]
+    return [rows.pos, *(() if rows.hull is None else rows.hull)]
 
 
-def _unlabelled(truth: Truth | None) -> list[list[int]]:
-    """Returns [first, last], frames from 1 and both inclusive, of each stretch of frames without group labels."""
-    return [] if truth is None or truth.labelled is None else spans(~truth.labelled)
-
-
-def _near_strangers(truth: Truth | None) -> list[list[int]]:
+def _near_strangers(near: Near) -> list[list[int]]:
     """Returns [first frame, last frame, id, id] of each two strangers who walk as if they were in one group."""
-    if truth is None or truth.near is None:
-        return []
-    near = truth.near
     listed: list[list[int]] = np.stack([near.start, near.end, near.a, near.b], axis=1).tolist()
     return listed
 
 
-def _detections(sequence: Sequence, span: tuple[int, int] | None) -> Json | None:
+def _detections(sequence: Sequence, low: int, high: int) -> Json | None:
     if not sequence.has_detections:
         return None
     found = [
         (f.index, f.detections)
         for f in sequence.without_pictures()
-        if f.detections is not None and len(f.detections.pos) and (span is None or span[0] <= f.index <= span[1])
+        if f.detections is not None and len(f.detections.pos) and low <= f.index <= high
     ]
     if not found:
         return None
@@ -234,37 +223,12 @@ def _detections(sequence: Sequence, span: tuple[int, int] | None) -> Json | None
     }
 
 
-def scene_json(scene: Scene | None) -> Json | None:
-    """Returns the scene for the page, in m, as a JSON object; None without a scene."""
-    if scene is None:
-        return None
-    return {
-        "size": _round(scene.size),
-        "walls": _round(scene.walls.reshape(-1, 4)),
-        "pillars": _round(scene.pillars),
-        "doors": _round(scene.doors.reshape(-1, 4)),
-        "service": _round(scene.service),
-        "stairs": [[*_round(s.foot), *_round(s.head), s.width, s.rise, s.steps, s.landing] for s in scene.stairs],
-        "wallHeight": scene.wall_height,
-        "pillarHeight": scene.pillar_height,
-    }
-
-
-def camera_json(camera: Camera | None) -> Json | None:
-    """Returns the camera for the page, which projects ground and walls with it, as a JSON object."""
-    if camera is None:
-        return None
-    return {
-        "kind": camera.kind,
-        "f": _round(camera.focal_px),
-        "c": _round(camera.centre_px),
-        "C": _round(camera.position, 4),
-        "R": _round(camera.rotation, 6),
-        "scale": None if math.isnan(camera.px_per_m) else camera.px_per_m,
-        "k": camera.radial,
-    }
-
-
-def _round(values: Any, digits: int = 3) -> list[Any]:
-    listed: list[Any] = np.round(np.asarray(values, float), digits).tolist()
-    return listed
+def plain(value: Any) -> Any:
+    """Returns arrays, numbers, and tuples and dataclasses of them, as JSON has them: with 6 digits, None for nan."""
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, tuple):
+        return [plain(one) for one in value]
+    if isinstance(value, float):
+        return None if math.isnan(value) else round(value, 6)
+    return np.round(value, 6).tolist() if isinstance(value, np.ndarray) else value

@@ -11,9 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,18 +39,21 @@ class Link(NamedTuple):
     b: int
 
 
-def bars(frame: Ints, group: Ints, least: int = 2, gap: int = 1, people: Array | None = None) -> list[Bar]:
-    """Returns the bars, unbroken lives, of the groups in rows of (frame, group), (R,) each, sorted by first frame."""
+def bars(frame: Ints, group: Ints, people: Array | None = None) -> list[Bar]:
+    """Returns the bars, unbroken lives, of the groups in rows of (frame, group), (R,) each, sorted by first frame.
+
+    people: estimated number in each row, (R,), of whole groups; without it, each row is a person, and two are a group.
+    """
     rows = group >= 0
     pairs, place = np.unique(np.stack([group[rows], frame[rows]], axis=1), axis=0, return_inverse=True)
     count = np.bincount(place.ravel(), None if people is None else people[rows], len(pairs))
-    pairs, count = pairs[count >= least], count[count >= least]
+    kept = count >= (2 if people is None else 0)
+    pairs, count = pairs[kept], count[kept]
     if not len(pairs):
         return []
-    new = np.flatnonzero((np.diff(pairs[:, 0]) != 0) | (np.diff(pairs[:, 1]) > gap)) + 1
+    new = np.flatnonzero((np.diff(pairs[:, 0]) != 0) | (np.diff(pairs[:, 1]) > 1)) + 1
     lives = zip(np.split(pairs, new), np.split(count, new), strict=True)
-    found = [(int(p[0, 1]), int(p[-1, 1]), int(p[0, 0]), round(float(n.max()))) for p, n in lives]
-    return _in_lanes(sorted(found))
+    return _in_lanes(sorted((int(p[0, 1]), int(p[-1, 1]), int(p[0, 0]), round(float(n.max()))) for p, n in lives))
 
 
 def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
@@ -96,23 +100,11 @@ Json = dict[str, Any]  # An object that `json` can write.
 
 
 @dataclass(frozen=True, eq=False)
-class PageGroupRows:
-    """What a tracker of whole groups says of R groups, one per row, in m or px; nan where unknown."""
-
-    hull: tuple[Array, ...]  # R polygons (V, 2) x, y, without vertices where unknown
-    extent: Array  # (R, 2, 2) covariance of where the group's people are, m² or px²
-    size: Array  # (R,) estimated number of people
-    speed: Array  # (R,) m/s or px/s
-
-    def kept(self, rows: Bools) -> PageGroupRows:
-        """Returns some of the rows."""
-        hull = tuple(polygon for polygon, kept in zip(self.hull, rows.tolist(), strict=True) if kept)
-        return PageGroupRows(hull, self.extent[rows], self.size[rows], self.speed[rows])
-
-
-@dataclass(frozen=True, eq=False)
 class PageRows:
-    """Truth or one tracker's tracks as R rows in any order, one per person or group and frame; nan where unknown."""
+    """Truth or one tracker's tracks as R rows in any order, one per person or group and frame; nan where unknown.
+
+    The last four are None but of a tracker of whole groups; in m or px.
+    """
 
     plane: str  # "ground" (m) or "image" (px)
     frame: Ints  # (R,) from 1
@@ -122,16 +114,17 @@ class PageRows:
     angle: Array  # (R,) rad, direction of view or movement, from +x towards +y, which in the image is downwards
     box: Array  # (R, 4) left, top, width, height, px
     visibility: Array  # (R,) 0 to 1
-    groups: PageGroupRows | None = None  # of rows that are groups
+    size: Array | None = None  # (R,) estimated number of people
+    speed: Array | None = None  # (R,) m/s or px/s
+    extent: Array | None = None  # (R, 2, 2) covariance of where the group's people are, m² or px²
+    hull: NDArray[np.object_] | None = None  # (R,) polygons (V, 2) x, y, without vertices where unknown
 
-    def within(self, span: tuple[int, int] | None) -> PageRows:
-        """Returns the rows of the frames from the first to the last of `span`, all without one."""
-        if span is None:
-            return self
-        kept = (self.frame >= span[0]) & (self.frame <= span[1])
-        arrays = {name: getattr(self, name)[kept] for name in ("frame", "id", "group", "pos", "angle", "box")}
-        groups = None if self.groups is None else self.groups.kept(kept)
-        return replace(self, **arrays, visibility=self.visibility[kept], groups=groups)
+    def ordered(self, rows: Ints) -> PageRows:
+        """Returns some rows in this order."""
+        names = [field.name for field in fields(self) if field.name != "plane"]
+        columns: dict[str, Any] = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        cut: dict[str, Any] = {name: column[rows] for name, column in columns.items()}
+        return replace(self, **cut)
 
 
 def rows_of_truth(truth: Truth) -> PageRows:
@@ -159,7 +152,7 @@ def rows_of_tracks(tracks: SequenceOf[Tracks]) -> PageRows:
         _directions(vel, len(vel)),
         np.concatenate([np.zeros((0, 4)), *box]),
         np.ones(len(vel)),
-        rows_of_groups(tracks) if any(t.unit == "group" for t in tracks) else None,
+        **(_wholes(tracks, vel) if any(t.unit == "group" for t in tracks) else {}),
     )
 
 
@@ -177,32 +170,25 @@ def _directions(vel: Array | None, n: int) -> Array:
 
 def encode_rows(rows: PageRows, events: Iterable[GroupEvent]) -> Json:
     """Returns the rows as encoded columns, sorted by id and frame, with events and the group timeline."""
-    events = list(events)
-    order = np.lexsort((rows.frame, rows.id))
-    frame, ids, group = rows.frame[order], rows.id[order], rows.group[order]
-    scale = SCALE[rows.plane]
-    pos, box = rows.pos[order] * scale, rows.box[order] * 2
+    events, scale = list(events), SCALE[rows.plane]
+    rows = rows.ordered(np.lexsort((rows.frame, rows.id)))
+    pos, box = rows.pos * scale, rows.box * 2
+    people = None if rows.size is None else np.nan_to_num(rows.size)
     return {
         "plane": rows.plane,
         "scale": scale,
-        "stints": stints(ids, frame),
+        "stints": stints(rows.id, rows.frame),
         "x": deltas(pos[:, 0]),
         "y": deltas(pos[:, 1]),
-        "a": deltas(np.degrees(rows.angle[order])),
+        "a": deltas(np.degrees(rows.angle)),
         "box": [] if np.isnan(box).all() else [deltas(box[:, k]) for k in range(4)],
-        "group": run_lengths(group),
-        "vis": run_lengths(np.nan_to_num(rows.visibility[order] * 10, nan=10).round().astype(np.int64)),
-        "wholes": None if rows.groups is None else encode_groups(rows.groups, order, rows.plane, scale),
+        "group": run_lengths(rows.group),
+        "vis": run_lengths(np.nan_to_num(rows.visibility * 10, nan=10).round().astype(np.int64)),
+        "wholes": _encoded_wholes(rows, scale),
         "events": [_event(e) for e in events if e.start >= 1],
-        "bars": _bars(rows),
+        "bars": bars(rows.frame, rows.group, people),
         "links": links(events),
     }
-
-
-def _bars(rows: PageRows) -> list[Bar]:
-    if rows.groups is None:
-        return bars(rows.frame, rows.group)
-    return bars(rows.frame, rows.group, least=0, people=np.nan_to_num(rows.groups.size))
 
 
 def _event(event: GroupEvent) -> list[Any]:
@@ -211,34 +197,30 @@ def _event(event: GroupEvent) -> list[Any]:
     return [event.kind, event.start, event.end, event.emitted, event.before, event.after, event.members, pos]
 
 
-def rows_of_groups(tracks: SequenceOf[Tracks]) -> PageGroupRows:
-    """Returns the groups of all rows of `tracks` (one `Tracks` per frame), in their order."""
-    rows = [row for t in tracks for row in _groups_of(t)]
-    speed = [np.hypot(t.vel[:, 0], t.vel[:, 1]) for t in tracks]
-    extent, size = [row[1] for row in rows], [row[2] for row in rows]
-    return PageGroupRows(
-        tuple(row[0] for row in rows),
-        np.array(extent).reshape(-1, 2, 2),
-        np.array(size, float),
-        np.concatenate([np.zeros(0), *speed]),
-    )
-
-
-def _groups_of(tracks: Tracks) -> list[tuple[Array, Array, float]]:
-    """Returns (hull (V, 2), extent (2, 2), size) of each row of one frame."""
-    groups, no_hull = tracks.groups or Groups.none(), np.zeros((0, 2))
-    hulls = groups.hull or (no_hull,) * len(groups.id)
-    known = dict(zip(groups.id.tolist(), zip(hulls, groups.extent, groups.size, strict=True), strict=True))
-    return [known.get(name, (no_hull, np.full((2, 2), np.nan), math.nan)) for name in tracks.id.tolist()]
-
-
-def encode_groups(rows: PageGroupRows, order: Ints, plane: str, scale: int) -> dict[str, Any]:
-    """Returns the rows in the order `order` as encoded columns."""
-    axes = ellipses(rows.extent[order])
-    hulls = [simplified(rows.hull[k], LEAST_CORNER[plane]) for k in order]
+def _wholes(tracks: SequenceOf[Tracks], vel: Array) -> dict[str, Any]:
+    """Returns the columns of whole groups of all rows of `tracks`."""
+    no_hull, columns = np.zeros((0, 2)), list[tuple[Array, Array, float]]()
+    for t in tracks:
+        groups = t.groups or Groups.none()
+        every = zip(groups.hull or (no_hull,) * len(groups.id), groups.extent, groups.size, strict=True)
+        known = dict(zip(groups.id.tolist(), every, strict=True))
+        columns += [known.get(name, (no_hull, np.full((2, 2), np.nan), math.nan)) for name in t.id.tolist()]
     return {
-        "size": deltas(rows.size[order] * 10),
-        "speed": deltas(rows.speed[order] * SPEED_SCALE[plane]),
+        "size": np.array([size for _, _, size in columns], float),
+        "speed": np.hypot(vel[:, 0], vel[:, 1]),
+        "extent": np.array([extent for _, extent, _ in columns]).reshape(-1, 2, 2),
+        "hull": np.fromiter((hull for hull, _, _ in columns), object, len(columns)),
+    }
+
+
+def _encoded_wholes(rows: PageRows, scale: int) -> Json | None:
+    if rows.size is None or rows.speed is None or rows.extent is None or rows.hull is None:
+        return None
+    axes = ellipses(rows.extent)
+    hulls = [simplified(hull, LEAST_CORNER[rows.plane]) for hull in rows.hull]
+    return {
+        "size": deltas(rows.size * 10),
+        "speed": deltas(rows.speed * SPEED_SCALE[rows.plane]),
         "ellipse": [deltas(axes[:, 0] * scale), deltas(axes[:, 1] * scale), deltas(np.degrees(axes[:, 2]))],
         "hull": [_steps(np.rint(hull * scale).astype(np.int64)) for hull in hulls],
     }
@@ -254,17 +236,11 @@ def ellipses(extent: Array) -> Array:
 
 
 def simplified(hull: Array, least: float) -> Array:
-    """Returns a convex polygon (V, 2) without the corners nearer than `least` to the line through their neighbours."""
-    for odd in (1, 0):  # every other corner at a time, so that no two neighbours go at once
-        n = len(hull)
-        if n > 3:
-            before, after = np.roll(hull, 1, axis=0), np.roll(hull, -1, axis=0)
-            along, out = after - before, hull - before
-            area = np.abs(along[:, 0] * out[:, 1] - along[:, 1] * out[:, 0])
-            flat = area < least * np.hypot(along[:, 0], along[:, 1])
-            candidates = np.arange(n) % 2 == odd
-            candidates[-1] &= n % 2 == 0  # with an odd number of corners the last is a neighbour of the first
-            hull = hull[~(flat & candidates)]
+    """Returns a convex polygon (V, 2) without corners nearer than `least` to what is left, by Douglas and Peucker."""
+    if len(hull) > 3:
+        corners = hull.astype(np.float32)
+        kept = (corners[:, None] == cv2.approxPolyDP(corners, least, closed=True)[:, 0]).all(axis=2).any(axis=1)
+        hull = hull[kept] if kept.sum() > 2 else hull
     return hull if len(hull) <= MAX_CORNERS else hull[:: math.ceil(len(hull) / MAX_CORNERS)]
 
 

@@ -103,8 +103,8 @@ function drawScene(ctx, map, scale) {
   for (const flight of stairs) drawStairs(ctx, map, flight);
   ctx.strokeStyle = theme.wall;
   ctx.lineWidth = Math.max(0.1 * scale, 3);
-  for (const [a, b, c, d] of walls) strokeLine(ctx, [map(a, b), map(c, d)]);
-  for (const [a, b, c, d] of doors) {
+  for (const [[a, b], [c, d]] of walls) strokeLine(ctx, [map(a, b), map(c, d)]);
+  for (const [[a, b], [c, d]] of doors) {
     ctx.strokeStyle = theme.ground;
     ctx.lineWidth = Math.max(0.1 * scale, 3) + 2;
     strokeLine(ctx, [map(a, b), map(c, d)]);
@@ -129,7 +129,7 @@ function drawScene(ctx, map, scale) {
   }
 }
 
-function drawStairs(ctx, map, [fx, fy, hx, hy, width, , count, landing]) {
+function drawStairs(ctx, map, { foot: [fx, fy], head: [hx, hy], width, steps: count, landing }) {
   const length = Math.hypot(hx - fx, hy - fy), ex = (hx - fx) / length, ey = (hy - fy) / length;
   const across = s => [map(fx + ex * s - ey * width / 2, fy + ey * s + ex * width / 2), map(fx + ex * s + ey * width / 2, fy + ey * s - ex * width / 2)];
   ctx.fillStyle = theme.floor;

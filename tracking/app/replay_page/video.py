@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -16,7 +16,7 @@ from scenarios.errors import InputError
 from sim.io.files.atomic import staged_path
 from sim.io.files.own_files import GENERATOR, refuse_foreign_file
 from sim.io.pictures.video_files import rate_of, write_video
-from sim.types import Image, Sequence
+from sim.types import Frame, Image, Sequence
 
 VideoPlacement = Literal["auto", "inside", "beside", "none"]
 LARGE = 12_000_000  # bytes: with "auto", a video of this size or more is written beside the page.
@@ -69,17 +69,22 @@ def _encode(sequence: Sequence, path: Path, step: Callable[[str], None]) -> tupl
     """Writes the pictures as MP4 at `path` and returns the frames (from 1) without a picture."""
     assert sequence.image_size is not None, "pictures have a size"
     width, height = sequence.image_size
-    last: Image = np.full((height, width, 3), GREY, np.uint8)
     lost = []
     with write_video(path, (width + width % 2, height + height % 2), sequence.fps, QUALITY, GENERATOR) as video:
-        for frame in sequence:
-            if frame.image is None:
-                lost.append(frame.index)
-            else:
-                last = frame.image
-            video.add(even_size(last))
+        for frame, picture in shown_pictures(sequence):
+            lost += [frame.index] if frame.image is None else []
+            video.add(even_size(picture))
             step(sequence.name)
     return tuple(lost)
+
+
+def shown_pictures(sequence: Sequence) -> Iterator[tuple[Frame, Image]]:
+    """Yields each frame with its picture; a frame without one with the picture before it, grey if there is none."""
+    assert sequence.image_size is not None, "pictures have a size"
+    last: Image = np.full((*sequence.image_size[::-1], 3), GREY, np.uint8)
+    for frame in sequence:
+        last = last if frame.image is None else frame.image
+        yield frame, last
 
 
 def even_size(picture: Image) -> Image:

@@ -3,24 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
+
+from tracking.errors.found import CauseRow
+from tracking.stats import mean_of_finite
 
 Json = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class RankedRow:
-    """A row of the ranking; a row without ranks is an oracle's."""
+class Played:
+    """A run of one sequence."""
 
     name: str
-    rank: str  # range of ranks in words, "" of an oracle
-    mean: float
-    low: float
-    high: float
-    scores: Mapping[str, float]  # means of other scores, nan where unknown
+    scenario: str
+    sequence: str
+    score: float  # nan where unknown
+    best: float  # the oracle's score, nan without one
+    why: str = ""  # why it cannot be shown
+    command: str = ""  # generates the sequence, "" for a given one
+
+    @property
+    def shortfall(self) -> float:
+        """What the run lacks beside the oracle."""
+        return (1.0 if math.isnan(self.best) else self.best) - self.score
 
 
 @dataclass(frozen=True)
@@ -42,19 +53,24 @@ class HeatMap:
     """Scores of trackers (columns) by scenario, or by values of two axes (rows)."""
 
     title: str
-    columns: tuple[str, ...]
+    columns: SequenceOf[str]
     rows: Mapping[str, SequenceOf[HeatCell]]
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A tracker's score over an axis of difficulty, with 95 % intervals, and where it breaks."""
+def heat_map(title: str, played: Iterable[tuple[str, str, Played]]) -> HeatMap:
+    """Returns mean scores; played: row, column and run. Rows and columns have the order in which they come."""
+    found: dict[str, dict[str, list[Played]]] = {}
+    for row, column, one in played:
+        found.setdefault(row, {}).setdefault(column, []).append(one)
+    columns = list(dict.fromkeys(column for row in found.values() for column in row))
+    rows = {name: [_cell(row.get(column, [])) for column in columns] for name, row in found.items()}
+    return HeatMap(title, columns, rows)
 
-    name: str
-    mean: SequenceOf[float]
-    low: SequenceOf[float]
-    high: SequenceOf[float]
-    breaks: Mapping[str, float | None]  # at, low, high: values of the axis
+
+def _cell(found: SequenceOf[Played]) -> HeatCell:
+    score, best = (mean_of_finite(np.array(part)) for part in ([p.score for p in found], [p.best for p in found]))
+    why = " or ".join(sorted({one.why for one in found}))
+    return HeatCell(score, best, "" if math.isfinite(score) else why)
 
 
 @dataclass(frozen=True)
@@ -64,46 +80,19 @@ class Curves:
     axis: str
     about: str
     values: SequenceOf[float]
-    curves: SequenceOf[Curve]
+    curves: Mapping[str, Json]  # by tracker, as in stress.json: mean, low and high by value, and the breaking point
     words: SequenceOf[str]  # breaking points in words
-
-
-@dataclass(frozen=True)
-class CauseBar:
-    """What the repair of the errors of one kind and cause adds to a tracker's scores, mean over sequences."""
-
-    name: str
-    kind: str
-    cause: str
-    errors: int
-    seconds: float
-    gains: Mapping[str, float]  # HOTA, group_F1
 
 
 @dataclass(frozen=True)
 class Moment:
     """A stretch of a sequence in which a tracker is bad, with its replay."""
 
-    name: str
-    scenario: str
-    sequence: str
-    score: float
-    best: float  # the oracle's score, nan without one
+    run: Played
     start: float  # s
     kind: str  # of the dearest error, "" without one
     words: str
     replay: str | None  # page data as text for a script element; None: it was left out
-    command: str = ""  # generates the sequence, "" for a given one
-
-
-@dataclass(frozen=True)
-class Failure:
-    """An episode that a tracker could not finish."""
-
-    name: str
-    scene: str
-    line: str
-    traceback: str = ""
 
 
 @dataclass(frozen=True)
@@ -113,13 +102,13 @@ class Report:
     title: str
     about: str
     by: str
-    ranking: SequenceOf[RankedRow]
+    ranking: SequenceOf[Json]  # run, rank in words ("" of an oracle), mean, low, high, and means of other scores by key
     ranking_words: SequenceOf[str] = ()
     heat: HeatMap | None = None
-    curves: SequenceOf[Curves] = ()
+    curves: Curves | None = None
     matrices: SequenceOf[HeatMap] = ()
-    causes: SequenceOf[CauseBar] = ()
+    causes: SequenceOf[tuple[str, CauseRow]] = ()  # tracker, and what a kind and cause of errors costs it
     causes_about: str = ""
     moments: SequenceOf[Moment] = ()
-    failures: SequenceOf[Failure] = ()
+    failures: SequenceOf[Json] = ()  # episodes that a tracker could not finish, as in stress.json
     sequences: SequenceOf[tuple[str, str, float]] = ()  # name, address of its page, score: worst first

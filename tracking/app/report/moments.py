@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import base64
-import math
 import warnings
 from collections.abc import Callable
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 
 from scenarios.errors import InputError
 from sim.types import Sequence
 from tracking.app.replay_page.page import Run, page_data, script_json
-from tracking.app.report.content import CauseBar, Moment
-from tracking.errors.found import FoundError, RunErrors, errors_of_run, sums_by_cause
+from tracking.app.report.content import Moment, Played
+from tracking.errors.found import CauseRow, FoundError, RunErrors, errors_of_run, sums_by_cause
 from tracking.errors.groups import GroupError
 from tracking.running.run import TrackingRun
 
-GAINS = ("HOTA", "group_F1")
 COSTS = 8  # longest errors of a run, of which the dearest is shown
 MOST = 12  # moments in a report
 BYTES = 7_000_000  # of all their replays
@@ -28,33 +26,16 @@ LONGEST = 40.0  # s of a replay
 JPEG_QUALITY = 60
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A run of one sequence that may be shown."""
-
-    name: str
-    scenario: str
-    sequence: str
-    score: float
-    best: float  # the oracle's score
-    rival: str  # the best other tracker there, "" without one
-    command: str = ""  # generates the sequence
-
-    @property
-    def shortfall(self) -> float:
-        """What the run lacks beside the oracle."""
-        return (1.0 if self.best != self.best else self.best) - self.score
+Runs = Callable[[Played, str], tuple[Sequence, Run, Run | None]]  # the sequence, its run, that of a rival, "" without
 
 
-Runs = Callable[[Candidate], tuple[Sequence, Run, Run | None]]  # the sequence, its run, the rival's
-
-
-def chosen(candidates: SequenceOf[Candidate], most: int = MOST) -> list[Candidate]:
+def chosen(played: SequenceOf[Played], most: int = MOST) -> list[Played]:
     """Returns the runs that are shown, worst first: in turn each tracker's worst, of another scenario if it can be."""
-    waiting: dict[str, list[Candidate]] = {}
-    for one in sorted((one for one in candidates if one.shortfall > 0), key=lambda one: -one.shortfall):
+    waiting: dict[str, list[Played]] = {}
+    bad = [one for one in played if not one.why and one.shortfall > 0]
+    for one in sorted(bad, key=lambda one: -one.shortfall):
         waiting.setdefault(one.name, []).append(one)
-    shown: list[Candidate] = []
+    shown: list[Played] = []
     while len(shown) < most and any(waiting.values()):
         for name, left in waiting.items():
             if left and len(shown) < most:
@@ -65,17 +46,22 @@ def chosen(candidates: SequenceOf[Candidate], most: int = MOST) -> list[Candidat
     return sorted(shown, key=lambda one: -one.shortfall)
 
 
-def moments(candidates: SequenceOf[Candidate], runs: Runs) -> list[Moment]:
-    """Returns the worst moments, with replays as far as the report stays small; runs: with costs of their errors."""
+def moments(played: SequenceOf[Played], runs: Runs) -> list[Moment]:
+    """Returns the worst moments, with replays as far as the report stays small; runs: with costs of their errors.
+
+    The rival is the best other tracker on the sequence.
+    """
     found, size = [], 0
-    for one in chosen(candidates):
-        moment = _moment(one, *runs(one))
+    for one in chosen(played):
+        others = [p for p in played if p.sequence == one.sequence and p.name != one.name and not p.why]
+        rival = max(others, key=lambda other: other.score, default=None)
+        moment = _moment(one, *runs(one, "" if rival is None else rival.name))
         size += len(moment.replay or "")
         found.append(moment if size <= BYTES else replace(moment, replay=None))
     return found
 
 
-def _moment(one: Candidate, sequence: Sequence, run: Run, rival: Run | None) -> Moment:
+def _moment(one: Played, sequence: Sequence, run: Run, rival: Run | None) -> Moment:
     dearest = max(run.errors, key=lambda error: error.cost or 0.0, default=None)
     length = sequence.length or len(run.tracks or ())
     first, last = (1, length) if dearest is None else (dearest.error.start, dearest.error.end)
@@ -86,18 +72,14 @@ def _moment(one: Candidate, sequence: Sequence, run: Run, rival: Run | None) -> 
     data = page_data(sequence, run, rival, span=span, start=start)
     data["background"], data["video"] = _background(sequence), None
     kind, words = ("", "") if dearest is None else (dearest.error.kind, _words(dearest))
-    known = (one.name, one.scenario, one.sequence, one.score, one.best)
-    return Moment(*known, (first - 1) / sequence.fps, kind, words, script_json(data), one.command)
+    return Moment(one, (first - 1) / sequence.fps, kind, words, script_json(data))
 
 
-def cause_bars(found: SequenceOf[tuple[str, RunErrors]]) -> list[CauseBar]:
+def cause_rows(found: SequenceOf[tuple[str, RunErrors]]) -> list[tuple[str, CauseRow]]:
     """Returns what each kind and cause of errors costs each tracker, mean over its runs; found: trackers and runs."""
-    bars = []
-    for name in sorted({name for name, _ in found}):
-        for row in sums_by_cause([errors for other, errors in found if other == name and errors.scores]):
-            gains = {key: 0.0 if math.isnan(row.gains[key]) else row.gains[key] for key in GAINS}
-            bars.append(CauseBar(name, row.kind, row.cause, row.errors, row.seconds, gains))
-    return bars
+    names = sorted({name for name, _ in found})
+    runs = {name: [errors for other, errors in found if other == name and errors.scores] for name in names}
+    return [(name, row) for name in names for row in sums_by_cause(runs[name])]
 
 
 def _words(error: FoundError) -> str:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
+from operator import itemgetter
 
 import numpy as np
 
 from scenarios.errors import counted
-from scenarios.loading.resolve import rows
+from scenarios.loading.resolve import SuiteEntry, rows
 from sim.types import Array, Sequence
 from tracking.app.commands.score_ranking import rank_words
 from tracking.app.replay_page.page import Run
-from tracking.app.report.content import Curve, Curves, Failure, HeatCell, HeatMap, Json, RankedRow, Report
-from tracking.app.report.moments import COSTS, Candidate, cause_bars, moments, shown_errors
+from tracking.app.report.content import Curves, HeatMap, Json, Played, Report, heat_map
+from tracking.app.report.moments import COSTS, cause_rows, moments, shown_errors
 from tracking.environment.episodes import streams_for
 from tracking.errors.found import RunErrors
 from tracking.ranking import rank
@@ -36,16 +37,16 @@ def report_of_sweep(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Report:
     plan, searched = sweep.plan, data["found"] is not None
     scenes = [*sweep.scenes.values()]
     easy = scenes if searched or not plan.axes else [s for s in scenes if s.values == sweep.values[0]]
-    candidates = dict(_candidates(sweep, scenes))
+    entries = {entry.name: entry for name in plan.scenarios for entry in rows(name)}
+    played = {one: scene for scene in scenes for one in _played(sweep, scene, entries)}
     errors: list[tuple[str, RunErrors]] = []
-    shown = moments([*candidates], lambda one: _replay(sweep, one, candidates[one], errors))
+    shown = moments([*played], lambda one, rival: _replay(sweep, (one.name, rival), played[one], errors))
     return Report(
         title=f"Stress of {', '.join(sweep.trackers)}", about=_about(sweep, data), by=plan.by,
         ranking=[] if searched else list(_ranking(sweep, easy)), ranking_words=_ranking_words(sweep, easy),
-        heat=_scenarios(sweep, easy), curves=_curves(sweep, data, words), matrices=list(_matrices(sweep, data)),
-        causes=cause_bars(errors), causes_about=CAUSES,
-        moments=shown,
-        failures=[Failure(row["tracker"], _scene(row), row["failed"], row["traceback"]) for row in data["failures"]],
+        heat=heat_map(f"{plan.by} by scenario", ((p.scenario, p.name, p) for p, s in played.items() if s in easy)),
+        curves=_curves(sweep, data, words), matrices=list(_matrices(sweep, played)) if data["matrix"] else [],
+        causes=cause_rows(errors), causes_about=CAUSES, moments=shown, failures=data["failures"],
     )  # fmt: skip
 
 
@@ -56,30 +57,22 @@ def _about(sweep: Sweep, data: Json) -> str:
     return f"{counted(data['episodes'], 'episode')} of {', '.join(plan.scenarios)}{axes}, {seeds}"
 
 
-def _scene(row: Json) -> str:
-    return " ".join([f"{row['scenario']}, seed {row['seed']}", *row["settings"]])
-
-
-def _values(sweep: Sweep, name: str, scenes: SequenceOf[Scene], key: str | None = None) -> Array:
-    if key is None:
-        return np.array([sweep.score(name, scene) for scene in scenes])
+def _values(sweep: Sweep, name: str, scenes: SequenceOf[Scene], key: str) -> Array:
     rows = (sweep.row(name, scene) for scene in scenes)
     return np.array([math.nan if row is None else row["scores"].get(key, math.nan) for row in rows])
 
 
-def _ranking(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[RankedRow]:
-    mean, low, high = (float(end[0]) for end in mean_interval(_values(sweep, ORACLE, scenes)[:, None]))
-    yield RankedRow(ORACLE, "", mean, low, high, _means(sweep, ORACLE, scenes))
+def _ranking(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[Json]:
     names = [*sweep.trackers]
-    found = rank(np.array([_values(sweep, name, scenes) for name in names]))
-    for place, k in enumerate(found.order.tolist()):
-        row = {"first": int(found.first[place]), "last": int(found.last[place])}
-        mean, low, high = (float(end[place]) for end in (found.mean, found.low, found.high))
-        yield RankedRow(names[k], rank_words(row), mean, low, high, _means(sweep, names[k], scenes))
-
-
-def _means(sweep: Sweep, name: str, scenes: SequenceOf[Scene]) -> dict[str, float]:
-    return {key: mean_of_finite(_values(sweep, name, scenes, key)) for key in CATALOGUE}
+    best, *scores = (np.array([sweep.score(name, scene) for scene in scenes]) for name in (ORACLE, *names))
+    found = rank(np.array(scores))
+    ranks = [{"first": a, "last": b} for a, b in zip(found.first.tolist(), found.last.tolist(), strict=True)]
+    words = ["", *map(rank_words, ranks)]
+    ends = zip(mean_interval(best[:, None]), (found.mean, found.low, found.high), strict=True)
+    mean, low, high = (np.concatenate(pair).tolist() for pair in ends)
+    for k, name in enumerate([ORACLE, *(names[k] for k in found.order.tolist())]):
+        means = {key: mean_of_finite(_values(sweep, name, scenes, key)) for key in CATALOGUE}
+        yield {"run": name, "rank": words[k], "mean": mean[k], "low": low[k], "high": high[k], **means}
 
 
 def _ranking_words(sweep: Sweep, scenes: SequenceOf[Scene]) -> list[str]:
@@ -87,74 +80,42 @@ def _ranking_words(sweep: Sweep, scenes: SequenceOf[Scene]) -> list[str]:
     return [f"{counted(len(scenes), 'scene')}, {where}. Trackers with a common rank: no sure difference."]
 
 
-def _cell(sweep: Sweep, name: str, scenes: SequenceOf[Scene]) -> HeatCell:
-    score, best = (mean_of_finite(_values(sweep, each, scenes)) for each in (name, ORACLE))
-    rows = [row for scene in scenes if (row := sweep.row(name, scene)) is not None]
-    why = "not played" if not rows else "left out" if all(row["left_out"] for row in rows) else "not scored"
-    return HeatCell(score, best, "" if math.isfinite(score) else why)
-
-
-def _scenarios(sweep: Sweep, scenes: SequenceOf[Scene]) -> HeatMap:
-    own: dict[str, list[Scene]] = {}
-    for scene in scenes:
-        own.setdefault(scene.source.name, []).append(scene)
-    names = [*sweep.trackers]
-    rows = {scenario: [_cell(sweep, name, found) for name in names] for scenario, found in own.items()}
-    return HeatMap(f"{sweep.plan.by} by scenario", tuple(names), rows)
-
-
-def _curves(sweep: Sweep, data: Json, words: SequenceOf[str]) -> list[Curves]:
+def _curves(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Curves | None:
     if len(sweep.plan.axes) != 1 or not data["curves"]:
-        return []
+        return None
     (axis,) = sweep.plan.axes
-    unknown = {"at": None, "low": None, "high": None}
-    curves = []
-    for name, one in data["curves"].items():
-        mean, low, high = (_numbers(one[part]) for part in ("mean", "low", "high"))
-        curves.append(Curve(name, mean, low, high, one["break"] or unknown))
-    return [Curves(axis.name, axis.about, [value for (value,) in sweep.values], curves, words)]
+    return Curves(axis.name, axis.about, [value for (value,) in sweep.values], data["curves"], words)
 
 
-def _numbers(values: SequenceOf[float | None]) -> list[float]:
-    return [math.nan if value is None else value for value in values]
-
-
-def _matrices(sweep: Sweep, data: Json) -> Iterator[HeatMap]:
-    if data["matrix"] is None:
-        return
-    first, second = data["matrix"]["values"]
-    of = {(a, b): [s for s in sweep.scenes.values() if s.values == (a, b)] for a in first for b in second}
+def _matrices(sweep: Sweep, played: Mapping[Played, Scene]) -> Iterator[HeatMap]:
     rows, columns = (axis.name for axis in sweep.plan.axes)
+    order = {values: k for k, values in enumerate(sweep.values)}
+    every = sorted(((order[scene.values], scene.values, one) for one, scene in played.items()), key=itemgetter(0))
     for name in sweep.trackers:
-        cells = {f"{rows} {a:g}": [_cell(sweep, name, of[a, b]) for b in second] for a in first}
-        yield HeatMap(name, tuple(f"{columns} {b:g}" for b in second), cells)
+        yield heat_map(name, ((f"{rows} {a:g}", f"{columns} {b:g}", p) for _, (a, b), p in every if p.name == name))
 
 
-def _candidates(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[tuple[Candidate, Scene]]:
-    entries = {entry.name: entry for name in sweep.plan.scenarios for entry in rows(name)}
-    for scene in scenes:
-        scores = {name: sweep.score(name, scene) for name in sweep.trackers}
-        played = {name: sweep.row(name, scene) for name in sweep.trackers}
-        known = [name for name, row in played.items() if row and not row["failed"] and math.isfinite(scores[name])]
-        entry = entries.get(scene.source.name)  # None of a copy, which no command generates alone
-        settings = () if entry is None else (*entry.settings, *sweep.plan.settings_at(scene.values))
-        command = "" if entry is None else generate_command(entry.scenario, scene.source.seed, settings, "worst")
-        for name in known:
-            words = _scene(played[name] or {})
-            rival = max((other for other in known if other != name), key=scores.__getitem__, default="")
-            best = sweep.score(ORACLE, scene)
-            yield Candidate(name, scene.source.name, words, scores[name], best, rival, command), scene
+def _played(sweep: Sweep, scene: Scene, entries: Mapping[str, SuiteEntry]) -> Iterator[Played]:
+    settings, command = sweep.plan.settings_at(scene.values), ""
+    if (entry := entries.get(scene.source.name)) is not None:  # a copy is generated by no command alone
+        command = generate_command(entry.scenario, scene.source.seed, (*entry.settings, *settings), "worst")
+    for name in sweep.trackers:
+        row, score = sweep.row(name, scene), sweep.score(name, scene)
+        words = " ".join([f"{scene.source.name}, seed {scene.source.seed}", *settings])
+        why = "" if math.isfinite(score) else "not scored"
+        if row is None or row["failed"] or row["left_out"]:
+            why = "not played" if row is None else "failed" if row["failed"] else "left out"
+        yield Played(name, scene.source.name, words, score, sweep.score(ORACLE, scene), why, command)
 
 
 def _replay(
-    sweep: Sweep, one: Candidate, scene: Scene, found: list[tuple[str, RunErrors]]
+    sweep: Sweep, names: tuple[str, str], scene: Scene, found: list[tuple[str, RunErrors]]
 ) -> tuple[Sequence, Run, Run | None]:
-    """Returns the tracks of a candidate and its rival; the errors of the candidate are added to `found`."""
-    mode, names = sweep.plan.detections, [name for name in (one.name, one.rival) if name]
-    trackers = [sweep.trackers[name].tracker for name in names]
+    """Returns the tracks of a tracker and its rival; the errors of the first are added to `found`."""
+    mode, trackers = sweep.plan.detections, [sweep.trackers[name].tracker for name in names if name]
     streams = dict.fromkeys(stream for tracker in trackers for stream in streams_for(tracker, mode))
     sequence = opened_sources().open(scene.source, tuple(streams)).sequence  # it may be open still
     runs = [track(tracker, sequence, detections=mode, seed=scene.source.seed) for tracker in trackers]
-    found.append((one.name, shown_errors(sequence, runs[0], COSTS, causes=True)))
-    rivals = [Run(run, shown_errors(sequence, run).errors, one.rival) for run in runs[1:]]
-    return sequence, Run(runs[0], found[-1][1].errors, one.name), rivals[0] if rivals else None
+    found.append((names[0], shown_errors(sequence, runs[0], COSTS, causes=True)))
+    rivals = [Run(run, shown_errors(sequence, run).errors, names[1]) for run in runs[1:]]
+    return sequence, Run(runs[0], found[-1][1].errors, names[0]), rivals[0] if rivals else None

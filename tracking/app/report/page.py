@@ -49,7 +49,8 @@ def report_html(report: Report) -> str:
     from tracking.app.report.charts import cause_parts, charts, scripts
 
     drawn = [("scenes" if name == "heat" else name, word) for name, word in PARTS.items() if getattr(report, name)]
-    keys = [key for key in KEYS if key != report.by and any(_known(row.scores, key) for row in report.ranking)]
+    known = {key for row in report.ranking for key in KEYS if math.isfinite(row.get(key, math.nan))}
+    keys = [key for key in KEYS if key != report.by and key in known]
     replay = page_html("Replay", "@@DATA@@").replace("</script", "<\\/script")
     found = _environment().get_template("report.html").render(
         report=report, parts=drawn, generator=GENERATOR, ranking_keys=keys,
@@ -61,10 +62,6 @@ def report_html(report: Report) -> str:
         replay_page=Markup(replay),
     )  # fmt: skip
     return str(found)
-
-
-def _known(scores: object, key: str) -> bool:
-    return isinstance(scores, dict) and math.isfinite(scores.get(key, math.nan))
 
 
 def _environment() -> Environment:

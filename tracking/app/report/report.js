@@ -12,12 +12,10 @@ function colourCharts() {
     Axis: { axis_label_text_color: ink, major_label_text_color: ink, axis_line_color: line, major_tick_line_color: line, minor_tick_line_color: null },
     Grid: { grid_line_color: line, grid_line_alpha: 0.6 },
     Legend: { label_text_color: ink, background_fill_alpha: 0, border_line_alpha: 0 },
-    Whisker: { line_color: ink },
     Text: { text_color: ink },
   };
   for (const document of Bokeh.documents) for (const model of document._all_models.values()) {
     for (const [kind, look] of Object.entries(looks)) if (model.type.endsWith(kind)) model.setv(look);
-    if (model.type === "Whisker") for (const head of [model.lower_head, model.upper_head]) if (head) head.setv({ line_color: ink });
   }
 }
 

@@ -15,8 +15,11 @@ from sim.types import GroupEvent, Sequence, Truth
 from tests.coded_pictures import SIZE, number, sequence
 from tracking.app.pictures import contact_sheet
 from tracking.drawing.canvas import FLOOR, colour
+from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.grouping.known_people import people_as_tracks
 from tracking.running.run import grouped
+
+NO_LAYER = Layer("true", "G", {})
 
 
 def bare(length: int, starts: dict[int, str]) -> Truth:
@@ -26,7 +29,8 @@ def bare(length: int, starts: dict[int, str]) -> Truth:
 
 
 def test_onsets_come_first_and_gaps_are_filled() -> None:
-    chosen = contact_sheet.choose_frames(bare(200, {50: "merge", 120: "split", 60: "enter"}), 8)
+    layer = layer_of_truth(bare(200, {50: "merge", 120: "split", 60: "enter"}))
+    chosen = contact_sheet.choose_frames(layer, 200, 10.0, 8)
     assert {50, 120} <= set(chosen)
     assert len(set(chosen)) == 8
     assert max(np.diff([1, *chosen, 200])) < 45
@@ -40,7 +44,7 @@ def test_onsets_come_first_and_gaps_are_filled() -> None:
     starts=st.dictionaries(st.integers(1, 300), st.sampled_from(["merge", "split", "cross", "enter"])),
 )
 def test_frames_are_distinct_and_inside(length: int, frames: int, starts: dict[int, str]) -> None:
-    chosen = contact_sheet.choose_frames(bare(length, starts), frames)
+    chosen = contact_sheet.choose_frames(layer_of_truth(bare(length, starts)), length, 10.0, frames)
     assert len(chosen) == len(set(chosen)) == min(frames, length)
     assert chosen[0] >= 1
     assert chosen[-1] <= length
@@ -49,18 +53,15 @@ def test_frames_are_distinct_and_inside(length: int, frames: int, starts: dict[i
 @pytest.mark.parametrize("moved", [None, 0.5])
 def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_path: Path, moved: float | None) -> None:
     """moved: the tracks are, and are drawn in place of the truth."""
-    from tracking.app.pictures.contact_sheet import sheet_area
-
     tracks = None if moved is None else [t.replace(pos=t.pos + moved) for t in people_as_tracks(truth)]
     path = contact_sheet.write_sheet(sequence, tmp_path / "new" / "sheet.png", 1, tracks)
-    truth = truth if tracks is None else contact_sheet.as_labels(grouped(tracks, sequence), sequence)
-    index = contact_sheet.choose_frames(truth, 1)[0]
+    plan = layer_of_tracks(grouped(tracks, sequence), None, None, True) if tracks else layer_of_truth(truth, True)
+    (index,) = contact_sheet.choose_frames(plan, truth.length, truth.fps, 1)
+    (part,) = contact_sheet.views(sequence, [plan, plan], [index])
     picture = cv2.imread(str(path))
-    low, high = sheet_area(sequence, truth)
-    scale = contact_sheet.WIDTH / 2 / (high - low)[0]
-    row = truth.rows(index).start + int(np.flatnonzero(truth.at(index).id == 7)[0])
-    x, y = truth.pos[row] if truth.pos is not None else (0, 0)
-    u, v = 10 + (x - low[0]) * scale, (contact_sheet.HEAD + contact_sheet.TITLE) / 2 + (high[1] - y) * scale
+    scale = contact_sheet.WIDTH / 2 / (part.high - part.low)[0]
+    ((x, y),) = truth.at(index).pos[truth.at(index).id == 7] + (moved or 0.0)
+    u, v = 10 + (x - part.low[0]) * scale, (contact_sheet.HEAD + contact_sheet.TITLE) / 2 + (part.high[1] - y) * scale
     np.testing.assert_allclose(picture[round(v), round(u)], colour(7), atol=12)
     np.testing.assert_allclose(picture[round(v) + 30, round(u) + 30], FLOOR, atol=12)
 
@@ -75,12 +76,11 @@ def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) ->
 def test_each_panel_shows_its_frame(tmp_path: Path) -> None:
     """Without labels too: frames spread over the recording."""
     bare = sequence(60)
-    truth = contact_sheet.empty_truth(bare)
-    chosen = contact_sheet.choose_frames(truth, 4)
-    pictures = contact_sheet.PanelPictures(bare, truth, chosen)
+    chosen = contact_sheet.choose_frames(NO_LAYER, 60, 10.0, 4)
+    (part,) = contact_sheet.views(bare, [NO_LAYER], chosen)
     for index in chosen:
         area = np.zeros((SIZE[1] * 4, SIZE[0] * 4, 3), np.uint8)
-        pictures.draw(area, index)
+        part.draw(area, index, 10.0)
         assert number(area, 0, 4) == index
     read = cv2.imread(str(contact_sheet.write_sheet(bare, tmp_path / "s.png", 4)))
     shrunk = contact_sheet.WIDTH / 2 / SIZE[0]

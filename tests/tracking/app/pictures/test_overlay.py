@@ -17,7 +17,6 @@ from tests.coded_pictures import SIZE, coded, number, sequence
 from tests.groups_as_wholes import wholes
 from tracking.app.pictures.overlay import overlay_pictures, write_overlay
 from tracking.drawing.canvas import colour
-from tracking.drawing.layer_painting import LayerStyle
 from tracking.drawing.layers import layer_of_tracks
 
 STRIP = 32
@@ -54,7 +53,7 @@ def test_every_frame_in_its_slot(tmp_path: Path) -> None:
 def test_boxes_are_where_they_belong() -> None:
     """At twice its size: the left edge of a box at u = 40 is drawn at 80, in the colour of its id, the id above it."""
     side = layer_of_tracks([answer(1, {3: [40, 30, 10, 20]})], None, None)
-    (picture,) = overlay_pictures(sequence(1), [(side, LayerStyle())])
+    (picture,) = overlay_pictures(sequence(1), [side])
     edges = np.argwhere(np.abs(picture[STRIP:].astype(int) - colour(3)).max(axis=2) < 12)
     box = edges[edges[:, 0] > 61]
     (_, left), (bottom, right) = box.min(axis=0), box.max(axis=0)
@@ -91,7 +90,7 @@ def test_what_a_frame_lacks_is_told() -> None:
 
     case = dataclasses.replace(sequence(3), frames=frames, has_detections=True)
     side = layer_of_tracks([answer(k, {}) for k in (1, 2, 3)], None, None)
-    made = list(overlay_pictures(case, [(side, LayerStyle())]))
+    made = list(overlay_pictures(case, [side]))
     red = [(np.abs(p[:STRIP].astype(int) - colour(6)).max(axis=2) < 4).sum() > 50 for p in made]
     assert red == [False, True, True]
     assert [number(p, STRIP, 2) for p in made] == [1, 1, 3]
@@ -132,7 +131,7 @@ def test_a_group_has_its_extent_its_way_and_its_size() -> None:
     np.testing.assert_allclose((offset**2 / [9.0, 1.0]).sum(axis=1), 9.21, rtol=1e-6)
     np.testing.assert_allclose(region.motion, [[40, 30], [50, 30]])
     assert region.size == 3.04
-    (picture,) = overlay_pictures(sequence(1), [(side, LayerStyle())])
+    (picture,) = overlay_pictures(sequence(1), [side])
     drawn = coloured(picture, 4)
     drawn = drawn[drawn[:, 1] <= 30]  # above its name
     reach = 3 * np.sqrt(9.21)

@@ -15,7 +15,7 @@ from sim.io.store.truth_files import with_ground_height
 from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Scene, Sequence, Stairs
 from tests.groups_as_wholes import wholes
-from tracking.app.replay_page.page import Run, camera_json, page_data, scene_json
+from tracking.app.replay_page.page import Run, page_data, plain
 from tracking.drawing.layers import SIGMA_99, ellipse
 
 NODE = shutil.which("node")
@@ -66,7 +66,7 @@ def test_places_on_the_ground_are_where_the_camera_sees_them(radial: float) -> N
     camera = Camera("pinhole", (640, 480), (500.0, 520.0), (320.0, 240.0), place, turn, radial=radial)
     xy = np.random.default_rng(0).uniform([-2, -30], [14, 14], (300, 2))
     uv, _ = project(camera, with_ground_height(xy, scene))
-    data = {"camera": camera_json(camera), "scene": scene_json(scene)}
+    data = {"camera": plain(camera), "scene": plain(scene)}
     what = f"{json.dumps(xy.tolist())}.map(([x, y]) => project(x, y, heightAt(x, y)) || [null, null])"
     found = np.array(ran(EMPTY | data, ("decode.js", "camera_view.js"), what), float)
     np.testing.assert_array_equal(np.isnan(found), np.isnan(uv))

@@ -10,29 +10,33 @@ from dataclasses import replace
 import pytest
 
 from tracking.app.report import content, moments
-from tracking.app.report.moments import Candidate, chosen
+from tracking.app.report.moments import chosen
 from tracking.app.report.page import report_html
+from tracking.errors.found import CauseRow
 
 EVIL = "<img src=x onerror=alert(1)></script><script>alert(2)</script>"
 EMPTY = content.Report("Two trackers", "about", "HOTA", [])
 
 
+def candidate(name: str, scenario: str, score: float) -> content.Played:
+    return content.Played(name, scenario, f"{scenario}-s{score}", score, 0.9)
+
+
 def full(name: str) -> content.Report:
     """A report with all parts, in which trackers, scenes and errors have this name."""
-    cells = [content.HeatCell(0.5, 0.8), content.HeatCell(math.nan, math.nan, f"no scene, {name}")]
-    ends = [0.8, math.nan, 0.2], [1, math.nan, 0.4]
-    curve = content.Curve(name, [0.9, math.nan, 0.3], *ends, {"at": 0.6, "low": 0.5, "high": 1.0})
-    rows = [
-        content.RankedRow("oracle", "", 0.9, math.nan, math.nan, {}),
-        content.RankedRow(name, "1", 0.8, 0.7, 0.9, {"MOTA": 0.5}),
-    ]
-    maps = [content.HeatMap(name, columns, {name: cells}) for columns in ((name, "b"), ("1", "2"))]
+    curve = {"mean": [0.9, None, 0.3], "low": [0.8, None, 0.2], "high": [1, None, 0.4], "break": {"at": 0.6}}
+    oracle = {"run": "oracle", "rank": "", "mean": 0.9, "low": math.nan, "high": math.nan}
+    rows = [oracle, {"run": name, "rank": "1", "mean": 0.8, "low": 0.7, "high": 0.9, "MOTA": 0.5}]
+    runs = [candidate(name, name, score) for score in (0.4, 0.6, math.nan)]
+    runs[2] = replace(runs[2], why=f"no scene, {name}")
+    maps = [content.heat_map(name, zip([name] * 3, [name, name, "b"], runs, strict=True)) for _ in range(2)]
     return content.Report(
         name, name, "HOTA", rows, [name], maps[0],
-        [content.Curves(name, name, [1, 0.8, 0.4], [curve], [name])], maps[1:],
-        [content.CauseBar(name, name, name, 2, 1.5, {"HOTA": 0.1, "group_F1": 0.2})], name,
-        [content.Moment(name, name, name, 0.5, 0.9, 1.0, name, name, json.dumps({"name": "x"}))],
-        [content.Failure(name, name, name, name)], [(name, "page.html", 0.5)],
+        content.Curves(name, name, [1, 0.8, 0.4], {name: curve}, [name]), maps[1:],
+        [(name, CauseRow(name, name, 2, 1.5, {"HOTA": 0.1, "group_F1": 0.2}))], name,
+        [content.Moment(runs[0], 1.0, name, name, json.dumps({"name": "x"}))],
+        [dict.fromkeys(("tracker", "scenario", "seed", "failed", "settings", "traceback"), name)],
+        [(name, "page.html", 0.5)],
     )  # fmt: skip
 
 
@@ -41,9 +45,10 @@ def test_all_parts_stand_in_the_page() -> None:
     parts = ("ranking", "scenes", "curves", "matrices", "moments", "causes", "sequences", "failures")
     assert [id for id in parts if f'<section id="{id}">' in page] == list(parts)
     charts = json.loads(re.findall(r'id="charts">(.*?)</script>', page, re.DOTALL)[0])
-    assert list(charts) == ["chart-ranking", "chart-curves-0", "chart-causes"]
+    assert list(charts) == ["chart-curves", "chart-causes"]
     assert all(f'id="{id}"' in page for id in charts)
     assert "no scene, blob" in page, "an empty cell says why"
+    assert page.count("56 %<small>0.500") == 2, "means, as a share of the oracle's 0.9"
 
 
 def test_parts_without_content_are_left_out() -> None:
@@ -66,10 +71,6 @@ def test_the_page_loads_nothing() -> None:
     assert "default-src 'none'" in page
 
 
-def candidate(name: str, scenario: str, score: float) -> Candidate:
-    return Candidate(name, scenario, f"{scenario}-s{score}", score, 0.9, "")
-
-
 def test_moments_are_shared_among_trackers_and_scenarios() -> None:
     bad = [candidate("a", "merge", 0.1 + 0.01 * k) for k in range(8)] + [candidate("a", "split", 0.5)]
     good = [candidate("b", "merge", 0.8)]
@@ -79,10 +80,10 @@ def test_moments_are_shared_among_trackers_and_scenarios() -> None:
 
 
 def test_a_report_stays_small(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = content.Moment("a", "merge", "merge-s0", 0.5, 0.9, 0.0, "switch", "words", "x" * 3_000_000)
+    made = content.Moment(candidate("a", "merge", 0.5), 0.0, "switch", "words", "x" * 3_000_000)
     monkeypatch.setattr(moments, "_moment", lambda *_: made)
     chosen_ones = [candidate("a", "merge", k / 10) for k in range(4)]
-    found = moments.moments(chosen_ones, lambda one: ())  # type: ignore[return-value, arg-type]
+    found = moments.moments(chosen_ones, lambda one, rival: ())  # type: ignore[return-value, arg-type]
     assert [one.replay is None for one in found] == [False, False, True, True]
     page = report_html(replace(EMPTY, moments=found))
     assert page.count('id="moment-') == 2
