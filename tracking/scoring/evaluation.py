@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -245,16 +245,30 @@ class Scorer:
 
 
 def _scores(compared: MatchedSides, group_match: GroupMatch, step: int | None) -> Scores:
-    sides, found = compared.sides, dict.fromkeys(CATALOGUE, float("nan"))
-    frames_scored = int(sides.inside.sum())
+    sides, size = compared.sides, len(compared.sides.inside)
+    found = unweighted(_weighted(compared, group_match), size)
+    frames = int(sides.inside.sum())
+    return Scores(found, compared.similarity, sides.surface, group_match, frames, sides.truth.length, step)
+
+
+def _weighted(compared: MatchedSides, group_match: GroupMatch) -> WeightedScores:
+    """Returns a function from weights of frames to every score of the catalogue, in its order."""
+    sides, parts = compared.sides, list[WeightedScores]()
     if compared.people is not None:
-        found |= people_scores(compared.people)
-        found |= unweighted(weighted_positions(sides), len(sides.inside))
+        compared.people.require_unique_ids()
+        parts += [scores(compared.people, len(sides.inside)) for scores in OF_PEOPLE]
+        parts.append(weighted_positions(sides))
     if compared.groups is not None:
-        scores = weighted_groups_and_events(sides, compared.groups, group_match)
-        found |= unweighted(scores, len(sides.frames))
-    found["objective"] = objective_of(found)
-    return Scores(found, compared.similarity, sides.surface, group_match, frames_scored, sides.truth.length, step)
+        parts += weighted_groups_and_events(sides, compared.groups, group_match)
+
+    def score(weights: Array) -> dict[str, Array]:
+        found = dict.fromkeys(CATALOGUE, np.full(len(weights), np.nan))
+        for part in parts:
+            found |= part(weights)
+        found["objective"] = mean_of_known(np.column_stack([found["HOTA"], found["group_F1"]]))
+        return {key: found[key] for key in CATALOGUE}
+
+    return score
 
 
 def chosen_frames(frames: int | range | None, length: int) -> Bools:
@@ -310,29 +324,11 @@ def weighted_scorers(
     The function takes D draws (D, length) of weights of the frames 1 … length, of mean 1, as counts are their sums.
     It returns all scores (D, K) in the order of `CATALOGUE`, nan where the frames of a denominator have no weight.
     """
-    found = Scorer(truth).compare(runs, similarity, frames)
-    return [_weighted(one, truth.length + 1, group_match) for one in found]
+    scores = [_weighted(one, group_match) for one in Scorer(truth).compare(runs, similarity, frames)]
+    return [partial(_in_portions, one) for one in scores]
 
 
-def _weighted(compared: MatchedSides, size: int, group_match: GroupMatch) -> Callable[[Array], Array]:
-    parts: list[WeightedScores] = []
-    if compared.people is not None:
-        compared.people.require_unique_ids()
-        parts += [scores(compared.people, size) for scores in OF_PEOPLE]
-        parts.append(weighted_positions(compared.sides))
-    if compared.groups is not None:
-        parts.append(weighted_groups_and_events(compared.sides, compared.groups, group_match))
-    place = {key: k for k, key in enumerate(CATALOGUE)}
-
-    def score(weights: Array) -> Array:
-        padded = np.pad(np.asarray(weights, float), ((0, 0), (1, 0)))  # frame 0 is no frame
-        out = np.full((len(padded), len(place)), np.nan)
-        for first in range(0, len(padded), PORTION):
-            rows = slice(first, first + PORTION)
-            for part in parts:
-                for key, values in part(padded[rows]).items():
-                    out[rows, place[key]] = values
-        out[:, place["objective"]] = mean_of_known(out[:, [place["HOTA"], place["group_F1"]]])
-        return out
-
-    return score
+def _in_portions(scores: WeightedScores, weights: Array) -> Array:
+    padded = np.pad(np.asarray(weights, float), ((0, 0), (1, 0)))  # frame 0 is no frame
+    portions = [padded[first : first + PORTION] for first in range(0, len(padded), PORTION)]
+    return np.concatenate([np.column_stack(list(scores(portion).values())) for portion in portions])

@@ -112,27 +112,6 @@ def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float =
     return near.keep(match(near.frame, near.i, near.j, near.s + TIE * closeness))
 
 
-@dataclass(frozen=True, eq=False)
-class GroupComparison:
-    """G true and H estimated groups in frames, with their matchings."""
-
-    # true, est: the groups
-    true: GroupRows
-    est: GroupRows
-    shared: SharedMembers  # numbers of their common people
-    pairs: Pairs  # all candidate pairs
-    chosen: Pairs  # the one-to-one matching of all pairs
-
-
-def correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]:
-    """Returns which matches of true rows i and estimated rows j (K,) are correct for GDSR, and for GDSR2."""
-    common = compared.shared.of(i, j)
-    part, whole = CORRECT
-    right = whole * common >= part * compared.true.count[i]
-    pure = right & (whole * common >= part * compared.est.count[j])
-    return right, pure
-
-
 def switch_frames(frame: Ints, true: Ints, est: Ints) -> Ints:
     """Returns the frames in which a true id is matched with another estimated id than in its previous match."""
     order = np.lexsort((frame, true))
