@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -94,37 +94,22 @@ def _point(action: ArrayLike, size: int) -> Array:
 
 
 def _to_unit(p: Param, value: Value) -> float:
-    if p.scale == "categorical":
-        return _middle(p.choices.index(value), len(p.choices))
+    choices = _choices(p)
+    if choices:
+        return (2 * choices.index(value) + 1) / len(choices) - 1
     assert isinstance(value, int | float)
-    if p.scale == "int":
-        first, count = _whole(p)
-        return _middle(int(value) - first, count)
     if p.scale == "log":
         return 2 * math.log(value / p.low) / math.log(p.high / p.low) - 1
     return 2 * (value - p.low) / (p.high - p.low) - 1
 
 
 def _from_unit(p: Param, a: float) -> Value:
-    share = (a + 1) / 2
-    if p.scale == "categorical":
-        return p.choices[_part(share, len(p.choices))]
-    if p.scale == "int":
-        first, count = _whole(p)
-        return first + _part(share, count)
+    share, choices = (a + 1) / 2, _choices(p)
+    if choices:
+        return choices[min(int(share * len(choices)), len(choices) - 1)]
     value = p.low * (p.high / p.low) ** share if p.scale == "log" else p.low + share * (p.high - p.low)
     return min(max(value, p.low), p.high)
 
 
-def _whole(p: Param) -> tuple[int, int]:
-    """Returns the first whole number of a parameter's range, and how many whole numbers the range holds."""
-    first = math.ceil(p.low)
-    return first, math.floor(p.high) - first + 1
-
-
-def _middle(k: int, count: int) -> float:
-    return (2 * k + 1) / count - 1
-
-
-def _part(share: float, count: int) -> int:
-    return min(int(share * count), count - 1)
+def _choices(p: Param) -> Sequence[Value]:
+    return range(math.ceil(p.low), math.floor(p.high) + 1) if p.scale == "int" else p.choices

@@ -15,6 +15,8 @@ TrackEval.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from sim.types import Array, Bools, Ints
@@ -117,34 +119,26 @@ def _solved(frame: Ints, i: Ints, j: Ints, w: Array) -> Ints:
     """Returns the indices of the pairs that scipy matches; each frame is one table of the rows in its pairs."""
     from scipy.optimize import linear_sum_assignment
 
-    if len(w) == 0:
-        return np.zeros(0, np.int64)
-    starts = np.flatnonzero(np.diff(frame, prepend=frame[0] - 1))
-    which = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(w)))
-    row, rows = _local(i, which, len(starts))
-    column, columns = _local(j, which, len(starts))
-    size = rows * columns
-    offset = np.cumsum(size) - size
-    cell = offset[which] + row * columns[which] + column
-    cost, place = np.zeros(int(size.sum())), np.full(int(size.sum()), -1)
-    cost[cell] = -w
-    place[cell] = np.arange(len(w))
-    found = []
-    for first, n, m in zip(offset.tolist(), rows.tolist(), columns.tolist(), strict=True):
-        a, b = linear_sum_assignment(cost[first : first + n * m].reshape(n, m))
-        found.append(first + a * m + b)
-    places: Ints = place[np.concatenate(found)]
-    return places[places >= 0]
+    found = [np.zeros(0, np.int64)]
+    cuts = np.flatnonzero(np.diff(frame, prepend=-1, append=-1)).tolist()
+    for first, end in pairwise(cuts):
+        (row, rows), (column, columns) = (_local(side[first:end]) for side in (i, j))
+        place = np.full((rows, columns), -1)
+        place[row, column] = np.arange(first, end)
+        cost = np.zeros((rows, columns))
+        cost[row, column] = -w[first:end]
+        places = place[linear_sum_assignment(cost)]
+        found.append(places[places >= 0])
+    return np.concatenate(found)
 
 
-def _local(row: Ints, which: Ints, frames: int) -> tuple[Ints, Ints]:
-    """Returns the index of each pair's row within its frame (K,), and the number of rows of each frame (F,)."""
-    home = np.full(int(row.max()) + 1, -1)
-    home[row] = which
-    seen = home >= 0
-    count = np.bincount(home[seen], minlength=frames)
-    number = np.cumsum(seen) - 1
-    return number[row] - (np.cumsum(count) - count)[which], count
+def _local(row: Ints) -> tuple[Ints, int]:
+    """Returns the index of each pair's row among those of the pairs, and their number."""
+    low = int(row.min())
+    seen = np.zeros(int(row.max()) - low + 1, bool)
+    seen[row - low] = True
+    place = np.cumsum(seen) - 1
+    return place[row - low], int(place[-1]) + 1
 
 
 def mapped_people(pairs: Pairs, least: float = FOUND) -> Ints:
