@@ -80,17 +80,13 @@ def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config
 
 def _point(action: ArrayLike, size: int) -> Array:
     try:
-        point = np.asarray(action)
-    except ValueError:  # rows of different lengths
-        point = np.asarray(None)
-    if point.dtype.kind not in "biuf":
-        got = repr(action)[:80]
-    elif point.shape != (size,) or not np.isfinite(point).all():
-        got = f"shape {point.shape}" if point.shape != (size,) else "NaN or infinity"
-    else:
-        return np.asarray(np.clip(point.astype(float), -1.0, 1.0))
-    remedy = "give one number in [-1, 1] for each parameter of the space"
-    raise InputError(place="action", got=got, expected=f"({size},) finite numbers", remedy=remedy)
+        point = np.asarray(action, float)
+    except (TypeError, ValueError):
+        point = np.zeros(0)
+    if point.shape != (size,) or not np.isfinite(point).all():
+        remedy = "give one number in [-1, 1] for each parameter of the space"
+        raise InputError(place="action", got=repr(action)[:80], expected=f"({size},) finite numbers", remedy=remedy)
+    return np.asarray(np.clip(point, -1.0, 1.0))
 
 
 def _to_unit(p: Param, value: Value) -> float:

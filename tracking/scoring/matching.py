@@ -32,7 +32,11 @@ def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
     frame, i (K,): ascending; each row index i, j belongs to one frame; weight (K,): above 0.
     """
     chosen, left = _settle(i, j, weight, strict=False)
-    chosen[left[_solved(frame[left], i[left], j[left], weight[left])]] = True
+    cuts = np.flatnonzero(np.diff(frame[left], prepend=-1, append=-1)).tolist()
+    for first, end in pairwise(cuts):
+        part = left[first:end]
+        (row, rows), (column, columns) = _local(i[part]), _local(j[part])
+        chosen[part] = _solve(row, column, (rows, columns), weight[part])
     return chosen
 
 
@@ -50,17 +54,20 @@ def match_as_table(pairs: Pairs, weight: Array) -> Bools:
 
 def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
     """Returns which of the pairs start … end - 1, all pairs of one frame, scipy's linear_sum_assignment matches."""
-    from scipy.optimize import linear_sum_assignment
-
     i, j = pairs.i[start:end], pairs.j[start:end]
     frame = pairs.true.frame[i[0]]
     (top, bottom), (first, last) = (np.searchsorted(r.frame, (frame, frame + 1)) for r in (pairs.true, pairs.est))
-    cost = np.zeros((bottom - top, last - first))
-    cost[i - top, j - first] = -weight
+    return _solve(i - top, j - first, (bottom - top, last - first), weight)
+
+
+def _solve(row: Ints, column: Ints, shape: tuple[int, int], weight: Array) -> Bools:
+    from scipy.optimize import linear_sum_assignment
+
+    cost, partner = np.zeros(shape), np.full(shape[0], -1)
+    cost[row, column] = -weight
     rows, columns = linear_sum_assignment(cost)
-    partner = np.full(len(cost), -1)
     partner[rows] = columns
-    return np.asarray(partner[i - top] == j - first)
+    return np.asarray(partner[row] == column)
 
 
 def _settle(i: Ints, j: Ints, weight: Array, strict: bool) -> tuple[Bools, Ints]:
@@ -113,23 +120,6 @@ def _touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
     taken_i[i[chosen]] = True
     taken_j[j[chosen]] = True
     return np.asarray(taken_i[i] | taken_j[j])
-
-
-def _solved(frame: Ints, i: Ints, j: Ints, w: Array) -> Ints:
-    """Returns the indices of the pairs that scipy matches; each frame is one table of the rows in its pairs."""
-    from scipy.optimize import linear_sum_assignment
-
-    found = [np.zeros(0, np.int64)]
-    cuts = np.flatnonzero(np.diff(frame, prepend=-1, append=-1)).tolist()
-    for first, end in pairwise(cuts):
-        (row, rows), (column, columns) = (_local(side[first:end]) for side in (i, j))
-        place = np.full((rows, columns), -1)
-        place[row, column] = np.arange(first, end)
-        cost = np.zeros((rows, columns))
-        cost[row, column] = -w[first:end]
-        places = place[linear_sum_assignment(cost)]
-        found.append(places[places >= 0])
-    return np.concatenate(found)
 
 
 def _local(row: Ints) -> tuple[Ints, int]:

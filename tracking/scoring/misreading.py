@@ -123,7 +123,7 @@ def likely_misreading(
         labels, numbers = (f"{side.rows.frame[0]} to {side.rows.frame[-1]}" for side in sides)
         words = f"no frame in common: labels in frames {labels}, tracks in frames {numbers}"
     if best is not None:
-        return f"{words}; {_words(best)}, {best.share:.0%} would. {_remedy(best, usual, size, given)}"
+        return f"{words}; {_words(best)}, {best.share:.0%} would. {_remedy(best, usual, given)}"
     tried = " No other columns, scale or shift of frames match better." if len(together) else ""
     check = "the detections that were tracked" if given == "run" else "the columns"
     return f"{words}.{tried} Check {check}, and that these are tracks of this very sequence"
@@ -227,7 +227,7 @@ def _words(best: Reading) -> str:
     return f"{'with labels ' if best.labels else ''}{' and '.join(parts)}"
 
 
-def _remedy(best: Reading, usual: Reading, size: tuple[int, int] | None, given: Given) -> str:
+def _remedy(best: Reading, usual: Reading, given: Given) -> str:
     if best.frames and best.frames != "id":
         return "Number the frames of both alike"
     points, parts = usual.columns == "x,y", []
@@ -241,13 +241,6 @@ def _remedy(best: Reading, usual: Reading, size: tuple[int, int] | None, given: 
         parts.append(f"name all columns in a first line of {text}: {first},{columns},…")
     if best.scale != (1.0, 1.0) and unit is None:
         add = f"add --box-scale {_factor(best.scale)}{' to `flockscope track`' if given == 'run' else ''}"
-        parts.append(f"give the positions of {text} in m" if points else f"{add}{_made(best, size)}")
+        parts.append(f"give the positions of {text} in m" if points else add)
     words = " and ".join(parts)
     return words[0].upper() + words[1:]
-
-
-def _made(best: Reading, size: tuple[int, int] | None) -> str:
-    if size is None:
-        return ""
-    width, height = (side / factor for side, factor in zip(size, best.scale, strict=True))
-    return " (shares of the picture)" if width < 2 else f" (boxes of pictures of {width:.0f} × {height:.0f})"
