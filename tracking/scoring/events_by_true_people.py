@@ -30,7 +30,7 @@ def true_events(
     the groups of the members in the last of the `step` frames before the start in which each is there, children those
     at the start. A member alone or absent is a part of its own.
     """
-    lookup, group = RowLookup(people.rows), _group_by_row(people.group)
+    lookup, group = RowLookup(people.rows), [*people.group.tolist(), -1]
 
     def comparable(event: GroupEvent) -> ComparableEvent:
         before = _by_group(event.members, lambda m: group[lookup.last(m, event.start - 1, step - 1)])
@@ -49,10 +49,6 @@ def true_events(
 def _counts(event: GroupEvent, frames: Bools) -> bool:
     known = event.kind in KINDS or event.kind in COUNTS_AS
     return known and 0 <= event.start < len(frames) and bool(frames[event.start])
-
-
-def _group_by_row(group: Ints) -> list[int]:
-    return [*group.tolist(), -1]
 
 
 def _by_group(members: Sequence[int], group: Callable[[int], int]) -> list[list[int]]:
@@ -91,7 +87,7 @@ def tracked_events(
     frame nearest to the start, within `reach` frames. Parents are the groups of the members in the frame before the
     report, or before the start if nothing changes there; children those in the frame of the report.
     """
-    mapped, lookup, group = RowLookup(people.rows, mapping >= 0), RowLookup(people.rows), _group_by_row(people.group)
+    mapped, lookup, group = RowLookup(people.rows, mapping >= 0), RowLookup(people.rows), [*people.group.tolist(), -1]
     person = np.append(true.id, -1)[mapping].tolist()
 
     def groups_until(event: GroupEvent, frame: int) -> list[list[int]]:
@@ -132,8 +128,8 @@ def events_of_hulls(
         children = _contained(groups, person, event.after, range(reported, reported + span))
         return ComparableEvent(event.kind, event.start, reported, None, event.pos, parents, children)
 
-    found = _reports(tracks, frames)
-    return [comparable(event, reported) for event, reported in found if not (without_members and event.members)]
+    reports = _reports(tracks, frames)
+    return [comparable(*report) for report in reports if not (without_members and report[0].members)]
 
 
 def _last_appearance(rows: FrameRows, ids: Sequence[int]) -> int:
