@@ -127,7 +127,11 @@ class MatchedSides:
         return Scores(found, self.similarity, sides.surface, group_match, int(inside.sum()), length, self.step)
 
     def weighted_scores(self, group_match: GroupMatch) -> Callable[[Array], Array]:
-        """Returns a function from weights of the frames 1 … length to scores, as `weighted_scorers` does."""
+        """Returns a function from weights of frames to scores; group_match as of `evaluate`.
+
+        The function takes D draws (D, length) of weights of the frames 1 … length, of mean 1, as counts are their sums.
+        It returns all scores (D, K) in the order of `CATALOGUE`, nan where the frames of a denominator have no weight.
+        """
         scores = self._weighted(group_match)
 
         def in_portions(weights: Array) -> Array:
@@ -241,7 +245,7 @@ class Scorer:
         return compared.scores("hull")
 
     def compare(
-        self, runs: Sequence[Iterable[Tracks]], similarity: Similarity | None, frames: int | range | None = None
+        self, runs: Sequence[Iterable[Tracks]], similarity: Similarity | None = None, frames: int | range | None = None
     ) -> list[MatchedSides]:
         """Returns this truth and each run with people mapped, all in one plane and by one similarity, as `evaluate`."""
         inside = self.scored(frames)
@@ -303,18 +307,3 @@ def objective_of(found: Mapping[str, float]) -> float:
     """Returns the mean of found["HOTA"] and found["group_F1"], or the one that is known, or nan."""
     known = [v for v in (found["HOTA"], found["group_F1"]) if v == v]
     return sum(known) / len(known) if known else float("nan")
-
-
-def weighted_scorers(
-    truth: Truth,
-    runs: Sequence[Sequence[Tracks]],
-    similarity: Similarity | None = None,
-    group_match: GroupMatch = "hull",
-    frames: int | range | None = None,
-) -> list[Callable[[Array], Array]]:
-    """Returns for each run of one sequence a function from weights of frames to scores; arguments as of `evaluate`.
-
-    The function takes D draws (D, length) of weights of the frames 1 … length, of mean 1, as counts are their sums.
-    It returns all scores (D, K) in the order of `CATALOGUE`, nan where the frames of a denominator have no weight.
-    """
-    return [one.weighted_scores(group_match) for one in Scorer(truth).compare(runs, similarity, frames)]
