@@ -11,7 +11,6 @@ frames (weighted_group_scores.py).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -72,19 +71,13 @@ def group_of_person(groups: GroupRows, people: int) -> Ints:
     return group
 
 
-def hull_iou(true: Sequence[Array], est: Sequence[Array]) -> Callable[[Ints, Ints], Array]:
-    """Returns a function of row indices i, j (K,) that gives the IoU (K,) of polygons true[i] and est[j]."""
-    width = max(map(len, (*true, *est)), default=1)
-    a, b = pack(true, width), pack(est, width)
-    return lambda i, j: iou_pairs(a, b, i, j)
-
-
 def hull_pairs(true: GroupRows, est: GroupRows) -> Pairs:
     """Returns the pairs of groups of one frame whose hulls overlap, with the IoU of the hulls."""
-    iou = hull_iou(true.hull, est.hull)
+    width = max(map(len, (*true.hull, *est.hull)), default=1)
+    a, b = pack(true.hull, width), pack(est.hull, width)
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
-        s = iou(i, j)
+        s = iou_pairs(a, b, i, j)
         some = np.flatnonzero(s > EPS)
         return some, s[some]
 

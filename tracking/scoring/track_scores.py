@@ -34,7 +34,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
 from tracking.scoring.matching import match, match_as_table, solve_frame
-from tracking.scoring.weighted_sums import BinSums, FrameScores, WeightedScores, ratio
+from tracking.scoring.weighted_sums import FrameScores, WeightedScores, bin_sums, ratio
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 CELLS = 2_000_000  # numbers of matches held at once
@@ -54,9 +54,9 @@ def weighted_hota(pairs: Pairs, size: int, by_level: bool = True) -> WeightedSco
     level = np.searchsorted(ALPHAS - EPS, s, side="right")  # number of thresholds, the lowest, at which a match counts
     used, link = np.unique(link[chosen], return_inverse=True)
     true_id, est_id = true_id[used], est_id[used]
-    true_rows = BinSums(pairs.true.frame, pairs.true_ids[1], len(pairs.true_ids[0]), size)
-    est_rows = BinSums(pairs.est.frame, pairs.est_ids[1], len(pairs.est_ids[0]), size)
-    met = BinSums(frame, link * bins + level, len(used) * bins, size)
+    true_rows = bin_sums(pairs.true.frame, pairs.true_ids[1], len(pairs.true_ids[0]), size)
+    est_rows = bin_sums(pairs.est.frame, pairs.est_ids[1], len(pairs.est_ids[0]), size)
+    met = bin_sums(frame, link * bins + level, len(used) * bins, size)
     # The sums of similarity at each threshold.
     near = np.column_stack([np.bincount(frame, np.where(level >= k, s, 0.0), size) for k in range(1, bins)])
     total = _reached(np.bincount(level, weights=s, minlength=bins).astype(float))
@@ -67,8 +67,8 @@ def weighted_hota(pairs: Pairs, size: int, by_level: bool = True) -> WeightedSco
         return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]} if parts else {}
 
     def of_part(weights: Array) -> dict[str, Array]:
-        n, m = true_rows.of(weights), est_rows.of(weights)
-        together = _reached(met.of(weights).reshape(len(weights), len(used), bins))
+        n, m = true_rows(weights), est_rows(weights)
+        together = _reached(met(weights).reshape(len(weights), len(used), bins))
         similar = total + (weights - 1) @ near if by_level else weights @ near
         return _scores(together, similar, n[:, true_id], m[:, est_id], n.sum(axis=1), m.sum(axis=1))
 
@@ -194,7 +194,7 @@ def weighted_identity(pairs: Pairs, size: int) -> WeightedScores:
     """Returns the weighted IDF1, IDP, IDR and IDTP; ids are assigned anew for each draw of weights."""
     near = pairs.s >= FOUND
     true_id, est_id, link = pairs.links
-    common = BinSums(pairs.frame[near], link[near], len(true_id), size)
+    common = bin_sums(pairs.frame[near], link[near], len(true_id), size)
     true, est = (np.bincount(rows.frame, minlength=size).astype(float) for rows in (pairs.true, pairs.est))
 
     def assigned(frames: Array) -> float:
@@ -203,7 +203,7 @@ def weighted_identity(pairs: Pairs, size: int) -> WeightedScores:
         return float(weight[match(np.zeros_like(i), i, j, weight)].sum())
 
     def score(weights: Array) -> dict[str, Array]:
-        n, m, found = weights @ true, weights @ est, np.array([assigned(frames) for frames in common.of(weights)])
+        n, m, found = weights @ true, weights @ est, np.array([assigned(frames) for frames in common(weights)])
         return {
             "IDF1": ratio(2 * found, n + m, 0.0), "IDP": ratio(found, m, 0.0), "IDR": ratio(found, n, 0.0),
             "IDTP": found,

@@ -103,14 +103,12 @@ def mean_of_known(values: Array) -> Array:
     return ratio(np.where(known, values, 0.0).sum(axis=1), known.sum(axis=1).astype(float))
 
 
-class BinSums:
-    """Numbers of items by bin (for example by id), weighted by their frames: items of each bin and frame, sparse."""
+def bin_sums(frame: Ints, bin: Ints, bins: int, size: int) -> Callable[[Array], Array]:
+    """Returns a function from weights (D, size) to the weighted numbers of items in bins, by id for example, (D, bins).
 
-    def __init__(self, frame: Ints, bin: Ints, bins: int, size: int) -> None:
-        from scipy.sparse import csr_array
+    frame, bin: of each item.
+    """
+    from scipy.sparse import csr_array
 
-        self._counts = csr_array((np.ones(len(frame)), (bin, frame)), shape=(bins, size))
-
-    def of(self, weights: Array) -> Array:
-        """Returns the weighted numbers of items, (D, bins); weights (D, size)."""
-        return np.asarray((self._counts @ weights.T).T)
+    counts = csr_array((np.ones(len(frame)), (bin, frame)), shape=(bins, size))
+    return lambda weights: np.asarray((counts @ weights.T).T)
