@@ -21,6 +21,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
+from tracking.scoring.rows import numbered
 
 CLEARLY = 1 + 1e-9  # factor by which a weight must exceed its rivals to be greater despite rounding
 WORTH = 0.2  # share of pairs that a pass must remove for another pass to be quicker than the solver
@@ -32,11 +33,13 @@ def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
     frame, i (K,): ascending; each row index i, j belongs to one frame; weight (K,): above 0.
     """
     chosen, left = _settle(i, j, weight, strict=False)
+    # Rows are sorted by frame: among those of the pairs that are left, those of a frame are neighbours.
+    row, column = numbered(i[left])[1], numbered(j[left])[1]
     cuts = np.flatnonzero(np.diff(frame[left], prepend=-1, append=-1)).tolist()
     for first, end in pairwise(cuts):
         part = left[first:end]
-        (row, rows), (column, columns) = _local(i[part]), _local(j[part])
-        chosen[part] = _solve(row, column, (rows, columns), weight[part])
+        a, b = row[first:end] - row[first], column[first:end] - column[first:end].min()
+        chosen[part] = _solve(a, b, (int(a[-1]) + 1, int(b.max()) + 1), weight[part])
     return chosen
 
 
@@ -120,15 +123,6 @@ def _touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
     taken_i[i[chosen]] = True
     taken_j[j[chosen]] = True
     return np.asarray(taken_i[i] | taken_j[j])
-
-
-def _local(row: Ints) -> tuple[Ints, int]:
-    """Returns the index of each pair's row among those of the pairs, and their number."""
-    low = int(row.min())
-    seen = np.zeros(int(row.max()) - low + 1, bool)
-    seen[row - low] = True
-    place = np.cumsum(seen) - 1
-    return place[row - low], int(place[-1]) + 1
 
 
 def mapped_people(pairs: Pairs, least: float = FOUND) -> Ints:
