@@ -35,11 +35,11 @@ def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
     chosen, left = _settle(i, j, weight, strict=False)
     # Rows are sorted by frame: among those of the pairs that are left, those of a frame are neighbours.
     row, column = numbered(i[left])[1], numbered(j[left])[1]
-    cuts = np.flatnonzero(np.diff(frame[left], prepend=-1, append=-1)).tolist()
-    for first, end in pairwise(cuts):
-        part = left[first:end]
-        a, b = row[first:end] - row[first], column[first:end] - column[first:end].min()
-        chosen[part] = _solve(a, b, (int(a[-1]) + 1, int(b.max()) + 1), weight[part])
+    cuts = np.flatnonzero(np.diff(frame[left], prepend=-1, append=-1))
+    low, high = (of.reduceat(column, cuts[:-1]).tolist() for of in (np.minimum, np.maximum))
+    for (first, end), least, most in zip(pairwise(cuts.tolist()), low, high, strict=True):
+        part, a = left[first:end], row[first:end] - row[first]
+        chosen[part] = _solve(a, column[first:end] - least, (int(a[-1]) + 1, most - least + 1), weight[part])
     return chosen
 
 
