@@ -28,7 +28,7 @@ from sim.types import Tracks, Truth
 from tracking.ranking import SCALES, presence
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import weighted_scorers
+from tracking.scoring.evaluation import Scorer
 from tracking.stats import block_intervals
 
 KEYS = ("HOTA", "IDF1", "MOTA", "IDSW", "group_F1_hull", "event_F1")
@@ -146,7 +146,7 @@ def rows_of(name: str, seed: int) -> Iterator[Row]:
 
 def intervals(truth: Truth, answers: Sequence[Tracks], frames: range) -> dict[str, tuple[float, float, float]]:
     """Returns score, low and high end of each key of KEYS and MORE, of a recording that is some frames of another."""
-    scorer = weighted_scorers(truth, [answers], frames=frames)[0]
+    scorer = Scorer(truth).compare([answers], frames=frames)[0].weighted_scores("hull")
     at = [list(CATALOGUE).index(key) for key in (*KEYS, *MORE)]
 
     def score(weights: np.ndarray) -> np.ndarray:

@@ -33,7 +33,7 @@ from tracking.papers.blob.tracker import Blob
 from tracking.ranking import presence_in
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import weighted_scorers
+from tracking.scoring.evaluation import Scorer
 from tracking.stats import block_intervals
 from tracking.tuning.result import TuningResult, short
 from tracking.tuning.search import tune
@@ -109,7 +109,7 @@ def on_second_half(tracker: type, recording: Sequence, config: Config) -> list[t
     truth = recording.truth
     assert truth is not None
     runs = [list(track(tracker, recording, params=c, detections="file")) for c in (type(config)(), config)]
-    default, other = weighted_scorers(truth, runs)
+    default, other = (one.weighted_scores("hull") for one in Scorer(truth).compare(runs))
     first, at = truth.length // 2, list(CATALOGUE).index(SCORE)
 
     def scores(weights: Array) -> Array:

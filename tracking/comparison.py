@@ -20,7 +20,7 @@ from tracking.oracle import oracle
 from tracking.ranking import Ranking, rank, recording_rankings
 from tracking.running.run import TrackingRun, input_name
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import Scorer, Scores, weighted_scorers
+from tracking.scoring.evaluation import Scorer, Scores
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.people_comparison import IncomparableError, Similarity
 from tracking.stats import mean_of_finite
@@ -200,12 +200,11 @@ def compare_one(
             given = {"stored detections" if sequence.has_detections else "labels": {}}
         best = {name: oracle(sequence, info, similarity) for name, info in given.items()} if oracles else {}
         rows: list[SequenceOf[Tracks]] = [*best.values(), *runs]
-        found = scorer.evaluate_all(rows, similarity=similarity, group_match=group_match)
-        drawn = None
+        compared = scorer.compare(rows, similarity)
+        found, drawn = [one.scores(group_match) for one in compared], None
         if blocks:
-            assert sequence.truth is not None, "a scorer has checked it"
-            weighted = weighted_scorers(sequence.truth, rows, similarity, group_match)[len(best) :]
-            drawn = recording_rankings(sequence.truth, weighted, blocks)
+            weighted = [one.weighted_scores(group_match) for one in compared[len(best) :]]
+            drawn = recording_rankings(scorer.truth, weighted, blocks)
     own = dict(zip(best, found, strict=False))
     return ComparedSequence(found[len(best) :], [name or UNKNOWN for name in inputs], own, drawn)
 

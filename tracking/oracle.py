@@ -18,6 +18,7 @@ import numpy as np
 
 from sim.types import (
     EVENT_KINDS,
+    Array,
     Bools,
     Context,
     DetectionMode,
@@ -25,6 +26,7 @@ from sim.types import (
     Frame,
     GroupEvent,
     Groups,
+    Ints,
     Plane,
     Sequence,
     Tracks,
@@ -52,11 +54,16 @@ class _Detections:
         pos, plane, box = detections.pos, detections.plane, detections.box
         if self.needs == ("boxes",) and box is not None:
             pos, plane = box[:, :2] + box[:, 2:] / 2, "image"
-        count, dims = pos.shape
-        id, alone = np.arange(count), np.full(count, -1)
-        vel, cov = np.full((count, dims), np.nan), np.full((count, 2 * dims, 2 * dims), np.nan)
-        rows = (id, alone, pos, vel, cov, box, detections.score)
-        return Tracks(frame.index, frame.t, plane, "person", *rows, Groups.none(), derived=True)
+        who = (np.arange(len(pos)), np.full(len(pos), -1))
+        return _tracks(frame.index, frame.t, plane, who, pos, box, detections.score)
+
+
+def _tracks(
+    index: int, t: float, plane: Plane, who: tuple[Ints, Ints], pos: Array, box: Array | None, score: Array
+) -> Tracks:
+    count, dims = pos.shape
+    vel, cov = np.full((count, dims), np.nan), np.full((count, 2 * dims, 2 * dims), np.nan)
+    return Tracks(index, t, plane, "person", *who, pos, vel, cov, box, score, Groups.none(), derived=True)
 
 
 def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None = None) -> TrackingRun:
@@ -116,21 +123,18 @@ def _visible(truth: Truth, index: int, places: bool) -> Tracks:
     """Returns the people of a frame who are visible at all: their true places, or the boxes of what is visible."""
     rows = np.arange(len(truth.id))[truth.rows(index)]
     rows = rows[truth.visibility[rows] > 0]
-    box = None
+    plane: Plane = "ground" if places else "image"
     if places:
         assert truth.pos is not None, "people before a calibrated pair have places"
-        pos = truth.pos[rows]
+        box, pos = None, truth.pos[rows]
     else:
         boxes = truth.box if truth.visible_box is None else truth.visible_box
         assert boxes is not None, "people in pictures have boxes"
         rows = rows[np.isfinite(boxes[rows]).all(axis=1)]
         box = boxes[rows]
         pos = box[:, :2] + box[:, 2:] / 2
-    who, none = (truth.id[rows], truth.group[rows]), np.full((len(rows), 2), np.nan)
-    cov, score = np.full((len(rows), 4, 4), np.nan), np.ones(len(rows))
-    t = (index - 1) / truth.fps
-    plane: Plane = "ground" if places else "image"
-    return Tracks(index, t, plane, "person", *who, pos, none, cov, box, score, Groups.none(), derived=True)
+    who = (truth.id[rows], truth.group[rows])
+    return _tracks(index, (index - 1) / truth.fps, plane, who, pos, box, np.ones(len(rows)))
 
 
 def _with_groups_and_events(tracks: SequenceOf[Tracks], truth: Truth) -> tuple[Tracks, ...]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -80,51 +80,32 @@ def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config
 
 def _point(action: ArrayLike, size: int) -> Array:
     try:
-        point = np.asarray(action)
-    except ValueError:  # rows of different lengths
-        point = np.asarray(None)
-    if point.dtype.kind not in "biuf":
-        got = repr(action)[:80]
-    elif point.shape != (size,) or not np.isfinite(point).all():
-        got = f"shape {point.shape}" if point.shape != (size,) else "NaN or infinity"
-    else:
-        return np.asarray(np.clip(point.astype(float), -1.0, 1.0))
-    remedy = "give one number in [-1, 1] for each parameter of the space"
-    raise InputError(place="action", got=got, expected=f"({size},) finite numbers", remedy=remedy)
+        point = np.asarray(action, float)
+    except (TypeError, ValueError):
+        point = np.zeros(0)
+    if point.shape != (size,) or not np.isfinite(point).all():
+        remedy = "give one number in [-1, 1] for each parameter of the space"
+        raise InputError(place="action", got=repr(action)[:80], expected=f"({size},) finite numbers", remedy=remedy)
+    return np.asarray(np.clip(point, -1.0, 1.0))
 
 
 def _to_unit(p: Param, value: Value) -> float:
-    if p.scale == "categorical":
-        return _middle(p.choices.index(value), len(p.choices))
+    choices = _choices(p)
+    if choices:
+        return (2 * choices.index(value) + 1) / len(choices) - 1
     assert isinstance(value, int | float)
-    if p.scale == "int":
-        first, count = _whole(p)
-        return _middle(int(value) - first, count)
     if p.scale == "log":
         return 2 * math.log(value / p.low) / math.log(p.high / p.low) - 1
     return 2 * (value - p.low) / (p.high - p.low) - 1
 
 
 def _from_unit(p: Param, a: float) -> Value:
-    share = (a + 1) / 2
-    if p.scale == "categorical":
-        return p.choices[_part(share, len(p.choices))]
-    if p.scale == "int":
-        first, count = _whole(p)
-        return first + _part(share, count)
+    share, choices = (a + 1) / 2, _choices(p)
+    if choices:
+        return choices[min(int(share * len(choices)), len(choices) - 1)]
     value = p.low * (p.high / p.low) ** share if p.scale == "log" else p.low + share * (p.high - p.low)
     return min(max(value, p.low), p.high)
 
 
-def _whole(p: Param) -> tuple[int, int]:
-    """Returns the first whole number of a parameter's range, and how many whole numbers the range holds."""
-    first = math.ceil(p.low)
-    return first, math.floor(p.high) - first + 1
-
-
-def _middle(k: int, count: int) -> float:
-    return (2 * k + 1) / count - 1
-
-
-def _part(share: float, count: int) -> int:
-    return min(int(share * count), count - 1)
+def _choices(p: Param) -> Sequence[Value]:
+    return range(math.ceil(p.low), math.floor(p.high) + 1) if p.scale == "int" else p.choices

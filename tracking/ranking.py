@@ -24,7 +24,7 @@ from sim.types import Array, Bools, Ints, Truth
 from tracking.scoring.annotated_frames import annotated_frames
 from tracking.scoring.catalogue import ALL, CATALOGUE, Score
 from tracking.scoring.rows import numbered
-from tracking.stats import DRAWS, FEWEST, LEVEL, Scale, block_intervals, joint_level, mean_interval, student
+from tracking.stats import DRAWS, FEWEST, LEVEL, Scale, block_intervals, joint_level, mean_interval
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +46,12 @@ class Ranking:
 
 def rank(values: Array, upwards: bool = True) -> Ranking:
     """Returns the ranking of R runs by their scores on S sequences, values (R, S); nan where unknown."""
-    known = np.isfinite(values).all(axis=0)
-    scores = values[:, known]
+    scores = values[:, np.isfinite(values).all(axis=0)]
     runs, count = scores.shape
-    own = mean_interval(scores.T) if count else (np.full(runs, np.nan),) * 3
-    return ordered(own, _joint_intervals(scores), upwards, count, sure=count >= FEWEST)
+    less = (scores[:, None] - scores[None]).reshape(runs * runs, count)
+    less_ends = mean_interval(less.T, joint_level(runs * (runs - 1) // 2))
+    mean, low, high = (end.reshape(runs, runs) for end in less_ends)
+    return ordered(mean_interval(scores.T), (mean, low, high), upwards, count, sure=count >= FEWEST)
 
 
 def ordered(
@@ -67,18 +68,6 @@ def ordered(
     alone = mean[order], own_low[order], own_high[order]
     ranks = first[order], last[order]
     return Ranking(order, *alone, *ranks, less[both], low[both], high[both], better[both], count)
-
-
-def _joint_intervals(scores: Array) -> tuple[Array, Array, Array]:
-    runs, count = scores.shape
-    if count < 2:
-        unknown = np.full((runs, runs), np.nan)
-        return scores.sum(axis=1)[:, None] - scores.sum(axis=1) if count else unknown, unknown, unknown
-    t = student(count - 1, joint_level(runs * (runs - 1) // 2))
-    difference = scores[:, None] - scores[None]
-    less = difference.mean(axis=2)
-    half = t * difference.std(axis=2, ddof=1) / np.sqrt(count)
-    return less, less - half, less + half
 
 
 def scale_of(score: Score) -> Scale:

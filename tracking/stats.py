@@ -40,14 +40,14 @@ def mean_of_finite(values: Array) -> float:
     return float(known.mean()) if len(known) else float("nan")
 
 
-def mean_interval(values: Array) -> tuple[Array, Array, Array]:
-    """Returns mean, low end and high end, (K,) each, of Student's 95 % intervals of the mean over S sequences."""
+def mean_interval(values: Array, level: float = LEVEL) -> tuple[Array, Array, Array]:
+    """Returns mean, low end and high end, (K,) each, of Student's intervals of the mean over S sequences; (S, K)."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
     some, two = np.maximum(count, 1), np.maximum(count, 2)
     mean = np.where(known, values, 0.0).sum(axis=0) / some
     spread = np.sqrt((np.where(known, values - mean, 0.0) ** 2).sum(axis=0) / (two - 1))
-    half = np.where(count > 1, student(two - 1) * spread / np.sqrt(some), np.nan)
+    half = np.where(count > 1, student(two - 1, level) * spread / np.sqrt(some), np.nan)
     mean = np.where(count > 0, mean, np.nan)
     return mean, mean - half, mean + half
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec
+from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType
 
 ID = "flockscope/Tuning-v0"
@@ -35,7 +35,7 @@ def _register() -> None:
 class _RegisteringFinder(MetaPathFinder):
     """Import hook: makes the loader of Gymnasium register the environment after loading, then removes itself.
 
-    It finds no modules itself; other modules are left to the other finders.
+    Other modules are left to the other finders.
     """
 
     def find_spec(
@@ -43,9 +43,7 @@ class _RegisteringFinder(MetaPathFinder):
     ) -> ModuleSpec | None:
         if fullname != LIBRARY:
             return None
-        others = [finder for finder in sys.meta_path if not isinstance(finder, _RegisteringFinder)]
-        specs = (finder.find_spec(fullname, path, target) for finder in others)
-        spec = next((found for found in specs if found is not None), None)
+        spec = PathFinder.find_spec(fullname, path, target)
         if spec is None or spec.loader is None:
             return spec
         load = spec.loader.exec_module

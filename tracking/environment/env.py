@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, cast, get_args
 
 import gymnasium
@@ -80,8 +81,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         """
         given = from_keywords(TuningEnvOptions, "TuningEnv", {"tracker": tracker, "suite": suite, **options})
         self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
-        self.tracker_seed, self.decision_every = given.tracker_seed, given.decision_every
-        self.similarity = given.similarity
+        self.options, self.decision_every = given, given.decision_every
         self.config_class = config_class(self.tracker, self.tracker.__name__)
         self.defaults = config_of(self.config_class, given.params)
         self.sources = sources(given.suite, given.seeds, given.set)
@@ -161,47 +161,44 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         if self._observer is None:
             raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
         if self.decision_every is None:
-            self.config, rollout = decode_and_build(
-                self.space, action, self.base, lambda c: self._rollout(c, self.source)
-            )
+            build = partial(self._rollout, source=self.source)
+            self.config, rollout = decode_and_build(self.space, action, self.base, build)
             self.rollout = rollout
-            terminated = self._advance(None)
+            terminated = self._advance(rollout, None)
         else:
             assert self.rollout is not None
-            terminated = self._advance_with(decode(self.space, action, self.base))
-        self.scores = self.rollout.scores() if self.rollout.tracks else {}
+            rollout, config = self.rollout, decode(self.space, action, self.base)
+            terminated = self._advance_with(rollout, config, len(rollout.tracks) + self.decision_every)
+        self.scores = rollout.scores() if rollout.tracks else {}
         before, self.score = self.score, self.scores.get("objective", 0.0)
         return self._observe(), self.score - before, terminated, False, self._info()
 
     def _rollout(self, config: Config, source: Source) -> Rollout:
+        seed, similarity = self.options.tracker_seed, self.options.similarity
         return Rollout(
-            self.tracker, source, config, detections=self.mode, tracker_seed=self.tracker_seed, cache=self.cache,
-            similarity=self.similarity,
+            self.tracker, source, config, detections=self.mode, tracker_seed=seed, cache=self.cache,
+            similarity=similarity,
         )  # fmt: skip
 
-    def _advance(self, upto: int | None) -> bool:
-        assert self.rollout is not None
-        for frame, tracks in self.rollout.advance(upto):
-            assert self._observer is not None
+    def _advance(self, rollout: Rollout, upto: int | None) -> bool:
+        assert self._observer is not None
+        for frame, tracks in rollout.advance(upto):
             self._observer.add(frame, tracks)
-        done = len(self.rollout.tracks)
-        return done == self.rollout.length or upto is None or done < upto
+        done = len(rollout.tracks)
+        return done == rollout.length or upto is None or done < upto
 
-    def _advance_with(self, config: Config) -> bool:
-        assert self.rollout is not None
-        assert self.decision_every is not None
-        upto = len(self.rollout.tracks) + self.decision_every
-        tracker = cast(Any, self.rollout.prepared.tracker)
+    def _advance_with(self, rollout: Rollout, config: Config, upto: int) -> bool:
+        tracker = cast(Any, rollout.prepared.tracker)
         before, self.refused = self.config, ""
         self.config = tracker.config = config
         try:
-            return self._advance(upto)
+            return self._advance(rollout, upto)
         except InputError as error:
             if before is config:
                 raise
             self.config = tracker.config = before
             self.refused = str(error)
-            return self._advance(upto)
+            return self._advance(rollout, upto)
 
     def close(self) -> None:
         """Ends the episode and replaces the cache of sources by an empty one. `reset` may follow."""
@@ -258,8 +255,7 @@ def _check_split(among: Iterable[Source]) -> None:
         raise InputError(place="seeds", got=got, expected="seeds of one split", remedy=remedy)
 
 
-def _detection_mode(tracker: type[Tracker], among: Iterable[Source], wanted: DetectionMode | None) -> DetectionMode:
-    among = tuple(among)
+def _detection_mode(tracker: type[Tracker], among: tuple[Source, ...], wanted: DetectionMode | None) -> DetectionMode:
     for source in among:
         if not source.simulated:
             wanted = choose_mode(tracker.needs, source.open(("left",)), wanted)

@@ -12,15 +12,13 @@ memory.
 from __future__ import annotations
 
 import hashlib
-from collections import Counter, OrderedDict
+import pickle
+from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, fields, is_dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
 from pathlib import Path
-from types import FunctionType, MethodType
 from typing import TYPE_CHECKING, Any, TypeVar
-
-import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import Frame, Sequence, Truth
@@ -29,7 +27,7 @@ if TYPE_CHECKING:
     from scenarios.loading.resolve import Entry
     from tracking.objective import ObjectiveScorer
 
-
+T = TypeVar("T")
 SourceSpec = str | Path | Sequence | Iterable["str | Path | Sequence | Source"]
 
 
@@ -126,9 +124,7 @@ def _stored(path: Path) -> list[Source]:
     return [Source(s.name, int(s.source.get("seed", 0)), path=str(s.source.get("path", path))) for s in found]
 
 
-T = TypeVar("T")
 DEFAULT_LIMIT = 256 * 2**20  # Bytes that a SourceCache keeps by default.
-TIMES_COUNTED = 2  # How often the bytes of a source are counted; after that it holds all that it will hold.
 
 
 class OpenedSource:
@@ -138,12 +134,12 @@ class OpenedSource:
     """
 
     def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
+        self.source, self._kept = source, list[object]()
         found = source.open(streams)
         loads = {name: getattr(found, name) for name in ("load_truth", "load_background")}
-        once: dict[str, Any] = {name: _computed_once(load) for name, load in loads.items() if load is not None}
-        opened = replace(found, **once)
-        self.source, self._opened = source, opened
-        frames_once = _computed_once(lambda: tuple(opened.without_pictures()))
+        once: dict[str, Any] = {name: self._computed_once(load) for name, load in loads.items() if load is not None}
+        self._opened = opened = replace(found, **once)
+        frames_once = self._computed_once(lambda: tuple(opened.without_pictures()))
 
         def frames_without_pictures() -> Iterator[Frame]:
             return iter(frames_once())
@@ -151,6 +147,14 @@ class OpenedSource:
         pictures = opened.has_images or opened.has_right
         frames = opened.frames if pictures else frames_without_pictures
         self.sequence = replace(opened, bare=frames_without_pictures, frames=frames)
+
+    def _computed_once(self, compute: Callable[[], T]) -> Callable[[], T]:
+        @cache
+        def first_result() -> T:
+            self._kept.append(found := compute())
+            return found
+
+        return first_result
 
     @cached_property
     def truth(self) -> Truth:
@@ -166,25 +170,22 @@ class OpenedSource:
         """An `ObjectiveScorer` for the sequence's truth, built on first use. InputError without labels."""
         from tracking.objective import ObjectiveScorer
 
-        return ObjectiveScorer(self.truth)
+        self._kept.append(judge := ObjectiveScorer(self.truth))
+        return judge
 
-
-def _computed_once(compute: Callable[[], T]) -> Callable[[], T]:
-    kept: list[T] = []
-
-    def first_result() -> T:
-        if not kept:
-            kept.append(compute())
-        return kept[0]
-
-    return first_result
+    @property
+    def bytes(self) -> int:
+        """Bytes of what is kept, as pickled: nearly all are those of arrays, which pickling does not copy."""
+        arrays: list[pickle.PickleBuffer] = []
+        packed = pickle.dumps(self._kept, protocol=5, buffer_callback=arrays.append)
+        return len(packed) + sum(array.raw().nbytes for array in arrays)
 
 
 class SourceCache:
     """Opened sources for reuse; the least recently used one is dropped first. len() gives their number.
 
-    limit: bytes of arrays that all of them may hold together. The source in use is kept whatever its size. The bytes
-    of a source are counted when the next one is opened, and again after its second use.
+    limit: bytes that all of them may hold together. The source in use is kept whatever its size. The bytes of a source
+    are counted when another one is opened after its use.
     """
 
     def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
@@ -193,73 +194,27 @@ class SourceCache:
         self.limit = limit
         self._opened: OrderedDict[tuple[object, ...], OpenedSource] = OrderedDict()
         self._bytes: dict[tuple[object, ...], int] = {}
-        self._counted: Counter[tuple[object, ...]] = Counter()
 
     def __len__(self) -> int:
         return len(self._opened)
 
     @property
     def bytes(self) -> int:
-        """Bytes of the arrays that the opened sources hold, counted anew for the last used one; 0 without sources."""
-        self._counted.clear()
-        self._count_last()
+        """Bytes that the opened sources hold, counted anew for the last used one; 0 without sources."""
+        last = next(reversed(self._opened), None)
+        for key, opened in self._opened.items():
+            if key == last or key not in self._bytes:
+                self._bytes[key] = opened.bytes
         return sum(self._bytes.values())
 
     def open(self, source: Source, streams: tuple[str, ...] = ()) -> OpenedSource:
         """Returns the opened source; one that was opened with the same `streams` and is still kept is used again."""
         key = (*source.key, streams)
-        if self._opened and next(reversed(self._opened)) == key:
-            return self._opened[key]
-        self._count_last()
-        if key in self._opened:
-            self._opened.move_to_end(key)
-            return self._opened[key]
-        self._make_room()
-        self._opened[key] = OpenedSource(source, streams)
+        if key not in self._opened:
+            held = self.bytes
+            while held > self.limit:
+                dropped, _ = self._opened.popitem(last=False)
+                held -= self._bytes.pop(dropped)
+            self._opened[key] = OpenedSource(source, streams)
+        self._opened.move_to_end(key)
         return self._opened[key]
-
-    def _count_last(self) -> None:
-        key = next(reversed(self._opened), None)
-        if key is not None and self._counted[key] < TIMES_COUNTED:
-            self._counted[key] += 1
-            self._bytes[key] = array_bytes(self._opened[key])
-
-    def _make_room(self) -> None:
-        while self._opened and sum(self._bytes.values()) > self.limit:
-            key, _ = self._opened.popitem(last=False)
-            del self._bytes[key], self._counted[key]
-
-
-def array_bytes(root: object) -> int:
-    """Returns the bytes of all numpy arrays that can be reached from the object `root`."""
-    arrays: dict[int, int] = {}
-    seen: set[int] = set()
-    waiting: list[Any] = [root]
-    while waiting:
-        one = waiting.pop()
-        if id(one) in seen:
-            continue
-        seen.add(id(one))
-        if isinstance(one, np.ndarray):
-            while isinstance(one.base, np.ndarray):
-                one = one.base
-            arrays[id(one)] = one.nbytes
-        else:
-            waiting.extend(_parts(one))
-    return sum(arrays.values())
-
-
-def _parts(one: Any) -> list[Any]:
-    if isinstance(one, tuple | list):
-        return list(one)
-    if isinstance(one, dict):
-        return list(one.values())
-    if isinstance(one, MethodType):
-        return [one.__self__]
-    if isinstance(one, FunctionType) or hasattr(one, "__wrapped__"):
-        cells = getattr(one, "__closure__", None) or ()
-        return [*(c.cell_contents for c in cells), getattr(one, "__wrapped__", None)]
-    if type(one).__module__.split(".")[0] not in ("sim", "tracking"):
-        return []
-    named = [getattr(one, f.name) for f in fields(one)] if is_dataclass(one) and not isinstance(one, type) else []
-    return [*named, *getattr(one, "__dict__", {}).values()]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
@@ -91,32 +91,34 @@ def play(
     return rollout.episode(every_score)
 
 
+@dataclass(eq=False)
 class Rollout:
     """An episode that is played frame by frame; the arguments are those of `play`.
 
     State: the prepared tracker; tracks, one `Tracks` per frame so far; seconds spent on tracking and scoring.
     """
 
-    def __init__(
-        self,
-        tracker: AnyTracker,
-        source: Source,
-        config: Params = None,
-        *,
-        detections: DetectionMode | None = None,
-        tracker_seed: int = 0,
-        cache: SourceCache | None = None,
-        similarity: Similarity | None = None,
-    ) -> None:
-        self.source, self.similarity = source, similarity
-        streams = streams_for(tracker, detections)
-        self.opened: OpenedSource = OpenedSource(source, streams) if cache is None else cache.open(source, streams)
+    tracker: AnyTracker
+    source: Source
+    config: Params = None
+    _: KW_ONLY
+    detections: DetectionMode | None = None
+    tracker_seed: int = 0
+    cache: SourceCache | None = None
+    similarity: Similarity | None = None
+
+    def __post_init__(self) -> None:
+        streams = streams_for(self.tracker, self.detections)
+        open_source = OpenedSource if self.cache is None else self.cache.open
+        self.opened: OpenedSource = open_source(self.source, streams)
         self.truth: Truth = self.opened.truth
-        self.prepared = prepare(tracker, self.sequence, params=config, detections=detections, seed=tracker_seed)
+        self.prepared = prepare(
+            self.tracker, self.sequence, params=self.config, detections=self.detections, seed=self.tracker_seed
+        )
         self.tracks: list[Tracks] = []
         self.seconds_tracking = self.seconds_scoring = 0.0
         start = time.perf_counter()
-        self.prepared.reset(tracker_seed)
+        self.prepared.reset(self.tracker_seed)
         self.seconds_tracking += time.perf_counter() - start
         self._frames: Iterator[Frame] | None = None
         self._next: Frame | None = None
@@ -158,15 +160,8 @@ class Rollout:
     def episode(self, every_score: bool = False) -> Episode:
         """Returns the result of the frames so far; objective is nan if there is nothing to score."""
         scores = self.scores(every_score)
-        return Episode(
-            self.source.name,
-            self.source.seed,
-            scores.get("objective", float("nan")),
-            scores,
-            len(self.tracks),
-            self.seconds_tracking,
-            self.seconds_scoring,
-        )
+        objective, seconds = scores.get("objective", float("nan")), (self.seconds_tracking, self.seconds_scoring)
+        return Episode(self.source.name, self.source.seed, objective, scores, len(self.tracks), *seconds)
 
     def scores(self, every: bool = False) -> dict[str, float]:
         """Returns the scores of the frames so far by key, without nan: objective, HOTA and group_F1, or all."""

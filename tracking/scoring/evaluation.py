@@ -52,6 +52,7 @@ from tracking.scoring.track_scores import weighted_clear, weighted_hota, weighte
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
 from tracking.scoring.weighted_sums import WeightedScores, mean_of_known, unweighted
 
+PORTION = 100  # Draws that are computed together: bounds memory.
 OF_PEOPLE = (weighted_hota, weighted_clear, weighted_identity)
 
 
@@ -69,16 +70,6 @@ def without_distractors(truth: Truth, unscored: Unscored, tracked: PersonRows) -
 
 
 __all__ = ["IncomparableError", "MatchedSides", "Scorer", "Scores", "Similarity", "evaluate"]
-
-
-@dataclass(frozen=True, eq=False)
-class MatchedSides:
-    """One truth and one tracker's tracks, compared but not counted yet."""
-
-    sides: ComparedSides  # both sides in the scored frames, people mapped
-    similarity: Similarity  # how people are compared
-    people: Pairs | None  # their candidate pairs, None for a tracker of whole groups
-    groups: TrueGroups | None  # the true groups in the scored frames, None if none of these frames is labelled
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +109,57 @@ class Scores(Mapping[str, float]):
         return "\n".join(f"{key:28} {value:.4g}" for key, value in self.items() if not math.isnan(value))
 
 
+@dataclass(frozen=True, eq=False)
+class MatchedSides:
+    """One truth and one tracker's tracks, compared but not counted yet."""
+
+    sides: ComparedSides  # both sides in the scored frames, people mapped
+    similarity: Similarity  # how people are compared
+    people: Pairs | None  # their candidate pairs, None for a tracker of whole groups
+    groups: TrueGroups | None  # the true groups in the scored frames, None if none of these frames is labelled
+    step: int | None  # from one annotated frame to the next, None if they are not evenly spaced
+
+    def scores(self, group_match: GroupMatch) -> Scores:
+        """Returns every score of the catalogue; group_match as of `evaluate`."""
+        sides, inside = self.sides, self.sides.inside
+        found = unweighted(self._weighted(group_match), len(inside))
+        length = sides.truth.length
+        return Scores(found, self.similarity, sides.surface, group_match, int(inside.sum()), length, self.step)
+
+    def weighted_scores(self, group_match: GroupMatch) -> Callable[[Array], Array]:
+        """Returns a function from weights of frames to scores; group_match as of `evaluate`.
+
+        The function takes D draws (D, length) of weights of the frames 1 … length, of mean 1, as counts are their sums.
+        It returns all scores (D, K) in the order of `CATALOGUE`, nan where the frames of a denominator have no weight.
+        """
+        scores = self._weighted(group_match)
+
+        def in_portions(weights: Array) -> Array:
+            padded = np.pad(np.asarray(weights, float), ((0, 0), (1, 0)))  # frame 0 is no frame
+            portions = [padded[first : first + PORTION] for first in range(0, len(padded), PORTION)]
+            return np.concatenate([np.column_stack(list(scores(portion).values())) for portion in portions])
+
+        return in_portions
+
+    def _weighted(self, group_match: GroupMatch) -> WeightedScores:
+        sides, parts = self.sides, list[WeightedScores]()
+        if self.people is not None:
+            self.people.require_unique_ids()
+            parts += [scores(self.people, len(sides.inside)) for scores in OF_PEOPLE]
+            parts.append(weighted_positions(sides))
+        if self.groups is not None:
+            parts += weighted_groups_and_events(sides, self.groups, group_match)
+
+        def score(weights: Array) -> dict[str, Array]:
+            found = dict.fromkeys(CATALOGUE, np.full(len(weights), np.nan))
+            for part in parts:
+                found |= part(weights)
+            found["objective"] = mean_of_known(np.column_stack([found["HOTA"], found["group_F1"]]))
+            return {key: found[key] for key in CATALOGUE}
+
+        return score
+
+
 def evaluate(
     truth: Truth,
     tracks: Iterable[Tracks],
@@ -148,7 +190,8 @@ def evaluate(
         ValueError: an id occurs twice in one frame.
         InputError: groups must be derived in the image and `truth.px_per_m` is 0 or less.
     """
-    return Scorer(truth).evaluate(tracks, similarity=similarity, group_match=group_match, frames=frames)
+    (compared,) = Scorer(truth).compare([tracks], similarity, frames)
+    return compared.scores(group_match)
 
 
 class Scorer:
@@ -195,32 +238,16 @@ class Scorer:
         return ComparedSides(self.truth, tracks, frames, self.labelled & frames, true, est, nobody, plane)
 
     def evaluate(
-        self,
-        tracks: Iterable[Tracks],
-        *,
-        similarity: Similarity | None = None,
-        group_match: GroupMatch = "hull",
-        frames: int | range | None = None,
+        self, tracks: Iterable[Tracks], similarity: Similarity | None = None, frames: int | range | None = None
     ) -> Scores:
         """Returns the scores of one tracker against this truth, as the function `evaluate` does."""
-        (found,) = self.evaluate_all([tracks], similarity=similarity, group_match=group_match, frames=frames)
-        return found
-
-    def evaluate_all(
-        self,
-        runs: Sequence[Iterable[Tracks]],
-        *,
-        similarity: Similarity | None = None,
-        group_match: GroupMatch = "hull",
-        frames: int | range | None = None,
-    ) -> list[Scores]:
-        """Returns the scores of several runs, all compared in one plane and by one similarity; else as `evaluate`."""
-        return [_scores(one, group_match, self.annotated.step) for one in self.compare(runs, similarity, frames)]
+        (compared,) = self.compare([tracks], similarity, frames)
+        return compared.scores("hull")
 
     def compare(
-        self, runs: Sequence[Iterable[Tracks]], similarity: Similarity | None, frames: int | range | None
+        self, runs: Sequence[Iterable[Tracks]], similarity: Similarity | None = None, frames: int | range | None = None
     ) -> list[MatchedSides]:
-        """Returns this truth and the tracks of each run with people mapped; arguments as of `evaluate`."""
+        """Returns this truth and each run with people mapped, all in one plane and by one similarity, as `evaluate`."""
         inside = self.scored(frames)
         ordered = [_in_order(run, inside) for run in runs]
         moved, chosen = in_one_plane(self.truth, ordered, [from_pixels(run) for run in runs], similarity)
@@ -241,20 +268,7 @@ class Scorer:
             pairs = people_pairs(sides, similarity)
             sides = replace(sides, mapping=mapped_people(pairs))
         groups = self.groups(sides.surface).in_frames(inside, inside[self.people.rows.frame]) if labelled else None
-        return MatchedSides(sides, similarity, pairs, groups)
-
-
-def _scores(compared: MatchedSides, group_match: GroupMatch, step: int | None) -> Scores:
-    sides, found = compared.sides, dict.fromkeys(CATALOGUE, float("nan"))
-    frames_scored = int(sides.inside.sum())
-    if compared.people is not None:
-        found |= people_scores(compared.people)
-        found |= unweighted(weighted_positions(sides), len(sides.inside))
-    if compared.groups is not None:
-        scores = weighted_groups_and_events(sides, compared.groups, group_match)
-        found |= unweighted(scores, len(sides.frames))
-    found["objective"] = objective_of(found)
-    return Scores(found, compared.similarity, sides.surface, group_match, frames_scored, sides.truth.length, step)
+        return MatchedSides(sides, similarity, pairs, groups, self.annotated.step)
 
 
 def chosen_frames(frames: int | range | None, length: int) -> Bools:
@@ -293,46 +307,3 @@ def objective_of(found: Mapping[str, float]) -> float:
     """Returns the mean of found["HOTA"] and found["group_F1"], or the one that is known, or nan."""
     known = [v for v in (found["HOTA"], found["group_F1"]) if v == v]
     return sum(known) / len(known) if known else float("nan")
-
-
-PORTION = 100  # Draws that are computed together: bounds memory.
-
-
-def weighted_scorers(
-    truth: Truth,
-    runs: Sequence[Sequence[Tracks]],
-    similarity: Similarity | None = None,
-    group_match: GroupMatch = "hull",
-    frames: int | range | None = None,
-) -> list[Callable[[Array], Array]]:
-    """Returns for each run of one sequence a function from weights of frames to scores; arguments as of `evaluate`.
-
-    The function takes D draws (D, length) of weights of the frames 1 … length, of mean 1, as counts are their sums.
-    It returns all scores (D, K) in the order of `CATALOGUE`, nan where the frames of a denominator have no weight.
-    """
-    found = Scorer(truth).compare(runs, similarity, frames)
-    return [_weighted(one, truth.length + 1, group_match) for one in found]
-
-
-def _weighted(compared: MatchedSides, size: int, group_match: GroupMatch) -> Callable[[Array], Array]:
-    parts: list[WeightedScores] = []
-    if compared.people is not None:
-        compared.people.require_unique_ids()
-        parts += [scores(compared.people, size) for scores in OF_PEOPLE]
-        parts.append(weighted_positions(compared.sides))
-    if compared.groups is not None:
-        parts.append(weighted_groups_and_events(compared.sides, compared.groups, group_match))
-    place = {key: k for k, key in enumerate(CATALOGUE)}
-
-    def score(weights: Array) -> Array:
-        padded = np.pad(np.asarray(weights, float), ((0, 0), (1, 0)))  # frame 0 is no frame
-        out = np.full((len(padded), len(place)), np.nan)
-        for first in range(0, len(padded), PORTION):
-            rows = slice(first, first + PORTION)
-            for part in parts:
-                for key, values in part(padded[rows]).items():
-                    out[rows, place[key]] = values
-        out[:, place["objective"]] = mean_of_known(out[:, [place["HOTA"], place["group_F1"]]])
-        return out
-
-    return score

@@ -30,14 +30,12 @@ def true_events(
     the groups of the members in the last of the `step` frames before the start in which each is there, children those
     at the start. A member alone or absent is a part of its own.
     """
-    lookup, group = RowLookup(people.rows), _group_by_row(people.group)
+    lookup, parts_of = RowLookup(people.rows), _parts_of(people)
 
     def comparable(event: GroupEvent) -> ComparableEvent:
-        before = _by_group(event.members, lambda m: group[lookup.last(m, event.start - 1, step - 1)])
-        after = _by_group(event.members, lambda m: group[lookup.next(m, event.start, 0)])
+        before, after = parts_of(event, event.start, step - 1, 0)
         pos = event.pos if positions is None else _mean_position(event, lookup, positions)
         members = EventMembers(frozenset(event.members))
-        before, after = _by_kind(event, before, after)
         if event.kind not in CHANGES or sorted(before) == sorted(after):
             return ComparableEvent(event.kind, event.start, None, members, pos)
         parents, children = (tuple(EventMembers(frozenset(part)) for part in parts) for parts in (before, after))
@@ -51,8 +49,24 @@ def _counts(event: GroupEvent, frames: Bools) -> bool:
     return known and 0 <= event.start < len(frames) and bool(frames[event.start])
 
 
-def _group_by_row(group: Ints) -> list[int]:
-    return [*group.tolist(), -1]
+def _parts_of(people: PersonRows) -> Callable[[GroupEvent, int, int, int], tuple[list[list[int]], list[list[int]]]]:
+    """Returns a function that divides the members of an event by their groups before and after a report."""
+    lookup, group = RowLookup(people.rows), [*people.group.tolist(), -1]
+
+    def parts_of(event: GroupEvent, reported: int, back: int, ahead: int) -> tuple[list[list[int]], list[list[int]]]:
+        def until(frame: int) -> list[list[int]]:
+            return _by_group(event.members, lambda m: group[lookup.last(m, frame, back)])
+
+        before, after = until(reported - 1), _by_group(event.members, lambda m: group[lookup.next(m, reported, ahead)])
+        if sorted(before) == sorted(after):
+            before = until(event.start - 1)
+        if sorted(before) != sorted(after):
+            return before, after
+        # data whose labels never change: a form joins people alone, a dissolve leaves them alone
+        one, alone = [list(event.members)], [[m] for m in event.members]
+        return {"form": (alone, one), "dissolve": (one, alone)}.get(event.kind, (before, after))
+
+    return parts_of
 
 
 def _by_group(members: Sequence[int], group: Callable[[int], int]) -> list[list[int]]:
@@ -62,16 +76,6 @@ def _by_group(members: Sequence[int], group: Callable[[int], int]) -> list[list[
         g = group(m)
         parts.setdefault((g, -1) if g >= 0 else (-1, m), []).append(m)
     return list(parts.values())
-
-
-def _by_kind(
-    event: GroupEvent, before: list[list[int]], after: list[list[int]]
-) -> tuple[list[list[int]], list[list[int]]]:
-    if sorted(before) != sorted(after):
-        return before, after
-    # data whose labels never change: a form joins people alone, a dissolve leaves them alone
-    one, alone = [list(event.members)], [[m] for m in event.members]
-    return {"form": (alone, one), "dissolve": (one, alone)}.get(event.kind, (before, after))
 
 
 def _mean_position(event: GroupEvent, lookup: RowLookup, positions: Array) -> tuple[float, float]:
@@ -91,17 +95,11 @@ def tracked_events(
     frame nearest to the start, within `reach` frames. Parents are the groups of the members in the frame before the
     report, or before the start if nothing changes there; children those in the frame of the report.
     """
-    mapped, lookup, group = RowLookup(people.rows, mapping >= 0), RowLookup(people.rows), _group_by_row(people.group)
+    mapped, parts_of = RowLookup(people.rows, mapping >= 0), _parts_of(people)
     person = np.append(true.id, -1)[mapping].tolist()
 
-    def groups_until(event: GroupEvent, frame: int) -> list[list[int]]:
-        return _by_group(event.members, lambda m: group[lookup.last(m, frame, reach)])
-
     def comparable(event: GroupEvent, reported: int) -> ComparableEvent:
-        after = _by_group(event.members, lambda m: group[lookup.next(m, reported, reach)])
-        before = groups_until(event, reported - 1)
-        before = groups_until(event, event.start - 1) if sorted(before) == sorted(after) else before
-        before, after = _by_kind(event, before, after)
+        before, after = parts_of(event, reported, reach, reach)
         rows = {m: mapped.nearest(m, event.start, reach) for m in event.members}
         known = {m: person[row] for m, row in rows.items() if row >= 0}
         parents, children = (tuple(_true_members(p, known) for p in parts) for parts in (before, after))
@@ -132,8 +130,8 @@ def events_of_hulls(
         children = _contained(groups, person, event.after, range(reported, reported + span))
         return ComparableEvent(event.kind, event.start, reported, None, event.pos, parents, children)
 
-    found = _reports(tracks, frames)
-    return [comparable(event, reported) for event, reported in found if not (without_members and event.members)]
+    reports = _reports(tracks, frames)
+    return [comparable(*report) for report in reports if not (without_members and report[0].members)]
 
 
 def _last_appearance(rows: FrameRows, ids: Sequence[int]) -> int:

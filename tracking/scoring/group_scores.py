@@ -11,7 +11,6 @@ frames (weighted_group_scores.py).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -72,19 +71,13 @@ def group_of_person(groups: GroupRows, people: int) -> Ints:
     return group
 
 
-def hull_iou(true: Sequence[Array], est: Sequence[Array]) -> Callable[[Ints, Ints], Array]:
-    """Returns a function of row indices i, j (K,) that gives the IoU (K,) of polygons true[i] and est[j]."""
-    width = max(map(len, (*true, *est)), default=1)
-    a, b = pack(true, width), pack(est, width)
-    return lambda i, j: iou_pairs(a, b, i, j)
-
-
 def hull_pairs(true: GroupRows, est: GroupRows) -> Pairs:
     """Returns the pairs of groups of one frame whose hulls overlap, with the IoU of the hulls."""
-    iou = hull_iou(true.hull, est.hull)
+    width = max(map(len, (*true.hull, *est.hull)), default=1)
+    a, b = pack(true.hull, width), pack(est.hull, width)
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
-        s = iou(i, j)
+        s = iou_pairs(a, b, i, j)
         some = np.flatnonzero(s > EPS)
         return some, s[some]
 
@@ -110,27 +103,6 @@ def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float =
     closeness = np.nan_to_num(1 / (1 + apart), nan=0.0)
     # Jaccard indices are often equal: the nearer centres decide, so that the order of groups has no influence
     return near.keep(match(near.frame, near.i, near.j, near.s + TIE * closeness))
-
-
-@dataclass(frozen=True, eq=False)
-class GroupComparison:
-    """G true and H estimated groups in frames, with their matchings."""
-
-    # true, est: the groups
-    true: GroupRows
-    est: GroupRows
-    shared: SharedMembers  # numbers of their common people
-    pairs: Pairs  # all candidate pairs
-    chosen: Pairs  # the one-to-one matching of all pairs
-
-
-def correct(compared: GroupComparison, i: Ints, j: Ints) -> tuple[Bools, Bools]:
-    """Returns which matches of true rows i and estimated rows j (K,) are correct for GDSR, and for GDSR2."""
-    common = compared.shared.of(i, j)
-    part, whole = CORRECT
-    right = whole * common >= part * compared.true.count[i]
-    pure = right & (whole * common >= part * compared.est.count[j])
-    return right, pure
 
 
 def switch_frames(frame: Ints, true: Ints, est: Ints) -> Ints:

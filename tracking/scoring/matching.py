@@ -15,10 +15,13 @@ TrackEval.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
+from tracking.scoring.rows import numbered
 
 CLEARLY = 1 + 1e-9  # factor by which a weight must exceed its rivals to be greater despite rounding
 WORTH = 0.2  # share of pairs that a pass must remove for another pass to be quicker than the solver
@@ -30,7 +33,13 @@ def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
     frame, i (K,): ascending; each row index i, j belongs to one frame; weight (K,): above 0.
     """
     chosen, left = _settle(i, j, weight, strict=False)
-    chosen[left[_solved(frame[left], i[left], j[left], weight[left])]] = True
+    # Rows are sorted by frame: among those of the pairs that are left, those of a frame are neighbours.
+    row, column = numbered(i[left])[1], numbered(j[left])[1]
+    cuts = np.flatnonzero(np.diff(frame[left], prepend=-1, append=-1))
+    low, high = (of.reduceat(column, cuts[:-1]).tolist() for of in (np.minimum, np.maximum))
+    for (first, end), least, most in zip(pairwise(cuts.tolist()), low, high, strict=True):
+        part, a = left[first:end], row[first:end] - row[first]
+        chosen[part] = _solve(a, column[first:end] - least, (int(a[-1]) + 1, most - least + 1), weight[part])
     return chosen
 
 
@@ -48,17 +57,20 @@ def match_as_table(pairs: Pairs, weight: Array) -> Bools:
 
 def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
     """Returns which of the pairs start … end - 1, all pairs of one frame, scipy's linear_sum_assignment matches."""
-    from scipy.optimize import linear_sum_assignment
-
     i, j = pairs.i[start:end], pairs.j[start:end]
     frame = pairs.true.frame[i[0]]
     (top, bottom), (first, last) = (np.searchsorted(r.frame, (frame, frame + 1)) for r in (pairs.true, pairs.est))
-    cost = np.zeros((bottom - top, last - first))
-    cost[i - top, j - first] = -weight
+    return _solve(i - top, j - first, (bottom - top, last - first), weight)
+
+
+def _solve(row: Ints, column: Ints, shape: tuple[int, int], weight: Array) -> Bools:
+    from scipy.optimize import linear_sum_assignment
+
+    cost, partner = np.zeros(shape), np.full(shape[0], -1)
+    cost[row, column] = -weight
     rows, columns = linear_sum_assignment(cost)
-    partner = np.full(len(cost), -1)
     partner[rows] = columns
-    return np.asarray(partner[i - top] == j - first)
+    return np.asarray(partner[row] == column)
 
 
 def _settle(i: Ints, j: Ints, weight: Array, strict: bool) -> tuple[Bools, Ints]:
@@ -111,40 +123,6 @@ def _touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
     taken_i[i[chosen]] = True
     taken_j[j[chosen]] = True
     return np.asarray(taken_i[i] | taken_j[j])
-
-
-def _solved(frame: Ints, i: Ints, j: Ints, w: Array) -> Ints:
-    """Returns the indices of the pairs that scipy matches; each frame is one table of the rows in its pairs."""
-    from scipy.optimize import linear_sum_assignment
-
-    if len(w) == 0:
-        return np.zeros(0, np.int64)
-    starts = np.flatnonzero(np.diff(frame, prepend=frame[0] - 1))
-    which = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(w)))
-    row, rows = _local(i, which, len(starts))
-    column, columns = _local(j, which, len(starts))
-    size = rows * columns
-    offset = np.cumsum(size) - size
-    cell = offset[which] + row * columns[which] + column
-    cost, place = np.zeros(int(size.sum())), np.full(int(size.sum()), -1)
-    cost[cell] = -w
-    place[cell] = np.arange(len(w))
-    found = []
-    for first, n, m in zip(offset.tolist(), rows.tolist(), columns.tolist(), strict=True):
-        a, b = linear_sum_assignment(cost[first : first + n * m].reshape(n, m))
-        found.append(first + a * m + b)
-    places: Ints = place[np.concatenate(found)]
-    return places[places >= 0]
-
-
-def _local(row: Ints, which: Ints, frames: int) -> tuple[Ints, Ints]:
-    """Returns the index of each pair's row within its frame (K,), and the number of rows of each frame (F,)."""
-    home = np.full(int(row.max()) + 1, -1)
-    home[row] = which
-    seen = home >= 0
-    count = np.bincount(home[seen], minlength=frames)
-    number = np.cumsum(seen) - 1
-    return number[row] - (np.cumsum(count) - count)[which], count
 
 
 def mapped_people(pairs: Pairs, least: float = FOUND) -> Ints:

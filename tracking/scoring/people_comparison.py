@@ -58,11 +58,8 @@ def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
 def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
     positions = people.positions_on(surface, plane)
     if positions is None and len(people.rows):
-        where, other = {
-            "ground": ("on the ground", "boxes or in the image"),
-            "image": ("in the image", "on the ground"),
-        }[surface]
-        raise IncomparableError(f"no positions {where} to compare: score {other}")
+        where = "on the ground" if surface == "ground" else "in the image"
+        raise IncomparableError(f"no positions {where} to compare: choose another similarity")
     return np.zeros((0, 2)) if positions is None else positions
 
 

@@ -24,8 +24,7 @@ from sim.types import Array
 from tracking.scoring.candidate_pairs import Pairs, point_pairs
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.matching import match
-from tracking.scoring.people_and_groups import PersonRows, Surface
-from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, ratio
+from tracking.scoring.weighted_sums import FrameScores, WeightedScores
 
 REACH = 2.0  # m: distance from which the similarity of two positions is 0; also the cut-off of GOSPA
 POWER = 2.0
@@ -35,48 +34,33 @@ PARTS = ("localisation", "missed", "false")  # Parts of GOSPA.
 def weighted_positions(sides: ComparedSides) -> WeightedScores:
     """Returns the weighted RMSE_pos, RMSE_vel, GOSPA and its parts; {} without positions or scale on the surface."""
     true, est = sides.true, sides.est
-    compared = compared_positions(true, est, sides.surface, sides.plane, sides.scale)
-    if compared is None:
+    true_pos, est_pos = true.positions_on(sides.surface, "ground"), est.positions_on(sides.surface, sides.plane)
+    if true_pos is None or est_pos is None or not 0 < sides.scale < np.inf:
         return lambda weights: {}
-    true_pos, est_pos, true_vel, est_vel = compared
-    sums, reach = FrameSums(len(sides.inside)), REACH * sides.scale
+    scores, reach = FrameScores(len(sides.inside)), REACH * sides.scale
     j = np.flatnonzero(sides.mapping >= 0)
     i = sides.mapping[j]
-    off = np.full((len(i), 2), np.nan) if true_vel is None or est_vel is None else est_vel[j] - true_vel[i]
+    off = np.full((len(i), 2), np.nan)
+    if sides.surface == "ground" and true.vel is not None and est.vel is not None:
+        off = est.vel[j] - true.vel[i]
     for key, error in (("RMSE_pos", est_pos[j] - true_pos[i]), ("RMSE_vel", off)):
         squares = np.square(error).sum(axis=1)
-        sums.add_mean(key, true.rows.frame[i], squares, float(squares[np.isfinite(squares)].sum()))
+        scores.add_mean(key, true.rows.frame[i], squares, float(squares[np.isfinite(squares)].sum()))
     parts = gospa_parts(point_pairs(true.rows, est.rows, true_pos, est_pos, reach), reach)
+    frames = sides.inside.astype(float)
     for name, values, total in zip(PARTS, parts.T, parts.sum(axis=0).tolist(), strict=True):
-        sums.add(name, np.arange(len(parts)), values, total)
-    sums.add("frames", np.flatnonzero(sides.inside))
-
-    def score(weights: Array) -> dict[str, Array]:
-        s = sums.of(weights)
-        return {key: np.sqrt(mean(s, key)) for key in ("RMSE_pos", "RMSE_vel")} | gospa_of(s)
-
-    return score
+        scores.add_ratio(name, scores.column(np.arange(len(parts)), values), frames, total=total)
+    scores.add_further(lambda found, *_: {key: np.sqrt(found[key]) for key in ("RMSE_pos", "RMSE_vel")})
+    scores.add_further(lambda found, *_: gospa_of(found))
+    return scores
 
 
-def compared_positions(
-    true: PersonRows, est: PersonRows, surface: Surface, plane: str, scale: float
-) -> tuple[Array, Array, Array | None, Array | None] | None:
-    """Returns positions on the surface (R, 2), (S, 2), and velocities or None; None if a side has no positions."""
-    true_pos, est_pos = true.positions_on(surface, "ground"), est.positions_on(surface, plane)
-    if true_pos is None or est_pos is None or not 0 < scale < np.inf:
-        return None
-    return (true_pos, est_pos, true.vel, est.vel) if surface == "ground" else (true_pos, est_pos, None, None)
-
-
-def gospa_of(sums: Mapping[str, Array], power: float = POWER) -> dict[str, Array]:
-    """Returns GOSPA and its parts by key: roots of means of d^p and of its parts over the frames; nan without frames.
-
-    sums: (D,) each, of `PARTS` and "frames".
-    """
-    means = {f"GOSPA_{name}": ratio(sums[name], sums["frames"]) for name in PARTS}
-    means = {"GOSPA": means["GOSPA_localisation"] + means["GOSPA_missed"] + means["GOSPA_false"], **means}
+def gospa_of(means: Mapping[str, Array], power: float = POWER) -> dict[str, Array]:
+    """Returns GOSPA and its parts by key, roots of means over frames of d^p and of `PARTS`, (D,) each by name."""
+    powers = {f"GOSPA_{name}": means[name] for name in PARTS}
+    powers |= {"GOSPA": means["localisation"] + means["missed"] + means["false"]}
     # float by float: numpy takes another root of arrays, which differs in the last bit
-    return {key: np.array([v ** (1 / power) for v in values.tolist()]) for key, values in means.items()}
+    return {key: np.array([v ** (1 / power) for v in values.tolist()]) for key, values in powers.items()}
 
 
 def gospa_parts(pairs: Pairs, cutoff: float, power: float = POWER) -> Array:

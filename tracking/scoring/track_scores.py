@@ -34,7 +34,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
 from tracking.scoring.matching import match, match_as_table, solve_frame
-from tracking.scoring.weighted_sums import BinSums, FrameSums, WeightedScores, ratio
+from tracking.scoring.weighted_sums import FrameScores, WeightedScores, bin_sums, ratio
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 CELLS = 2_000_000  # numbers of matches held at once
@@ -54,12 +54,12 @@ def weighted_hota(pairs: Pairs, size: int, by_level: bool = True) -> WeightedSco
     level = np.searchsorted(ALPHAS - EPS, s, side="right")  # number of thresholds, the lowest, at which a match counts
     used, link = np.unique(link[chosen], return_inverse=True)
     true_id, est_id = true_id[used], est_id[used]
-    true_rows = BinSums(pairs.true.frame, pairs.true_ids[1], len(pairs.true_ids[0]), size)
-    est_rows = BinSums(pairs.est.frame, pairs.est_ids[1], len(pairs.est_ids[0]), size)
-    met, near = BinSums(frame, link * bins + level, len(used) * bins, size), FrameSums(size)
-    totals = _reached(np.bincount(level, weights=s, minlength=bins).astype(float)).tolist()
-    for k, total in enumerate(totals, 1):  # the sums of similarity at each threshold
-        near.add(str(k), frame, np.where(level >= k, s, 0.0), total if by_level else None)
+    true_rows = bin_sums(pairs.true.frame, pairs.true_ids[1], len(pairs.true_ids[0]), size)
+    est_rows = bin_sums(pairs.est.frame, pairs.est_ids[1], len(pairs.est_ids[0]), size)
+    met = bin_sums(frame, link * bins + level, len(used) * bins, size)
+    # The sums of similarity at each threshold.
+    near = np.column_stack([np.bincount(frame, np.where(level >= k, s, 0.0), size) for k in range(1, bins)])
+    total = _reached(np.bincount(level, weights=s, minlength=bins).astype(float))
 
     def score(weights: Array) -> dict[str, Array]:
         rows = max(1, CELLS // max(1, len(used) * bins))
@@ -67,9 +67,9 @@ def weighted_hota(pairs: Pairs, size: int, by_level: bool = True) -> WeightedSco
         return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]} if parts else {}
 
     def of_part(weights: Array) -> dict[str, Array]:
-        n, m = true_rows.of(weights), est_rows.of(weights)
-        together = _reached(met.of(weights).reshape(len(weights), len(used), bins))
-        similar = np.column_stack(list(near.of(weights).values()))
+        n, m = true_rows(weights), est_rows(weights)
+        together = _reached(met(weights).reshape(len(weights), len(used), bins))
+        similar = total + (weights - 1) @ near if by_level else weights @ near
         return _scores(together, similar, n[:, true_id], m[:, est_id], n.sum(axis=1), m.sum(axis=1))
 
     return score
@@ -129,30 +129,20 @@ def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
     order = np.argsort(who, kind="stable")
     who, by, frame = who[order], near.est_ids[1][near.j][order], near.frame[order]
     same, when = who[1:] == who[:-1], turn[frame]
-    sums = FrameSums(size)
-    sums.add("true", pairs.true.frame)
-    sums.add("est", pairs.est.frame)
-    sums.add("TP", near.frame)
-    sums.add("similarity", near.frame, near.s, float(near.s.sum()))
-    sums.add("IDSW", frame[1:][same & (by[1:] != by[:-1])])
-    sums.add("Frag", frame[1:][same & (when[1:] > when[:-1] + 1)])  # matched again after a pause
+    scores = FrameScores(size)
+    n, m, hits = (scores.column(frames) for frames in (pairs.true.frame, pairs.est.frame, near.frame))
+    switches = scores.column(frame[1:][same & (by[1:] != by[:-1])])
+    pauses = scores.column(frame[1:][same & (when[1:] > when[:-1] + 1)])  # matched again after a pause
+    scores.add_ratio("MOTA", hits - (m - hits) - switches, n, 0.0)
+    scores.add_ratio("MOTP", scores.column(near.frame, near.s), hits, 0.0, float(near.s.sum()))
+    for key, column in {"TP": hits, "FN": n - hits, "FP": m - hits, "IDSW": switches, "Frag": pauses}.items():
+        scores.add(key, column)
     who = pairs.true_ids[1]
     part = 1 / np.bincount(who)[who]
     kinds = {"MT": share > MOSTLY, "PT": (share >= LOST) & (share <= MOSTLY), "ML": share < LOST}
     for key, inside in kinds.items():
-        sums.add(key, pairs.true.frame, part * inside[who], float(inside.sum()))
-
-    def score(weights: Array) -> dict[str, Array]:
-        s = sums.of(weights)
-        n, m, hits = s["true"], s["est"], s["TP"]
-        quality = ratio(hits - (m - hits) - s["IDSW"], n, 0.0)
-        return {
-            "MOTA": np.where(m > 0, quality, 0.0), "MOTP": ratio(s["similarity"], hits, 0.0),
-            "TP": hits, "FN": n - hits, "FP": m - hits,
-            **{key: s[key] for key in ("IDSW", "MT", "PT", "ML", "Frag")},
-        }  # fmt: skip
-
-    return score
+        scores.add(key, scores.column(pairs.true.frame, part * inside[who]), float(inside.sum()))
+    return scores
 
 
 def clear_matches(pairs: Pairs) -> Pairs:
@@ -204,10 +194,8 @@ def weighted_identity(pairs: Pairs, size: int) -> WeightedScores:
     """Returns the weighted IDF1, IDP, IDR and IDTP; ids are assigned anew for each draw of weights."""
     near = pairs.s >= FOUND
     true_id, est_id, link = pairs.links
-    common = BinSums(pairs.frame[near], link[near], len(true_id), size)
-    sums = FrameSums(size)
-    sums.add("true", pairs.true.frame)
-    sums.add("est", pairs.est.frame)
+    common = bin_sums(pairs.frame[near], link[near], len(true_id), size)
+    true, est = (np.bincount(rows.frame, minlength=size).astype(float) for rows in (pairs.true, pairs.est))
 
     def assigned(frames: Array) -> float:
         some = frames > 0
@@ -215,8 +203,7 @@ def weighted_identity(pairs: Pairs, size: int) -> WeightedScores:
         return float(weight[match(np.zeros_like(i), i, j, weight)].sum())
 
     def score(weights: Array) -> dict[str, Array]:
-        s, found = sums.of(weights), np.array([assigned(frames) for frames in common.of(weights)])
-        n, m = s["true"], s["est"]
+        n, m, found = weights @ true, weights @ est, np.array([assigned(frames) for frames in common(weights)])
         return {
             "IDF1": ratio(2 * found, n + m, 0.0), "IDP": ratio(found, m, 0.0), "IDR": ratio(found, n, 0.0),
             "IDTP": found,

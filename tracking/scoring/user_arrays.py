@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scenarios.limits import COORDINATE, DETECTIONS, FRAME_RATES, FRAMES, is_number
-from sim.types import Bools, GroupEvent, Groups, Ints, Plane, Tracks, Truth
+from sim.types import GroupEvent, Groups, Ints, Plane, Tracks, Truth
 from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.scoring.annotated_frames import annotated_frames
 from tracking.scoring.evaluation import Scores, evaluate
@@ -23,10 +23,15 @@ from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.misreading import likely_misreading
 from tracking.scoring.people_comparison import Similarity
 
-COLUMNS = {"frame": (), "id": (), "pos": (2,), "box": (4,), "group": ()}  # name: shape of one row
+# By the name of a column: shape of one row; least and greatest value, as in files. One number in a row is a whole one.
+COLUMNS: dict[str, tuple[tuple[int, ...], float, float]] = {
+    "frame": ((), 1, FRAMES),
+    "id": ((), 0, 2**53),
+    "pos": ((2,), -COORDINATE, COORDINATE),
+    "box": ((4,), -COORDINATE, COORDINATE),
+    "group": ((), -1, 2**53),
+}
 PERSON_HEIGHT = 1.7  # m: assumed height of the median box
-RANGES = {"frame": (1, FRAMES), "id": (0, 2**53), "group": (-1, 2**53), "pos": (-COORDINATE, COORDINATE)}
-RANGES |= {"box": RANGES["pos"]}  # Least and greatest value of a column, as in files.
 MEMORY = 10.0  # s: groups and events depend on what was there at most that long before
 
 Table = dict[str, Any]
@@ -111,33 +116,23 @@ def _table(columns: Mapping[str, ArrayLike], side: str) -> Table:
 
 
 def _column(given: ArrayLike, name: str, side: str) -> Any:
-    values, shape = np.asarray(given), COLUMNS[name]
-    values = values if values.size else values.reshape(0, *shape)
-    if values.shape[1:] != shape or values.ndim == 0:
-        expected = ("rows", *shape)
-        raise ValueError(f"{side}: got {name} of shape {values.shape}, expected ({', '.join(map(str, expected))})")
-    if values.size and values.dtype.kind not in "iuf":
-        first = values.ravel().tolist()[0]
-        remedy = "" if shape else ": number them, as by np.unique(…, return_inverse=True)"
-        raise ValueError(f"{side}: got {first!r} in {name}, expected {'' if shape else 'whole '}numbers{remedy}")
-    if not np.isfinite(values).all():
-        raise ValueError(f"{side}: got a {name} that is not finite, expected numbers")
-    _require_range(values, name, side)
-    if shape:
-        return values.astype(float)
-    if not np.array_equal(values, values.astype(np.int64)):
-        raise ValueError(f"{side}: got a {name} that is not whole, expected whole numbers")
-    return values.astype(np.int64)
-
-
-def _require_range(values: Any, name: str, side: str) -> None:
-    low, high = RANGES[name]
-    outside = values[(values < low) | (values > high)]
-    if outside.size:
-        words = f"from 1 on, to {FRAMES:,}" if name == "frame" else f"from {low:g} to {high:,}"
-        raise ValueError(f"{side}: got {outside[0]} in {name}, expected numbers {words}")
-    if name == "box" and (values[:, 2:] <= 0).any():
-        raise ValueError(f"{side}: got a box without area, expected width and height above 0")
+    values, (shape, low, high) = np.asarray(given), COLUMNS[name]
+    values = values if values.size else values.reshape(0, *shape).astype(float)
+    whole = "" if shape else "whole "
+    if values.ndim == 0 or values.shape[1:] != shape:
+        got, expected = f"{name} of shape {values.shape}", str(("rows", *shape)).replace("'", "")
+    elif values.dtype.kind not in "iuf":
+        got, remedy = f"{values.ravel().tolist()[0]!r} in {name}", "" if shape else ": number them, as by np.unique"
+        expected = f"{whole}numbers{remedy}"
+    else:
+        good = (values >= low) & (values <= high) & (shape != () or values == np.floor(values))
+        if name == "box":
+            good[:, 2:] &= values[:, 2:] > 0
+        if good.all():
+            return values.astype(float if shape else np.int64)
+        area = ", boxes with width and height above 0" if name == "box" else ""
+        got, expected = f"{values[~good][0]} in {name}", f"{whole}numbers from {low:g} to {high:,}{area}"
+    raise ValueError(f"{side}: got {got}, expected {expected}")
 
 
 def _scale(box: Any) -> float:
@@ -183,16 +178,11 @@ def _in_frames(tracks: Tracks, known: Ints, fps: float) -> Tracks:
 
 def _live_frames(frame: Ints, length: int, fps: float) -> Ints:
     """Returns the frames with rows, those up to 10 s after each, 1 and `length`: the others decide nothing."""
-    if not length:
-        return np.zeros(0, np.int64)
-    live: Bools = np.zeros(length + 1, bool)
-    live[[1, length]] = True
-    occupied = np.unique(frame)
-    reach = int(np.ceil(MEMORY * fps))
-    step = np.zeros(length + 2, np.int64)
-    np.add.at(step, occupied, 1)
-    np.add.at(step, np.minimum(occupied + reach + 1, length + 1), -1)
-    return np.flatnonzero(live | (np.cumsum(step)[: length + 1] > 0))
+    rows = np.cumsum(np.bincount(frame, minlength=length + 1))
+    reach = int(np.ceil(MEMORY * fps)) + 1
+    live = rows > np.concatenate([np.zeros(reach), rows])[: length + 1]
+    live[[1, length] if length else []] = True
+    return np.flatnonzero(live)
 
 
 def _truth(table: Table, length: int, fps: float, px_per_m: float, plane: Plane) -> Truth:

@@ -24,13 +24,14 @@ Departure: people who are missed, and tracks mapped to nobody, are parts of thei
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from functools import partial
 
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.scoring.candidate_pairs import FOUND, compare
-from tracking.scoring.events import HEADLINE, MatchedEvents, same_lineage
+from tracking.scoring.candidate_pairs import FOUND, Pairs, compare
+from tracking.scoring.events import HEADLINE, ComparableEvent, MatchedEvents, same_lineage
 from tracking.scoring.group_and_event_scores import (
     ComparedSides,
     TrackedGroups,
@@ -40,10 +41,9 @@ from tracking.scoring.group_and_event_scores import (
     unknown_kinds,
 )
 from tracking.scoring.group_scores import (
-    GroupComparison,
+    CORRECT,
     GroupMatch,
     SharedMembers,
-    correct,
     group_of_person,
     groups_found,
     hull_pairs,
@@ -55,25 +55,10 @@ from tracking.scoring.group_scores import (
 from tracking.scoring.people_and_groups import GroupRows, PersonRows, TrueGroups
 from tracking.scoring.rows import FrameRows
 from tracking.scoring.track_scores import weighted_hota
-from tracking.scoring.weighted_sums import FrameSums, WeightedScores, mean, mean_of_known, ratio
+from tracking.scoring.weighted_sums import F1_AND_PARTS, FrameScores, WeightedScores, mean_of_known, ratio
 
 # Numerator and denominator of T, by the name of the scores; integers avoid rounding.
 TOLERANCES = {"right_groups": (2, 3), "exact_groups": (1, 1)}
-
-
-def weighted_detection(
-    sides: ComparedSides, true: GroupRows, tracked: TrackedGroups, shared: SharedMembers
-) -> list[WeightedScores]:
-    """Returns the weighted F1, precision and recall of G-MITRE, and of the groups right at T = 2/3 and T = 1."""
-    size, est = len(sides.frames), tracked.counted
-    n, m = (np.bincount(groups.rows.frame, minlength=size) for groups in (true, est))
-    parts = []
-    if tracked.named:
-        parts.append(_means_over_frames("GMITRE", sides.frames, link_counts(sides, true, est), f1_of_means=False))
-    for name, tolerance in TOLERANCES.items():
-        hits = np.bincount(true.rows.frame[groups_right(true, est, shared, tolerance)], minlength=size)
-        parts.append(_means_over_frames(name, sides.frames, np.stack([n, m, hits]), f1_of_means=True))
-    return parts
 
 
 def link_counts(sides: ComparedSides, true: GroupRows, est: GroupRows) -> Array:
@@ -103,23 +88,6 @@ def groups_right(true: GroupRows, est: GroupRows, shared: SharedMembers, toleran
     right = np.zeros(len(true), bool)
     right[i[enough & pure]] = True
     return right
-
-
-def _means_over_frames(name: str, frames: Bools, counts: Array, f1_of_means: bool) -> WeightedScores:
-    n, m, hits = counts
-    sums, every = FrameSums(len(frames)), np.flatnonzero(frames)
-    for key, part, whole in (("F1", 2 * hits, n + m), ("precision", hits, m), ("recall", hits, n)):
-        sums.add_mean(key, every, ratio(part, whole, empty=1.0)[every])
-
-    def score(weights: Array) -> dict[str, Array]:
-        s = sums.of(weights)
-        found = {f"{name}_{key}": mean(s, key) for key in ("F1", "precision", "recall")}
-        if f1_of_means:
-            p, r = found[f"{name}_precision"], found[f"{name}_recall"]
-            found[f"{name}_F1"] = np.where(p + r > 0, ratio(2 * p * r, p + r), p + r)
-        return found
-
-    return score
 
 
 def pair_counts(true: GroupRows, est: GroupRows, person: Ints) -> Ints:
@@ -154,164 +122,132 @@ def _pairs_in(groups: GroupRows, size: int) -> Ints:
     return pairs
 
 
-def weighted_groups_and_events(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> WeightedScores:
-    """Returns the weighted scores of groups, membership, events and lineage, by the keys of the catalogue.
+def weighted_groups_and_events(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> list[WeightedScores]:
+    """Returns functions to the weighted scores of groups, membership, events and lineage, by key of the catalogue.
 
     by: matches groups by "hull" (IoU) or by "members" (Jaccard index). Core frames are more than 1 s away from every
     true merge and split. Keys are missing where the truth or the tracker lacks data.
     """
-    size, core = len(sides.frames), sides.frames & ~near_changes(sides.truth)
+    core = sides.frames & ~near_changes(sides.truth)
     tracked = tracked_groups(sides)
-    groups, est = true.groups, tracked.counted
+    groups, est, scores = true.groups, tracked.counted, FrameScores(len(core))
+    n, m = (scores.column(side.rows.frame, within=sides.frames) for side in (groups, est))
     shared = shared_members(groups, est, tracked.person, len(sides.true.rows))
     hulls = hull_pairs(groups, est) if true.comparable else None
     pairs = hulls if by == "hull" else member_pairs(groups, est, shared) if tracked.known else None
-    parts: list[WeightedScores] = []
+    parts: list[WeightedScores] = [scores]
     if tracked.known:
-        parts += [_pairwise(true, tracked, size), *weighted_detection(sides, groups, tracked, shared)]
+        parts += _add_membership(scores, sides, groups, tracked, shared)
         found = groups.rows.frame[groups_found(groups, est, shared)]
-        for frames, end in ((sides.frames, ""), (core, "_core")):
-            parts.append(_renamed(_detection(groups, est, found, frames), None, end))
+        scores.add_f1("group", n, m, scores.column(found, within=sides.frames))
+        scores.add_f1("group", n * core, m * core, scores.column(found, within=core), "_core")
     if hulls is not None:
         overlapping = matched_groups(groups.pos, est.pos, hulls, FOUND).frame
-        parts.append(_renamed(_detection(groups, est, overlapping, sides.frames), {"F1": "group_F1_hull"}))
+        scores.add_ratio("group_F1_hull", 2 * scores.column(overlapping, within=sides.frames), n + m)
     if pairs is not None:
-        compared = GroupComparison(groups, est, shared, pairs, matched_groups(groups.pos, est.pos, pairs))
+        chosen = matched_groups(groups.pos, est.pos, pairs)
         for frames, end in ((sides.frames, ""), (core, "_core")):
-            parts.append(_renamed(weighted_groups(compared, frames), None, end))
+            parts.append(_weighted_groups(groups, est, shared, chosen.keep(frames[chosen.frame]), frames, end))
+            parts.append(_group_hota(pairs.in_frames(frames), (n + m) * frames, end))
     if sides.truth.events is not None:
         matched, unknown = compared_events(sides, tracked), unknown_kinds(sides)
-        parts.append(weighted_events([m for m in matched if m.kind not in unknown], sides.truth.fps, size))
-    return lambda weights: {key: value for part in parts for key, value in part(weights).items()}
+        parts.append(weighted_events([m for m in matched if m.kind not in unknown], sides.truth.fps, len(core)))
+    return parts
 
 
-def _renamed(scores: WeightedScores, names: dict[str, str] | None, end: str = "") -> WeightedScores:
-    """Returns the same function with other keys: those of `names` only, or without names "group_<key><end>"."""
-
-    def renamed(weights: Array) -> dict[str, Array]:
-        found = scores(weights)
-        return {f"group_{k}{end}": v for k, v in found.items()} if names is None else {
-            new: found[old] for old, new in names.items()
-        }  # fmt: skip
-
-    return renamed
-
-
-def _pairwise(true: TrueGroups, tracked: TrackedGroups, size: int) -> WeightedScores:
-    counts = pair_counts(true.groups, tracked.counted, tracked.person)
-    sums = FrameSums(size)
-    for name, column in zip(("true", "est", "hits"), counts.T, strict=True):
-        sums.add(name, np.arange(len(counts)), column)
-
-    def score(weights: Array) -> dict[str, Array]:
-        return {f"pairwise_{key}": values for key, values in _f1_and_parts(sums.of(weights)).items()}
-
-    return score
+def _add_membership(
+    scores: FrameScores, sides: ComparedSides, true: GroupRows, tracked: TrackedGroups, shared: SharedMembers
+) -> list[WeightedScores]:
+    est = tracked.counted
+    pairs = pair_counts(true, est, tracked.person)
+    of_true, of_est, common = (scores.column(np.arange(len(pairs)), column) for column in pairs.T)
+    scores.add_f1("pairwise", of_true, of_est, common)
+    n, m = (scores.column(groups.rows.frame) for groups in (true, est))
+    parts: list[WeightedScores] = []
+    if tracked.named:
+        parts.append(_means_over_frames("GMITRE", sides.frames, link_counts(sides, true, est)))
+    for name, tolerance in TOLERANCES.items():
+        right = scores.column(true.rows.frame[groups_right(true, est, shared, tolerance)])
+        means = _means_over_frames(name, sides.frames, np.stack([n, m, right]))
+        means.add_further(partial(_f1_of_means, name))
+        parts.append(means)
+    return parts
 
 
-def _f1_and_parts(s: Mapping[str, Array]) -> dict[str, Array]:
-    return {
-        "F1": ratio(2 * s["hits"], s["true"] + s["est"]),
-        "precision": ratio(s["hits"], s["est"]),
-        "recall": ratio(s["hits"], s["true"]),
-    }
+def _means_over_frames(name: str, frames: Bools, counts: Array) -> FrameScores:
+    (n, m, hits), every, scores = counts, np.flatnonzero(frames), FrameScores(len(frames))
+    for key, part, whole in zip(F1_AND_PARTS, (2 * hits, hits, hits), (n + m, m, n), strict=True):
+        scores.add_mean(f"{name}_{key}", every, ratio(part, whole, empty=1.0)[every])
+    return scores
 
 
-def _detection(true: GroupRows, est: GroupRows, found: Ints, frames: Bools) -> WeightedScores:
-    sums = FrameSums(len(frames))
-    sums.add("true", _kept(true.rows.frame, frames))
-    sums.add("est", _kept(est.rows.frame, frames))
-    sums.add("hits", _kept(found, frames))
-
-    def score(weights: Array) -> dict[str, Array]:
-        return _f1_and_parts(sums.of(weights))
-
-    return score
+def _f1_of_means(name: str, means: dict[str, Array], _: object) -> dict[str, Array]:
+    p, r = means[f"{name}_precision"], means[f"{name}_recall"]
+    return {f"{name}_F1": np.where(p + r > 0, ratio(2 * p * r, p + r), p + r)}
 
 
-def _kept(frame: Ints, frames: Bools) -> Ints:
-    return frame[frames[frame]]
-
-
-def weighted_groups(compared: GroupComparison, frames: Bools) -> WeightedScores:
-    """Returns the weighted scores of groups over the frames f where frames[f] is true, by key without "group_"."""
-    true, est, sums = compared.true, compared.est, _sums_of_groups(compared, frames)
-    hota = weighted_hota(compared.pairs.in_frames(frames), len(frames), by_level=False)
-    groups = bool(frames[true.rows.frame].any() or frames[est.rows.frame].any())
-
-    def score(weights: Array) -> dict[str, Array]:
-        s = sums.of(weights)
-        n, m, hits = s["true"], s["est"], s["TP"]
-        misses, false = n - hits, m - hits
-        nothing = n + m == 0
-        return {
-            "1-FP": ratio(n - false, n),
-            "1-FN": ratio(n - misses, n),
-            "GDSR": ratio(s["right"], n),
-            "GDSR2": ratio(s["pure"], n),
-            "MOTP": mean(s, "MOTP"), "MSE": mean(s, "MSE"),
-            "MOTA": ratio(n - misses - false - s["IDSW"], n),
-            "IDSW": s["IDSW"], "TP": hits, "FP": false, "FN": misses,
-            **({key: np.where(nothing, np.nan, v) for key, v in hota(weights).items()} if groups else {}),
-        }  # fmt: skip
-
-    return score
-
-
-def _sums_of_groups(compared: GroupComparison, frames: Bools) -> FrameSums:
-    true, est, chosen = compared.true, compared.est, compared.chosen
-    kept = frames[chosen.frame]
-    i, j, frame = chosen.i[kept], chosen.j[kept], chosen.frame[kept]
-    size, sums, every = len(frames), FrameSums(len(frames)), np.flatnonzero(frames)
-    n, m, hits = (np.bincount(f, minlength=size)[every] for f in (true.rows.frame, est.rows.frame, frame))
+def _weighted_groups(
+    true: GroupRows, est: GroupRows, shared: SharedMembers, chosen: Pairs, frames: Bools, end: str
+) -> WeightedScores:
+    i, j, frame, (part, whole), scores = chosen.i, chosen.j, chosen.frame, CORRECT, FrameScores(len(frames))
     distance = np.hypot(*(true.pos[i] - est.pos[j]).T)
-    sums.add_mean("MOTP", frame, distance)
-    sums.add_mean("MSE", frame, distance**2)
-    for name, count in (("true", n), ("est", m), ("TP", hits)):
-        sums.add(name, every, count)
-    for name, good in zip(("right", "pure"), correct(compared, i, j), strict=True):
-        sums.add(name, frame[good])
-    sums.add("IDSW", switch_frames(frame, true.rows.id[i], est.rows.id[j]))
-    return sums
+    scores.add_mean(f"group_MOTP{end}", frame, distance)
+    scores.add_mean(f"group_MSE{end}", frame, distance**2)
+    common = shared.of(i, j)
+    right = whole * common >= part * true.count[i]
+    pure = right & (whole * common >= part * est.count[j])
+    n, m = (scores.column(rows.frame, within=frames) for rows in (true.rows, est.rows))
+    hits, switches = scores.column(frame), scores.column(switch_frames(frame, true.rows.id[i], est.rows.id[j]))
+    false = m - hits
+    ratios = {
+        "1-FP": n - false, "1-FN": hits, "MOTA": hits - false - switches,
+        "GDSR": scores.column(frame[right]), "GDSR2": scores.column(frame[pure]),
+    }  # fmt: skip
+    for key, column in ratios.items():
+        scores.add_ratio(f"group_{key}{end}", column, n)
+    for key, column in {"TP": hits, "FP": false, "FN": n - hits, "IDSW": switches}.items():
+        scores.add(f"group_{key}{end}", column)
+    return scores
+
+
+def _group_hota(pairs: Pairs, rows: Array, end: str) -> WeightedScores:
+    hota = weighted_hota(pairs, len(rows), by_level=False)
+
+    def score(weights: Array) -> dict[str, Array]:
+        some = weights @ rows > 0
+        return {f"group_{key}{end}": np.where(some, values, np.nan) for key, values in hota(weights).items()}
+
+    return score
 
 
 def weighted_events(matched: Sequence[MatchedEvents], fps: float, size: int) -> WeightedScores:
     """Returns a function from weights (D, size) to the scores of events and lineage, (D,) by key."""
-    sums = FrameSums(size)
-    for m in matched:
-        _add_events(sums, m, fps)
+    scores = FrameScores(size)
+    right, with_lineage = np.zeros(size), np.zeros(size)
 
-    def score(weights: Array) -> dict[str, Array]:
-        s = sums.of(weights)
-        out: dict[str, Array] = {}
-        for kind in (m.kind for m in matched):
-            hits, false, missed = (s[f"{kind} {what}"] for what in ("TP", "FP", "FN"))
-            out |= {
-                f"{kind}_F1": ratio(2 * hits, 2 * hits + false + missed),
-                f"{kind}_precision": ratio(hits, hits + false),
-                f"{kind}_recall": ratio(hits, hits + missed),
-                f"{kind}_TP": hits, f"{kind}_FP": false, f"{kind}_FN": missed,
-                f"{kind}_latency": mean(s, f"{kind} latency"),
-            }  # fmt: skip
-        for name in ("F1", "precision", "recall"):
-            out[f"event_{name}"] = mean_of_known(np.column_stack([out[f"{kind}_{name}"] for kind in HEADLINE]))
-        late, known, right, with_lineage = (
-            np.sum([s[f"{kind} {what}"] for kind in HEADLINE], axis=0)
-            for what in ("latency", "latency known", "right", "lineage")
+    def starting(events: Iterable[ComparableEvent]) -> Array:
+        return scores.column(np.array([event.start for event in events], np.int64))
+
+    for kind, true, est, pairs in ((m.kind, m.true, m.est, m.pairs) for m in matched):
+        hit = {id(event) for pair in pairs for event in pair}
+        hits, false, missed = (
+            starting(events)
+            for events in ([a for a, _ in pairs], *([e for e in side if id(e) not in hit] for side in (est, true)))
         )
-        return out | {"event_latency": ratio(late, known), "lineage_accuracy": ratio(right, with_lineage)}
+        scores.add_f1(kind, hits + missed, hits + false, hits)
+        for key, column in {"TP": hits, "FP": false, "FN": missed}.items():
+            scores.add(f"{kind}_{key}", column)
+        late = [np.nan if b.emitted is None else (b.emitted - a.start) / fps for a, b in pairs]
+        scores.add_mean(f"{kind}_latency", np.array([a.start for a, _ in pairs], np.int64), np.array(late, float))
+        if kind in HEADLINE:
+            right += starting(a for a, b in pairs if same_lineage(a, b))
+            with_lineage += starting(a for a in true if a.has_lineage)
+    scores.add_ratio("lineage_accuracy", right, with_lineage)
+    scores.add_further(_of_merges_and_splits)
+    return scores
 
-    return score
 
-
-def _add_events(sums: FrameSums, events: MatchedEvents, fps: float) -> None:
-    kind, pairs = events.kind, events.pairs
-    hit = {id(event) for pair in pairs for event in pair}
-    start = np.array([a.start for a, _ in pairs], np.int64)
-    sums.add(f"{kind} TP", start)
-    for name, side in (("FN", events.true), ("FP", events.est)):
-        sums.add(f"{kind} {name}", np.array([e.start for e in side if id(e) not in hit], np.int64))
-    late = [np.nan if b.emitted is None else (b.emitted - a.start) / fps for a, b in pairs]
-    sums.add_mean(f"{kind} latency", start, np.array(late, float))
-    sums.add(f"{kind} lineage", np.array([a.start for a in events.true if a.has_lineage], np.int64))
-    sums.add(f"{kind} right", np.array([a.start for a, b in pairs if same_lineage(a, b)], np.int64))
+def _of_merges_and_splits(found: dict[str, Array], sums: dict[str, Array]) -> dict[str, Array]:
+    late, known = (np.sum([sums[f"{kind}_latency{of}"] for kind in HEADLINE], axis=0) for of in ("", " of"))
+    means = {name: np.column_stack([found[f"{kind}_{name}"] for kind in HEADLINE]) for name in F1_AND_PARTS}
+    return {f"event_{k}": mean_of_known(values) for k, values in means.items()} | {"event_latency": ratio(late, known)}

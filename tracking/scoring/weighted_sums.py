@@ -1,6 +1,7 @@
-"""Weighted sums over the frames of one recording, and ratios of them, for D draws of weights at once.
+"""Scores as functions of weights of the frames of one recording, for D draws of weights at once.
 
-Weights are arrays (D, size) by frame number from 0, size being the length of the recording + 1.
+Weights are arrays (D, size) by frame number from 0, size being the length of the recording + 1. Weights of 1 give the
+scores of the recording.
 """
 
 from __future__ import annotations
@@ -9,10 +10,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.types import Array, Ints
+from sim.types import Array, Bools, Ints
+
+F1_AND_PARTS = ("F1", "precision", "recall")
 
 # Takes weights (D, size) by frame number; returns scores (D,) by key.
 WeightedScores = Callable[[Array], dict[str, Array]]
+# Takes scores, and the weighted sums of their parts by key and of their denominators by "KEY of"; returns scores; (D,).
+MoreScores = Callable[[dict[str, Array], dict[str, Array]], dict[str, Array]]
 
 
 def unweighted(scores: WeightedScores, size: int) -> dict[str, float]:
@@ -20,41 +25,71 @@ def unweighted(scores: WeightedScores, size: int) -> dict[str, float]:
     return {key: float(value[0]) for key, value in scores(np.ones((1, size))).items()}
 
 
-class FrameSums:
-    """Named sums that are linear in the weights of the frames; State: by name, the part of each frame (size,)."""
+class FrameScores:
+    """Scores that are weighted sums over the frames, or ratios of two such sums; called with weights, as others are.
+
+    State: by key, columns (size,), the part of each frame in a sum, for ratios in order numerator and denominator, "KEY
+    of"; totals, where given; the values of ratios without a denominator; further, functions that make scores of others.
+    """
 
     def __init__(self, size: int) -> None:
         self._size = size
         self._columns: dict[str, Array] = {}
         self._totals: dict[str, float] = {}
+        self._empty: dict[str, float] = {}
+        self._further: list[MoreScores] = []
 
-    def add(self, name: str, frame: Ints, values: Array | Ints | None = None, total: float | None = None) -> None:
-        """Adds the sum `name` of K items: frame (K,), their frame numbers; values (K,), 1 each by default.
+    def column(self, frame: Ints, values: Array | Ints | None = None, within: Bools | None = None) -> Array:
+        """Returns the sums of K items by frame (size,).
+
+        frame (K,): their frame numbers; values (K,), 1 each by default; within (size,): the frames that count.
+        """
+        found = np.bincount(frame, weights=values, minlength=self._size).astype(float)
+        return found if within is None else np.where(within, found, 0.0)
+
+    def add(self, key: str, column: Array, total: float | None = None) -> None:
+        """Adds the sum of a column (size,).
 
         total: at weights of 1, where it is added up in another order; the last bit of a score depends on it.
         """
-        self._columns[name] = np.bincount(frame, weights=values, minlength=self._size).astype(float)
+        self._columns[key] = column
         if total is not None:
-            self._totals[name] = total
+            self._totals[key] = total
 
-    def add_mean(self, name: str, frame: Ints, values: Array, total: float | None = None) -> None:
-        """Adds what `mean` needs: the sum `name` of the finite values (K,), and their number."""
+    def add_ratio(
+        self, key: str, part: Array, whole: Array, empty: float = float("nan"), total: float | None = None
+    ) -> None:
+        """Adds the ratio of the sums of two columns (size,), `empty` where the second is 0; total: of the first."""
+        self.add(key, part, total)
+        self.add(f"{key} of", whole)
+        self._empty[key] = empty
+
+    def add_mean(self, key: str, frame: Ints, values: Array, total: float | None = None) -> None:
+        """Adds the mean of the finite values (K,) of items in the frames (K,), nan without one; total: their sum."""
         known = np.isfinite(values)
-        self.add(name, frame[known], values[known], total)
-        self.add(f"{name} known", frame[known])
+        self.add_ratio(key, self.column(frame[known], values[known]), self.column(frame[known]), total=total)
 
-    def of(self, weights: Array) -> dict[str, Array]:
-        """Returns the weighted sums (D,) by name; weights (D, size)."""
+    def add_f1(self, name: str, true: Array, est: Array, hits: Array, end: str = "") -> None:
+        """Adds name_F1, name_precision and name_recall with an ending; columns (size,) of both sides and the hits."""
+        for key, part, whole in zip(F1_AND_PARTS, (2 * hits, hits, hits), (true + est, est, true), strict=True):
+            self.add_ratio(f"{name}_{key}{end}", part, whole)
+
+    def add_further(self, scores: MoreScores) -> None:
+        """Adds scores that a function makes of the others."""
+        self._further.append(scores)
+
+    def __call__(self, weights: Array) -> dict[str, Array]:
+        """Returns the scores (D,) by key; weights (D, size)."""
         columns = np.column_stack(list(self._columns.values()))
-        found = dict(zip(self._columns, (weights @ columns).T, strict=True))
-        exact = [place for place, name in enumerate(self._columns) if name in self._totals]
+        sums = dict(zip(self._columns, (weights @ columns).T, strict=True))
+        exact = [place for place, key in enumerate(self._columns) if key in self._totals]
         changes = ((weights - 1) @ columns[:, exact]).T  # sum w x = total + sum (w - 1) x
-        return found | {n: total + d for (n, total), d in zip(self._totals.items(), changes, strict=True)}
-
-
-def mean(sums: dict[str, Array], name: str) -> Array:
-    """Returns the weighted means (D,) of the values given to `FrameSums.add_mean`, nan without a finite one."""
-    return ratio(sums[name], sums[f"{name} known"])
+        sums |= {key: total + d for (key, total), d in zip(self._totals.items(), changes, strict=True)}
+        found = {key: sums[key] for key in sums if not key.endswith(" of")}
+        found |= {key: ratio(sums[key], sums[f"{key} of"], empty) for key, empty in self._empty.items()}
+        for scores in self._further:
+            found |= scores(found, sums)
+        return found
 
 
 def ratio(part: Array, whole: Array, empty: float = float("nan")) -> Array:
@@ -68,14 +103,12 @@ def mean_of_known(values: Array) -> Array:
     return ratio(np.where(known, values, 0.0).sum(axis=1), known.sum(axis=1).astype(float))
 
 
-class BinSums:
-    """Numbers of items by bin (for example by id), weighted by their frames: items of each bin and frame, sparse."""
+def bin_sums(frame: Ints, bin: Ints, bins: int, size: int) -> Callable[[Array], Array]:
+    """Returns a function from weights (D, size) to the weighted numbers of items in bins, by id for example, (D, bins).
 
-    def __init__(self, frame: Ints, bin: Ints, bins: int, size: int) -> None:
-        from scipy.sparse import csr_array
+    frame, bin: of each item.
+    """
+    from scipy.sparse import csr_array
 
-        self._counts = csr_array((np.ones(len(frame)), (bin, frame)), shape=(bins, size))
-
-    def of(self, weights: Array) -> Array:
-        """Returns the weighted numbers of items, (D, bins); weights (D, size)."""
-        return np.asarray((self._counts @ weights.T).T)
+    counts = csr_array((np.ones(len(frame)), (bin, frame)), shape=(bins, size))
+    return lambda weights: np.asarray((counts @ weights.T).T)

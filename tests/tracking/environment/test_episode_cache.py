@@ -12,8 +12,8 @@ def test_it_is_bounded_and_drops_what_was_used_longest_ago():
     cache = SourceCache()
     for source in SOURCES[:2]:
         play("blob", source, cache=cache)
-    cache.limit = cache.bytes
     first = cache.open(SOURCES[0])
+    cache.limit = cache.bytes
     play("blob", SOURCES[2], cache=cache)
     assert cache.open(SOURCES[0]) is first
     before = len(cache)

@@ -14,7 +14,7 @@ from tracking.objective import ObjectiveScorer
 from tracking.scoring import evaluate, score_arrays
 from tracking.scoring.annotated_frames import annotated_frames
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import weighted_scorers
+from tracking.scoring.evaluation import Scorer
 
 LENGTH = 600
 
@@ -114,7 +114,7 @@ def test_sparse_labels_score_as_these_frames_of_both_sides(merge: tuple[Truth, t
     assert found["merge_F1"] == evaluate(dense, run)["merge_F1"]
     known = {key: found[key] for key in ("HOTA", "group_F1", "objective")}
     assert ObjectiveScorer(sparse).scores(run, float("nan")) == pytest.approx(known)
-    weighted = weighted_scorers(sparse, [run])[0](np.ones((1, dense.length)))[0]
+    weighted = Scorer(sparse).compare([run])[0].weighted_scores("hull")(np.ones((1, dense.length)))[0]
     assert dict(zip(CATALOGUE, weighted, strict=True)) == pytest.approx(dict(found), nan_ok=True)
 
 

@@ -11,7 +11,7 @@ from sim.io.source import open_source
 from sim.io.store.track_files import read_tracks
 from sim.types import Truth
 from tests.reference_trackeval import trackeval_files
-from tracking.scoring.evaluation import Scores, evaluate, weighted_scorers
+from tracking.scoring.evaluation import Scorer, Scores, evaluate
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 FRAMES = 12
@@ -58,8 +58,8 @@ def test_equal_to_trackeval(tmp_path: Path, name: str, seed: int) -> None:
     truth, found = ours(source, tracks)
     for key, value in expected.items():
         assert found[key] == pytest.approx(value, abs=1e-9), key
-    weighted = weighted_scorers(truth, [read_tracks(tracks, fps=10, length=FRAMES)])[0](np.ones((1, FRAMES)))[0]
-    assert weighted[list(found).index("MOTA")] == pytest.approx(expected["MOTA"], abs=1e-9)
+    weighted = Scorer(truth).compare([read_tracks(tracks, fps=10, length=FRAMES)])[0].weighted_scores("hull")
+    assert weighted(np.ones((1, FRAMES)))[0, list(found).index("MOTA")] == pytest.approx(expected["MOTA"], abs=1e-9)
 
 
 PERSON = [1, 1, 0, 0, 40, 100, 1, 1, 1]

@@ -16,15 +16,16 @@ from tests.hand_made import Scene, event, tracks, truth
 from tracking import track
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import weighted_scorers
-from tracking.scoring.weighted_sums import FrameSums
+from tracking.scoring.evaluation import Scorer
+from tracking.scoring.weighted_sums import FrameScores
 
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
 PAIR = {1: ((1, 2), None)}
 
 
-def scored(true, answers, weights, **options) -> dict[str, float]:
-    (row,) = weighted_scorers(true, [answers], **options)[0](np.array([weights], float))
+def scored(true, answers, weights, group_match="hull", frames=None) -> dict[str, float]:
+    (compared,) = Scorer(true).compare([answers], frames=frames)
+    (row,) = compared.weighted_scores(group_match)(np.array([weights], float))
     return dict(zip(CATALOGUE, row.tolist(), strict=True))
 
 
@@ -76,13 +77,12 @@ def test_no_weight_where_a_score_is_defined_makes_it_unknown() -> None:
 
 
 def test_a_stated_total_stands_at_weights_of_one_and_changes_with_them() -> None:
-    sums = FrameSums(3)
-    frame, values = np.array([1, 2, 2]), np.array([0.1, 0.2, 0.3])
-    sums.add("plain", frame, values)
-    sums.add("number", frame)
-    sums.add("exact", frame, values, 0.6)
-    found = sums.of(np.array([[1.0, 1.0, 1.0], [1.0, 2.0, 0.0], [0.0, 0.0, 0.5]]))
+    scores = FrameScores(3)
+    values = scores.column(np.array([1, 2, 2]), np.array([0.1, 0.2, 0.3]))
+    scores.add("plain", values)
+    scores.add_ratio("ratio", values, np.ones(3))
+    scores.add("exact", values, 0.6)
+    found = scores(np.array([[1.0, 1.0, 1.0], [1.0, 2.0, 0.0], [0.0, 0.0, 0.5]]))
     assert found["exact"][0] == 0.6 != 0.1 + 0.2 + 0.3
-    for name in ("plain", "exact"):
-        assert found[name] == pytest.approx([0.6, 0.2, 0.25])
-    assert found["number"].tolist() == [3, 2, 1]
+    assert np.stack([found["plain"], found["exact"]]) == pytest.approx(np.array([[0.6, 0.2, 0.25]] * 2))
+    assert found["ratio"] == pytest.approx([0.2, 0.2 / 3, 0.5])

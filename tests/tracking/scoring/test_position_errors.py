@@ -46,8 +46,8 @@ def one_frame(x: np.ndarray, y: np.ndarray, cutoff: float) -> Pairs:
 
 
 def gospa(pairs: Pairs, cutoff: float, frames: int, power: float = 2.0) -> dict[str, float]:
-    sums = {name: np.array([x]) for name, x in zip(PARTS, gospa_parts(pairs, cutoff, power).sum(axis=0), strict=True)}
-    return {key: float(v[0]) for key, v in gospa_of({**sums, "frames": np.array([float(frames)])}, power).items()}
+    means = zip(PARTS, gospa_parts(pairs, cutoff, power).sum(axis=0)[:, None] / frames, strict=True)
+    return {key: float(v[0]) for key, v in gospa_of(dict(means), power).items()}
 
 
 def by_all_assignments(x: np.ndarray, y: np.ndarray, cutoff: float, power: float) -> float:
