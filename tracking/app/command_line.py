@@ -42,7 +42,8 @@ def add_command(app: typer.Typer, name: str, options: type, run: Callable[[Any],
         return run(options(**values))
 
     types, keyword = get_type_hints(options), inspect.Parameter.KEYWORD_ONLY
-    parameters = [signature_parameter(f, keyword, Annotated[types[f.name], _declared(f)]) for f in fields(options)]
+    own_first = sorted(fields(options), key=lambda f: f.name not in inspect.get_annotations(options))
+    parameters = [signature_parameter(f, keyword, Annotated[types[f.name], _declared(f)]) for f in own_first]
     parameters.append(inspect.Parameter("json", keyword, default=False, annotation=JSON))
     made: Any = command
     made.__signature__, made.__doc__ = inspect.Signature(parameters), options.__doc__

@@ -1,13 +1,13 @@
-"""The options of each command as one frozen dataclass: every field is an option, with its type, default and help text.
+"""The options of each command as one class: every field is an option, with its type, default and help text.
 
-The docstring of a dataclass is the help text of its command."""
+The docstring of a class is the help text of its command. The help lists its own options first, then inherited ones."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Literal, dataclass_transform
 
 from tracking.keyword_options import option
 
@@ -23,13 +23,9 @@ SOURCE = partial(
 SIMILARITY = partial(option, "How true and tracked people are compared. Default: by the data.", None)
 TRACKS = partial(ARGUMENT, "Output of `track`, or MOT text.", None, metavar="TRACKS")
 FPS = partial(option, "Frames per second of a recording, in place of its own. Not for generated sequences.", None)
-SCALE = partial(option, "Pixels per metre of a recording without a camera.", None)
 PERSON_CLASS = partial(
     option, "Classes of people in MOT texts (column 8), tables and COCO results. Default: 1, or person, pedestrian.",
     None, metavar="A,B,…", flag="--class")
-BOX_SCALE = partial(
-    option, "Factor of the boxes in MOT texts, except labels, if they are not in pixels of the pictures.", None,
-    metavar="X|X,Y")
 CAMERA = partial(option, "Calibration: camera.json, Tsai's XML, or OpenCV's YAML of a pair.", None, metavar="FILE")
 SENSOR = partial(option, "Detector profile, as `fit sensor` writes it.", None, metavar="FILE.toml")
 WORKERS = partial(option, "Processes. On a cluster: the least number of tasks at a time.", 1, low=1)
@@ -44,15 +40,38 @@ IMAGES = partial(option, "Format of left, right and background pictures. Default
 GROUPING = partial(
     option, "What derives groups (default: belief), or a file of `tune grouping` or `fit grouping`.", None,
     metavar="rule|belief|FILE.toml")
-SEEDS = partial(option, "Seeds from A to B - 1, or one seed.", metavar="A:B")
-FIT_SEEDS = partial(option, "Seeds of the scenes to fit to.", "30000:30002", metavar="A:B")
-CHECK = partial(option, "Other seeds, to score the fit with.", None, metavar="A:B")
+SEEDS = partial(option, metavar="A:B")
+SEEDS_HELP = "Seeds from A to B - 1, or one seed."
 Images = Literal["jpg", "png", "mp4"] | None
+Detections = Literal["image", "truth", "file"] | None
 Similarity = Literal["boxes", "ground", "image"] | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class DemoOptions:
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+class Options:
+    """The options of a command; each subclass is made a frozen dataclass."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, kw_only=True)(cls)
+
+
+class RecordingOptions(Options):
+    """What a recording may lack."""
+
+    fps: float | None = FPS()
+    px_per_m: float | None = option("Pixels per metre of a recording without a camera.", None)
+
+
+class BoxOptions(RecordingOptions):
+    """How boxes are read."""
+
+    person_class: str | None = PERSON_CLASS()
+    box_scale: str | None = option(
+        "Factor of the boxes in MOT texts, except labels, if they are not in pixels of the pictures.", None,
+        metavar="X|X,Y")
+
+
+class DemoOptions(Options):
     """Generate scenes, track them, score the tracks and write a page with the results."""
 
     quick: bool = option(
@@ -60,8 +79,7 @@ class DemoOptions:
     out: Path = OUT(default=Path("flockscope-demo"))
 
 
-@dataclass(frozen=True, kw_only=True)
-class ScenariosOptions:
+class ScenariosOptions(Options):
     """List scenarios and suites, or explain one with a drawing."""
 
     name: str | None = ARGUMENT("Scenario, *.toml file or suite to explain.", None)
@@ -70,12 +88,11 @@ class ScenariosOptions:
     schema: bool = option("List every key of a scenario file.", False)
 
 
-@dataclass(frozen=True, kw_only=True)
-class GenerateOptions:
+class GenerateOptions(Options):
     """Simulate scenarios and store them as a dataset."""
 
     names: list[str] = NAMES()
-    seeds: str = SEEDS()
+    seeds: str = SEEDS(SEEDS_HELP)
     out: Path = OUT()
     settings: list[str] = SET()
     sensor: Path | None = SENSOR()
@@ -86,8 +103,7 @@ class GenerateOptions:
     cluster: str | None = CLUSTER()
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrackOptions:
+class TrackOptions(BoxOptions):
     """Run a tracker and store its tracks."""
 
     tracker: str = ARGUMENT("Name of a tracker, or file.py:Class, or module:Class.", metavar="TRACKER")
@@ -96,7 +112,7 @@ class TrackOptions:
     params: str | None = option(
         "The tracker's parameters: a file, or a preset such as paper.", None, metavar="FILE.toml|PRESET")
     settings: list[str] = SET()
-    detections: Literal["image", "truth", "file"] | None = option(
+    detections: Detections = option(
         "Detections that the tracker gets. Default: the first of image, file, truth that it and the source allow.",
         None)
     boxes: Path | None = option(
@@ -106,36 +122,26 @@ class TrackOptions:
     sensor: Path | None = SENSOR()
     grouping: Path | None = GROUPING()
     seed: int = option("The tracker's seed.", 0, low=0)
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
     background: str | None = option(
         "Frames a background model is trained on, or a picture of the empty place.", None,
         metavar="first:N|spread:N|PICTURE")
     step_timeout: float | None = STEP_TIMEOUT()
-    person_class: str | None = PERSON_CLASS()
-    box_scale: str | None = BOX_SCALE()
     min_score: float | None = option("Leave out boxes with a lower score, as it stands in their file.", None)
     workers: int = PROCESSES()
 
 
-@dataclass(frozen=True, kw_only=True)
-class GroupOptions:
+class GroupOptions(BoxOptions):
     """Find who belongs together, and what happened, for people whose ids are known."""
 
     source: Path = ARGUMENT("Labelled people, MOT text with ids, or output of `track`.", metavar="SOURCE|TRACKS")
     out: Path = OUT()
     grouping: Path | None = GROUPING()
     probabilities: bool = option("Store the probability that two people belong together.", False)
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
-    person_class: str | None = PERSON_CLASS()
-    box_scale: str | None = BOX_SCALE()
 
 
-@dataclass(frozen=True, kw_only=True)
-class ScoreOptions:
+class ScoreOptions(BoxOptions):
     """Score tracks against the truth."""
 
     truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
@@ -146,17 +152,10 @@ class ScoreOptions:
     blocks: int = option("Intervals for a single recording, by N draws of blocks of frames.", 0, low=0, metavar="N")
     by: str | None = option(
         "The score that ranks. Default: objective, or what all runs have of it.", None, metavar="SCORE")
-    all: bool = option("Show each sequence of a ranking, too.", False)
-    csv: Path | None = option("Write all scores of a ranking into this file.", None, metavar="FILE")
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
-    person_class: str | None = PERSON_CLASS()
-    box_scale: str | None = BOX_SCALE()
     workers: int = PROCESSES()
 
 
-@dataclass(frozen=True, kw_only=True)
-class StressOptions:
+class StressOptions(Options):
     """Play trackers on scenes that get harder, and find where they break, or the scenes in which one is worst."""
 
     trackers: list[str] = ARGUMENT("Trackers to compare: names, file.py:Class or module:Class.", metavar="TRACKER…")
@@ -164,7 +163,7 @@ class StressOptions:
         "Axis: a name such as detection, or a key of scenarios with its ends. Twice: a matrix.", [],
         metavar="NAME|KEY=EASY:HARD", flag="--vary")
     suite: list[str] = option("Scenario or suite. Can be given several times.", metavar="NAME", flag="--suite")
-    seeds: str = option("Seeds that may be played, from A to B - 1.", "20000:20020", metavar="A:B")
+    seeds: str = SEEDS("Seeds that may be played, from A to B - 1.", "20000:20020")
     out: Path = OUT()
     search: int | None = option(
         "Search N scenes, between the ends of all axes, for those in which the first tracker is worst.", None, low=1,
@@ -175,7 +174,7 @@ class StressOptions:
     start: int = option("Seeds that are played at first.", 4, low=2, metavar="N")
     episodes: int | None = option("Stop after about so many episodes.", None, low=1, metavar="N")
     minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
-    detections: Literal["image", "truth", "file"] | None = option(
+    detections: Detections = option(
         "Input of the trackers. Default: file, if they can.", None)
     settings: list[str] = SET()
     sensor: Path | None = SENSOR()
@@ -184,8 +183,7 @@ class StressOptions:
     cluster: str | None = CLUSTER()
 
 
-@dataclass(frozen=True, kw_only=True)
-class MinimizeOptions:
+class MinimizeOptions(Options):
     """Find the smallest scene in which a tracker still fails, by taking out whatever can be."""
 
     source: str = ARGUMENT("Output of `track` on a generated sequence; or the sequence, a scenario, a *.toml file.",
@@ -204,23 +202,17 @@ class MinimizeOptions:
     workers: int = option("Processes that play episodes.", 1, low=1)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ErrorsOptions:
+class ErrorsOptions(BoxOptions):
     """List what went wrong in a run: each error with its frames, people, cause and cost, and a sum by cause."""
 
     truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
     tracks: Path = ARGUMENT("Output of `track`, or MOT text.", metavar="TRACKS")
     limit: int = option("Number of errors to show, the dearest first; --json has all.", 20, low=0, metavar="N")
     similarity: Similarity = SIMILARITY()
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
-    person_class: str | None = PERSON_CLASS()
-    box_scale: str | None = BOX_SCALE()
     workers: int = PROCESSES()
 
 
-@dataclass(frozen=True, kw_only=True)
-class CompareOptions:
+class CompareOptions(Options):
     """Compare stored scores with those of a baseline. Exit code 1 if a score is surely worse."""
 
     baseline: Path = ARGUMENT("Scores of `score --json`, or of --save.", metavar="BASELINE.json")
@@ -231,16 +223,14 @@ class CompareOptions:
     save: Path | None = option("Write the compared scores of NOW, as the next baseline.", None, metavar="FILE.json")
 
 
-@dataclass(frozen=True, kw_only=True)
-class ReplayCommandOptions:
+class ReplayCommandOptions(Options):
     """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
 
     source: Path = SOURCE()
     out: Path = OUT()
     camera: Path | None = option(
         "Tables [camera], [sensor], [light], [picture]; each may be absent.", None, metavar="FILE.toml")
-    seeds: str = option(
-        "Seeds of bodies, looks and sensor. For real recordings from 20000 on.", "20000", metavar="A:B")
+    seeds: str = SEEDS("Seeds of bodies, looks and sensor. For real recordings from 20000 on.", "20000")
     start: float = option("Second at which to begin.", 0.0, low=0.0, metavar="S")
     duration: float | None = option("Seconds to replay. Default: up to the end.", None, metavar="S")
     settings: list[str] = SET()
@@ -252,8 +242,7 @@ class ReplayCommandOptions:
         "Calibration of a recording that has boxes only: camera.json or Tsai's XML.", None, metavar="FILE")
 
 
-@dataclass(frozen=True, kw_only=True)
-class ViewOptions:
+class ViewOptions(RecordingOptions):
     """Write a page that replays a sequence in the browser: truth, tracks, and pictures if it has any.
 
     For several sequences also a report on the tracks; two trackers on one sequence are shown beside each other."""
@@ -266,14 +255,11 @@ class ViewOptions:
         "Pictures inside the page, beside it as FILE.view.mp4, or none. auto: beside from 12 MB on.", "auto")
     by: str | None = option(
         "The score that ranks in a report. Default: objective, or what all runs have of it.", None, metavar="SCORE")
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
     workers: int = PROCESSES()
 
 
-@dataclass(frozen=True, kw_only=True)
-class SheetOptions:
+class SheetOptions(Options):
     """Write a contact sheet: several frames of a sequence in one picture, with the truth or, if given, the tracks."""
 
     source: Path = SOURCE()
@@ -283,8 +269,7 @@ class SheetOptions:
     fps: float | None = FPS()
 
 
-@dataclass(frozen=True, kw_only=True)
-class OverlayOptions:
+class OverlayOptions(RecordingOptions):
     """Write a video with boxes, ids, trails, groups and events drawn over the pictures."""
 
     source: Path = SOURCE()
@@ -292,20 +277,16 @@ class OverlayOptions:
     out: Path = FILE("Video to write; for several sequences, a folder.", metavar="FILE.mp4")
     truth: Literal["over"] | None = option(
         "Draw the truth over the same picture. Without TRACKS it is drawn alone.", None)
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
 
 
-@dataclass(frozen=True, kw_only=True)
-class ValidateOptions:
+class ValidateOptions(Options):
     """Check that a dataset or stored tracks are complete, unaltered and consistent."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset, or stored tracks.", metavar="DIR")
 
 
-@dataclass(frozen=True, kw_only=True)
-class CocoOptions:
+class CocoOptions(Options):
     """Write COCO files, one per split, with track and group ids and masks."""
 
     folder: Path = ARGUMENT("A sequence or dataset with labelled boxes.", metavar="DIR")
@@ -313,16 +294,14 @@ class CocoOptions:
     person_class: str | None = PERSON_CLASS()
 
 
-@dataclass(frozen=True, kw_only=True)
-class KittiOptions:
+class KittiOptions(Options):
     """Write stereo pairs, disparities and calibrations as in KITTI."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset with stereo pairs.", metavar="DIR")
     out: Path = OUT()
 
 
-@dataclass(frozen=True, kw_only=True)
-class WebdatasetOptions:
+class WebdatasetOptions(Options):
     """Write tar shards for streaming, in the format of the library webdataset."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset.", metavar="DIR")
@@ -330,8 +309,7 @@ class WebdatasetOptions:
     shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrajnetOptions:
+class TrajnetOptions(Options):
     """Write the positions of people, of tracks or of labels, as TrajNet++ (*.ndjson)."""
 
     source: Path = ARGUMENT("Output of `track` or `group`, or labelled people.", metavar="RUN|SOURCE")
@@ -339,12 +317,10 @@ class TrajnetOptions:
     fps: float | None = FPS()
 
 
-@dataclass(frozen=True, kw_only=True)
 class PedpyOptions(TrajnetOptions):
     """Write the positions of people, of tracks or of labels, as a text of PedPy and JuPedSim."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class CsvOptions(TrajnetOptions):
     """Write tables of people, groups, members, events and counts per minute as CSV, of tracks or of labels."""
 
@@ -353,13 +329,11 @@ class CsvOptions(TrajnetOptions):
         "Count who is in a polygon. Can be given several times.", [], metavar="NAME=X1,Y1,X2,Y2,X3,Y3,…")
 
 
-@dataclass(frozen=True, kw_only=True)
 class ParquetOptions(CsvOptions):
     """Write tables of people, groups, members, events and counts per minute as Parquet, of tracks or of labels."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class FitSensorOptions:
+class FitSensorOptions(Options):
     """Measure the errors of a detector, so that simulated detections have the same errors."""
 
     sources: list[Path] = ARGUMENT("Recordings with gt and det, pooled.", metavar="SOURCE…")
@@ -367,36 +341,30 @@ class FitSensorOptions:
     fps: float | None = FPS()
 
 
-@dataclass(frozen=True, kw_only=True)
-class FitGroupingOptions:
-    """Fit the belief of who belongs together to simulated scenes."""
-
-    names: list[str] = NAMES()
-    out: Path = TOML("File to write, for --grouping.")
-    seeds: str = FIT_SEEDS()
-    events: list[str] = option(
-        "Fit the log-odds of events to this scenario or suite. Can be given several times. Default: the NAMEs.", [],
-        metavar="NAME", flag="--events")
-    check: str | None = CHECK()
-
-
-@dataclass(frozen=True, kw_only=True)
-class FitJointOptions:
+class FitJointOptions(Options):
     """Learn the merges and splits of the tracker joint from simulated truth."""
 
     names: list[str] = NAMES()
     out: Path = TOML("File to write: parameters of joint, for --params.")
-    seeds: str = FIT_SEEDS()
-    check: str | None = CHECK()
+    seeds: str = SEEDS("Seeds of the scenes to fit to.", "30000:30002")
+    check: str | None = option("Other seeds, to score the fit with.", None, metavar="A:B")
 
 
-@dataclass(frozen=True, kw_only=True)
-class FitRelationalOptions:
+class FitGroupingOptions(FitJointOptions):
+    """Fit the belief of who belongs together to simulated scenes."""
+
+    out: Path = TOML("File to write, for --grouping.")
+    events: list[str] = option(
+        "Fit the log-odds of events to this scenario or suite. Can be given several times. Default: the NAMEs.", [],
+        metavar="NAME", flag="--events")
+
+
+class FitRelationalOptions(Options):
     """Learn the speed table and the relations of the tracker relational from simulated truth."""
 
     names: list[str] = NAMES()
     out: Path = TOML("File to write: parameters of relational, for --params.")
-    seeds: str = SEEDS(default="30000:30004")
+    seeds: str = SEEDS(SEEDS_HELP, "30000:30004")
     observed: bool = option(
         "Learn the speed table and the noise of positions from detections of successive frames, as the paper does; "
         "no relations.", False)

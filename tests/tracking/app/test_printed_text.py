@@ -74,7 +74,7 @@ def broken_name(tmp_path_factory) -> Path:
 
 LINES_WITH_NAMES = [
     "track blob {0}/data --detections file --out {1}", "score {0}/data {0}/tracks",
-    "score {0}/data {0}/tracks {0}/tracks/. --all", "fit sensor {0}/data --out {1}/sensor.toml",
+    "score {0}/data {0}/tracks {0}/tracks/.", "fit sensor {0}/data --out {1}/sensor.toml",
     "view {0}/data --video none --out {1}", "sheet {0}/data --out {1}", "validate {0}/tracks",
 ]  # fmt: skip
 

@@ -22,7 +22,7 @@ from sim.io.files.atomic import write_file
 from sim.io.files.tables import json_document, read_json
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import checked_key, new_table, with_title
+from tracking.app.commands.score_tables import checked_key, table
 from tracking.app.option_parsing import output_file
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import paired
@@ -127,9 +127,10 @@ def _verdict(mean: float, low: float, high: float, tolerance: float) -> str:
 
 
 def _table(rows: list[dict[str, Any]], sequences: int) -> Any:
-    table = new_table(["score"], ["baseline", "now", "difference", "95 % interval"], ["verdict"])
+    cells = []
     for row in rows:
         ends = f"{row['low']:+.4f} to {row['high']:+.4f}"
         numbers = f"{row['baseline']:.4f}", f"{row['now']:.4f}", f"{row['difference']:+.4f}", ends
-        table.add_row(row["score"], *numbers, row["verdict"])
-    return with_title(f"{counted(sequences, 'sequence')}, paired", table)
+        cells.append([row["score"], *numbers, row["verdict"]])
+    columns = ["baseline", "now", "difference", "95 % interval"]
+    return table(f"{counted(sequences, 'sequence')}, paired", ["score"], columns, cells, ["verdict"])

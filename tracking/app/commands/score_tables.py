@@ -65,7 +65,7 @@ def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), 
     people = _any_known(PEOPLE[1:], means)
     titles = TABLES if people else GROUP_TRACKER_TABLES
     known = {title: keys for title, keys in titles.items() if _any_known(keys, means)}
-    parts = [_table(title, keys, rows, means) for title, keys in known.items()]
+    parts = [_family(title, keys, rows, means) for title, keys in known.items()]
     lines = [LOWER, detections, *_comparison_lines(rows, people, "groups, strict" in known)]
     if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
         lines.append("intervals by weights of blocks of frames")
@@ -78,15 +78,12 @@ def _any_known(keys: Sequence[str], means: Means) -> bool:
     return any(math.isfinite(means[key]["mean"]) for key in keys)
 
 
-def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> Any:
-    table = new_table(["sequence"], [_heading(key, rows) for key in keys])
-    for row in rows:
-        table.add_row(printable(row.sequence), *(number(key, row.scores[key]) for key in keys))
+def _family(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> Any:
+    shown = [[row.sequence, *(number(key, row.scores[key]) for key in keys)] for row in rows]
     if any(math.isfinite(means[key]["low"]) for key in keys):
         for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high"))[len(rows) == 1 :]:
-            cells = (number(key, means[key][part], mean=True) for key in keys)
-            table.add_row(name, *cells, style="bold" if part == "mean" else None)
-    return with_title(title, table)
+            shown.append([name, *(number(key, means[key][part], mean=True) for key in keys)])
+    return table(title, ["sequence"], [_heading(key, rows) for key in keys], shown)
 
 
 def _heading(key: str, rows: Sequence[SequenceScores]) -> str:
@@ -106,26 +103,33 @@ def checked_key(key: str, better: Sequence[str] = ("higher", "lower")) -> str:
     return key
 
 
-def new_table(words: Iterable[str] = (), numbers: Iterable[str] = (), more: Iterable[str] = ()) -> Any:
-    """Returns a table of rich without frame and rows: columns of words, then of numbers, then of words again."""
-    from rich.table import Table
+def table(
+    title: str,
+    words: Iterable[str],
+    numbers: Iterable[str],
+    rows: Iterable[Sequence[str]],
+    more: Iterable[str] = (),
+    foot: str = "",
+) -> Any:
+    """Returns, for rich to print, a title, a table without frame, and a foot.
 
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in words:
-        table.add_column(name, overflow="fold")
-    for name in numbers:
-        table.add_column(name, justify="right", no_wrap=True)
-    for name in more:
-        table.add_column(name, overflow="fold")
-    return table
-
-
-def with_title(title: str, table: Any, foot: str = "") -> Any:
-    """Returns, for rich to print, the title, not wrapped to the table's width, the table and the foot."""
+    words, numbers, more: names of its columns, of words, then of numbers, then of words again; rows: their cells.
+    """
     from rich.console import Group
+    from rich.table import Table
     from rich.text import Text
 
-    return Group(Text(title, style="italic"), table, *([foot] if foot else []), "")
+    made = Table(box=None, pad_edge=False, header_style="bold")
+    for name in words:
+        made.add_column(printable(name), overflow="fold")
+    for name in numbers:
+        made.add_column(printable(name), justify="right", no_wrap=True)
+    for name in more:
+        made.add_column(name, overflow="fold")
+    for cells in rows:
+        made.add_row(*map(printable, cells))
+    heading = [Text(printable(title), style="italic")] if title else []
+    return Group(*heading, made, *([foot] if foot else []), "")
 
 
 def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) -> list[str]:

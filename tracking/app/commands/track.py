@@ -15,6 +15,7 @@ from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.commands.group import LASTING, groups_of, lasting
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.app.stored_tracks import run_folders
@@ -154,12 +155,14 @@ def _check_modes(
 
 
 def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:
-    ids, groups = ({int(k) for tracks in run for k in getattr(tracks, name)} for name in ("id", "group"))
-    count = {"tracks": len(ids), "groups": len(groups - {-1})}
+    groups = groups_of(run, run.info["fps"])
+    tracks = len({id for t in run for id in t.id.tolist()})
+    count = {"tracks": tracks, "groups": len(groups), "lasting_groups": lasting(groups)}
     return {**{key: run.info[key] for key in ROW_KEYS}, **count, "folder": folder}
 
 
 def _line(row: dict[str, Any]) -> str:
     speed = f"{row['frames_per_second']:.0f} frames/s ({row['whole_frames_per_second']:.0f} with reading)"
     counts = ", ".join(counted(row[f"{name}s"], name) for name in ("frame", "track", "group"))
+    counts += f" ({row['lasting_groups']} of {LASTING:g} s or longer)" if row["groups"] else ""
     return printable(f"{row['sequence']}: {counts}, detections {input_summary(row)}, {speed} → {row['folder']}")

@@ -15,9 +15,8 @@ from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_ranking import run_names, stored_runs
 from tracking.app.commands.score_tables import checked_key
-from tracking.app.commands.scored_sequence import ScoringJob, read_runs
+from tracking.app.commands.scored_sequence import ScoringJob, read_runs, run_names, stored_runs
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import OpenedAs
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
@@ -82,7 +81,9 @@ def _pages(
     from tracking.app.report.moments import shown_errors
 
     words = [*names] if len(names) > 1 else [""] * len(names)
-    runs = dict(zip((s.name for s in sequences), zip(*stored_runs(names, sequences), strict=True), strict=False))
+    runs = dict(
+        zip((s.name for s in sequences), zip(*stored_runs(names.values(), sequences), strict=True), strict=False)
+    )
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
         given = read_runs(sequence, ScoringJob(runs.get(sequence.name, ())))

@@ -11,9 +11,9 @@ import numpy as np
 
 from scenarios.errors import counted
 from sim.types import Sequence
-from tracking.app.commands.score_ranking import RankedRuns, rank_words, ranked_runs, stored_runs, verdict
+from tracking.app.commands.score_ranking import RankedRuns, rank_words, ranked_runs, verdict
 from tracking.app.commands.score_tables import SIMILARITY
-from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, read_runs, score_runs
+from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, read_runs, score_runs, stored_runs
 from tracking.app.replay_page.page import Run
 from tracking.app.report.content import HeatCell, HeatMap, RankedRow, Report
 from tracking.app.report.moments import COSTS, Candidate, cause_bars, moments, shown_errors
@@ -34,7 +34,7 @@ def judged_runs(
     names: Mapping[str, str], sequences: list[Sequence], source: OpenedAs, workers: int
 ) -> list[JudgedRuns]:
     """Returns scores and errors of runs, by name the text of the command line: stored tracks or a tracker class."""
-    runs = stored_runs(names, sequences)
+    runs = stored_runs(names.values(), sequences)
     jobs = [ScoringJob(sources, oracles=True) for sources in zip(*runs, strict=True)]
     return results_over_sequences("report", _judge, sequences, jobs, source, workers)
 
@@ -47,7 +47,7 @@ def report_of_runs(
     files: Mapping[str, str],
 ) -> Report:
     """Returns the report on runs; files: by sequence, the address of its page."""
-    ranked = ranked_runs(list(names), sequences, [one.scored for one in found], by, [])
+    ranked = ranked_runs(list(names), sequences, [one.scored for one in found], by)
     candidates = list(_candidates(ranked))
 
     def replayed(one: Candidate) -> tuple[Sequence, Run, Run | None]:
