@@ -47,12 +47,21 @@ Detections = Literal["image", "truth", "file"] | None
 Similarity = Literal["boxes", "ground", "image"] | None
 
 
+# By the words of a command: its options, and the function that takes them, by its module in `commands/`.
+COMMANDS: dict[str, tuple[type, str]] = {}
+
+
 @dataclass_transform(kw_only_default=True, frozen_default=True)
 class Options:
-    """The options of a command; each subclass is made a frozen dataclass."""
+    """The options of a command; each subclass is made a frozen dataclass.
 
-    def __init_subclass__(cls) -> None:
+    words: of the command; run: the function that takes the options, by its module in `commands/`.
+    """
+
+    def __init_subclass__(cls, words: str = "", run: str = "") -> None:
         dataclass(frozen=True, kw_only=True)(cls)
+        if words:
+            COMMANDS[words] = cls, run or f"{words}:{words}"
 
 
 class RecordingOptions(Options):
@@ -71,7 +80,7 @@ class BoxOptions(RecordingOptions):
         metavar="X|X,Y")
 
 
-class DemoOptions(Options):
+class DemoOptions(Options, words="demo"):
     """Generate scenes, track them, score the tracks and write a page with the results."""
 
     quick: bool = option(
@@ -79,7 +88,7 @@ class DemoOptions(Options):
     out: Path = OUT(default=Path("flockscope-demo"))
 
 
-class ScenariosOptions(Options):
+class ScenariosOptions(Options, words="scenarios"):
     """List scenarios and suites, or explain one with a drawing."""
 
     name: str | None = ARGUMENT("Scenario, *.toml file or suite to explain.", None)
@@ -88,7 +97,7 @@ class ScenariosOptions(Options):
     schema: bool = option("List every key of a scenario file.", False)
 
 
-class GenerateOptions(Options):
+class GenerateOptions(Options, words="generate", run="datasets:generate"):
     """Simulate scenarios and store them as a dataset."""
 
     names: list[str] = NAMES()
@@ -103,7 +112,7 @@ class GenerateOptions(Options):
     cluster: str | None = CLUSTER()
 
 
-class TrackOptions(BoxOptions):
+class TrackOptions(BoxOptions, words="track"):
     """Run a tracker and store its tracks."""
 
     tracker: str = ARGUMENT("Name of a tracker, or file.py:Class, or module:Class.", metavar="TRACKER")
@@ -131,7 +140,7 @@ class TrackOptions(BoxOptions):
     workers: int = PROCESSES()
 
 
-class GroupOptions(BoxOptions):
+class GroupOptions(BoxOptions, words="group"):
     """Find who belongs together, and what happened, for people whose ids are known."""
 
     source: Path = ARGUMENT("Labelled people, MOT text with ids, or output of `track`.", metavar="SOURCE|TRACKS")
@@ -141,7 +150,7 @@ class GroupOptions(BoxOptions):
     camera: Path | None = CAMERA()
 
 
-class ScoreOptions(BoxOptions):
+class ScoreOptions(BoxOptions, words="score"):
     """Score tracks against the truth."""
 
     truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
@@ -155,7 +164,7 @@ class ScoreOptions(BoxOptions):
     workers: int = PROCESSES()
 
 
-class StressOptions(Options):
+class StressOptions(Options, words="stress"):
     """Play trackers on scenes that get harder, and find where they break, or the scenes in which one is worst."""
 
     trackers: list[str] = ARGUMENT("Trackers to compare: names, file.py:Class or module:Class.", metavar="TRACKER…")
@@ -183,7 +192,7 @@ class StressOptions(Options):
     cluster: str | None = CLUSTER()
 
 
-class MinimizeOptions(Options):
+class MinimizeOptions(Options, words="minimize"):
     """Find the smallest scene in which a tracker still fails, by taking out whatever can be."""
 
     source: str = ARGUMENT("Output of `track` on a generated sequence; or the sequence, a scenario, a *.toml file.",
@@ -202,7 +211,7 @@ class MinimizeOptions(Options):
     workers: int = option("Processes that play episodes.", 1, low=1)
 
 
-class ErrorsOptions(BoxOptions):
+class ErrorsOptions(BoxOptions, words="errors"):
     """List what went wrong in a run: each error with its frames, people, cause and cost, and a sum by cause."""
 
     truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
@@ -212,7 +221,7 @@ class ErrorsOptions(BoxOptions):
     workers: int = PROCESSES()
 
 
-class CompareOptions(Options):
+class CompareOptions(Options, words="compare"):
     """Compare stored scores with those of a baseline. Exit code 1 if a score is surely worse."""
 
     baseline: Path = ARGUMENT("Scores of `score --json`, or of --save.", metavar="BASELINE.json")
@@ -223,7 +232,7 @@ class CompareOptions(Options):
     save: Path | None = option("Write the compared scores of NOW, as the next baseline.", None, metavar="FILE.json")
 
 
-class ReplayCommandOptions(Options):
+class ReplayCommandOptions(Options, words="replay", run="datasets:replay"):
     """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
 
     source: Path = SOURCE()
@@ -242,7 +251,7 @@ class ReplayCommandOptions(Options):
         "Calibration of a recording that has boxes only: camera.json or Tsai's XML.", None, metavar="FILE")
 
 
-class ViewOptions(RecordingOptions):
+class ViewOptions(RecordingOptions, words="view"):
     """Write a page that replays a sequence in the browser: truth, tracks, and pictures if it has any.
 
     For several sequences also a report on the tracks; two trackers on one sequence are shown beside each other."""
@@ -259,7 +268,7 @@ class ViewOptions(RecordingOptions):
     workers: int = PROCESSES()
 
 
-class SheetOptions(Options):
+class SheetOptions(Options, words="sheet", run="view:sheet"):
     """Write a contact sheet: several frames of a sequence in one picture, with the truth or, if given, the tracks."""
 
     source: Path = SOURCE()
@@ -269,7 +278,7 @@ class SheetOptions(Options):
     fps: float | None = FPS()
 
 
-class OverlayOptions(RecordingOptions):
+class OverlayOptions(RecordingOptions, words="overlay", run="view:overlay"):
     """Write a video with boxes, ids, trails, groups and events drawn over the pictures."""
 
     source: Path = SOURCE()
@@ -280,13 +289,13 @@ class OverlayOptions(RecordingOptions):
     camera: Path | None = CAMERA()
 
 
-class ValidateOptions(Options):
+class ValidateOptions(Options, words="validate", run="datasets:validate"):
     """Check that a dataset or stored tracks are complete, unaltered and consistent."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset, or stored tracks.", metavar="DIR")
 
 
-class CocoOptions(Options):
+class CocoOptions(Options, words="export coco", run="datasets:export_coco"):
     """Write COCO files, one per split, with track and group ids and masks."""
 
     folder: Path = ARGUMENT("A sequence or dataset with labelled boxes.", metavar="DIR")
@@ -294,14 +303,14 @@ class CocoOptions(Options):
     person_class: str | None = PERSON_CLASS()
 
 
-class KittiOptions(Options):
+class KittiOptions(Options, words="export kitti", run="datasets:export_kitti"):
     """Write stereo pairs, disparities and calibrations as in KITTI."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset with stereo pairs.", metavar="DIR")
     out: Path = OUT()
 
 
-class WebdatasetOptions(Options):
+class WebdatasetOptions(Options, words="export webdataset", run="datasets:export_webdataset"):
     """Write tar shards for streaming, in the format of the library webdataset."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset.", metavar="DIR")
@@ -309,7 +318,7 @@ class WebdatasetOptions(Options):
     shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
 
 
-class TrajnetOptions(Options):
+class TrajnetOptions(Options, words="export trajnet", run="tables:export_trajnet"):
     """Write the positions of people, of tracks or of labels, as TrajNet++ (*.ndjson)."""
 
     source: Path = ARGUMENT("Output of `track` or `group`, or labelled people.", metavar="RUN|SOURCE")
@@ -317,11 +326,11 @@ class TrajnetOptions(Options):
     fps: float | None = FPS()
 
 
-class PedpyOptions(TrajnetOptions):
+class PedpyOptions(TrajnetOptions, words="export pedpy", run="tables:export_pedpy"):
     """Write the positions of people, of tracks or of labels, as a text of PedPy and JuPedSim."""
 
 
-class CsvOptions(TrajnetOptions):
+class CsvOptions(TrajnetOptions, words="export csv", run="tables:export_csv"):
     """Write tables of people, groups, members, events and counts per minute as CSV, of tracks or of labels."""
 
     line: list[str] = option("Count who crosses a line. Can be given several times.", [], metavar="NAME=X1,Y1,X2,Y2")
@@ -329,11 +338,11 @@ class CsvOptions(TrajnetOptions):
         "Count who is in a polygon. Can be given several times.", [], metavar="NAME=X1,Y1,X2,Y2,X3,Y3,…")
 
 
-class ParquetOptions(CsvOptions):
+class ParquetOptions(CsvOptions, words="export parquet", run="tables:export_parquet"):
     """Write tables of people, groups, members, events and counts per minute as Parquet, of tracks or of labels."""
 
 
-class FitSensorOptions(Options):
+class FitSensorOptions(Options, words="fit sensor", run="fit:fit_sensor"):
     """Measure the errors of a detector, so that simulated detections have the same errors."""
 
     sources: list[Path] = ARGUMENT("Recordings with gt and det, pooled.", metavar="SOURCE…")
@@ -341,7 +350,7 @@ class FitSensorOptions(Options):
     fps: float | None = FPS()
 
 
-class FitJointOptions(Options):
+class FitJointOptions(Options, words="fit joint", run="fit:fit_joint"):
     """Learn the merges and splits of the tracker joint from simulated truth."""
 
     names: list[str] = NAMES()
@@ -350,7 +359,7 @@ class FitJointOptions(Options):
     check: str | None = option("Other seeds, to score the fit with.", None, metavar="A:B")
 
 
-class FitGroupingOptions(FitJointOptions):
+class FitGroupingOptions(FitJointOptions, words="fit grouping", run="fit:fit_grouping"):
     """Fit the belief of who belongs together to simulated scenes."""
 
     out: Path = TOML("File to write, for --grouping.")
@@ -359,7 +368,7 @@ class FitGroupingOptions(FitJointOptions):
         metavar="NAME", flag="--events")
 
 
-class FitRelationalOptions(Options):
+class FitRelationalOptions(Options, words="fit relational", run="fit:fit_relational"):
     """Learn the speed table and the relations of the tracker relational from simulated truth."""
 
     names: list[str] = NAMES()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -37,6 +37,12 @@ class OpenedAs:
     def open(self) -> list[Sequence]:
         """Returns the sequences of the source. Raises InputError as `open_source`."""
         return open_source(**asdict(self))
+
+
+def source_of(options: Any, path: Path, images: bool = False, without: str = "") -> OpenedAs:
+    """Returns a source with those options of a command that `open_source` has, too; without: one that means more."""
+    known = {f.name for f in fields(OpenedAs)} - {"path", "images", without}
+    return OpenedAs(path, images=images, **{name: value for name, value in vars(options).items() if name in known})
 
 
 @dataclass(frozen=True, eq=False)

@@ -120,7 +120,6 @@ OPTIONS = {
     "score {made}/data {made}/run {made}/run": "TRACKS: got … twice; expected each run once",
     "score {made}/data {made}/run {made}/run/scene-s40000 --by HOTAA": "--by: got HOTAA … such as HOTA",
     "score {made}/data {made}/run --by HOTA": "got --by; expected none for one run; leave it out",
-    "score {made}/data {made}/run --by HOTA": "got --by; expected none for one run; leave it out",
     "export coco {made}/data --out {tmp}/scene.toml": "--out: got … ends in .json",
     "replay {made}/data --out {tmp}/x --duration nan": "--duration: got nan; expected seconds above 0",
     "export csv {made}/data --out {tmp}/x --line a=nan,2,3,4": "--line: got 'a=nan,2,3,4'",

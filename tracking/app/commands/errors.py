@@ -10,7 +10,7 @@ from tracking.app.command_options import ErrorsOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import table
 from tracking.app.commands.scored_sequence import box_scale_of
-from tracking.app.sequence_workers import OpenedAs, results_over_sequences
+from tracking.app.sequence_workers import results_over_sequences, source_of
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.errors.found import RunErrors, errors_of_run, sums_by_cause
 from tracking.errors.repairs import SHOWN
@@ -22,7 +22,7 @@ Job = tuple[StoredTracks, Similarity | None, BoxScale | None]
 
 def errors(options: ErrorsOptions) -> CommandResult:
     """Lists the errors of every sequence of the truth."""
-    source = OpenedAs(options.truth, options.fps, options.px_per_m, images=False, person_class=options.person_class)
+    source = source_of(options, options.truth, without="box_scale")
     sequences = source.open()
     stored = [tracks for _, tracks in match_tracks(sequences, find_tracks(options.tracks))]
     box_scale = box_scale_of(options.box_scale, stored)

@@ -17,7 +17,6 @@ import numpy as np
 
 from scenarios.errors import InputError, counted, shortened
 from sim.io.formats.options import refuse_options
-from sim.io.source import open_source
 from sim.io.store.seal import reject_foreign
 from sim.types import EVENT_KINDS, Sequence
 from tracking.app import option_parsing
@@ -25,6 +24,7 @@ from tracking.app.command_options import GroupOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import table
 from tracking.app.progress import ProgressMeter
+from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import STATED, StoredTracks, find_tracks, holds_tracks, run_folders
 from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
@@ -174,10 +174,7 @@ def _opened(options: GroupOptions) -> tuple[list[Sequence], list[StoredTracks | 
 
 
 def _open(path: Path, options: GroupOptions) -> list[Sequence]:
-    sequences = open_source(
-        path, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=False,
-        person_class=options.person_class, box_scale=options.box_scale,
-    )  # fmt: skip
+    sequences = source_of(options, path).open()
     if options.box_scale is not None and any(s.source["kind"] != TEXT for s in sequences):
         raise InputError(
             file=path, place="--box-scale", got="a recording, whose labels are not scaled", expected="a text with ids",

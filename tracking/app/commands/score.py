@@ -24,7 +24,7 @@ from tracking.app.commands.scored_sequence import (
     score_sequence,
     stored_runs,
 )
-from tracking.app.sequence_workers import OpenedAs, results_over_sequences
+from tracking.app.sequence_workers import results_over_sequences, source_of
 from tracking.comparison import check_blocks
 from tracking.scoring.catalogue import ALL, CATALOGUE
 from tracking.scoring.evaluation import Scores
@@ -33,7 +33,7 @@ from tracking.stats import mean_interval
 
 def score(options: ScoreOptions, ranked: bool = False) -> CommandResult:
     """Scores every sequence of the truth with its tracks; ranks several runs, or with `ranked` also a single one."""
-    source = OpenedAs(options.truth, options.fps, options.px_per_m, images=False, person_class=options.person_class)
+    source = source_of(options, options.truth, without="box_scale")
     sequences, first = source.open(), options.tracks[0]
     check_blocks(options.blocks, len(sequences))
     ranked = ranked or len(options.tracks) > 1 or is_class(first)

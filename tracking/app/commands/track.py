@@ -17,7 +17,7 @@ from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.group import LASTING, groups_of, lasting
 from tracking.app.progress import ProgressMeter, total_frames
-from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.app.stored_tracks import run_folders
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
@@ -64,10 +64,7 @@ def track(options: TrackOptions) -> CommandResult:
     option_parsing.output_folder(options.out)
     needs = find(setup.tracker).needs
     pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
-    source = OpenedAs(
-        options.source, options.fps, options.px_per_m, options.camera, pictures, options.background,
-        options.person_class, options.box_scale, options.min_score, options.boxes,
-    )  # fmt: skip
+    source = source_of(options, options.source, pictures)
     sequences = source.open()
     folders = run_folders(sequences, options.source, options.out)
     rows = []

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError, counted
 from sim.io.files.own_files import output_paths, refuse_foreign_file
-from sim.io.source import open_source
 from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
@@ -18,11 +17,12 @@ from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import checked_key
 from tracking.app.commands.scored_sequence import ScoringJob, read_runs, run_names, stored_runs
 from tracking.app.progress import ProgressMeter, total_frames
-from tracking.app.sequence_workers import OpenedAs
-from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
+from tracking.app.sequence_workers import source_of
+from tracking.app.stored_tracks import find_tracks, match_tracks
 
 if TYPE_CHECKING:
     from tracking.errors.found import RunErrors
+    from tracking.running.run import TrackingRun
 
 INDEX = "index.html"  # the report in the folder of the pages
 
@@ -35,7 +35,8 @@ def view(options: ViewOptions) -> CommandResult:
     """Writes a replay page for each sequence, with its tracks if they are given, and a report on several sequences."""
     if options.by is not None:
         checked_key(options.by)
-    sequences, names = _open(options), run_names(options.tracks)
+    sequences = source_of(options, options.source, images=True).open()
+    names = run_names(options.tracks)
     if len(sequences) == 1:
         if len(names) > 2:
             raise InputError(
@@ -92,8 +93,7 @@ def _pages(
         first, other = shown[0] if shown else Run(), shown[1] if len(shown) > 1 else None
         write_page(sequence, first, path, video=page_video(sequence, path, options.video, step), other=other)
 
-    pictures = _picture_count(sequences) if options.video != "none" else 0
-    return _write_each("view", sequences, options.out, ".html", write, pictures)
+    return _write_each("view", sequences, options.out, ".html", write, by_picture=options.video != "none")
 
 
 def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str]) -> CommandResult:
@@ -104,8 +104,7 @@ def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str,
     index, pages = options.out / INDEX, CommandResult({"files": []})
     if len(names) == 1:
         _files(sequences, options.out, ".html")  # refuses files of others before anything is tracked
-    source = OpenedAs(options.source, options.fps, options.px_per_m, options.camera, images=False)
-    found = judged_runs(names, sequences, source, options.workers)
+    found = judged_runs(names, sequences, source_of(options, options.source), options.workers)
     if len(names) == 1:
         known = {sequence.name: one.errors[0] for sequence, one in zip(sequences, found, strict=True)}
         pages = _pages(options, sequences, names, known)
@@ -118,52 +117,47 @@ def sheet(options: SheetOptions) -> CommandResult:
     """Writes a contact sheet, several frames in one PNG, for each sequence. The result's data: "files", their paths."""
     from tracking.app.pictures.contact_sheet import write_sheet
 
-    sequences = open_source(options.source, fps=options.fps, images=True)
-    stored = _stored(sequences, options.tracks)
+    sequences = source_of(options, options.source, images=True).open()
+    read = _reader(sequences, options.tracks)
 
     def write(sequence: Sequence, path: Path, _: Step) -> None:
-        found = stored.get(sequence.name)
-        write_sheet(sequence, path, options.frames, None if found is None else found.read(sequence))
+        write_sheet(sequence, path, options.frames, read(sequence))
 
-    return _write_each("sheet", sequences, options.out, ".png", write, 0)
+    return _write_each("sheet", sequences, options.out, ".png", write, by_picture=False)
 
 
 def overlay(options: OverlayOptions) -> CommandResult:
     """Writes a video for each sequence with tracks, truth or both drawn over its pictures."""
     from tracking.app.pictures.overlay import write_overlay
 
-    sequences = _open(options)
-    stored = _stored(sequences, options.tracks)
+    sequences = source_of(options, options.source, images=True).open()
+    read = _reader(sequences, options.tracks)
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
-        found = stored.get(sequence.name)
-        write_overlay(sequence, None if found is None else found.read(sequence), path, options.truth, step)
+        write_overlay(sequence, read(sequence), path, options.truth, step)
 
-    return _write_each("overlay", sequences, options.out, ".mp4", write, _picture_count(sequences))
-
-
-def _stored(sequences: list[Sequence], tracks: Path | None) -> dict[str, StoredTracks]:
-    return {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
+    return _write_each("overlay", sequences, options.out, ".mp4", write)
 
 
-def _open(options: ViewOptions | OverlayOptions) -> list[Sequence]:
-    return open_source(
-        options.source, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=True
-    )  # fmt: skip
+def _reader(sequences: list[Sequence], tracks: Path | None) -> Callable[[Sequence], TrackingRun | None]:
+    """Returns a function that reads the tracks of a sequence; None without tracks."""
+    stored = {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
 
+    def read(sequence: Sequence) -> TrackingRun | None:
+        return stored[sequence.name].read(sequence) if stored else None
 
-def _picture_count(sequences: list[Sequence]) -> int | None:
-    return total_frames(sequence for sequence in sequences if sequence.has_images)
+    return read
 
 
 def _write_each(
-    what: str, sequences: list[Sequence], out: Path, suffix: str, write: Write, pictures: int | None
+    what: str, sequences: list[Sequence], out: Path, suffix: str, write: Write, by_picture: bool = True
 ) -> CommandResult:
     files = _files(sequences, out, suffix)
-    with ProgressMeter(what, len(files) if pictures == 0 else pictures) as meter:
+    with_pictures = [sequence for sequence in sequences if sequence.has_images and by_picture]
+    with ProgressMeter(what, total_frames(with_pictures) if with_pictures else len(files)) as meter:
         for sequence, path in zip(sequences, files, strict=True):
             write(sequence, path, meter.step)
-            if pictures == 0:
+            if not with_pictures:
                 meter.step(sequence.name)
     return CommandResult({"files": files}, "\n".join(map(str, files)))
 
