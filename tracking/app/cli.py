@@ -13,7 +13,6 @@ import typer
 from tracking.app.command_line import add_command, run_command
 from tracking.app.command_options import COMMANDS
 from tracking.app.command_result import INTERRUPTED
-from tracking.app.commands.tune import CommandLine
 
 GROUPS = {
     "export": "Convert a dataset, or tracks, to another format.",
@@ -33,7 +32,7 @@ def _declare() -> None:
     groups = {name: typer.Typer(rich_markup_mode=None, help=text) for name, text in GROUPS.items()}
     for name, group in groups.items():
         app.add_typer(group, name=name)
-    for words, (kind, target) in {**COMMANDS, "tune": (CommandLine, "tune:tune")}.items():
+    for words, (kind, target) in COMMANDS.items():
         family, _, name = words.rpartition(" ")
         add_command(groups.get(family, app), name, kind, target)
 

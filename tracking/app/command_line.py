@@ -10,6 +10,7 @@ import errno
 import inspect
 import io
 import os
+import re
 import sys
 import warnings
 from collections import Counter
@@ -29,6 +30,8 @@ from tracking.keyword_options import signature_parameter
 from tracking.running.user_code import recorded_interrupts
 
 HELP = {"-h", "--help", "--version"}
+# A folder's labels and detections are read alike: one warning is enough for both.
+SAME_TABLES = re.compile(r"(gt/gt|det/det)\.txt|\d+ rows")
 LONGEST_WARNING = 400  # Characters of a warning that are shown at most.
 JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
 
@@ -172,8 +175,9 @@ def _print_warnings_once() -> Callable[..., None]:
 
     def warn(message: Warning | str, *_: object) -> None:
         text = shortened(printable(" ".join(str(message).split())), LONGEST_WARNING)
-        if text not in printed:
+        key = SAME_TABLES.sub("", text)
+        if key not in printed:
             print(f"warning: {text}", file=sys.stderr)
-        printed.add(text)
+        printed.add(key)
 
     return warn

@@ -4,12 +4,13 @@ The docstring of a class is the help text of its command. The help lists its own
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import Literal, dataclass_transform
+from typing import Any, Literal, dataclass_transform
 
 from tracking.keyword_options import option
+from tracking.tuning.options import TuneOptions
 
 # fmt: off
 ARGUMENT = partial(option, flag="")
@@ -24,8 +25,8 @@ SIMILARITY = partial(option, "How true and tracked people are compared. Default:
 TRACKS = partial(ARGUMENT, "Output of `track`, or MOT text.", None, metavar="TRACKS")
 FPS = partial(option, "Frames per second of a recording, in place of its own. Not for generated sequences.", None)
 PERSON_CLASS = partial(
-    option, "Classes of people in MOT texts (column 8), tables and COCO results. Default: 1, or person, pedestrian.",
-    None, metavar="A,B,…", flag="--class")
+    option, "Classes of people in texts, tables and COCO results. Default: 1, or person, pedestrian.", None,
+    metavar="A,B,…", flag="--class")
 CAMERA = partial(option, "Calibration: camera.json, Tsai's XML, or OpenCV's YAML of a pair.", None, metavar="FILE")
 SENSOR = partial(option, "Detector profile, as `fit sensor` writes it.", None, metavar="FILE.toml")
 WORKERS = partial(option, "Processes. On a cluster: the least number of tasks at a time.", 1, low=1)
@@ -45,6 +46,16 @@ SEEDS_HELP = "Seeds from A to B - 1, or one seed."
 Images = Literal["jpg", "png", "mp4"] | None
 Detections = Literal["image", "truth", "file"] | None
 Similarity = Literal["boxes", "ground", "image"] | None
+
+
+TUNING = {f.name: f for f in fields(TuneOptions)}
+
+
+def tuned(name: str, default: Any = ..., flag: str | None = None) -> Any:
+    """Returns an option of `tracking.tune` as one of the command, with another default if it is given."""
+    f = TUNING[name]
+    more = {"metavar": f.metadata["metavar"], "flag": f"--{name}" if flag is None else flag}
+    return option(f.metadata["help"], f.default if default is ... else default, **more)
 
 
 # By the words of a command: its options, and the function that takes them, by its module in `commands/`.
@@ -122,11 +133,9 @@ class TrackOptions(BoxOptions, words="track"):
         "The tracker's parameters: a file, or a preset such as paper.", None, metavar="FILE.toml|PRESET")
     settings: list[str] = SET()
     detections: Detections = option(
-        "Detections that the tracker gets. Default: the first of image, file, truth that it and the source allow.",
-        None)
+        "Detections that the tracker gets. Default: the first of image, file, truth that can be.", None)
     boxes: Path | None = option(
-        "Boxes of a detector on the source's pictures: MOT text, table with named columns (frames or times), or COCO "
-        "results.", None,
+        "A detector's boxes on the pictures: MOT text, table with named columns (frames or times), COCO results.", None,
         metavar="FILE")
     sensor: Path | None = SENSOR()
     grouping: Path | None = GROUPING()
@@ -175,8 +184,7 @@ class StressOptions(Options, words="stress"):
     seeds: str = SEEDS("Seeds that may be played, from A to B - 1.", "20000:20020")
     out: Path = OUT()
     search: int | None = option(
-        "Search N scenes, between the ends of all axes, for those in which the first tracker is worst.", None, low=1,
-        metavar="N")
+        "Search N scenes between the ends of all axes for the worst of the first tracker.", None, low=1, metavar="N")
     by: str = option("The score.", "objective", metavar="SCORE")
     share: float = option(
         "A tracker breaks where its score falls to this share of its easy value.", 0.8, low=0.0, high=1.0)
@@ -230,6 +238,33 @@ class CompareOptions(Options, words="compare"):
         "Score to compare; can be given several times. Default: objective.", [], metavar="SCORE", flag="--by")
     tolerance: float = option("Difference that does not matter.", 0.01, low=0.0)
     save: Path | None = option("Write the compared scores of NOW, as the next baseline.", None, metavar="FILE.json")
+
+
+class TuneCommandOptions(Options, words="tune"):
+    """Search a tracker's parameters on simulated scenes; measure the gain on others."""
+
+    tracker: str = tuned("tracker", flag="")
+    suite: list[str] = tuned("suite")
+    trials: int = tuned("trials", MISSING)
+    seeds: str | None = tuned("seeds")
+    validation: str | None = tuned("validation")
+    test: str | None = tuned("test")
+    check: str | None = tuned("check", None)
+    objective: list[str] = tuned("objective", [])
+    detections: Detections = tuned("detections")
+    similarity: Similarity = tuned("similarity")
+    set: list[str] = SET()
+    sensor: Path | None = SENSOR()
+    only: str | None = tuned("only", None)
+    out: Path = tuned("out", MISSING)
+    storage: str | None = tuned("storage")
+    study: str | None = tuned("study")
+    workers: int = WORKERS()
+    cluster: str | None = CLUSTER()
+    step_timeout: float | None = STEP_TIMEOUT()
+    prune: float = tuned("prune")
+    finalists: int = tuned("finalists")
+    seed: int = tuned("seed")
 
 
 class ReplayCommandOptions(Options, words="replay", run="datasets:replay"):
@@ -375,6 +410,5 @@ class FitRelationalOptions(Options, words="fit relational", run="fit:fit_relatio
     out: Path = TOML("File to write: parameters of relational, for --params.")
     seeds: str = SEEDS(SEEDS_HELP, "30000:30004")
     observed: bool = option(
-        "Learn the speed table and the noise of positions from detections of successive frames, as the paper does; "
-        "no relations.", False)
+        "Learn speed table and noise of positions from successive detections, as the paper does; no relations.", False)
 # fmt: on

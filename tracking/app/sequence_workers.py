@@ -53,11 +53,8 @@ class _Task:
     job: Any
 
 
-@dataclass(frozen=True)
-class _Outcome:
-    value: Any = None
-    error: FlockscopeError | None = None
-    warnings: tuple[str, ...] = ()
+# The value of a task, or its error, and its warnings.
+_Outcome = tuple[Any, FlockscopeError | None, list[str]]
 
 
 def results_over_sequences(
@@ -94,25 +91,26 @@ def over_sequences(
     tasks = [_Task(source, k, function, job) for k, job in enumerate(jobs)]
 
     def lost(task: _Task, error: WorkError) -> _Outcome:
-        return _Outcome(error=error.replaced(place=sequences[task.index].name))
+        return None, error.replaced(place=sequences[task.index].name), []
 
     with start_workers(workers) as run:
-        for outcome in results_in_order(partial(run, on_loss=lost), _outcome, tasks):  # type: ignore[arg-type]
-            for text in outcome.warnings:
+        for value, error, texts in results_in_order(partial(run, on_loss=lost), _outcome, tasks):  # type: ignore[arg-type]
+            for text in texts:
                 warnings.warn(text, stacklevel=2)
-            if outcome.error is not None:
-                raise outcome.error
-            yield outcome.value
+            if error is not None:
+                raise error
+            yield value
 
 
 def _outcome(task: _Task) -> _Outcome:
+    value, error = None, None
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
         try:
-            value, error = task.function(_opened(task.source)[task.index], task.job), None
+            value = task.function(_opened(task.source)[task.index], task.job)
         except FlockscopeError as failure:
-            value, error = None, failure
-    return _Outcome(value, error, tuple(str(w.message) for w in caught if issubclass(w.category, UserWarning)))
+            error = failure
+    return value, error, [str(w.message) for w in caught if issubclass(w.category, UserWarning)]
 
 
 @cache

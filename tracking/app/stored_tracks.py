@@ -67,18 +67,14 @@ class StoredTracks:
         """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`."""
         fps, seal = self.info.get("fps"), self.folder / RUN
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
-            raise InputError(
-                file=seal, place="fps", got=f"tracks at {fps:g} fps", expected=f"{sequence.fps:g} fps",
-                remedy=f"track it again with --fps {sequence.fps:g}, or, if {fps:g} is the true rate, read the "
-                f"sequence with --fps {fps:g}, as `track` did",
-            )  # fmt: skip
+            remedy = f"read the sequence with --fps {fps:g}, as `track` did, or track it again"
+            expected = f"{sequence.fps:g} fps"
+            raise InputError(file=seal, place="fps", got=f"tracks at {fps:g} fps", expected=expected, remedy=remedy)
         tracked = self.info.get("truth_hash")
         if tracked is not None and tracked_hash(sequence) not in (None, tracked):
-            raise InputError(
-                file=seal, place="truth_hash", got=f"tracks of another {sequence.name}",
-                expected=f"those of {sequence.source.get('path', 'this sequence')}",
-                remedy=f"{AGAIN}: its labels, scenario or settings are others",
-            )  # fmt: skip
+            got, expected = f"tracks of another {sequence.name}", f"those of {sequence.source.get('path', 'this one')}"
+            remedy = f"{AGAIN}: its labels, scenario or settings are others"
+            raise InputError(file=seal, place="truth_hash", got=got, expected=expected, remedy=remedy)
         tracks = read_checked_tracks(
             self.path, fps=sequence.fps, length=sequence.length, person_class=sequence.source.get("class"),
             box_scale=box_scale,
@@ -130,10 +126,8 @@ def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[
         names = [sequences[0].name]
     elif count > 1:
         first, second, *_ = (each.path for each, own in zip(stored, names, strict=True) if own == name)
-        raise InputError(
-            file=second, got=f"tracks of {name} a second time", expected="one result for each sequence",
-            remedy=f"the first: {first}; give one run at a time",
-        )  # fmt: skip
+        got, remedy = f"tracks of {name} a second time", f"the first: {first}; give one run at a time"
+        raise InputError(file=second, got=got, expected="one result for each sequence", remedy=remedy)
     by_name = dict(zip(names, stored, strict=True))
     for sequence in sequences:
         if sequence.name not in by_name:
@@ -150,16 +144,9 @@ def _refuse_unmatched(sequence: Sequence, by_name: dict[str, StoredTracks]) -> N
     for each in stored:
         if not each.info:
             each.check()
-    folder, remedy = Path(sequence.source.get("path", "")), "track it first, or give the right folder"
-    text = stored[0].path / "tracks.txt"
-    if folder.name in by_name and (folder / "seqinfo.ini").is_file():
-        remedy = f"if they are its tracks, correct name={sequence.name} in {folder / 'seqinfo.ini'}"
-    elif len(stored) == 1 and stored[0].info.get("truth_hash") is None and text.is_file():
-        remedy += f"; if they are of the same frames, give {text}"
-    raise InputError(
-        file=stored[0].path.parent if len(stored) > 1 else stored[0].path,
-        got="tracks of " + ", ".join(sorted(by_name)[:5]), expected=f"tracks of {sequence.name}", remedy=remedy,
-    )  # fmt: skip
+    file, got = stored[0].path.parent if len(stored) > 1 else stored[0].path, ", ".join(sorted(by_name)[:5])
+    remedy = "track it first, or give the right folder; a text alone (tracks.txt) may have any name"
+    raise InputError(file=file, got=f"tracks of {got}", expected=f"tracks of {sequence.name}", remedy=remedy)
 
 
 def _refuse_mixture(runs: list[StoredTracks]) -> None:
@@ -170,10 +157,8 @@ def _refuse_mixture(runs: list[StoredTracks]) -> None:
                 f"{one.info.get('tracker')}{_settings_words(one, other)} in {one.path.name}"
                 for one, other in ((first, each), (each, first))
             )
-            raise InputError(
-                file=each.path.parent, got=got, expected="one tracker with one config",
-                remedy="keep one folder per run: track again with another --out, and score them apart",
-            )  # fmt: skip
+            remedy = "keep one folder per run: track again with another --out, and score them apart"
+            raise InputError(file=each.path.parent, got=got, expected="one tracker with one config", remedy=remedy)
 
 
 def _method(stored: StoredTracks) -> tuple[object, dict[str, Any]]:

@@ -72,11 +72,12 @@ def _require_same(options: CompareOptions, before: Stored, now: Stored) -> None:
     elif len(before) < FEWEST:
         place, got, expected, remedy = "too few", "1 sequence", f"at least {FEWEST}", "generate more seeds"
     else:
-        for name, key in product(before, HOW):
-            was, one = before[name].get(key), now[name].get(key)
-            if None not in (was, one) and was != one:
-                place, got, expected = f"{name}: {key}", repr(one), f"{was!r}, as in {options.baseline}"
-                remedy = "track and score the same sequences" if key == "truth" else "score both alike"
+        known = [(n, k) for n, k in product(before, HOW) if None not in (before[n].get(k), now[n].get(k))]
+        name, key = next(((n, k) for n, k in known if before[n][k] != now[n][k]), ("", ""))
+        if name:
+            place, got = f"{name}: {key}", repr(now[name][key])
+            expected = f"{before[name][key]!r}, as in {options.baseline}"
+            remedy = "track and score the same sequences" if key == "truth" else "score both alike"
     if place:
         raise InputError(file=options.now, place=place, got=got, expected=expected, remedy=remedy)
 

@@ -176,10 +176,8 @@ def _opened(options: GroupOptions) -> tuple[list[Sequence], list[StoredTracks | 
 def _open(path: Path, options: GroupOptions) -> list[Sequence]:
     sequences = source_of(options, path).open()
     if options.box_scale is not None and any(s.source["kind"] != TEXT for s in sequences):
-        raise InputError(
-            file=path, place="--box-scale", got="a recording, whose labels are not scaled", expected="a text with ids",
-            remedy="leave it out, or give the text itself",
-        )  # fmt: skip
+        got, remedy = "a recording, whose labels are not scaled", "leave it out, or give the text itself"
+        raise InputError(file=path, place="--box-scale", got=got, expected="a text with ids", remedy=remedy)
     return sequences
 
 
@@ -195,16 +193,12 @@ def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
 def _belief(grouping: Grouping) -> Belief:
     if isinstance(grouping, Belief):
         return grouping
-    raise InputError(
-        place="--probabilities", got="the baseline rule, which has none", expected="a grouping with probabilities",
-        remedy="leave --grouping out, or name a file of `fit grouping`",
-    )  # fmt: skip
+    expected, remedy = "a grouping with probabilities", "leave --grouping out, or name a file of `fit grouping`"
+    raise InputError(place="--probabilities", got="the baseline rule", expected=expected, remedy=remedy)
 
 
 def _refuse(folder: Path, tracks: StoredTracks | None) -> None:
     if tracks is not None and folder.resolve() in (tracks.path.resolve(), tracks.path.resolve().parent):
-        raise InputError(
-            file=folder, place="--out", got="the folder of the tracks themselves", expected="another folder",
-            remedy="choose another --out",
-        )  # fmt: skip
+        got, remedy = "the folder of the tracks themselves", "choose another --out"
+        raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=remedy)
     reject_foreign(folder)

@@ -119,10 +119,9 @@ def _sequence_of(run: Path) -> Path:
         for path in sorted(Path().glob(f"*/{pattern}")):
             if path.parent.name == info["sequence"] and read_manifest(path.parent)["truth_hash"] == info["truth_hash"]:
                 return path.parent
-    raise InputError(
-        file=run, got=f"tracks of {info['sequence']}, which is not below this folder", expected="a generated sequence",
-        remedy=f"give the sequence, too: flockscope minimize SEQUENCE RUN; {NO_RECORDING}",
-    )  # fmt: skip
+    got = f"tracks of {info['sequence']}, which is not below this folder"
+    remedy = f"give the sequence, too: flockscope minimize SEQUENCE RUN; {NO_RECORDING}"
+    raise InputError(file=run, got=got, expected="a generated sequence", remedy=remedy)
 
 
 def _tracked(source: Path, path: Path) -> Subject:

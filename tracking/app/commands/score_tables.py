@@ -96,10 +96,8 @@ def _heading(key: str, rows: Sequence[SequenceScores]) -> str:
 def checked_key(key: str, better: Sequence[str] = ("higher", "lower")) -> str:
     """Returns the key of a score that was given with --by. Raises InputError for another, or of another direction."""
     if key not in CATALOGUE or CATALOGUE[key].better not in better:
-        raise InputError(
-            place="--by", got=key, expected=f"a score of which {' or '.join(better)} is better, such as HOTA",
-            remedy="docs/reference/metrics.md lists them",
-        )  # fmt: skip
+        expected = f"a score of which {' or '.join(better)} is better, such as HOTA"
+        raise InputError(place="--by", got=key, expected=expected, remedy="docs/reference/metrics.md lists them")
     return key
 
 

@@ -84,10 +84,8 @@ def stored_runs(texts: Iterable[str], sequences: list[Sequence]) -> list[list[So
 def box_scale_of(text: str | None, sources: Iterable[Source]) -> BoxScale | None:
     """Returns the factors of --box-scale. Raises InputError if no source is a text of another program."""
     if text is not None and all(isinstance(source, str) or source.info for source in sources):
-        raise InputError(
-            place="--box-scale", got="runs of `flockscope track`", expected="a text of another program",
-            remedy="give --box-scale to `flockscope track`",
-        )  # fmt: skip
+        got, expected = "runs of `flockscope track`", "a text of another program"
+        raise InputError(place="--box-scale", got=got, expected=expected, remedy="give it to `flockscope track`")
     return None if text is None else parse_box_scale(text)
 
 

@@ -44,10 +44,8 @@ def _export(options: TrajnetOptions, form: Form, places: Places) -> CommandResul
     folders = run_folders([sequence for sequence, _ in jobs], options.source, options.out)
     for folder in folders:
         if is_run(folder) or is_sequence(folder):
-            raise InputError(
-                file=folder, place="--out", got="a folder of tracks or of a sequence", expected="another folder",
-                remedy="choose another --out",
-            )  # fmt: skip
+            got, remedy = "a folder of tracks or of a sequence", "choose another --out"
+            raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=remedy)
     rows, lines = [], []
     with ProgressMeter("export", len(jobs)) as meter:
         for (sequence, make), folder in zip(jobs, folders, strict=True):
@@ -69,10 +67,8 @@ def _of_runs(options: TrajnetOptions) -> list[Job]:
     for stored in find_tracks(options.source):
         stored.check()
         if not stored.info:
-            raise InputError(
-                file=stored.path, got="tracks of another program", expected="what `flockscope track` or `group` wrote",
-                remedy="give the text itself",
-            )  # fmt: skip
+            got, expected = "tracks of another program", "what `flockscope track` or `group` wrote"
+            raise InputError(file=stored.path, got=got, expected=expected, remedy="give the text itself")
         sequence = stored.sequence(options.fps)
         jobs.append((sequence, partial(_run, stored, sequence.fps)))
     return jobs
@@ -86,10 +82,9 @@ def _of_sequences(options: TrajnetOptions) -> list[Job]:
     sequences = open_source(options.source, fps=options.fps, images=False)
     for sequence in sequences:
         if sequence.load_truth is None:
-            raise InputError(
-                file=sequence.source.get("path", options.source), got="no labelled people",
-                expected="a run, or people with ids", remedy="`flockscope track` it, and give the --out of that",
-            )  # fmt: skip
+            file, expected = sequence.source.get("path", options.source), "a run, or people with ids"
+            remedy = "`flockscope track` it, and give the --out of that"
+            raise InputError(file=file, got="no labelled people", expected=expected, remedy=remedy)
     return [(sequence, partial(_truth, sequence)) for sequence in sequences]
 
 

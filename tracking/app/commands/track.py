@@ -17,7 +17,7 @@ from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.group import LASTING, groups_of, lasting
 from tracking.app.progress import ProgressMeter, total_frames
-from tracking.app.sequence_workers import over_sequences, source_of
+from tracking.app.sequence_workers import results_over_sequences, source_of
 from tracking.app.stored_tracks import run_folders
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
@@ -67,22 +67,20 @@ def track(options: TrackOptions) -> CommandResult:
     source = source_of(options, options.source, pictures)
     sequences = source.open()
     folders = run_folders(sequences, options.source, options.out)
-    rows = []
     with lock_folder(options.out):
         for folder in folders:
             reject_foreign(folder)
         _check_modes(setup, needs, sequences, options.background)
-        with setup.limited or nullcontext(), ProgressMeter("track", total_frames(sequences)) as meter:
-            if min(options.workers, len(sequences)) == 1:
-                for sequence, folder in zip(sequences, folders, strict=True):
-                    step = partial(_step, meter, sequence.name)
-                    rows.append(_track_sequence(setup, sequence, folder, step))
-            else:
-                given = pickle.dumps(options)  # a tracker class and its config cannot be pickled, their names can
-                jobs = [(given, folder) for folder in folders]
-                for row in over_sequences(_track_in_worker, sequences, jobs, source, options.workers):
-                    meter.step(row["sequence"], row["frames"])
-                    rows.append(row)
+        if min(options.workers, len(sequences)) > 1:
+            given = pickle.dumps(options)  # a tracker class and its config cannot be pickled, their names can
+            jobs = [(given, folder) for folder in folders]
+            rows = results_over_sequences("track", _track_in_worker, sequences, jobs, source, options.workers)
+        else:
+            with setup.limited or nullcontext(), ProgressMeter("track", total_frames(sequences)) as meter:
+                rows = [
+                    _track_sequence(setup, sequence, folder, partial(_step, meter, sequence.name))
+                    for sequence, folder in zip(sequences, folders, strict=True)
+                ]
     return CommandResult({"tracker": setup.tracker, "runs": rows}, "\n".join(map(_line, rows)))
 
 
@@ -134,12 +132,8 @@ def _config(tracker: str, params: str | None, settings: list[str]) -> Config | N
         return config.with_set(*settings)
     if params is None and not settings:
         return None
-    raise InputError(
-        place="--params" if params else f"--set {settings[0]}",
-        got=tracker,
-        expected="a tracker with parameters",
-        remedy="leave it out, or give the class a config_class (docs/guides/your-own-tracker.md)",
-    )
+    place, remedy = "--params" if params else f"--set {settings[0]}", "leave it out, or give the class a config_class"
+    raise InputError(place=place, got=tracker, expected="a tracker with parameters", remedy=remedy)
 
 
 def _check_modes(

@@ -39,18 +39,14 @@ def view(options: ViewOptions) -> CommandResult:
     names = run_names(options.tracks)
     if len(sequences) == 1:
         if len(names) > 2:
-            raise InputError(
-                place="TRACKS", got=counted(len(names), "run"), expected="one or two for a single sequence",
-                remedy="give two, or the whole dataset",
-            )  # fmt: skip
+            got, expected = counted(len(names), "run"), "one or two for a single sequence"
+            raise InputError(place="TRACKS", got=got, expected=expected, remedy="give two, or the whole dataset")
         return _pages(options, sequences, names)
     _require_folder(options.out, ".html", sequences)
     unlabelled = next((sequence.name for sequence in sequences if sequence.load_truth is None), None)
     if len(names) > 1 and unlabelled is not None:
-        raise InputError(
-            file=unlabelled, got="no labels", expected="labels, by which several runs are compared",
-            remedy="give one run, or one sequence",
-        )  # fmt: skip
+        expected, remedy = "labels, by which several runs are compared", "give one run, or one sequence"
+        raise InputError(file=unlabelled, got="no labels", expected=expected, remedy=remedy)
     reported = bool(names) and unlabelled is None and _can_report(options.out / INDEX, alone=len(names) > 1)
     return _report(options, sequences, names) if reported else _pages(options, sequences, names)
 
@@ -174,7 +170,5 @@ def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
 
 def _require_folder(out: Path, suffix: str, sequences: list[Sequence]) -> None:
     if out.suffix.lower() == suffix:
-        raise InputError(
-            file=out, place="--out", got=f"one file for {len(sequences)} sequences", expected="a folder",
-            remedy="give a folder, or one sequence",
-        )  # fmt: skip
+        got, remedy = f"one file for {len(sequences)} sequences", "give a folder, or one sequence"
+        raise InputError(file=out, place="--out", got=got, expected="a folder", remedy=remedy)
