@@ -116,7 +116,7 @@ OPTIONS = {
         "with truth, without pictures; expected a sequence with pictures; … try --detections truth",
     "track blob {made}/data --camera {made}/scene.toml --out {tmp}/x":
         "{made}/scene.toml: --camera: got a TOML file; expected a camera.json … describes a view",
-    "generate crossing --seeds 0": "flockscope generate: got missing option '--out'; expected a command line as in the help",
+    "generate crossing --seeds 0": "flockscope generate: got missing option '--out'; … generate --help",
     "score {made}/data {made}/run {made}/run": "TRACKS: got … twice; expected each run once",
     "score {made}/data {made}/run {made}/run/scene-s40000 --by HOTAA": "--by: got HOTAA … such as HOTA",
     "score {made}/data {made}/run --by HOTA": "got --by; expected none for one run; leave it out",

@@ -42,7 +42,7 @@ def view(options: ViewOptions) -> CommandResult:
             got, expected = counted(len(names), "run"), "one or two for a single sequence"
             raise InputError(place="TRACKS", got=got, expected=expected, remedy="give two, or the whole dataset")
         return _pages(options, sequences, names)
-    _require_folder(options.out, ".html", sequences)
+    _files(sequences, options.out, ".html")  # refuses files of others before anything is tracked
     unlabelled = next((sequence.name for sequence in sequences if sequence.load_truth is None), None)
     if len(names) > 1 and unlabelled is not None:
         expected, remedy = "labels, by which several runs are compared", "give one run, or one sequence"
@@ -98,8 +98,6 @@ def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str,
     from tracking.app.report.page import write_report
 
     index, pages = options.out / INDEX, CommandResult({"files": []})
-    if len(names) == 1:
-        _files(sequences, options.out, ".html")  # refuses files of others before anything is tracked
     found = judged_runs(names, sequences, source_of(options, options.source), options.workers)
     if len(names) == 1:
         known = {sequence.name: one.errors[0] for sequence, one in zip(sequences, found, strict=True)}
@@ -161,14 +159,10 @@ def _write_each(
 def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
     if len(sequences) == 1:
         return [option_parsing.output_file(out, suffix)]
-    _require_folder(out, suffix, sequences)
+    if out.suffix.lower() == suffix:
+        got, remedy = f"one file for {len(sequences)} sequences", "give a folder, or one sequence"
+        raise InputError(file=out, place="--out", got=got, expected="a folder", remedy=remedy)
     files = output_paths(out, [sequence.name for sequence in sequences], suffix)
     for file in files:
         refuse_foreign_file(file)
     return files
-
-
-def _require_folder(out: Path, suffix: str, sequences: list[Sequence]) -> None:
-    if out.suffix.lower() == suffix:
-        got, remedy = f"one file for {len(sequences)} sequences", "give a folder, or one sequence"
-        raise InputError(file=out, place="--out", got=got, expected="a folder", remedy=remedy)
