@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from rich.table import Table
 
 from scenarios.errors import InputError
 from sim.io.store.seal import read_manifest, with_hash
@@ -19,6 +18,7 @@ from tracking.app import progress
 from tracking.app.cli import run
 from tracking.app.command_line import _print_warnings_once
 from tracking.app.command_result import CommandResult, print_error, print_result
+from tracking.app.commands.score_tables import table
 from tracking.app.progress import ProgressMeter
 
 NAMES = ("[/red]", "x[door]y", ":smile:", "\x1b[31mred", "a\u202eb", "[link=http://x]y[/link]")
@@ -27,9 +27,7 @@ SHOWN = ("[/red]", "x[door]y", ":smile:", "\\x1b[31mred", "a\\u202eb", "[link=ht
 
 @pytest.mark.parametrize(("name", "shown"), [*zip(NAMES, SHOWN, strict=True)])
 def test_a_table_shows_names_letter_by_letter(name, shown, capsys):
-    table = Table(name, box=None)
-    table.add_row(name)
-    assert print_result(CommandResult({}, table), as_json=False) == 0
+    assert print_result(CommandResult({}, table("", [name], (), [[name]])), as_json=False) == 0
     assert [line.strip() for line in capsys.readouterr().out.splitlines()] == [shown, shown]
 
 

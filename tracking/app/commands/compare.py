@@ -110,7 +110,7 @@ def _verdict(mean: float, low: float, high: float, tolerance: float) -> str:
     return "no difference" if -tolerance <= low and high <= tolerance else "too noisy"
 
 
-def _table(rows: list[dict[str, Any]], sequences: int) -> Any:
+def _table(rows: list[dict[str, Any]], sequences: int) -> str:
     cells = []
     for row in rows:
         ends = f"{row['low']:+.4f} to {row['high']:+.4f}"

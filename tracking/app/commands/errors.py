@@ -10,7 +10,7 @@ from tracking.app.command_options import ErrorsOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import table
 from tracking.app.commands.scored_sequence import box_scale_of
-from tracking.app.sequence_workers import results_over_sequences, source_of
+from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.errors.found import RunErrors, errors_of_run, sums_by_cause
 from tracking.errors.repairs import SHOWN
@@ -27,7 +27,7 @@ def errors(options: ErrorsOptions) -> CommandResult:
     stored = [tracks for _, tracks in match_tracks(sequences, find_tracks(options.tracks))]
     box_scale = box_scale_of(options.box_scale, stored)
     jobs: list[Job] = [(one, options.similarity, box_scale) for one in stored]
-    found = results_over_sequences("errors", errors_of, sequences, jobs, source, options.workers)
+    found = list(over_sequences("errors", errors_of, sequences, jobs, source, options.workers))
     every = [
         {
             "name": sequence.name, "scores": one.scores, "left": one.left,
@@ -48,9 +48,7 @@ def errors_of(sequence: Sequence, job: Job) -> RunErrors:
     return errors_of_run(sequence, stored.read(sequence, box_scale), similarity)
 
 
-def _tables(found: list[RunErrors], sequences: list[dict[str, Any]], causes: list[dict[str, Any]], limit: int) -> Any:
-    from rich.console import Group
-
+def _tables(found: list[RunErrors], sequences: list[dict[str, Any]], causes: list[dict[str, Any]], limit: int) -> str:
     left = {key: mean_of_known(run.left[key] for run in found) for key in SHOWN}
     every = [*causes, {"kind": "position", "cause": "", "errors": "", "seconds": None, **left}]
     lost = [
@@ -66,10 +64,8 @@ def _tables(found: list[RunErrors], sequences: list[dict[str, Any]], causes: lis
         for name, e in dearest
     ]
     title = f"the {len(dearest)} dearest of {len(errors)} errors; cost: HOTA, of groups group_F1"
-    return Group(
-        table(f"where the score is lost; now {now}", ["kind", "cause"], ["errors", "seconds", *SHOWN], lost),
-        table(title, ["sequence", "frames", "kind", "who", "cause"], ["cost"], listed),
-    )
+    costs = table(f"where the score is lost; now {now}", ["kind", "cause"], ["errors", "seconds", *SHOWN], lost)
+    return costs + "\n" + table(title, ["sequence", "frames", "kind", "who", "cause"], ["cost"], listed)
 
 
 def _number(value: float | None, form: str, unknown: str = "–") -> str:

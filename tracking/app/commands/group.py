@@ -74,20 +74,18 @@ def group_row(run: TrackingRun, folder: Path) -> Row:
     }  # fmt: skip
 
 
-def group_tables(rows: SequenceOf[Row]) -> Any:
-    """Returns something rich can print: a table of groups and one of events, with a line for each run and their sum."""
-    from rich.console import Group
-
+def group_tables(rows: SequenceOf[Row]) -> str:
+    """Returns a table of groups and one of events, with a line for each run and their sum."""
     counts = _counts_table("groups", rows, _group_counts)
     events = _counts_table(
         "events", rows, lambda some: {kind: sum(r["events"][kind] for r in some) for kind in EVENT_KINDS}
     )
     if len(rows) > 1:
-        return Group(counts, events, f"stored in {rows[0]['folder'].parent}")
-    return Group(counts, *_longest(rows[0]), events, _place(rows[0]), f"stored in {rows[0]['folder']}")
+        return "\n".join([counts, events, f"stored in {rows[0]['folder'].parent}"])
+    return "\n".join([counts, *_longest(rows[0]), events, _place(rows[0]), f"stored in {rows[0]['folder']}"])
 
 
-def _counts_table(title: str, rows: SequenceOf[Row], cells: Callable[[SequenceOf[Row]], dict[str, object]]) -> Any:
+def _counts_table(title: str, rows: SequenceOf[Row], cells: Callable[[SequenceOf[Row]], dict[str, object]]) -> str:
     parts = [(row["sequence"], [row]) for row in rows] + [("all", [*rows])] * (len(rows) > 1)
     shown = [[name, *map(str, cells(part).values())] for name, part in parts]
     return table(title, ["sequence"], cells(rows), shown)
@@ -106,7 +104,7 @@ def _group_counts(rows: SequenceOf[Row]) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _longest(row: Row) -> list[Any]:
+def _longest(row: Row) -> list[str]:
     kept = sorted(row["groups"], key=lambda g: -g["seconds"])[:LISTED]
     shown = [
         [str(g["id"]), f"{(g['start'] - 1) / row['fps']:.1f}", f"{g['end'] / row['fps']:.1f}", str(g["size"]),

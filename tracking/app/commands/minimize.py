@@ -225,9 +225,7 @@ def _counts(scenario: Scenario, outcome: Outcome) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _text(data: dict[str, Any]) -> Any:
-    from rich.console import Group
-
+def _text(data: dict[str, Any]) -> str:
     before, after, complete = data["before"], data["after"], data["complete"]
     changes = ", ".join(f"{before[key]:g} {key} → {after[key]:g}" for key in before if before[key])
     confirmed = f"fails on {data['fails']} of {counted(data['fresh'], 'fresh seed')}"
@@ -245,4 +243,4 @@ def _text(data: dict[str, Any]) -> Any:
     ]  # fmt: skip
     files = f"{data['file']}, and a replay of seed {data['seed']}: {data['page']}"
     shown = table("", (), ["seed", data["while"], *keys], rows)
-    return Group(*map(printable, lines), "", shown, *map(printable, data["commands"]), printable(files))
+    return "\n".join([*map(printable, lines), "", shown, *map(printable, data["commands"]), printable(files)])

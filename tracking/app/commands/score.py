@@ -24,7 +24,7 @@ from tracking.app.commands.scored_sequence import (
     score_sequence,
     stored_runs,
 )
-from tracking.app.sequence_workers import results_over_sequences, source_of
+from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.comparison import check_blocks
 from tracking.scoring.catalogue import ALL, CATALOGUE
 from tracking.scoring.evaluation import Scores
@@ -47,15 +47,13 @@ def score(options: ScoreOptions, ranked: bool = False) -> CommandResult:
     runs = stored_runs(names.values(), sequences)
     how = (options.similarity, options.group_match, options.blocks, ranked, box_scale_of(options.box_scale, runs[0]))
     jobs = [ScoringJob(sources, *how) for sources in zip(*runs, strict=True)]
-    found = results_over_sequences("score", score_sequence, sequences, jobs, source, options.workers)
+    found = list(over_sequences("score", score_sequence, sequences, jobs, source, options.workers))
     if not ranked:
         return _run_result(sequences, found)
     return ranking_result(ranked_runs(list(names), sequences, found, options.by))
 
 
 def _run_result(sequences: list[Sequence], found: list[ScoredSequence]) -> CommandResult:
-    from rich.console import Group
-
     rows = [SequenceScores(s.name, one.scores[0], one.given[0]) for s, one in zip(sequences, found, strict=True)]
     parts = [[row for row in rows if row.given == given] for given in dict.fromkeys(row.given for row in rows)]
     blocks = found[0].compared.blocks
@@ -74,7 +72,7 @@ def _run_result(sequences: list[Sequence], found: list[ScoredSequence]) -> Comma
         "notes": notes,
     }
     texts = [tables(part, mean, notes, len(rows)) for part, mean in zip(parts, means, strict=True)]
-    return CommandResult(data, Group(*texts))
+    return CommandResult(data, "\n".join(texts))
 
 
 def _row_data(row: SequenceScores) -> dict[str, Any]:

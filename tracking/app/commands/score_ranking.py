@@ -133,8 +133,6 @@ def differences(c: ComparedRuns, key: str, by: str) -> list[dict[str, Any]]:
 
 def ranking_result(every: RankedRuns) -> CommandResult:
     """Returns the ranking as the result of `score`."""
-    from rich.console import Group
-
     c, own = every.comparison, ("run", "input", "first", "last", "mean", "low", "high")
     parts = ("mean", "low", "high", "sure")
     by_score = {key: differences(c, key, every.key) for key in CATALOGUE}
@@ -162,7 +160,7 @@ def ranking_result(every: RankedRuns) -> CommandResult:
     elif pairs:
         rows = {f"{pair['run']} minus {pair['minus']}": (every.key, pair) for pair in pairs}
         shown.append(_difference_table(f"differences, {arrow(every.key)}", "runs", rows))
-    return CommandResult(data, Group(*shown, "\n".join(_last_lines(every))))
+    return CommandResult(data, "\n".join([*shown, *_last_lines(every)]))
 
 
 def _last_lines(every: RankedRuns) -> Iterable[str]:
@@ -179,7 +177,7 @@ def _last_lines(every: RankedRuns) -> Iterable[str]:
     yield "oracle: true ids on the same input, without false alarms"
 
 
-def _ranking_table(every: RankedRuns) -> Any:
+def _ranking_table(every: RankedRuns) -> str:
     keys = shown_columns(every.table, every.key)
     inputs = list(dict.fromkeys(row["input"] for row in every.table if row["first"] is not None))
     rows = []
@@ -214,7 +212,7 @@ def _interval(key: str, ends: Mapping[str, Any]) -> str:
     return f"{number(key, ends['low'], mean=True)} to {number(key, ends['high'], mean=True)}"
 
 
-def _by_scenario(every: RankedRuns) -> tuple[dict[str, dict[str, float]], Any]:
+def _by_scenario(every: RankedRuns) -> tuple[dict[str, dict[str, float]], str]:
     """Returns the means of the ranking score by scenario and run, and a table of them with the oracles."""
     c, key, means, rows = every.comparison, every.key, dict[str, dict[str, float]](), []
     shown, scores = [row["run"] for row in every.table], c.rows()
@@ -231,7 +229,7 @@ def _by_scenario(every: RankedRuns) -> tuple[dict[str, dict[str, float]], Any]:
     return means, table(f"{arrow(key)} by scenario", ["scenario"], numbers, rows, foot=foot)
 
 
-def _score_differences(every: RankedRuns, pair: Mapping[str, Mapping[str, Any]]) -> Any:
+def _score_differences(every: RankedRuns, pair: Mapping[str, Mapping[str, Any]]) -> str:
     known = [key for keys in TABLES.values() for key in keys if math.isfinite(pair[key]["mean"])]
     keys = [key for key in known if key != "objective" or usual_key(every.comparison) == key]
     sure = [chance(len(keys))] if _can_be_sure(every.comparison, every.key) else []
@@ -239,7 +237,7 @@ def _score_differences(every: RankedRuns, pair: Mapping[str, Mapping[str, Any]])
     return _difference_table(title, "score", rows, "; ".join([LOWER, *sure]))
 
 
-def _difference_table(title: str, first: str, rows: Mapping[str, tuple[str, Mapping[str, Any]]], foot: str = "") -> Any:
+def _difference_table(title: str, first: str, rows: Mapping[str, tuple[str, Mapping[str, Any]]], foot: str = "") -> str:
     cells = []
     for name, (key, d) in rows.items():
         sure = f"surely {d['sure']}" if d["sure"] else ""  # of the run named first
@@ -257,11 +255,9 @@ def verdict(comparison: ComparedRuns, key: str) -> list[str]:
     sure = [p for p in pairs if p["sure"]]
     lines = []
     for run in dict.fromkeys(p["run"] for p in sure):
-        nearest, *others = (p for p in sure if p["run"] == run)
-        low, mean, high = (number(key, x) for x in sorted(abs(nearest[end]) for end in ("mean", "low", "high")))
-        rest = f", and than {', '.join(p['minus'] for p in others)}" if others else ""
-        by = f"by {mean} ({low} to {high})"
-        lines.append(printable(f"{run} is surely better than {nearest['minus']} {by}{rest}"))
+        worse = [p for p in sure if p["run"] == run]
+        words = [f"{p['minus']} by {number(key, abs(p['mean']), mean=True)}" for p in worse]
+        lines.append(printable(f"{run} is surely better than {', '.join(words)}"))
     if pairs and not _can_be_sure(comparison, key):
         hint = "; --blocks 1000 gives intervals of one recording" if len(comparison.sequences) == 1 else ""
         found = counted(comparison.ranking(key).sequences, "sequence")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from scenarios.errors import InputError, counted, printable
 from tracking.scoring.catalogue import CATALOGUE
@@ -57,10 +56,8 @@ class SequenceScores:
     given: str = ""  # what detections the tracker got, in words; "" without run.json
 
 
-def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), total: int = 0) -> Any:
-    """Returns, for rich to print, a table for each family of scores with a known mean, and how all was compared."""
-    from rich.console import Group
-
+def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), total: int = 0) -> str:
+    """Returns a table for each family of scores with a known mean, and how all was compared."""
     detections = f"detections {printable(rows[0].given) or 'unknown (no run.json)'}"
     people = _any_known(PEOPLE[1:], means)
     titles = TABLES if people else GROUP_TRACKER_TABLES
@@ -71,14 +68,14 @@ def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), 
         lines.append("intervals by weights of blocks of frames")
     partial = len(rows) < total
     head = [f"{len(rows)} of {total} sequences, {detections}", ""] if partial else []
-    return Group(*head, *parts, "\n".join([*lines, *notes]), *([""] if partial else []))
+    return "\n".join([*head, *parts, *lines, *notes, *([""] if partial else [])])
 
 
 def _any_known(keys: Sequence[str], means: Means) -> bool:
     return any(math.isfinite(means[key]["mean"]) for key in keys)
 
 
-def _family(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> Any:
+def _family(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> str:
     shown = [[row.sequence, *(number(key, row.scores[key]) for key in keys)] for row in rows]
     if any(math.isfinite(means[key]["low"]) for key in keys):
         for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high"))[len(rows) == 1 :]:
@@ -108,26 +105,18 @@ def table(
     rows: Iterable[Sequence[str]],
     more: Iterable[str] = (),
     foot: str = "",
-) -> Any:
-    """Returns, for rich to print, a title, a table without frame, and a foot.
+) -> str:
+    """Returns a title, a table without frame, a foot and an empty line as text.
 
     words, numbers, more: names of its columns, of words, then of numbers, then of words again; rows: their cells.
     """
-    from rich.console import Group
-    from rich.table import Table
-    from rich.text import Text
-
-    made = Table(box=None, pad_edge=False, header_style="bold")
-    for name in words:
-        made.add_column(printable(name), overflow="fold")
-    for name in numbers:
-        made.add_column(printable(name), justify="right", no_wrap=True)
-    for name in more:
-        made.add_column(name, overflow="fold")
-    for cells in rows:
-        made.add_row(*map(printable, cells))
-    heading = [Text(printable(title), style="italic")] if title else []
-    return Group(*heading, made, *([foot] if foot else []), "")
+    before, middle, after = list(words), list(numbers), list(more)
+    cells = [[printable(cell) for cell in row] for row in ([*before, *middle, *after], *rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    sides = ["<"] * len(before) + [">"] * len(middle) + ["<"] * len(after)
+    forms = [f"{side}{width}" for side, width in zip(sides, widths, strict=True)]
+    lines = ["  ".join(map(format, row, forms)).rstrip() for row in cells]
+    return "\n".join([*([printable(title)] if title else []), *lines, *([foot] if foot else []), ""])
 
 
 def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) -> list[str]:

@@ -162,14 +162,13 @@ def _parquet(sweep: Sweep) -> bytes:
     return table_bytes(columns, {"axes": [axis.name for axis in sweep.plan.axes]})
 
 
-def _text(sweep: Sweep, data: dict[str, Any], out: Path, report: str) -> Any:
-    from rich.console import Group
-
+def _text(sweep: Sweep, data: dict[str, Any], out: Path, report: str) -> str:
     parts = _found(sweep, data) if data["found"] is not None else _curves(sweep, data)
-    return Group(*parts, *_notes(data), f"{counted(data['episodes'], 'episode')} stored in {out}; report: {report}")
+    end = f"{counted(data['episodes'], 'episode')} stored in {out}; report: {report}"
+    return "\n".join([*parts, *_notes(data), end])
 
 
-def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
+def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
     plan, curves, axes = sweep.plan, data["curves"], [axis.name for axis in sweep.plan.axes]
     over = f" over {' and '.join(axes)}" if axes else ""
     title = f"{plan.by}{over} ({', '.join(plan.scenarios)}, {counted(sweep.seeds, 'seed')})"
@@ -200,7 +199,7 @@ def _break_lines(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
         yield f"{printable(name)} {_break_words(data['curves'][name]['break'], sweep.plan.share)}"
 
 
-def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
+def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
     plan, tracker = sweep.plan, next(iter(sweep.trackers))
     columns = ["scenario", "seed", *(axis.name for axis in plan.axes), tracker, ORACLE, "shortfall"]
     rows = [

@@ -17,7 +17,7 @@ from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.group import LASTING, groups_of, lasting
 from tracking.app.progress import ProgressMeter, total_frames
-from tracking.app.sequence_workers import results_over_sequences, source_of
+from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.app.stored_tracks import run_folders
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
@@ -74,7 +74,7 @@ def track(options: TrackOptions) -> CommandResult:
         if min(options.workers, len(sequences)) > 1:
             given = pickle.dumps(options)  # a tracker class and its config cannot be pickled, their names can
             jobs = [(given, folder) for folder in folders]
-            rows = results_over_sequences("track", _track_in_worker, sequences, jobs, source, options.workers)
+            rows = list(over_sequences("track", _track_in_worker, sequences, jobs, source, options.workers))
         else:
             with setup.limited or nullcontext(), ProgressMeter("track", total_frames(sequences)) as meter:
                 rows = [

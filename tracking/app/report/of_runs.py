@@ -17,7 +17,7 @@ from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, re
 from tracking.app.replay_page.page import Run
 from tracking.app.report.content import HeatCell, HeatMap, RankedRow, Report
 from tracking.app.report.moments import COSTS, Candidate, cause_bars, moments, shown_errors
-from tracking.app.sequence_workers import OpenedAs, results_over_sequences
+from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.errors.found import RunErrors
 
 
@@ -36,7 +36,7 @@ def judged_runs(
     """Returns scores and errors of runs, by name the text of the command line: stored tracks or a tracker class."""
     runs = stored_runs(names.values(), sequences)
     jobs = [ScoringJob(sources, oracles=True) for sources in zip(*runs, strict=True)]
-    return results_over_sequences("report", _judge, sequences, jobs, source, workers)
+    return list(over_sequences("report", _judge, sequences, jobs, source, workers))
 
 
 def report_of_runs(
