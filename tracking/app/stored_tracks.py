@@ -145,7 +145,9 @@ def _refuse_unmatched(sequence: Sequence, by_name: dict[str, StoredTracks]) -> N
         if not each.info:
             each.check()
     file, got = stored[0].path.parent if len(stored) > 1 else stored[0].path, ", ".join(sorted(by_name)[:5])
-    remedy = "track it first, or give the right folder; a text alone (tracks.txt) may have any name"
+    remedy, text = "track it first, or give the right folder", stored[0].path / "tracks.txt"
+    if len(stored) == 1 and stored[0].info.get("truth_hash") is None and text.is_file():
+        remedy += f"; if they are of the same frames, give {text}"
     raise InputError(file=file, got=f"tracks of {got}", expected=f"tracks of {sequence.name}", remedy=remedy)
 
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from html import escape
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-from scenarios.errors import counted, printable
+from scenarios.errors import counted
 from sim.io.files.own_files import GENERATOR, output_path
 from sim.types import Array, DetectionMode, Sequence
 from tracking.app import option_parsing
@@ -111,18 +111,9 @@ def demo(options: DemoOptions) -> CommandResult:
     pixels = _shown_pixels(scene, from_pixels, out / "pages" / "pictures")
     write_file(page, _page(out, tables, sections, scene, pixels).encode())
     lines = [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]
-    lines += [
-        _line(title, rows) for title, rows in (*sections.items(), *((f"{r.name}, from pixels", [r]) for r in pixels))
-    ]
     lines += [f"{time.monotonic() - start:.0f} s; open this page:", str(page.resolve())]
     means = {title: summary([row.scores for row in rows]) for title, rows in sections.items()}
     return CommandResult({"sequences": len(sequences), "scores": means, "page": page}, "\n".join(lines))
-
-
-def _line(title: str, rows: list[ShownRun]) -> str:
-    means = summary([row.scores for row in rows])
-    known = {key: means[key]["mean"] for key in SHOWN if math.isfinite(means[key]["mean"])}
-    return f"{printable(title)}: " + ", ".join(f"{key} {number(key, value, mean=True)}" for key, value in known.items())
 
 
 def _jobs(out: Path, trackers: Iterable[str], folders: list[Path], rendered: Path, quick: bool) -> list[_TrackJob]:
@@ -171,9 +162,10 @@ def _compiled_ahead() -> Iterator[Callable[[_TrackJob], list[TrackingRun]]]:
     from sim.scene.visibility_kernels import sample_visibility
     from sim.workers.pool import WorkerProcess
 
-    worker, stored = WorkerProcess(), getattr(sample_visibility, "stats").cache_path is not None  # noqa: B009
+    worker, kernel = WorkerProcess(), cast("Any", sample_visibility)
     # With one processor it would only take longer, as the process imports everything again; without a cache it is lost.
-    compiling = list(QUICK_TRACKERS) if (os.cpu_count() or 1) > 1 and stored else []
+    useful = (os.cpu_count() or 1) > 1 and kernel.stats.cache_path is not None
+    compiling = list(QUICK_TRACKERS) if useful else []
 
     def tracked(job: _TrackJob) -> list[TrackingRun]:
         while job.tracker in compiling:

@@ -255,8 +255,10 @@ def verdict(comparison: ComparedRuns, key: str) -> list[str]:
     sure = [p for p in pairs if p["sure"]]
     lines = []
     for run in dict.fromkeys(p["run"] for p in sure):
-        worse = [p for p in sure if p["run"] == run]
-        words = [f"{p['minus']} by {number(key, abs(p['mean']), mean=True)}" for p in worse]
+        words = []
+        for p in (p for p in sure if p["run"] == run):
+            low, mean, high = (number(key, x) for x in sorted(abs(p[end]) for end in ("mean", "low", "high")))
+            words.append(f"{p['minus']} by {mean} ({low} to {high})")
         lines.append(printable(f"{run} is surely better than {', '.join(words)}"))
     if pairs and not _can_be_sure(comparison, key):
         hint = "; --blocks 1000 gives intervals of one recording" if len(comparison.sequences) == 1 else ""
