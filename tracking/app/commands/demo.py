@@ -94,20 +94,17 @@ def demo(options: DemoOptions) -> CommandResult:
     sequences, (scene,) = [open_source(folder)[0] for folder in folders], open_source(rendered)
     from_points, from_pixels = ({j.tracker: r for j, r in runs.items() if j.detections == m} for m in ("file", "image"))
     inputs = {name: "boxes" if "boxes" in tracker_registry.find(name).needs else "points" for name in trackers}
-    tables = {
-        f"from {word}": compare(sequences, {name: from_points[name] for name in trackers if inputs[name] == word})
-        for word in sorted({*inputs.values()}, reverse=True)
-    }
-    sections: Sections = {
-        f"{name}, {word}": [
-            _shown(
-                name, sequence.name, sequence, run, scores, output_path(out / "pages" / name, sequence.name, ".html")
-            )
-            for sequence, run, scores in zip(sequences, from_points[name], compared.scores[name], strict=True)
-        ]
-        for word, compared in tables.items()
-        for name in compared.runs
-    }
+    tables: dict[str, ComparedRuns] = {}
+    sections: Sections = {}
+    for word in sorted({*inputs.values()}, reverse=True):
+        alike = {name: from_points[name] for name in trackers if inputs[name] == word}
+        compared = tables[f"from {word}"] = compare(sequences, alike)
+        for name, scores in compared.scores.items():
+            pages = out / "pages" / name
+            sections[f"{name}, from {word}"] = [
+                _shown(name, one.name, one, run, own, output_path(pages, one.name, ".html"))
+                for one, run, own in zip(sequences, from_points[name], scores, strict=True)
+            ]
     pixels = _shown_pixels(scene, from_pixels, out / "pages" / "pictures")
     write_file(page, _page(out, tables, sections, scene, pixels).encode())
     lines = [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]

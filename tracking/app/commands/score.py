@@ -59,8 +59,9 @@ def _run_result(sequences: list[Sequence], found: list[ScoredSequence]) -> Comma
     blocks = found[0].compared.blocks
     means = [summary([row.scores for row in part]) for part in parts]
     if blocks is not None:
-        ends = ("mean", "low", "high")
-        means = [{key: {end: float(getattr(r, end)[0]) for end in ends} for key, r in blocks.items()}]
+        means = [{}]
+        for key, r in blocks.items():
+            means[0][key] = {"mean": float(r.mean[0]), "low": float(r.low[0]), "high": float(r.high[0])}
     notes, hashes = scoring_notes(sequences, found), {s.name: tracked_hash(s) for s in sequences}
     data = {
         "sequences": [{**_row_data(row), "truth": hashes[row.sequence]} for part in parts for row in part],

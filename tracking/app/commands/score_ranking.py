@@ -136,10 +136,12 @@ def ranking_result(every: RankedRuns) -> CommandResult:
     c, own = every.comparison, ("run", "input", "first", "last", "mean", "low", "high")
     parts = ("mean", "low", "high", "sure")
     by_score = {key: differences(c, key, every.key) for key in CATALOGUE}
-    pairs = [
-        {**pair, "scores": {key: {part: rows[n][part] for part in parts} for key, rows in by_score.items()}}
-        for n, pair in enumerate(by_score[every.key])
-    ]
+    pairs = []
+    for n, pair in enumerate(by_score[every.key]):
+        scores = {}
+        for key, found in by_score.items():
+            scores[key] = {part: found[n][part] for part in parts}
+        pairs.append({**pair, "scores": scores})
     scenarios, scenario_table = _by_scenario(every)
     data = {
         "by": every.key, "similarity": c.similarity, "sequences": list(c.sequences),

@@ -179,14 +179,12 @@ def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
             rows = [[f"{value:g}", *map(_number, row)] for value, row in zip(first, means, strict=True)]
             yield table(f"{name}: {title}", (), [axes[0], *columns], rows)
         return
-    shown = {f"{values[0]:g}" if axes else "all": [_first(c, k) for c in curves.values()]
-             for k, values in enumerate(sweep.values)}  # fmt: skip
-    if not axes:
-        of_scenario = {
-            scenario: [of[scenario] for of in data["by_scenario"].values()] for scenario in data["by_scenario"][ORACLE]
-        }
-        shown = of_scenario | shown
-    rows = [[name, *map(_interval, means)] for name, means in shown.items()]
+    rows = []
+    for scenario in {} if axes else data["by_scenario"][ORACLE]:
+        rows.append([scenario, *(_interval(of[scenario]) for of in data["by_scenario"].values())])
+    for k, values in enumerate(sweep.values):
+        name = f"{values[0]:g}" if axes else "all"
+        rows.append([name, *(_interval(_first(curve, k)) for curve in curves.values())])
     yield table(title, (), [axes[0] if axes else "", *curves], rows)
     yield from _break_lines(sweep, data)
 

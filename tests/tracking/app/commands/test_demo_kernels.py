@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
@@ -18,8 +18,7 @@ def test_trackers_see_the_made_up_people(tracker: str, monkeypatch: pytest.Monke
 
 
 def test_nothing_is_compiled_ahead_that_cannot_be_stored(monkeypatch: pytest.MonkeyPatch) -> None:
-    not_stored = SimpleNamespace(stats=SimpleNamespace(cache_path=None))
-    monkeypatch.setattr("sim.scene.visibility_kernels.sample_visibility", not_stored)
+    monkeypatch.setattr("sim.scene.visibility_kernels.sample_visibility", Mock(stats=Mock(cache_path=None)))
     monkeypatch.setattr("os.cpu_count", lambda: 2)
     monkeypatch.setattr("sim.workers.pool.WorkerProcess.send", None)
     with demo._compiled_ahead():
