@@ -16,17 +16,16 @@ from benchmarks.support.tables import head, row
 from sim.dataset.generate import generate
 from sim.workers.pool import WorkerOptions
 from tracking.app.command_options import ScoreOptions, TrackOptions
-from tracking.app.commands.score_ranking import rank_words, ranking, shown_columns
+from tracking.app.commands.score import score
+from tracking.app.commands.score_ranking import rank_words, shown_columns
 from tracking.app.commands.score_tables import number
 from tracking.app.commands.track import track
-from tracking.app.sequence_workers import OpenedAs
 from tracking.running import tracker_registry
 
 
 def print_ranking(title: str, options: ScoreOptions) -> None:
     """Prints the ranking of some runs, also of a single one, of which `score` would show no oracle."""
-    source = OpenedAs(options.truth, images=False)
-    found = ranking(options, source, source.open()).data
+    found = score(options, ranked=True).data
     by, rows = found["by"], found["ranking"]
     keys = shown_columns([one["scores"] for one in rows], by)
     print(f"\n{title}, mean of {len(found['sequences'])} sequences")

@@ -1,4 +1,4 @@
-"""The command `flockscope`: the table of commands. The work of each is in the module of `commands/` that it names."""
+"""The command `flockscope`, made of the options in `command_options`. Modules of `commands/` do the work."""
 
 from __future__ import annotations
 
@@ -6,46 +6,14 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from importlib import import_module
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from tracking.app import command_options as options
 from tracking.app.command_line import add_command, run_command
-from tracking.app.command_result import INTERRUPTED, CommandResult
-from tracking.app.commands.tune import CommandLine
+from tracking.app.command_options import COMMANDS
+from tracking.app.command_result import INTERRUPTED
 
-# By the words of a command: its options, and the function that takes them, by its module in `commands/`.
-COMMANDS: dict[str, tuple[Any, str]] = {
-    "demo": (options.DemoOptions, "demo:demo"),
-    "scenarios": (options.ScenariosOptions, "scenarios:scenarios"),
-    "generate": (options.GenerateOptions, "datasets:generate"),
-    "track": (options.TrackOptions, "track:track"),
-    "group": (options.GroupOptions, "group:group"),
-    "score": (options.ScoreOptions, "score:score"),
-    "stress": (options.StressOptions, "stress:stress"),
-    "minimize": (options.MinimizeOptions, "minimize:minimize"),
-    "errors": (options.ErrorsOptions, "errors:errors"),
-    "compare": (options.CompareOptions, "compare:compare"),
-    "tune": (CommandLine, "tune:tune"),
-    "replay": (options.ReplayCommandOptions, "datasets:replay"),
-    "fit sensor": (options.FitSensorOptions, "fit:fit_sensor"),
-    "fit grouping": (options.FitGroupingOptions, "fit:fit_grouping"),
-    "fit joint": (options.FitJointOptions, "fit:fit_joint"),
-    "fit relational": (options.FitRelationalOptions, "fit:fit_relational"),
-    "view": (options.ViewOptions, "view:view"),
-    "sheet": (options.SheetOptions, "view:sheet"),
-    "overlay": (options.OverlayOptions, "view:overlay"),
-    "validate": (options.ValidateOptions, "datasets:validate"),
-    "export csv": (options.CsvOptions, "tables:export_csv"),
-    "export parquet": (options.ParquetOptions, "tables:export_parquet"),
-    "export trajnet": (options.TrajnetOptions, "tables:export_trajnet"),
-    "export pedpy": (options.PedpyOptions, "tables:export_pedpy"),
-    "export coco": (options.CocoOptions, "datasets:export_coco"),
-    "export kitti": (options.KittiOptions, "datasets:export_kitti"),
-    "export webdataset": (options.WebdatasetOptions, "datasets:export_webdataset"),
-}
 GROUPS = {
     "export": "Convert a dataset, or tracks, to another format.",
     "fit": "Fit a model to recordings or simulated scenes.",
@@ -66,27 +34,14 @@ def _declare() -> None:
         app.add_typer(group, name=name)
     for words, (kind, target) in COMMANDS.items():
         family, _, name = words.rpartition(" ")
-        add_command(groups.get(family, app), name, kind, _called(target))
-
-
-def _called(target: str) -> Any:
-    module, _, function = target.partition(":")
-
-    def run(given: Any) -> CommandResult:
-        result: CommandResult = getattr(import_module(f"tracking.app.commands.{module}"), function)(given)
-        return result
-
-    return run
+        add_command(groups.get(family, app), name, kind, target)
 
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import PackageNotFoundError, version
+        from importlib.metadata import version
 
-        try:
-            print(version("flockscope"))
-        except PackageNotFoundError:
-            print("unknown: not installed")
+        print(version("flockscope"))
         raise typer.Exit
 
 
@@ -121,10 +76,9 @@ def _open_streams() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, mode)  # takes the lowest free number, which is this one
-    if sys.stdout is None:
-        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
-    if sys.stderr is None:
-        sys.stderr = open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, "w", encoding="utf-8", closefd=False))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

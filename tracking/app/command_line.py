@@ -1,7 +1,7 @@
 """From the words of a command line to an exit code: commands made of options dataclasses, their results and errors.
 
-Of an option given twice click takes the last. Python reads `1_0` as 10, and the digits of other scripts. A
-`StrictCommand` refuses both. Every exception becomes an exit code and one clear line.
+Of an option given twice click takes the last; a `StrictCommand` refuses it. Every exception becomes an exit code and
+one clear line.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ import errno
 import inspect
 import io
 import os
+import re
 import sys
 import warnings
 from collections import Counter
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import fields
+from importlib import import_module
 from typing import Annotated, Any, get_type_hints
 
 import typer
@@ -28,21 +30,29 @@ from tracking.keyword_options import signature_parameter
 from tracking.running.user_code import recorded_interrupts
 
 HELP = {"-h", "--help", "--version"}
+# A folder's labels and detections are read alike: one warning is enough for both.
+SAME_TABLES = re.compile(r"(gt/gt|det/det)\.txt|\d+ rows")
 LONGEST_WARNING = 400  # Characters of a warning that are shown at most.
 JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
 
 
-def add_command(app: typer.Typer, name: str, options: type, run: Callable[[Any], CommandResult]) -> None:
-    """Adds the command `name`, which calls `run` with the dataclass `options`, whose docstring is its help.
+def add_command(app: typer.Typer, name: str, options: type, target: str) -> None:
+    """Adds the command `name`, which calls `target` with the dataclass `options`, whose docstring is its help.
 
-    Typer reads a command's options from the signature of its function, here one keyword for every field."""
+    Typer reads a command's options from the signature of its function, here one keyword for every field.
+
+    target: "module:function" in `commands/`.
+    """
 
     def command(**values: Any) -> CommandResult:
         del values["json"]
-        return run(options(**values))
+        module, _, function = target.partition(":")
+        result: CommandResult = getattr(import_module(f"{__package__}.commands.{module}"), function)(options(**values))
+        return result
 
     types, keyword = get_type_hints(options), inspect.Parameter.KEYWORD_ONLY
-    parameters = [signature_parameter(f, keyword, Annotated[types[f.name], _declared(f)]) for f in fields(options)]
+    own_first = sorted(fields(options), key=lambda f: f.name not in inspect.get_annotations(options))
+    parameters = [signature_parameter(f, keyword, Annotated[types[f.name], _declared(f)]) for f in own_first]
     parameters.append(inspect.Parameter("json", keyword, default=False, annotation=JSON))
     made: Any = command
     made.__signature__, made.__doc__ = inspect.Signature(parameters), options.__doc__
@@ -58,8 +68,7 @@ def _declared(f: Any) -> Any:
 
 
 class StrictCommand(TyperCommand):
-    """A command that raises InputError for an option given twice, unless it may be, for an empty value, and for a
-    number in other digits."""
+    """A command that raises InputError for an option given twice, unless it may be, and for an empty value."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parses the words of the command line after the command's name, as Typer does."""
@@ -76,16 +85,7 @@ class StrictCommand(TyperCommand):
             if "" in (text if isinstance(text, list | tuple) else [text]):
                 name = param.opts[0] if param.param_type_name == "option" else param.name.upper()
                 raise InputError(place=name, got="''", expected="a value", remedy="give one, or leave it out")
-            if isinstance(text, str) and isinstance(ctx.params.get(param.name), int | float):
-                _check_number(param.opts[0], text)
         return rest
-
-
-def _check_number(option: str, text: str) -> None:
-    from sim.io.files.numeric_text import is_number_text
-
-    if not is_number_text(text):
-        raise InputError(place=option, got=repr(text), expected="a number in digits 0 to 9", remedy="correct it")
 
 
 def run_command(app: typer.Typer, arguments: list[str]) -> int:
@@ -155,11 +155,6 @@ def _usage(error: Any) -> InputError:
     where = "flockscope" if error.ctx is None else error.ctx.command_path
     message = error.format_message().rstrip(".").removeprefix("Got ")
     got, expected, remedy = message[:1].lower() + message[1:], "a command line as in the help", f"see {where} --help"
-    if type(error).__name__ == "MissingParameter" and error.param is not None:
-        value = error.param.metavar or error.param.name.upper()
-        expected = f"{error.param.opts[0]} {value}" if error.param.param_type_name == "option" else value
-        expected += f": {error.param.help.rstrip('.')}" if error.param.help else ""
-        remedy = f"add it; {remedy}"
     return InputError(place=where, got=got, expected=expected, remedy=remedy)
 
 
@@ -180,8 +175,9 @@ def _print_warnings_once() -> Callable[..., None]:
 
     def warn(message: Warning | str, *_: object) -> None:
         text = shortened(printable(" ".join(str(message).split())), LONGEST_WARNING)
-        if text not in printed:
+        key = SAME_TABLES.sub("", text)
+        if key not in printed:
             print(f"warning: {text}", file=sys.stderr)
-        printed.add(text)
+        printed.add(key)
 
     return warn

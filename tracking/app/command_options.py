@@ -1,15 +1,16 @@
-"""The options of each command as one frozen dataclass: every field is an option, with its type, default and help text.
+"""The options of each command as one class: every field is an option, with its type, default and help text.
 
-The docstring of a dataclass is the help text of its command."""
+The docstring of a class is the help text of its command. The help lists its own options first, then inherited ones."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, dataclass_transform
 
 from tracking.keyword_options import option
+from tracking.tuning.options import TuneOptions
 
 # fmt: off
 ARGUMENT = partial(option, flag="")
@@ -23,13 +24,9 @@ SOURCE = partial(
 SIMILARITY = partial(option, "How true and tracked people are compared. Default: by the data.", None)
 TRACKS = partial(ARGUMENT, "Output of `track`, or MOT text.", None, metavar="TRACKS")
 FPS = partial(option, "Frames per second of a recording, in place of its own. Not for generated sequences.", None)
-SCALE = partial(option, "Pixels per metre of a recording without a camera.", None)
 PERSON_CLASS = partial(
-    option, "Classes of people in MOT texts (column 8), tables and COCO results. Default: 1, or person, pedestrian.",
-    None, metavar="A,B,…", flag="--class")
-BOX_SCALE = partial(
-    option, "Factor of the boxes in MOT texts, except labels, if they are not in pixels of the pictures.", None,
-    metavar="X|X,Y")
+    option, "Classes of people in texts, tables and COCO results. Default: 1, or person, pedestrian.", None,
+    metavar="A,B,…", flag="--class")
 CAMERA = partial(option, "Calibration: camera.json, Tsai's XML, or OpenCV's YAML of a pair.", None, metavar="FILE")
 SENSOR = partial(option, "Detector profile, as `fit sensor` writes it.", None, metavar="FILE.toml")
 WORKERS = partial(option, "Processes. On a cluster: the least number of tasks at a time.", 1, low=1)
@@ -44,15 +41,57 @@ IMAGES = partial(option, "Format of left, right and background pictures. Default
 GROUPING = partial(
     option, "What derives groups (default: belief), or a file of `tune grouping` or `fit grouping`.", None,
     metavar="rule|belief|FILE.toml")
-SEEDS = partial(option, "Seeds from A to B - 1, or one seed.", metavar="A:B")
-FIT_SEEDS = partial(option, "Seeds of the scenes to fit to.", "30000:30002", metavar="A:B")
-CHECK = partial(option, "Other seeds, to score the fit with.", None, metavar="A:B")
+SEEDS = partial(option, metavar="A:B")
+SEEDS_HELP = "Seeds from A to B - 1, or one seed."
 Images = Literal["jpg", "png", "mp4"] | None
+Detections = Literal["image", "truth", "file"] | None
 Similarity = Literal["boxes", "ground", "image"] | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class DemoOptions:
+TUNING = {f.name: f for f in fields(TuneOptions)}
+
+
+def tuned(name: str, default: Any = ..., flag: str | None = None) -> Any:
+    """Returns an option of `tracking.tune` as one of the command, with another default if it is given."""
+    f = TUNING[name]
+    more = {"metavar": f.metadata["metavar"], "flag": f"--{name}" if flag is None else flag}
+    return option(f.metadata["help"], f.default if default is ... else default, **more)
+
+
+# By the words of a command: its options, and the function that takes them, by its module in `commands/`.
+COMMANDS: dict[str, tuple[type, str]] = {}
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+class Options:
+    """The options of a command; each subclass is made a frozen dataclass.
+
+    words: of the command; run: the function that takes the options, by its module in `commands/`.
+    """
+
+    def __init_subclass__(cls, words: str = "", run: str = "") -> None:
+        dataclass(frozen=True, kw_only=True)(cls)
+        if words:
+            COMMANDS[words] = cls, run or f"{words}:{words}"
+
+
+class RecordingOptions(Options):
+    """What a recording may lack."""
+
+    fps: float | None = FPS()
+    px_per_m: float | None = option("Pixels per metre of a recording without a camera.", None)
+
+
+class BoxOptions(RecordingOptions):
+    """How boxes are read."""
+
+    person_class: str | None = PERSON_CLASS()
+    box_scale: str | None = option(
+        "Factor of the boxes in MOT texts, except labels, if they are not in pixels of the pictures.", None,
+        metavar="X|X,Y")
+
+
+class DemoOptions(Options, words="demo"):
     """Generate scenes, track them, score the tracks and write a page with the results."""
 
     quick: bool = option(
@@ -60,8 +99,7 @@ class DemoOptions:
     out: Path = OUT(default=Path("flockscope-demo"))
 
 
-@dataclass(frozen=True, kw_only=True)
-class ScenariosOptions:
+class ScenariosOptions(Options, words="scenarios"):
     """List scenarios and suites, or explain one with a drawing."""
 
     name: str | None = ARGUMENT("Scenario, *.toml file or suite to explain.", None)
@@ -70,12 +108,11 @@ class ScenariosOptions:
     schema: bool = option("List every key of a scenario file.", False)
 
 
-@dataclass(frozen=True, kw_only=True)
-class GenerateOptions:
+class GenerateOptions(Options, words="generate", run="datasets:generate"):
     """Simulate scenarios and store them as a dataset."""
 
     names: list[str] = NAMES()
-    seeds: str = SEEDS()
+    seeds: str = SEEDS(SEEDS_HELP)
     out: Path = OUT()
     settings: list[str] = SET()
     sensor: Path | None = SENSOR()
@@ -86,8 +123,7 @@ class GenerateOptions:
     cluster: str | None = CLUSTER()
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrackOptions:
+class TrackOptions(BoxOptions, words="track"):
     """Run a tracker and store its tracks."""
 
     tracker: str = ARGUMENT("Name of a tracker, or file.py:Class, or module:Class.", metavar="TRACKER")
@@ -96,46 +132,34 @@ class TrackOptions:
     params: str | None = option(
         "The tracker's parameters: a file, or a preset such as paper.", None, metavar="FILE.toml|PRESET")
     settings: list[str] = SET()
-    detections: Literal["image", "truth", "file"] | None = option(
-        "Detections that the tracker gets. Default: the first of image, file, truth that it and the source allow.",
-        None)
+    detections: Detections = option(
+        "Detections that the tracker gets. Default: the first of image, file, truth that can be.", None)
     boxes: Path | None = option(
-        "Boxes of a detector on the source's pictures: MOT text, table with named columns (frames or times), or COCO "
-        "results.", None,
+        "A detector's boxes on the pictures: MOT text, table with named columns (frames or times), COCO results.", None,
         metavar="FILE")
     sensor: Path | None = SENSOR()
     grouping: Path | None = GROUPING()
     seed: int = option("The tracker's seed.", 0, low=0)
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
     background: str | None = option(
         "Frames a background model is trained on, or a picture of the empty place.", None,
         metavar="first:N|spread:N|PICTURE")
     step_timeout: float | None = STEP_TIMEOUT()
-    person_class: str | None = PERSON_CLASS()
-    box_scale: str | None = BOX_SCALE()
     min_score: float | None = option("Leave out boxes with a lower score, as it stands in their file.", None)
     workers: int = PROCESSES()
 
 
-@dataclass(frozen=True, kw_only=True)
-class GroupOptions:
+class GroupOptions(BoxOptions, words="group"):
     """Find who belongs together, and what happened, for people whose ids are known."""
 
     source: Path = ARGUMENT("Labelled people, MOT text with ids, or output of `track`.", metavar="SOURCE|TRACKS")
     out: Path = OUT()
     grouping: Path | None = GROUPING()
     probabilities: bool = option("Store the probability that two people belong together.", False)
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
-    person_class: str | None = PERSON_CLASS()
-    box_scale: str | None = BOX_SCALE()
 
 
-@dataclass(frozen=True, kw_only=True)
-class ScoreOptions:
+class ScoreOptions(BoxOptions, words="score"):
     """Score tracks against the truth."""
 
     truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
@@ -146,17 +170,10 @@ class ScoreOptions:
     blocks: int = option("Intervals for a single recording, by N draws of blocks of frames.", 0, low=0, metavar="N")
     by: str | None = option(
         "The score that ranks. Default: objective, or what all runs have of it.", None, metavar="SCORE")
-    all: bool = option("Show each sequence of a ranking, too.", False)
-    csv: Path | None = option("Write all scores of a ranking into this file.", None, metavar="FILE")
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
-    person_class: str | None = PERSON_CLASS()
-    box_scale: str | None = BOX_SCALE()
     workers: int = PROCESSES()
 
 
-@dataclass(frozen=True, kw_only=True)
-class StressOptions:
+class StressOptions(Options, words="stress"):
     """Play trackers on scenes that get harder, and find where they break, or the scenes in which one is worst."""
 
     trackers: list[str] = ARGUMENT("Trackers to compare: names, file.py:Class or module:Class.", metavar="TRACKER…")
@@ -164,18 +181,17 @@ class StressOptions:
         "Axis: a name such as detection, or a key of scenarios with its ends. Twice: a matrix.", [],
         metavar="NAME|KEY=EASY:HARD", flag="--vary")
     suite: list[str] = option("Scenario or suite. Can be given several times.", metavar="NAME", flag="--suite")
-    seeds: str = option("Seeds that may be played, from A to B - 1.", "20000:20020", metavar="A:B")
+    seeds: str = SEEDS("Seeds that may be played, from A to B - 1.", "20000:20020")
     out: Path = OUT()
     search: int | None = option(
-        "Search N scenes, between the ends of all axes, for those in which the first tracker is worst.", None, low=1,
-        metavar="N")
+        "Search N scenes between the ends of all axes for the worst of the first tracker.", None, low=1, metavar="N")
     by: str = option("The score.", "objective", metavar="SCORE")
     share: float = option(
         "A tracker breaks where its score falls to this share of its easy value.", 0.8, low=0.0, high=1.0)
     start: int = option("Seeds that are played at first.", 4, low=2, metavar="N")
     episodes: int | None = option("Stop after about so many episodes.", None, low=1, metavar="N")
     minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
-    detections: Literal["image", "truth", "file"] | None = option(
+    detections: Detections = option(
         "Input of the trackers. Default: file, if they can.", None)
     settings: list[str] = SET()
     sensor: Path | None = SENSOR()
@@ -184,8 +200,7 @@ class StressOptions:
     cluster: str | None = CLUSTER()
 
 
-@dataclass(frozen=True, kw_only=True)
-class MinimizeOptions:
+class MinimizeOptions(Options, words="minimize"):
     """Find the smallest scene in which a tracker still fails, by taking out whatever can be."""
 
     source: str = ARGUMENT("Output of `track` on a generated sequence; or the sequence, a scenario, a *.toml file.",
@@ -204,23 +219,17 @@ class MinimizeOptions:
     workers: int = option("Processes that play episodes.", 1, low=1)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ErrorsOptions:
+class ErrorsOptions(BoxOptions, words="errors"):
     """List what went wrong in a run: each error with its frames, people, cause and cost, and a sum by cause."""
 
     truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
     tracks: Path = ARGUMENT("Output of `track`, or MOT text.", metavar="TRACKS")
     limit: int = option("Number of errors to show, the dearest first; --json has all.", 20, low=0, metavar="N")
     similarity: Similarity = SIMILARITY()
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
-    person_class: str | None = PERSON_CLASS()
-    box_scale: str | None = BOX_SCALE()
     workers: int = PROCESSES()
 
 
-@dataclass(frozen=True, kw_only=True)
-class CompareOptions:
+class CompareOptions(Options, words="compare"):
     """Compare stored scores with those of a baseline. Exit code 1 if a score is surely worse."""
 
     baseline: Path = ARGUMENT("Scores of `score --json`, or of --save.", metavar="BASELINE.json")
@@ -231,16 +240,41 @@ class CompareOptions:
     save: Path | None = option("Write the compared scores of NOW, as the next baseline.", None, metavar="FILE.json")
 
 
-@dataclass(frozen=True, kw_only=True)
-class ReplayCommandOptions:
+class TuneCommandOptions(Options, words="tune"):
+    """Search a tracker's parameters on simulated scenes; measure the gain on others."""
+
+    tracker: str = tuned("tracker", flag="")
+    suite: list[str] = tuned("suite")
+    trials: int = tuned("trials", MISSING)
+    seeds: str | None = tuned("seeds")
+    validation: str | None = tuned("validation")
+    test: str | None = tuned("test")
+    check: str | None = tuned("check", None)
+    objective: list[str] = tuned("objective", [])
+    detections: Detections = tuned("detections")
+    similarity: Similarity = tuned("similarity")
+    set: list[str] = SET()
+    sensor: Path | None = SENSOR()
+    only: str | None = tuned("only", None)
+    out: Path = tuned("out", MISSING)
+    storage: str | None = tuned("storage")
+    study: str | None = tuned("study")
+    workers: int = WORKERS()
+    cluster: str | None = CLUSTER()
+    step_timeout: float | None = STEP_TIMEOUT()
+    prune: float = tuned("prune")
+    finalists: int = tuned("finalists")
+    seed: int = tuned("seed")
+
+
+class ReplayCommandOptions(Options, words="replay", run="datasets:replay"):
     """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
 
     source: Path = SOURCE()
     out: Path = OUT()
     camera: Path | None = option(
         "Tables [camera], [sensor], [light], [picture]; each may be absent.", None, metavar="FILE.toml")
-    seeds: str = option(
-        "Seeds of bodies, looks and sensor. For real recordings from 20000 on.", "20000", metavar="A:B")
+    seeds: str = SEEDS("Seeds of bodies, looks and sensor. For real recordings from 20000 on.", "20000")
     start: float = option("Second at which to begin.", 0.0, low=0.0, metavar="S")
     duration: float | None = option("Seconds to replay. Default: up to the end.", None, metavar="S")
     settings: list[str] = SET()
@@ -252,8 +286,7 @@ class ReplayCommandOptions:
         "Calibration of a recording that has boxes only: camera.json or Tsai's XML.", None, metavar="FILE")
 
 
-@dataclass(frozen=True, kw_only=True)
-class ViewOptions:
+class ViewOptions(RecordingOptions, words="view"):
     """Write a page that replays a sequence in the browser: truth, tracks, and pictures if it has any.
 
     For several sequences also a report on the tracks; two trackers on one sequence are shown beside each other."""
@@ -266,14 +299,11 @@ class ViewOptions:
         "Pictures inside the page, beside it as FILE.view.mp4, or none. auto: beside from 12 MB on.", "auto")
     by: str | None = option(
         "The score that ranks in a report. Default: objective, or what all runs have of it.", None, metavar="SCORE")
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
     workers: int = PROCESSES()
 
 
-@dataclass(frozen=True, kw_only=True)
-class SheetOptions:
+class SheetOptions(Options, words="sheet", run="view:sheet"):
     """Write a contact sheet: several frames of a sequence in one picture, with the truth or, if given, the tracks."""
 
     source: Path = SOURCE()
@@ -283,8 +313,7 @@ class SheetOptions:
     fps: float | None = FPS()
 
 
-@dataclass(frozen=True, kw_only=True)
-class OverlayOptions:
+class OverlayOptions(RecordingOptions, words="overlay", run="view:overlay"):
     """Write a video with boxes, ids, trails, groups and events drawn over the pictures."""
 
     source: Path = SOURCE()
@@ -292,20 +321,16 @@ class OverlayOptions:
     out: Path = FILE("Video to write; for several sequences, a folder.", metavar="FILE.mp4")
     truth: Literal["over"] | None = option(
         "Draw the truth over the same picture. Without TRACKS it is drawn alone.", None)
-    fps: float | None = FPS()
-    px_per_m: float | None = SCALE()
     camera: Path | None = CAMERA()
 
 
-@dataclass(frozen=True, kw_only=True)
-class ValidateOptions:
+class ValidateOptions(Options, words="validate", run="datasets:validate"):
     """Check that a dataset or stored tracks are complete, unaltered and consistent."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset, or stored tracks.", metavar="DIR")
 
 
-@dataclass(frozen=True, kw_only=True)
-class CocoOptions:
+class CocoOptions(Options, words="export coco", run="datasets:export_coco"):
     """Write COCO files, one per split, with track and group ids and masks."""
 
     folder: Path = ARGUMENT("A sequence or dataset with labelled boxes.", metavar="DIR")
@@ -313,16 +338,14 @@ class CocoOptions:
     person_class: str | None = PERSON_CLASS()
 
 
-@dataclass(frozen=True, kw_only=True)
-class KittiOptions:
+class KittiOptions(Options, words="export kitti", run="datasets:export_kitti"):
     """Write stereo pairs, disparities and calibrations as in KITTI."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset with stereo pairs.", metavar="DIR")
     out: Path = OUT()
 
 
-@dataclass(frozen=True, kw_only=True)
-class WebdatasetOptions:
+class WebdatasetOptions(Options, words="export webdataset", run="datasets:export_webdataset"):
     """Write tar shards for streaming, in the format of the library webdataset."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset.", metavar="DIR")
@@ -330,8 +353,7 @@ class WebdatasetOptions:
     shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrajnetOptions:
+class TrajnetOptions(Options, words="export trajnet", run="tables:export_trajnet"):
     """Write the positions of people, of tracks or of labels, as TrajNet++ (*.ndjson)."""
 
     source: Path = ARGUMENT("Output of `track` or `group`, or labelled people.", metavar="RUN|SOURCE")
@@ -339,13 +361,11 @@ class TrajnetOptions:
     fps: float | None = FPS()
 
 
-@dataclass(frozen=True, kw_only=True)
-class PedpyOptions(TrajnetOptions):
+class PedpyOptions(TrajnetOptions, words="export pedpy", run="tables:export_pedpy"):
     """Write the positions of people, of tracks or of labels, as a text of PedPy and JuPedSim."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class CsvOptions(TrajnetOptions):
+class CsvOptions(TrajnetOptions, words="export csv", run="tables:export_csv"):
     """Write tables of people, groups, members, events and counts per minute as CSV, of tracks or of labels."""
 
     line: list[str] = option("Count who crosses a line. Can be given several times.", [], metavar="NAME=X1,Y1,X2,Y2")
@@ -353,13 +373,11 @@ class CsvOptions(TrajnetOptions):
         "Count who is in a polygon. Can be given several times.", [], metavar="NAME=X1,Y1,X2,Y2,X3,Y3,…")
 
 
-@dataclass(frozen=True, kw_only=True)
-class ParquetOptions(CsvOptions):
+class ParquetOptions(CsvOptions, words="export parquet", run="tables:export_parquet"):
     """Write tables of people, groups, members, events and counts per minute as Parquet, of tracks or of labels."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class FitSensorOptions:
+class FitSensorOptions(Options, words="fit sensor", run="fit:fit_sensor"):
     """Measure the errors of a detector, so that simulated detections have the same errors."""
 
     sources: list[Path] = ARGUMENT("Recordings with gt and det, pooled.", metavar="SOURCE…")
@@ -367,37 +385,30 @@ class FitSensorOptions:
     fps: float | None = FPS()
 
 
-@dataclass(frozen=True, kw_only=True)
-class FitGroupingOptions:
-    """Fit the belief of who belongs together to simulated scenes."""
-
-    names: list[str] = NAMES()
-    out: Path = TOML("File to write, for --grouping.")
-    seeds: str = FIT_SEEDS()
-    events: list[str] = option(
-        "Fit the log-odds of events to this scenario or suite. Can be given several times. Default: the NAMEs.", [],
-        metavar="NAME", flag="--events")
-    check: str | None = CHECK()
-
-
-@dataclass(frozen=True, kw_only=True)
-class FitJointOptions:
+class FitJointOptions(Options, words="fit joint", run="fit:fit_joint"):
     """Learn the merges and splits of the tracker joint from simulated truth."""
 
     names: list[str] = NAMES()
     out: Path = TOML("File to write: parameters of joint, for --params.")
-    seeds: str = FIT_SEEDS()
-    check: str | None = CHECK()
+    seeds: str = SEEDS("Seeds of the scenes to fit to.", "30000:30002")
+    check: str | None = option("Other seeds, to score the fit with.", None, metavar="A:B")
 
 
-@dataclass(frozen=True, kw_only=True)
-class FitRelationalOptions:
+class FitGroupingOptions(FitJointOptions, words="fit grouping", run="fit:fit_grouping"):
+    """Fit the belief of who belongs together to simulated scenes."""
+
+    out: Path = TOML("File to write, for --grouping.")
+    events: list[str] = option(
+        "Fit the log-odds of events to this scenario or suite. Can be given several times. Default: the NAMEs.", [],
+        metavar="NAME", flag="--events")
+
+
+class FitRelationalOptions(Options, words="fit relational", run="fit:fit_relational"):
     """Learn the speed table and the relations of the tracker relational from simulated truth."""
 
     names: list[str] = NAMES()
     out: Path = TOML("File to write: parameters of relational, for --params.")
-    seeds: str = SEEDS(default="30000:30004")
+    seeds: str = SEEDS(SEEDS_HELP, "30000:30004")
     observed: bool = option(
-        "Learn the speed table and the noise of positions from detections of successive frames, as the paper does; "
-        "no relations.", False)
+        "Learn speed table and noise of positions from successive detections, as the paper does; no relations.", False)
 # fmt: on

@@ -20,15 +20,13 @@ STATUS = {0: "ok", 1: "failed", 2: "refused", 130: "interrupted"}  # The "status
 INTERRUPTED = 130
 DEBUG = "FLOCKSCOPE_DEBUG"  # With this environment variable set, an unexpected exception is raised with its traceback.
 
-WIDTH = 160  # Columns of a table that goes to a file or another program.
-
 
 @dataclass(frozen=True)
 class CommandResult:
     """What a command returns."""
 
     data: dict[str, Any]  # content of the JSON object that --json prints, without its "status"
-    text: Any = ""  # printed without --json: a string, letter by letter, or what rich can print
+    text: str = ""  # printed without --json
     code: int = 0  # exit code: 0, or 1 if a check found problems
 
 
@@ -37,24 +35,8 @@ def print_result(result: CommandResult, as_json: bool) -> int:
     if as_json:
         _print_json({"status": STATUS[result.code], **result.data})
     else:
-        text = printable(result.text, keep="\n") if isinstance(result.text, str) else _rendered(result.text)
-        print(text.rstrip("\n"), flush=True)
+        print(printable(result.text, keep="\n").rstrip("\n"), flush=True)
     return result.code
-
-
-def _rendered(tables: Any) -> str:
-    from rich.console import Console
-    from rich.text import Text
-
-    class PlainConsole(Console):
-        def render_str(self, text: str, **options: Any) -> Text:
-            return super().render_str(printable(text, keep="\n"), **options)
-
-    width = None if sys.stdout.isatty() else WIDTH
-    console = PlainConsole(width=width, highlight=False, markup=False, emoji=False)
-    with console.capture() as captured:
-        console.print(tables)
-    return captured.get()
 
 
 def print_error(error: FlockscopeError, as_json: bool) -> int:

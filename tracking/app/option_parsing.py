@@ -16,59 +16,42 @@ def seeds(text: str, option: str = "--seeds") -> range:
     """Returns the seeds of the text "a:b", a to b - 1 (empty if b <= a), or of one number, a range of length 1."""
     found = re.fullmatch(r"([0-9]{1,18})(?::([0-9]{1,18}))?", text.strip())
     if found is None:
-        raise InputError(
-            place=option,
-            got=repr(text),
-            expected="a:b (from a to b - 1) or one seed, in digits 0 to 9",
-            remedy="write 0:10 or 7",
-        )
+        expected = "a:b (from a to b - 1) or one seed, in digits 0 to 9"
+        raise InputError(place=option, got=repr(text), expected=expected, remedy="write 0:10 or 7")
     first = int(found[1])
     return range(first, first + 1 if found[2] is None else int(found[2]))
 
 
-def settings(texts: Iterable[str], default: str, subjects: Iterable[str]) -> list[tuple[str, str]]:
+def settings(texts: Iterable[str], default: str, subjects: tuple[str, ...]) -> list[tuple[str, str]]:
     """Splits `--set` texts into pairs (subject, "key=value"), in the order given."""
-    found = [_setting(text, default, tuple(subjects)) for text in texts]
-    _refuse_repeated(found, default)
-    return found
-
-
-def _refuse_repeated(settings: list[tuple[str, str]], default: str) -> None:
-    earlier: dict[tuple[str, str], str] = {}
-    for subject, text in settings:
-        key, _, value = text.partition("=")
-        name = key if subject == default else f"{subject}.{key}"
-        if (subject, key) in earlier:
+    found: dict[tuple[str, str], str] = {}
+    for text in texts:
+        subject, key, value = _setting(text, default, subjects)
+        if (subject, key) in found:
+            name, got = key if subject == default else f"{subject}.{key}", f"{found[subject, key]} and {value}"
             raise InputError(
-                place=f"--set {name}", got=f"it twice: {earlier[subject, key]} and {value}", expected="one value",
-                remedy="leave one out",
-            )  # fmt: skip
-        earlier[subject, key] = value
+                place=f"--set {name}", got=f"it twice: {got}", expected="one value", remedy="leave one out"
+            )
+        found[subject, key] = value
+    return [(subject, f"{key}={value}") for (subject, key), value in found.items()]
 
 
-def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, str]:
-    """Returns (subject, "key=value") of one `--set` text."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip():
-        raise InputError(
-            place=f"--set {text}", got=repr(text), expected="key=value", remedy=f"write --set {default}.key=value"
-        )
-    subject, dot, rest = key.strip().partition(".")
-    if not dot or subject not in SUBJECTS:
-        if dot and default == "tracker" and "scenario" in subjects:
-            raise InputError(
-                place=f"--set {text}", got=repr(key), expected="a parameter of the tracker, sensor.… or scenario.…",
-                remedy=f"write --set scenario.{text}",
-            )  # fmt: skip
-        subject, rest = default, key.strip()
-    if subject not in subjects:
-        raise InputError(
-            place=f"--set {text}",
-            got=f"a setting of the {subject}",
-            expected="a setting of the " + " or the ".join(subjects),
-            remedy=f"set it in the command that makes the {subject}",
-        )
-    return subject, f"{rest}={value}"
+def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, str, str]:
+    """Returns subject, key and value of one `--set` text."""
+    name, equals, value = text.partition("=")
+    name, expected, remedy = name.strip(), "key=value", f"write --set {default}.key=value"
+    subject, dot, key = name.partition(".")
+    own = dot and subject in SUBJECTS
+    got = repr(text) if not equals or not name else ""
+    if not got and dot and not own and default == "tracker" and "scenario" in subjects:
+        got, expected = repr(name), "a parameter of the tracker, sensor.… or scenario.…"
+        remedy = f"write --set scenario.{text}"
+    if not got and own and subject not in subjects:
+        got, expected = f"a setting of the {subject}", "a setting of the " + " or the ".join(subjects)
+        remedy = f"set it in the command that makes the {subject}"
+    if got:
+        raise InputError(place=f"--set {text}", got=got, expected=expected, remedy=remedy)
+    return (subject, key, value) if own else (default, name, value)
 
 
 def scenario_settings(texts: Iterable[str]) -> list[str]:
@@ -106,11 +89,10 @@ def toml_values(texts: Iterable[str]) -> dict[str, Any]:
 
 def output_file(out: Path, suffix: str, option: str = "--out") -> Path:
     """Returns `out` if it is a file name with this suffix; else raises InputError."""
-    is_folder = out.is_dir()
-    if is_folder or out.suffix.lower() != suffix:
-        got, better = (f"{out}, a folder", out / "page") if is_folder else (str(out), out.with_suffix(""))
-        remedy = f"write {better}{suffix}"
-        raise InputError(place=option, got=got, expected=f"a file that ends in {suffix}", remedy=remedy)
+    if out.is_dir() or out.suffix.lower() != suffix:
+        got, better = (f"{out}, a folder", out / "page") if out.is_dir() else (str(out), out.with_suffix(""))
+        expected = f"a file that ends in {suffix}"
+        raise InputError(place=option, got=got, expected=expected, remedy=f"write {better}{suffix}")
     return out
 
 
@@ -118,8 +100,6 @@ def output_folder(out: Path) -> Path:
     """Returns `out` if it is, or can become, a folder; else raises InputError."""
     existing = next(p for p in (out, *out.parents) if p.exists())
     if not existing.is_dir():
-        raise InputError(
-            file=existing, place="--out", got="a file", expected="a folder, existing or new",
-            remedy="choose another --out",
-        )  # fmt: skip
+        expected, remedy = "a folder, existing or new", "choose another --out"
+        raise InputError(file=existing, place="--out", got="a file", expected=expected, remedy=remedy)
     return out

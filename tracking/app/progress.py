@@ -53,9 +53,9 @@ class ProgressMeter:
             if self._bar is not None:
                 self._bar.stop()
 
-    def step(self, item: str = "", amount: int = 1) -> None:
-        """Adds `amount` finished items (1 by default) and shows the count. item: name to show, "" for none."""
-        self.update(self.done + amount, self.total, item)
+    def step(self, item: str = "") -> None:
+        """Adds a finished item and shows the count. item: name to show, "" for none."""
+        self.update(self.done + 1, self.total, item)
 
     def update(self, done: int, total: int | None, item: str = "") -> None:
         """Sets the number of finished items, `done`, and of all items, `total` (None if unknown), and shows them."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,95 +18,81 @@ from tracking.app.progress import ProgressMeter
 J = TypeVar("J")
 R = TypeVar("R")
 
+# Options of commands that `open_source` has, too.
+OPTIONS = ("fps", "px_per_m", "camera", "background", "person_class", "box_scale", "min_score", "boxes")
+
 
 @dataclass(frozen=True)
 class OpenedAs:
     """A source with the options of `open_source`, so that another process can open it again."""
 
     path: Path
-    fps: float | None = None
-    px_per_m: float | None = None
-    camera: Path | None = None
-    images: bool = True
-    background: str | None = None
-    person_class: str | None = None
-    box_scale: str | None = None
-    min_score: float | None = None
-    boxes: Path | None = None
+    options: tuple[tuple[str, Any], ...] = ()
 
     def open(self) -> list[Sequence]:
         """Returns the sequences of the source. Raises InputError as `open_source`."""
-        return open_source(**asdict(self))
+        return open_source(self.path, **dict(self.options))
 
 
-@dataclass(frozen=True, eq=False)
-class _Task:
-    source: OpenedAs
-    index: int
-    function: Callable[[Sequence, Any], Any]
-    job: Any
+def source_of(options: Any, path: Path, images: bool = False, without: str = "") -> OpenedAs:
+    """Returns a source with those options of a command that `open_source` has, too; without: one that means more."""
+    given = [(name, value) for name, value in vars(options).items() if name in OPTIONS and name != without]
+    return OpenedAs(path, (("images", images), *given))
 
 
-@dataclass(frozen=True)
-class _Outcome:
-    value: Any = None
-    error: FlockscopeError | None = None
-    warnings: tuple[str, ...] = ()
+_Task = tuple[OpenedAs, int, Callable[[Sequence, Any], Any], Any]  # source, index of the sequence, function, job
+_Outcome = tuple[Any, FlockscopeError | None, list[str]]  # the value of a task, or its error, and its warnings
 
 
-def results_over_sequences(
+def over_sequences(
     what: str,
     function: Callable[[Sequence, J], R],
     sequences: SequenceOf[Sequence],
     jobs: SequenceOf[J],
     source: OpenedAs,
     workers: int,
-) -> list[R]:
-    """Returns function(sequence, job) for each sequence and its job, and shows the progress as `what`."""
-    found: list[R] = []
+) -> Iterator[R]:
+    """Yields function(sequence, job) for each sequence and its job, in order, and shows the progress as `what`."""
+    several = min(workers, len(sequences)) > 1
+    found = _in_processes(function, sequences, jobs, source, workers) if several else map(function, sequences, jobs)
     with ProgressMeter(what, len(sequences)) as meter:
-        for result in over_sequences(function, sequences, jobs, source, workers):
-            meter.step(sequences[len(found)].name)
-            found.append(result)
-    return found
+        for sequence, result in zip(sequences, found, strict=True):
+            meter.step(sequence.name)
+            yield result
 
 
-def over_sequences(
+def _in_processes(
     function: Callable[[Sequence, J], R],
     sequences: SequenceOf[Sequence],
     jobs: SequenceOf[J],
     source: OpenedAs,
     workers: int,
 ) -> Iterator[R]:
-    """Yields function(sequence, job) for each sequence and its job, in order."""
     from sim.workers.pool import results_in_order, start_workers
 
-    workers = min(workers, len(sequences))
-    if workers <= 1:
-        yield from map(function, sequences, jobs)
-        return
-    tasks = [_Task(source, k, function, job) for k, job in enumerate(jobs)]
-
     def lost(task: _Task, error: WorkError) -> _Outcome:
-        return _Outcome(error=error.replaced(place=sequences[task.index].name))
+        return None, error.replaced(place=sequences[task[1]].name), []
 
-    with start_workers(workers) as run:
-        for outcome in results_in_order(partial(run, on_loss=lost), _outcome, tasks):  # type: ignore[arg-type]
-            for text in outcome.warnings:
+    tasks: list[_Task] = [(source, k, function, job) for k, job in enumerate(jobs)]
+    with start_workers(min(workers, len(sequences))) as run:
+        for value, error, texts in results_in_order(partial(run, on_loss=lost), _outcome, tasks):  # type: ignore[arg-type]
+            for text in texts:
                 warnings.warn(text, stacklevel=2)
-            if outcome.error is not None:
-                raise outcome.error
-            yield outcome.value
+            if error is not None:
+                raise error
+            yield value
 
 
 def _outcome(task: _Task) -> _Outcome:
+    source, index, function, job = task
+    value, error = None, None
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
         try:
-            value, error = task.function(_opened(task.source)[task.index], task.job), None
+            value = function(_opened(source)[index], job)
         except FlockscopeError as failure:
-            value, error = None, failure
-    return _Outcome(value, error, tuple(str(w.message) for w in caught if issubclass(w.category, UserWarning)))
+            error = failure
+    return value, error, [str(w.message) for w in caught if issubclass(w.category, UserWarning)]
 
 
 @cache

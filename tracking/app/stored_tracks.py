@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, shortened
 from sim.io.files.own_files import is_hidden, output_paths
-from sim.io.formats.options import BoxScale
+from sim.io.formats.mot_folder import frame_rate
+from sim.io.formats.options import BoxScale, refuse_options
+from sim.io.source import holds_sequences
 from sim.io.store.seal import AGAIN, RUN, WHOLE, check_run, is_run, is_sequence, read_run, run_folder, tracked_hash
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
@@ -18,12 +21,7 @@ from tracking.running.run import TrackingRun
 DEPTH = 3  # Tracks are looked for in this many levels of folders below the path.
 
 EXPECTED = "a folder made by `flockscope track`, a folder of such folders, or MOTChallenge text"
-
-# Keys of run.json that say with what a sequence was tracked. Runs that are scored together have them in common.
-METHOD = ("tracker", "config", "grouping")
-
-SHOWN = 3  # Most parameters that the error on two configs names.
-
+STATED = "run.json states it"
 
 # Endings of files that hold no tracks.
 OTHER_FILES = (".toml", ".py", ".json", ".ini", ".html", ".svg", ".jpg", ".png", ".mp4", ".xml", ".ndjson")
@@ -39,28 +37,44 @@ class StoredTracks:
     path: Path  # the folder with the tracks, or the file
     info: dict[str, Any]  # content of run.json; {} for tracks of another program and for a run that was not finished
 
+    @property
+    def folder(self) -> Path:
+        """The folder with the tracks."""
+        return self.path if self.path.is_dir() else self.path.parent
+
     def check(self) -> None:
         """Raises InputError if these are tracks of a run of ours that is unfinished, damaged or mixed with another."""
         folder = run_folder(self.path)
         if folder is not None:
             check_run(folder)
 
+    def sequence(self, fps: float | None) -> Sequence:
+        """Returns what stands for the sequence that was tracked, without frames; fps: if run.json does not state it."""
+        self.check()
+        info, scale = self.info, self.info.get("px_per_m")
+        if "fps" in info:
+            refuse_options({"fps": fps}, "fps", self.folder, "a run", STATED)
+        source = {
+            "kind": "run", "path": str(self.folder), "truth_hash": info.get("truth_hash"),
+            "px_per_m_frames": int(info.get("px_per_m_frames") or 0),
+        }  # fmt: skip
+        return Sequence(
+            info.get("sequence", self.folder.name), frame_rate(fps, info.get("fps")), info.get("frames"),
+            lambda: iter(()), px_per_m=float("nan") if scale is None else scale, source=source,
+        )  # fmt: skip
+
     def read(self, sequence: Sequence, box_scale: BoxScale | None = None) -> TrackingRun:
         """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`."""
-        fps, seal = self.info.get("fps"), (self.path if self.path.is_dir() else self.path.parent) / RUN
+        fps, seal = self.info.get("fps"), self.folder / RUN
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
-            raise InputError(
-                file=seal, place="fps", got=f"tracks at {fps:g} fps", expected=f"{sequence.fps:g} fps",
-                remedy=f"track it again with --fps {sequence.fps:g}, or, if {fps:g} is the true rate, read the "
-                f"sequence with --fps {fps:g}, as `track` did",
-            )  # fmt: skip
+            remedy = f"read the sequence with --fps {fps:g}, as `track` did, or track it again"
+            expected = f"{sequence.fps:g} fps"
+            raise InputError(file=seal, place="fps", got=f"tracks at {fps:g} fps", expected=expected, remedy=remedy)
         tracked = self.info.get("truth_hash")
         if tracked is not None and tracked_hash(sequence) not in (None, tracked):
-            raise InputError(
-                file=seal, place="truth_hash", got=f"tracks of another {sequence.name}",
-                expected=f"those of {sequence.source.get('path', 'this sequence')}",
-                remedy=f"{AGAIN}: its labels, scenario or settings are others",
-            )  # fmt: skip
+            got, expected = f"tracks of another {sequence.name}", f"those of {sequence.source.get('path', 'this one')}"
+            remedy = f"{AGAIN}: its labels, scenario or settings are others"
+            raise InputError(file=seal, place="truth_hash", got=got, expected=expected, remedy=remedy)
         tracks = read_checked_tracks(
             self.path, fps=sequence.fps, length=sequence.length, person_class=sequence.source.get("class"),
             box_scale=box_scale,
@@ -68,16 +82,26 @@ class StoredTracks:
         return TrackingRun(tuple(tracks), self.info)
 
 
+def holds_tracks(path: Path) -> bool:
+    """Returns True if a path leads to a run of ours, or to a folder without sequences."""
+    own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)
+    return own or (path.is_dir() and not holds_sequences(path))
+
+
 def find_tracks(path: Path) -> list[StoredTracks]:
     """Returns all stored tracks at or below a path, not read yet, in the order of their paths."""
-    if not path.exists():
-        raise InputError(file=path, got="no such file or folder", expected=EXPECTED, remedy="check the path")
-    _refuse_other_things(path)
-    folder = run_folder(path)
-    info = read_run(folder) if folder is not None and path.name in WHOLE else {}
-    found = [StoredTracks(None, path, info)] if path.is_file() else list(_below(path, DEPTH))
+    got, remedy, found = "no such file or folder", "check the path", list[StoredTracks]()
+    if path.is_file() and path.suffix.lower() in OTHER_FILES:
+        got = f"a {path.suffix.lower()} file, no tracks"
+    elif path.is_file():
+        folder = run_folder(path)
+        found = [StoredTracks(None, path, read_run(folder) if folder is not None and path.name in WHOLE else {})]
+    elif any(is_sequence(folder) for pattern in DATASET for folder in ([path] if not pattern else path.glob(pattern))):
+        got, remedy = "a generated dataset, no tracks", "give the --out of `flockscope track`"
+    elif path.is_dir():
+        got, found = "no tracks", list(_below(path, DEPTH))
     if not found:
-        raise InputError(file=path, got="no tracks", expected=EXPECTED, remedy="check the path")
+        raise InputError(file=path, got=got, expected=EXPECTED, remedy=remedy)
     return found
 
 
@@ -96,89 +120,57 @@ def _below(folder: Path, depth: int) -> list[StoredTracks]:
 
 def match_tracks(sequences: list[Sequence], stored: list[StoredTracks]) -> list[tuple[Sequence, StoredTracks]]:
     """Returns each sequence with the stored tracks of the same name, in the order of `sequences`."""
+    names = [each.path.stem if each.name is None else each.name for each in stored]
+    ((name, count),) = Counter(names).most_common(1)
     if len(sequences) == len(stored) == 1 and stored[0].name is None:
-        matched = [(sequences[0], stored[0])]
-    else:
-        by_name = _by_name(stored)
-        matched = [(sequence, _named(sequence, by_name, stored)) for sequence in sequences]
+        names = [sequences[0].name]
+    elif count > 1:
+        first, second, *_ = (each.path for each, own in zip(stored, names, strict=True) if own == name)
+        got, remedy = f"tracks of {name} a second time", f"the first: {first}; give one run at a time"
+        raise InputError(file=second, got=got, expected="one result for each sequence", remedy=remedy)
+    by_name = dict(zip(names, stored, strict=True))
+    for sequence in sequences:
+        if sequence.name not in by_name:
+            _refuse_unmatched(sequence, by_name)
+    matched = [(sequence, by_name[sequence.name]) for sequence in sequences]
     for _, each in matched:
         each.check()
-    _refuse_mixture([each for _, each in matched])
+    _refuse_mixture([each for _, each in matched if each.info])
     return matched
 
 
-def _by_name(stored: list[StoredTracks]) -> dict[str, StoredTracks]:
-    found: dict[str, StoredTracks] = {}
-    for each in stored:
-        name = each.path.stem if each.name is None else each.name
-        if name in found:
-            raise InputError(
-                file=each.path, got=f"tracks of {name} a second time", expected="one result for each sequence",
-                remedy=f"the first: {found[name].path}; give one run at a time",
-            )  # fmt: skip
-        found[name] = each
-    return found
-
-
-def _named(sequence: Sequence, by_name: dict[str, StoredTracks], stored: list[StoredTracks]) -> StoredTracks:
-    if sequence.name in by_name:
-        return by_name[sequence.name]
+def _refuse_unmatched(sequence: Sequence, by_name: dict[str, StoredTracks]) -> None:
+    stored = [*by_name.values()]
     for each in stored:
         if not each.info:
             each.check()
-    folder, remedy = Path(sequence.source.get("path", "")), "track it first, or give the right folder"
-    if folder.name in by_name and (folder / "seqinfo.ini").is_file():
-        remedy = (
-            f"name={sequence.name} in {folder / 'seqinfo.ini'} is another than its folder's, {folder.name}: correct it"
-        )
-    elif (
-        len(stored) == 1
-        and stored[0].info.get("truth_hash") is None
-        and (text := stored[0].path / "tracks.txt").is_file()
-    ):
+    file, got = stored[0].path.parent if len(stored) > 1 else stored[0].path, ", ".join(sorted(by_name)[:5])
+    remedy, text = "track it first, or give the right folder", stored[0].path / "tracks.txt"
+    if len(stored) == 1 and stored[0].info.get("truth_hash") is None and text.is_file():
         remedy += f"; if they are of the same frames, give {text}"
-    raise InputError(
-        file=stored[0].path.parent if len(stored) > 1 else stored[0].path,
-        got="tracks of " + ", ".join(sorted(by_name)[:5]), expected=f"tracks of {sequence.name}", remedy=remedy,
-    )  # fmt: skip
+    raise InputError(file=file, got=f"tracks of {got}", expected=f"tracks of {sequence.name}", remedy=remedy)
 
 
-def _refuse_mixture(stored: Iterable[StoredTracks]) -> None:
-    runs = [each for each in stored if each.info]
-    for each in runs[1:]:
-        first = runs[0]
-        if _method(each) != _method(first):
-            got = f"{_method_words(first, each)} in {first.path.name}, {_method_words(each, first)} in {each.path.name}"
-            raise InputError(
-                file=each.path.parent, got=got, expected="one tracker with one config",
-                remedy="keep one folder per run: track again with another --out, and score them apart",
-            )  # fmt: skip
+def _refuse_mixture(runs: list[StoredTracks]) -> None:
+    """Raises InputError if stored tracks that are scored together are of different trackers or parameters."""
+    for first, each in pairwise(runs):
+        if _method(first) != _method(each):
+            got = " and ".join(
+                f"{one.info.get('tracker')}{_settings_words(one, other)} in {one.path.name}"
+                for one, other in ((first, each), (each, first))
+            )
+            remedy = "keep one folder per run: track again with another --out, and score them apart"
+            raise InputError(file=each.path.parent, got=got, expected="one tracker with one config", remedy=remedy)
 
 
-def _method(stored: StoredTracks) -> list[Any]:
-    return [stored.info.get(key) for key in METHOD]
+def _method(stored: StoredTracks) -> tuple[object, dict[str, Any]]:
+    return stored.info.get("tracker"), {**(stored.info.get("config") or {}), **(stored.info.get("grouping") or {})}
 
 
-def _method_words(stored: StoredTracks, other: StoredTracks) -> str:
-    mine, theirs = ({**(s.info.get("config") or {}), **(s.info.get("grouping") or {})} for s in (stored, other))
-    tracker = str(stored.info.get("tracker"))
-    if tracker != str(other.info.get("tracker")):
-        return tracker
-    changed = [f"{key} = {value}" for key, value in mine.items() if theirs.get(key) != value][:SHOWN]
-    return f"{tracker} ({', '.join(changed)})" if changed else tracker
-
-
-def _refuse_other_things(path: Path) -> None:
-    if path.is_file() and path.suffix.lower() in OTHER_FILES:
-        raise InputError(
-            file=path, got=f"a {path.suffix.lower()} file, no tracks", expected=EXPECTED, remedy="check the path"
-        )
-    folders = (folder for pattern in DATASET for folder in ([path] if not pattern else path.glob(pattern)))
-    if path.is_dir() and any(is_sequence(folder) for folder in folders):
-        raise InputError(
-            file=path, got="a generated dataset, no tracks", expected=EXPECTED,
-            remedy="give the --out of `flockscope track`",
-        )  # fmt: skip
+def _settings_words(stored: StoredTracks, other: StoredTracks) -> str:
+    (tracker, mine), (another, theirs) = _method(stored), _method(other)
+    changed = ", ".join(f"{key} = {value}" for key, value in mine.items() if theirs.get(key) != value)
+    return f" ({shortened(changed, 80)})" if changed and tracker == another else ""
 
 
 def run_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:

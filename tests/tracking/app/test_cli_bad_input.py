@@ -116,12 +116,10 @@ OPTIONS = {
         "with truth, without pictures; expected a sequence with pictures; … try --detections truth",
     "track blob {made}/data --camera {made}/scene.toml --out {tmp}/x":
         "{made}/scene.toml: --camera: got a TOML file; expected a camera.json … describes a view",
-    "generate crossing --seeds 0": "flockscope generate: got missing option '--out'; expected --out DIR: ",
+    "generate crossing --seeds 0": "flockscope generate: got missing option '--out'; … generate --help",
     "score {made}/data {made}/run {made}/run": "TRACKS: got … twice; expected each run once",
     "score {made}/data {made}/run {made}/run/scene-s40000 --by HOTAA": "--by: got HOTAA … such as HOTA",
     "score {made}/data {made}/run --by HOTA": "got --by; expected none for one run; leave it out",
-    "score {made}/data {made}/run --csv {tmp}/x.csv": "got --csv; expected none for one run; leave it out",
-    "score {made}/data {made}/run {made}/run/scene-s40000 --csv {tmp}/x.toml": "--csv: got … ends in .csv",
     "export coco {made}/data --out {tmp}/scene.toml": "--out: got … ends in .json",
     "replay {made}/data --out {tmp}/x --duration nan": "--duration: got nan; expected seconds above 0",
     "export csv {made}/data --out {tmp}/x --line a=nan,2,3,4": "--line: got 'a=nan,2,3,4'",

@@ -380,7 +380,7 @@ FLIPS = {
     },
     "score {0}/data {0}/tracks --similarity boxes": {"similarity": ("boxes", "ground")},
     SCORED: {"blocks": "--blocks 5"},
-    "score {0}/data {0}/tracks {0}/perfect": {"by": "--by HOTA", "all": "--all", "csv": "--csv {1}/all.csv"},
+    "score {0}/data {0}/tracks {0}/perfect": {"by": "--by HOTA"},
     "score {0}/mot {0}/mot-tracks": {"fps": "--fps 5"},
     IN_IMAGE: {"px_per_m": "--px-per-m 5"},
     f"view {ONE} --out {{1}}/page.html": {"source": ("40000", "40001"), "tracks": "{0}/tracks"},

@@ -9,7 +9,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from rich.table import Table
 
 from scenarios.errors import InputError
 from sim.io.store.seal import read_manifest, with_hash
@@ -19,6 +18,7 @@ from tracking.app import progress
 from tracking.app.cli import run
 from tracking.app.command_line import _print_warnings_once
 from tracking.app.command_result import CommandResult, print_error, print_result
+from tracking.app.commands.score_tables import table
 from tracking.app.progress import ProgressMeter
 
 NAMES = ("[/red]", "x[door]y", ":smile:", "\x1b[31mred", "a\u202eb", "[link=http://x]y[/link]")
@@ -26,16 +26,8 @@ SHOWN = ("[/red]", "x[door]y", ":smile:", "\\x1b[31mred", "a\\u202eb", "[link=ht
 
 
 @pytest.mark.parametrize(("name", "shown"), [*zip(NAMES, SHOWN, strict=True)])
-def test_a_table_shows_names_letter_by_letter(name, shown, capsys):
-    table = Table(name, box=None)
-    table.add_row(name)
-    assert print_result(CommandResult({}, table), as_json=False) == 0
-    assert [line.strip() for line in capsys.readouterr().out.splitlines()] == [shown, shown]
-
-
-@pytest.mark.parametrize(("name", "shown"), [*zip(NAMES, SHOWN, strict=True)])
-def test_text_errors_warnings_and_progress_show_names_letter_by_letter(name, shown, capsys, monkeypatch):
-    print_result(CommandResult({}, f"first\n{name}"), as_json=False)
+def test_text_tables_errors_warnings_and_progress_show_names_letter_by_letter(name, shown, capsys, monkeypatch):
+    print_result(CommandResult({}, f"first\n{name}\n{table('', [name], (), [[name]])}"), as_json=False)
     print_error(InputError(got=name, expected="a", remedy="b"), as_json=False)
     _print_warnings_once()(UserWarning(name))
     monkeypatch.setattr(progress, "PAUSE", -1.0)
@@ -43,10 +35,17 @@ def test_text_errors_warnings_and_progress_show_names_letter_by_letter(name, sho
         meter._last_line = 0.0
         meter.step(name)
     printed = capsys.readouterr()
-    assert printed.out == f"first\n{shown}\n"
+    assert printed.out == "first\n" + f"{shown}\n" * 3
     assert printed.err.splitlines() == [
         f"error: got {shown}; expected a; b", f"warning: {shown}", f"track: 1 of 2 {shown}",
     ]  # fmt: skip
+
+
+def test_labels_and_detections_of_a_folder_give_one_warning(capsys):
+    warn = _print_warnings_once()
+    for name in ("a/gt/gt", "a/det/det", "b/gt/gt"):
+        warn(UserWarning(f"{name}.txt: {len(name)} rows of class 2 are left out"))
+    assert len(capsys.readouterr().err.splitlines()) == 2
 
 
 @pytest.mark.parametrize("name", [*NAMES, "\udcff", "\x9b", "\U000e0041", "\u2028"])
@@ -74,7 +73,7 @@ def broken_name(tmp_path_factory) -> Path:
 
 LINES_WITH_NAMES = [
     "track blob {0}/data --detections file --out {1}", "score {0}/data {0}/tracks",
-    "score {0}/data {0}/tracks {0}/tracks/. --all", "fit sensor {0}/data --out {1}/sensor.toml",
+    "score {0}/data {0}/tracks {0}/tracks/.", "fit sensor {0}/data --out {1}/sensor.toml",
     "view {0}/data --video none --out {1}", "sheet {0}/data --out {1}", "validate {0}/tracks",
 ]  # fmt: skip
 

@@ -197,7 +197,7 @@ def outcome(data: Path, jobs: list[str], workers: int) -> tuple[list[str], list[
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            for one in over_sequences(named, source.open(), jobs, source, workers):
+            for one in over_sequences("test", named, source.open(), jobs, source, workers):
                 found.append(one)
         except (InputError, WorkError) as failure:
             error = failure.line()

@@ -231,7 +231,7 @@ def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
     Path("scene.toml").write_text(SCENE)
     line = ["minimize", "scene.toml", "--tracker", "blob", "--seed", "6", "--confirm", "0", "--while"]
     assert run([*line, "fragment", "--out", "small.toml"]) == 0
-    assert re.search(r"3 people → [12], 6 s → 2 s, 1 pillar → none", capsys.readouterr().out)
+    assert re.search(r"3 people → [12], 6 s → 2, 1 pillars → 0", capsys.readouterr().out)
     small = load("small.toml")
     assert len(small.group) == 1
     assert ("sensor", "detect_prob") in [piece.path for piece in difficulties(small)[:2]]

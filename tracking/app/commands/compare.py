@@ -12,6 +12,7 @@ that is better, with its 95 % interval (Student's, paired). The verdict follows 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from sim.io.files.atomic import write_file
 from sim.io.files.tables import json_document, read_json
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import checked_key, new_table, with_title
+from tracking.app.commands.score_tables import checked_key, table
 from tracking.app.option_parsing import output_file
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import paired
@@ -51,66 +52,49 @@ def compare(options: CompareOptions) -> CommandResult:
 def _read(path: Path) -> Stored:
     document = read_json(path)
     rows = document.get("sequences") if isinstance(document, dict) else None
-    if not isinstance(rows, list) or not rows or not all(map(_is_named, rows)):
+    rows = rows if isinstance(rows, list) else []
+    named = [row for row in rows if isinstance(row, dict) and "name" in row]
+    found = {str(row["name"]): row for row in named}
+    if not named or len(named) < len(rows):
         raise InputError(file=path, got="no scores of sequences", expected=EXPECTED, remedy="give another file")
-    found = {row["name"]: row for row in rows}
-    if len(found) < len(rows):
-        raise InputError(
-            file=path, got="a sequence twice", expected="one entry for each", remedy="score each split alone"
-        )  # fmt: skip
+    if len(found) < len(named):
+        raise InputError(file=path, got="a sequence twice", expected="one entry for each", remedy="score splits alone")
     return found
-
-
-def _is_named(row: object) -> bool:
-    return isinstance(row, dict) and isinstance(row.get("name"), str)
 
 
 def _require_same(options: CompareOptions, before: Stored, now: Stored) -> None:
     missing, new = sorted(before.keys() - now.keys()), sorted(now.keys() - before.keys())
+    place, got, expected, remedy = "", "", "the sequences of the baseline", "score the same sequences"
     if missing or new:
         names = shortened(", ".join(missing or new), 80)
-        got = f"no {names}" if missing else f"{names}, not in {options.baseline}"
-        raise InputError(
-            file=options.now, place="incomplete", got=got, expected="the sequences of the baseline",
-            remedy="score the same sequences, or save a new baseline with --save",
-        )  # fmt: skip
-    if len(before) < FEWEST:
-        raise InputError(
-            file=options.now, place="too few", got="1 sequence", expected=f"at least {FEWEST}",
-            remedy="generate more seeds",
-        )  # fmt: skip
-    for name, row in before.items():
-        for key in HOW:
-            if key in row and key in now[name] and row[key] != now[name][key]:
-                raise InputError(
-                    file=options.now, place=f"{name}: {key}", got=repr(now[name][key]),
-                    expected=f"{row[key]!r}, as in {options.baseline}",
-                    remedy="track and score the same sequences" if key == "truth" else "score both alike",
-                )  # fmt: skip
+        place, got = "incomplete", f"no {names}" if missing else f"{names}, not in {options.baseline}"
+        remedy += ", or save a new baseline with --save"
+    elif len(before) < FEWEST:
+        place, got, expected, remedy = "too few", "1 sequence", f"at least {FEWEST}", "generate more seeds"
+    else:
+        known = [(n, k) for n, k in product(before, HOW) if None not in (before[n].get(k), now[n].get(k))]
+        name, key = next(((n, k) for n, k in known if before[n][k] != now[n][k]), ("", ""))
+        if name:
+            place, got = f"{name}: {key}", repr(now[name][key])
+            expected = f"{before[name][key]!r}, as in {options.baseline}"
+            remedy = "track and score the same sequences" if key == "truth" else "score both alike"
+    if place:
+        raise InputError(file=options.now, place=place, got=got, expected=expected, remedy=remedy)
 
 
 def _row(key: str, before: Stored, now: Stored, tolerance: float) -> dict[str, Any]:
     pairs = np.array([[_value(row, key), _value(now[name], key)] for name, row in before.items()])
-    known = np.isfinite(pairs).all(axis=1)
-    if known.sum() < FEWEST:
-        both = [k for k in CATALOGUE if all(np.isfinite(_value(s[name], k)) for s in (before, now) for name in before)]
-        raise InputError(
-            place=key, got=f"known in {counted(int(known.sum()), 'sequence')} on both sides",
-            expected=f"at least {FEWEST}",
-            remedy="choose another score with --by" + (f", such as {' or '.join(both[:2])}" if both else ""),
-        )  # fmt: skip
-    first, second = pairs[known].T
+    first, second = pairs[np.isfinite(pairs).all(axis=1)].T
+    if len(first) < FEWEST:
+        got = f"known in {counted(len(first), 'sequence')} on both sides"
+        raise InputError(place=key, got=got, expected=f"at least {FEWEST}", remedy="choose another score with --by")
     mean, low, high = (float(end[0]) for end in paired(first[:, None], second[:, None]))
     upwards = CATALOGUE[key].better != "lower"
     verdict = _verdict(*((mean, low, high) if upwards else (-mean, -high, -low)), tolerance)
-    values = {
-        "baseline": float(first.mean()),
-        "now": float(second.mean()),
-        "difference": mean,
-        "low": low,
-        "high": high,
-    }
-    return {"score": key, "sequences": int(known.sum()), **values, "verdict": verdict}
+    return {
+        "score": key, "sequences": len(first), "baseline": float(first.mean()), "now": float(second.mean()),
+        "difference": mean, "low": low, "high": high, "verdict": verdict,
+    }  # fmt: skip
 
 
 def _value(row: Mapping[str, Any], key: str) -> float:
@@ -126,10 +110,11 @@ def _verdict(mean: float, low: float, high: float, tolerance: float) -> str:
     return "no difference" if -tolerance <= low and high <= tolerance else "too noisy"
 
 
-def _table(rows: list[dict[str, Any]], sequences: int) -> Any:
-    table = new_table(["score"], ["baseline", "now", "difference", "95 % interval"], ["verdict"])
+def _table(rows: list[dict[str, Any]], sequences: int) -> str:
+    cells = []
     for row in rows:
         ends = f"{row['low']:+.4f} to {row['high']:+.4f}"
         numbers = f"{row['baseline']:.4f}", f"{row['now']:.4f}", f"{row['difference']:+.4f}", ends
-        table.add_row(row["score"], *numbers, row["verdict"])
-    return with_title(f"{counted(sequences, 'sequence')}, paired", table)
+        cells.append([row["score"], *numbers, row["verdict"]])
+    columns = ["baseline", "now", "difference", "95 % interval"]
+    return table(f"{counted(sequences, 'sequence')}, paired", ["score"], columns, cells, ["verdict"])

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from scenarios.errors import printable
 from sim.io.formats.options import BoxScale
 from sim.types import Sequence
 from tracking.app.command_options import ErrorsOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score import matched_tracks
-from tracking.app.commands.score_tables import new_table, with_title
-from tracking.app.sequence_workers import OpenedAs, results_over_sequences
-from tracking.app.stored_tracks import StoredTracks
-from tracking.errors.found import CauseRow, RunErrors, errors_of_run, sums_by_cause
+from tracking.app.commands.score_tables import table
+from tracking.app.commands.scored_sequence import box_scale_of
+from tracking.app.sequence_workers import over_sequences, source_of
+from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
+from tracking.errors.found import RunErrors, errors_of_run, sums_by_cause
 from tracking.errors.repairs import SHOWN
 from tracking.scoring.people_comparison import Similarity
 from tracking.stats import mean_of_known
@@ -23,32 +22,24 @@ Job = tuple[StoredTracks, Similarity | None, BoxScale | None]
 
 def errors(options: ErrorsOptions) -> CommandResult:
     """Lists the errors of every sequence of the truth."""
-    source = OpenedAs(
-        options.truth, options.fps, options.px_per_m, images=False, person_class=options.person_class
-    )  # fmt: skip
+    source = source_of(options, options.truth, without="box_scale")
     sequences = source.open()
-    stored, box_scale = matched_tracks(sequences, options.tracks, options.box_scale)
+    stored = [tracks for _, tracks in match_tracks(sequences, find_tracks(options.tracks))]
+    box_scale = box_scale_of(options.box_scale, stored)
     jobs: list[Job] = [(one, options.similarity, box_scale) for one in stored]
-    found = results_over_sequences("errors", errors_of, sequences, jobs, source, options.workers)
-    names = [sequence.name for sequence in sequences]
-    fps = [sequence.fps for sequence in sequences]
-    causes = sums_by_cause(found)
-    data = {
-        "sequences": [
-            {
-                "name": name,
-                "scores": one.scores,
-                "left": one.left,
-                "errors": [error.facts(rate) for error in one.errors],
-            }
-            for name, rate, one in zip(names, fps, found, strict=True)
-        ],
-        "causes": [
-            {"kind": row.kind, "cause": row.cause, "errors": row.errors, "seconds": row.seconds, **row.gains}
-            for row in causes
-        ],
-    }  # fmt: skip
-    return CommandResult(data, _tables(names, fps, found, causes, options.limit))
+    found = list(over_sequences("errors", errors_of, sequences, jobs, source, options.workers))
+    every = [
+        {
+            "name": sequence.name, "scores": one.scores, "left": one.left,
+            "errors": [error.facts(sequence.fps) for error in one.errors],
+        }
+        for sequence, one in zip(sequences, found, strict=True)
+    ]  # fmt: skip
+    causes = [
+        {"kind": row.kind, "cause": row.cause, "errors": row.errors, "seconds": row.seconds, **row.gains}
+        for row in sums_by_cause(found)
+    ]
+    return CommandResult({"sequences": every, "causes": causes}, _tables(found, every, causes, options.limit))
 
 
 def errors_of(sequence: Sequence, job: Job) -> RunErrors:
@@ -57,33 +48,25 @@ def errors_of(sequence: Sequence, job: Job) -> RunErrors:
     return errors_of_run(sequence, stored.read(sequence, box_scale), similarity)
 
 
-def _tables(names: list[str], fps: list[float], found: list[RunErrors], causes: list[CauseRow], limit: int) -> Any:
-    from rich.console import Group
-
-    lost = new_table(["kind", "cause"], ["errors", "seconds", *SHOWN])
-    for row in causes:
-        gains = (_number(row.gains[k], "+.3f") for k in SHOWN)
-        lost.add_row(row.kind, row.cause, str(row.errors), f"{row.seconds:.1f}", *gains)
-    left = {k: mean_of_known(run.left[k] for run in found) for k in SHOWN}
-    lost.add_row("position", "", "", "", *(_number(left[k], "+.3f") for k in SHOWN))
-    now = "  ".join(f"{k} {_number(mean_of_known(run.scores[k] for run in found), '.3f')}" for k in SHOWN)
-    every = [(name, rate, error) for name, rate, run in zip(names, fps, found, strict=True) for error in run.errors]
-    dearest = sorted(every, key=lambda item: -(item[2].cost or 0.0))[:limit]
-    listed = new_table(["sequence", "frames", "kind", "who", "cause"], ["cost"])
-    for name, rate, error in dearest:
-        facts = error.facts(rate)
-        span = f"{facts['start']}–{facts['end']}"
-        listed.add_row(
-            printable(name),
-            span,
-            facts["kind"],
-            error.who,
-            facts["detail"] or facts["cause"],
-            _number(error.cost, ".4f"),
-        )
-    title = f"the {len(dearest)} dearest of {len(every)} errors; cost: HOTA, of groups group_F1"
-    return Group(with_title(f"where the score is lost; now {now}", lost), with_title(title, listed))
+def _tables(found: list[RunErrors], sequences: list[dict[str, Any]], causes: list[dict[str, Any]], limit: int) -> str:
+    left = {key: mean_of_known(run.left[key] for run in found) for key in SHOWN}
+    every = [*causes, {"kind": "position", "cause": "", "errors": "", "seconds": None, **left}]
+    lost = [
+        [row["kind"], row["cause"], str(row["errors"]), _number(row["seconds"], ".1f", ""),
+         *(_number(row[key], "+.3f") for key in SHOWN)]
+        for row in every
+    ]  # fmt: skip
+    now = "  ".join(f"{key} {_number(mean_of_known(run.scores[key] for run in found), '.3f')}" for key in SHOWN)
+    errors = [(sequence["name"], error) for sequence in sequences for error in sequence["errors"]]
+    dearest = sorted(errors, key=lambda item: -(item[1]["cost"] or 0.0))[:limit]
+    listed = [
+        [name, f"{e['start']}–{e['end']}", e["kind"], e["who"], e["detail"] or e["cause"], _number(e["cost"], ".4f")]
+        for name, e in dearest
+    ]
+    title = f"the {len(dearest)} dearest of {len(errors)} errors; cost: HOTA, of groups group_F1"
+    costs = table(f"where the score is lost; now {now}", ["kind", "cause"], ["errors", "seconds", *SHOWN], lost)
+    return costs + "\n" + table(title, ["sequence", "frames", "kind", "who", "cause"], ["cost"], listed)
 
 
-def _number(value: float | None, form: str) -> str:
-    return "–" if value is None or value != value else format(value, form)
+def _number(value: float | None, form: str, unknown: str = "–") -> str:
+    return unknown if value is None or value != value else format(value, form)

@@ -4,13 +4,11 @@ together, the events of `joint`, and the speed table and relations of `relationa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
 from scenarios.errors import printable
-from sim.types import Sequence as Recording
 from sim.types import Truth
 from tracking.app import option_parsing
 from tracking.app.command_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
@@ -30,13 +28,15 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     """Writes the profile of the detector behind the recordings, pooled over all of them, as a TOML file."""
     from scenarios.loading.resolve import dump_sensor
     from sim.io.files.atomic import write_file
+    from sim.io.source import open_source
     from tracking.fitting.detection_matching import match_sequence
     from tracking.fitting.error_statistics import error_statistics, simulated_detections
     from tracking.fitting.sensor import fit_matched
     from tracking.stats import mean_of_finite
 
     out = option_parsing.output_file(options.out, ".toml")
-    recordings = _open(options.sources, options.fps)
+    opened = [open_source(source, fps=options.fps, images=False) for source in options.sources]
+    recordings = [recording for found in opened for recording in found]
     matched = [match_sequence(recording) for recording in recordings]
     profile = fit_matched(matched)
     measured = error_statistics(matched)
@@ -54,29 +54,21 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     return CommandResult(data, "\n".join(lines))
 
 
-def _open(sources: Sequence[Path], fps: float | None) -> list[Recording]:
-    from sim.io.source import open_source
-
-    return [sequence for source in sources for sequence in open_source(source, fps=fps, images=False)]
-
-
 def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments."""
     from sim.io.files.atomic import write_file
     from tracking.fitting.belief import belief_scores, fit_belief, sample_of
     from tracking.fitting.grouping_scenes import pair_scenes
 
-    out = option_parsing.output_file(options.out, ".toml")
-    seeds = _fit_and_check_seeds(options.seeds, options.check)
+    out, seeds = option_parsing.output_file(options.out, ".toml"), _fit_and_check_seeds(options)
     samples = {key: sample_of(list(pair_scenes(options.names, numbers))) for key, numbers in seeds.items()}
     changes = sample_of(list(pair_scenes(options.events, seeds["fitted"]))) if options.events else None
     belief = fit_belief(samples["fitted"], changes)
     scores = {key: belief_scores(sample, belief.log_odds(sample.values)[:, 0]) for key, sample in samples.items()}
     asked = [f"--events {name}" for name in options.events]
-    words = " ".join(["flockscope fit grouping", *options.names, f"--seeds {options.seeds}", *asked])
-    lines = _score_lines(seeds, scores)
-    write_file(out, belief.toml_text("\n".join([words, *lines])).encode())
-    text = "\n".join([*lines, f"→ {out}: use it as --grouping {out}"])
+    comments = _comments("grouping", options, asked, seeds, scores)
+    write_file(out, belief.toml_text("\n".join(comments)).encode())
+    text = "\n".join([*comments[1:], f"→ {out}: use it as --grouping {out}"])
     return CommandResult({"file": out, **scores}, text)
 
 
@@ -88,18 +80,25 @@ def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]
     return ((seed, simulated(entry, seed)) for entry in entries for seed in seeds)
 
 
-def _fit_and_check_seeds(fitted: str, checked: str | None) -> dict[str, range]:
+def _fit_and_check_seeds(options: FitJointOptions) -> dict[str, range]:
     """Returns the seeds of --seeds under "fitted" and, if given, those of --check under "checked"."""
-    asked = {"fitted": ("--seeds", fitted), "checked": ("--check", checked)}
-    return {key: option_parsing.seeds(text, option) for key, (option, text) in asked.items() if text is not None}
+    found = {"fitted": option_parsing.seeds(options.seeds)}
+    return found | ({} if options.check is None else {"checked": option_parsing.seeds(options.check, "--check")})
 
 
-def _score_lines(seeds: Mapping[str, range], scores: Mapping[str, Mapping[str, float]]) -> list[str]:
-    return [
-        f"{key}, seeds {numbers.start}:{numbers.stop}: "
-        + ", ".join(f"{name} {value:.4g}" for name, value in scores[key].items())
-        for key, numbers in seeds.items()
-    ]
+def _comments(
+    kind: str,
+    options: FitJointOptions,
+    more: Iterable[str],
+    seeds: Mapping[str, range],
+    scores: Mapping[str, Mapping[str, float]],
+) -> list[str]:
+    """Returns the command that fits, and a line of scores for each range of seeds."""
+    lines = [" ".join(["flockscope fit", kind, *options.names, f"--seeds {options.seeds}", *more])]
+    for key, numbers in seeds.items():
+        values = ", ".join(f"{name} {value:.4g}" for name, value in scores[key].items())
+        lines.append(f"{key}, seeds {numbers.start}:{numbers.stop}: {values}")
+    return lines
 
 
 def fit_joint(options: FitJointOptions) -> CommandResult:
@@ -108,20 +107,18 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
     from tracking.fitting.joint_events import EventRows, event_rows, event_scores, fit_events
     from tracking.papers.joint.config import EVENT_TIME
 
-    out = option_parsing.output_file(options.out, ".toml")
-    seeds = _fit_and_check_seeds(options.seeds, options.check)
+    out, seeds = option_parsing.output_file(options.out, ".toml"), _fit_and_check_seeds(options)
     rows = {
         key: EventRows.joined(event_rows(truth, EVENT_TIME, seed) for seed, truth in _simulated(options.names, numbers))
         for key, numbers in seeds.items()
     }
     params = fit_events(rows["fitted"])
     scores = {key: event_scores(part, params) for key, part in rows.items()}
-    words = " ".join(["flockscope fit joint", *options.names, f"--seeds {options.seeds}"])
-    lines = _score_lines(seeds, scores)
+    comments = _comments("joint", options, (), seeds, scores)
     body = [f"{name} = {value}" for name, value in params.items()]
-    text = "\n".join([*(f"# {line}" for line in (words, *lines)), 'tracker = "joint"', "", "[params]", *body, ""])
+    text = "\n".join([*(f"# {line}" for line in comments), 'tracker = "joint"', "", "[params]", *body, ""])
     write_file(out, text.encode())
-    result = "\n".join([*lines, "", *body, "", f"→ {out}: use it as --params {out}"])
+    result = "\n".join([*comments[1:], "", *body, "", f"→ {out}: use it as --params {out}"])
     return CommandResult({"file": out, "params": params, **scores}, result)
 
 

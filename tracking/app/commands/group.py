@@ -7,7 +7,7 @@ kind.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from collections.abc import Sequence as SequenceOf
 from dataclasses import replace
 from pathlib import Path
@@ -15,18 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError, counted, printable, shortened
-from sim.io.formats.mot_folder import frame_rate
+from scenarios.errors import InputError, counted, shortened
 from sim.io.formats.options import refuse_options
-from sim.io.source import holds_sequences, open_source
-from sim.io.store.seal import WHOLE, reject_foreign, run_folder
+from sim.io.store.seal import reject_foreign
 from sim.types import EVENT_KINDS, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import GroupOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import new_table, with_title
+from tracking.app.commands.score_tables import table
 from tracking.app.progress import ProgressMeter
-from tracking.app.stored_tracks import StoredTracks, find_tracks, run_folders
+from tracking.app.sequence_workers import source_of
+from tracking.app.stored_tracks import STATED, StoredTracks, find_tracks, holds_tracks, run_folders
 from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.grouping.plausibility import median_speed
@@ -37,54 +36,59 @@ LISTED = 20  # Most groups that are listed one by one.
 
 LONGEST_LIST = 60  # Most characters of a list of members.
 
+LASTING = 2.0  # s: groups that last as long are counted apart.
+
 Row = dict[str, Any]
+
+
+def groups_of(run: TrackingRun, fps: float) -> list[Row]:
+    """Returns id, members, greatest size, first and last frame and duration of each group, in order of their starts."""
+    found: dict[int, Row] = {}
+    for t in run:
+        for name in np.unique(t.group[t.group >= 0]).tolist():
+            who = t.id[t.group == name].tolist()
+            group = found.setdefault(name, {"id": name, "members": set(), "size": 0, "start": t.index})
+            group["members"].update(who)
+            group |= {"size": max(group["size"], len(who)), "end": t.index}
+    return [
+        {**g, "members": sorted(g["members"]), "seconds": (g["end"] - g["start"] + 1) / fps} for g in found.values()
+    ]
+
+
+def lasting(groups: Iterable[Row]) -> int:
+    """Returns the number of groups that last for LASTING seconds or longer."""
+    return sum(group["seconds"] >= LASTING for group in groups)
 
 
 def group_row(run: TrackingRun, folder: Path) -> Row:
     """Returns what the command tells of one run, as a dictionary."""
-    count = [len(t.id) for t in run]
-    frame = np.repeat(np.array([t.index for t in run], np.int64), count)
-    id, group = (np.concatenate([np.zeros(0, np.int64), *(getattr(t, name) for t in run)]) for name in ("id", "group"))
-    inside = group >= 0
-    order = np.lexsort((frame[inside], group[inside]))
-    names, first = np.unique(group[inside][order], return_index=True)
-    parts = (np.split(a[inside][order], first[1:]) for a in (frame, id))
-    fps, found = run.info["fps"], []
-    for name, when, who in zip(names.tolist(), *parts, strict=bool(len(names))):
-        start, end, size = int(when[0]), int(when[-1]), int(np.unique(when, return_counts=True)[1].max())
-        members, seconds = np.unique(who).tolist(), (end - start + 1) / fps
-        found.append({"id": name, "members": members, "size": size, "start": start, "end": end, "seconds": seconds})
+    fps = run.info["fps"]
     events = Counter(e.kind for t in run for e in t.events)
     speed = median_speed(run, fps, run.info["px_per_m"] or 1.0)
     return {
         **{key: run.info[key] for key in ("sequence", "plane", "px_per_m", "px_per_m_frames", "fps", "frames")},
         "median_speed": None if np.isnan(speed) else speed,
-        "people": len(np.unique(id)), "people_in_groups": len(np.unique(id[inside])),
-        "groups": sorted(found, key=lambda g: (g["start"], g["id"])),
-        "events": {kind: events[kind] for kind in EVENT_KINDS}, "folder": folder,
+        "people": len({id for t in run for id in t.id.tolist()}),
+        "people_in_groups": len({id for t in run for id in t.id[t.group >= 0].tolist()}),
+        "groups": groups_of(run, fps), "events": {kind: events[kind] for kind in EVENT_KINDS}, "folder": folder,
     }  # fmt: skip
 
 
-def group_tables(rows: SequenceOf[Row]) -> Any:
-    """Returns something rich can print: a table of groups and one of events, with a line for each run and their sum."""
-    from rich.console import Group
-
+def group_tables(rows: SequenceOf[Row]) -> str:
+    """Returns a table of groups and one of events, with a line for each run and their sum."""
     counts = _counts_table("groups", rows, _group_counts)
     events = _counts_table(
         "events", rows, lambda some: {kind: sum(r["events"][kind] for r in some) for kind in EVENT_KINDS}
     )
     if len(rows) > 1:
-        return Group(counts, events, f"stored in {rows[0]['folder'].parent}")
-    return Group(counts, *_longest(rows[0]), events, _place(rows[0]), f"stored in {rows[0]['folder']}")
+        return "\n".join([counts, events, f"stored in {rows[0]['folder'].parent}"])
+    return "\n".join([counts, *_longest(rows[0]), events, _place(rows[0]), f"stored in {rows[0]['folder']}"])
 
 
-def _counts_table(title: str, rows: SequenceOf[Row], cells: Callable[[SequenceOf[Row]], dict[str, object]]) -> Any:
-    table = new_table(["sequence"], cells(rows))
-    for row in rows:
-        table.add_row(printable(row["sequence"]), *map(str, cells([row]).values()))
-    if len(rows) > 1:
-        table.add_row("all", *map(str, cells(rows).values()), style="bold")
-    return with_title(title, table)
+def _counts_table(title: str, rows: SequenceOf[Row], cells: Callable[[SequenceOf[Row]], dict[str, object]]) -> str:
+    parts = [(row["sequence"], [row]) for row in rows] + [("all", [*rows])] * (len(rows) > 1)
+    shown = [[name, *map(str, cells(part).values())] for name, part in parts]
+    return table(title, ["sequence"], cells(rows), shown)
 
 
 def _group_counts(rows: SequenceOf[Row]) -> dict[str, object]:
@@ -93,25 +97,24 @@ def _group_counts(rows: SequenceOf[Row]) -> dict[str, object]:
     return {
         "people": sum(row["people"] for row in rows),
         "in groups": sum(row["people_in_groups"] for row in rows),
-        "groups": len(groups),
-        "of 2": sizes[2],
-        "of 3": sizes[3],
-        "of 4 or more": sizes[4],
+        "groups": len(groups), f"{LASTING:g} s or longer": lasting(groups),
+        "of 2": sizes[2], "of 3": sizes[3], "of 4 or more": sizes[4],
         "median, s": f"{np.median(seconds):.1f}" if groups else "–",
         "longest, s": f"{max(seconds):.1f}" if groups else "–",
-    }
+    }  # fmt: skip
 
 
-def _longest(row: Row) -> list[Any]:
+def _longest(row: Row) -> list[str]:
     kept = sorted(row["groups"], key=lambda g: -g["seconds"])[:LISTED]
-    table = new_table((), ["group", "from, s", "to, s", "most at a time"], ["members"])
-    for g in (g for g in row["groups"] if g in kept):
-        times = [f"{frame / row['fps']:.1f}" for frame in (g["start"] - 1, g["end"])]
-        members = shortened(" ".join(map(str, g["members"])), LONGEST_LIST)
-        table.add_row(str(g["id"]), *times, str(g["size"]), members)
-    more = len(row["groups"]) - len(kept)
-    title = f"the {LISTED} groups that last longest (--json lists all)" if more else "members"
-    return [with_title(title, table)] if kept else []
+    shown = [
+        [str(g["id"]), f"{(g['start'] - 1) / row['fps']:.1f}", f"{g['end'] / row['fps']:.1f}", str(g["size"]),
+         shortened(" ".join(map(str, g["members"])), LONGEST_LIST)]
+        for g in row["groups"] if g in kept
+    ]  # fmt: skip
+    title = (
+        "members" if len(kept) == len(row["groups"]) else f"the {LISTED} groups that last longest (--json lists all)"
+    )
+    return [table(title, (), ["group", "from, s", "to, s", "most at a time"], shown, ["members"])] if kept else []
 
 
 def _place(row: Row) -> str:
@@ -128,7 +131,6 @@ def _place(row: Row) -> str:
 
 # Kind of a source whose rows are anybody's tracks: the run may be scored with the labels of any sequence.
 TEXT = "mot text"
-STATED = "run.json states it"
 
 
 def group(options: GroupOptions) -> CommandResult:
@@ -144,7 +146,9 @@ def group(options: GroupOptions) -> CommandResult:
     with ProgressMeter("group", len(sequences)) as meter:
         for sequence, tracks, folder in zip(sequences, stored, folders, strict=True):
             run = runs.group(sequence, None if tracks is None else tracks.read(sequence), grouping=grouping)
-            pairs = None if belief is None else pair_probabilities(run, sequence.fps, _scale(run), belief)
+            pairs = (
+                None if belief is None else pair_probabilities(run, sequence.fps, run.info["px_per_m"] or 1.0, belief)
+            )
             labelled = replace(sequence, load_truth=None) if sequence.source["kind"] == TEXT else sequence
             run.write(folder, labelled, pairs)
             rows.append({**group_row(run, folder), "pairs": None if pairs is None else len(pairs.frame)})
@@ -154,12 +158,10 @@ def group(options: GroupOptions) -> CommandResult:
 
 def _opened(options: GroupOptions) -> tuple[list[Sequence], list[StoredTracks | None]]:
     """Returns the sequences of the source, and for each its run if the source is stored tracks of ours, else None."""
-    path = options.source
-    own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)
-    if not own and (not path.is_dir() or holds_sequences(path)):
-        sequences = _open(path, options)
+    if not holds_tracks(options.source):
+        sequences = _open(options.source, options)
         return sequences, [None] * len(sequences)
-    sequences, found = [], find_tracks(path)
+    sequences, found = [], find_tracks(options.source)
     for tracks in found:
         if tracks.info:
             sequences.append(_of_run(tracks, options))
@@ -170,50 +172,31 @@ def _opened(options: GroupOptions) -> tuple[list[Sequence], list[StoredTracks | 
 
 
 def _open(path: Path, options: GroupOptions) -> list[Sequence]:
-    sequences = open_source(
-        path, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=False,
-        person_class=options.person_class, box_scale=options.box_scale,
-    )  # fmt: skip
+    sequences = source_of(options, path).open()
     if options.box_scale is not None and any(s.source["kind"] != TEXT for s in sequences):
-        raise InputError(
-            file=path, place="--box-scale", got="a recording, whose labels are not scaled", expected="a text with ids",
-            remedy="leave it out, or give the text itself",
-        )  # fmt: skip
+        got, remedy = "a recording, whose labels are not scaled", "leave it out, or give the text itself"
+        raise InputError(file=path, place="--box-scale", got=got, expected="a text with ids", remedy=remedy)
     return sequences
 
 
 def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
-    tracks.check()
-    info, folder = tracks.info, tracks.path if tracks.path.is_dir() else tracks.path.parent
-    stated = [name for name, known in (("fps", "fps" in info), ("px_per_m", info.get("plane") != "image")) if known]
-    refuse_options(vars(options), " ".join(("camera person_class box_scale", *stated)), folder, "a run", STATED)
-    scale, frames = info.get("px_per_m"), int(info.get("px_per_m_frames") or 0)
-    if options.px_per_m is not None:
-        scale, frames = options.px_per_m, 0
-    return Sequence(
-        name=info.get("sequence", folder.name), fps=frame_rate(options.fps, info.get("fps")), length=info.get("frames"),
-        frames=lambda: iter(()), px_per_m=float("nan") if scale is None else scale,
-        source={"kind": "run", "path": str(folder), "truth_hash": info.get("truth_hash"), "px_per_m_frames": frames},
-    )  # fmt: skip
+    known = "px_per_m" if tracks.info.get("plane") != "image" else ""
+    refuse_options(vars(options), f"camera person_class box_scale {known}", tracks.folder, "a run", STATED)
+    sequence = tracks.sequence(options.fps)
+    if options.px_per_m is None:
+        return sequence
+    return replace(sequence, px_per_m=options.px_per_m, source={**sequence.source, "px_per_m_frames": 0})
 
 
 def _belief(grouping: Grouping) -> Belief:
     if isinstance(grouping, Belief):
         return grouping
-    raise InputError(
-        place="--probabilities", got="the baseline rule, which has none", expected="a grouping with probabilities",
-        remedy="leave --grouping out, or name a file of `fit grouping`",
-    )  # fmt: skip
-
-
-def _scale(run: TrackingRun) -> float:
-    return run.info["px_per_m"] or 1.0
+    expected, remedy = "a grouping with probabilities", "leave --grouping out, or name a file of `fit grouping`"
+    raise InputError(place="--probabilities", got="the baseline rule", expected=expected, remedy=remedy)
 
 
 def _refuse(folder: Path, tracks: StoredTracks | None) -> None:
     if tracks is not None and folder.resolve() in (tracks.path.resolve(), tracks.path.resolve().parent):
-        raise InputError(
-            file=folder, place="--out", got="the folder of the tracks themselves", expected="another folder",
-            remedy="choose another --out",
-        )  # fmt: skip
+        got, remedy = "the folder of the tracks themselves", "choose another --out"
+        raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=remedy)
     reject_foreign(folder)

@@ -17,7 +17,7 @@ from sim.io.files.own_files import refuse_foreign_file
 from tracking.app import option_parsing
 from tracking.app.command_options import MinimizeOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import new_table, number
+from tracking.app.commands.score_tables import number, table
 from tracking.app.progress import ProgressMeter
 from tracking.running.tracker_registry import find, located
 from tracking.stress.failures import CRASH, EpisodeOf, Outcome, Subject, parse_failure, play_episode
@@ -25,11 +25,6 @@ from tracking.stress.minimize import Search
 from tracking.stress.reductions import OBSTACLES, difficulties, table_of
 
 LISTED = ("HOTA", "group_F1", "IDSW")
-NOUNS = {"stairs": "flights of stairs", "service": "service points"}
-SINGULAR = {
-    "people": "person", "orders": "order", "doors": "door", "walls": "wall", "pillars": "pillar",
-    "flights of stairs": "flight of stairs", "service points": "service point", "difficulties": "difficulty",
-}  # fmt: skip
 NO_RECORDING = "recordings cannot be made smaller"
 SEQUENCES = ("manifest.json", "*/manifest.json", "*/*/manifest.json")  # below a folder with a dataset
 
@@ -82,45 +77,36 @@ def _scene_and_subject(options: MinimizeOptions) -> tuple[Scene, Subject]:
     stored = source.is_dir() and options.source not in names()  # as elsewhere, a name of the catalogue counts first
     if run is None and stored and is_run(source):
         source, run = _sequence_of(source), source
-    scene = _stored_scene(source, options.seed) if stored else _named_scene(options)
-    if run is not None:
-        if options.tracker is not None:
-            raise InputError(
-                place="--tracker", got="a tracker beside a run", expected="one of both", remedy="leave one out"
-            )
-        return scene, _tracked(source, run)
+    if (options.tracker is None) == (run is None):
+        got = "nothing" if run is None else "a tracker beside a run"
+        raise InputError(place="--tracker", got=got, expected="a tracker, or a run", remedy="give one of both")
+    if stored:
+        scene = _stored_scene(source, options.seed)
+    else:
+        entry, *others = resolve(options.source)
+        if others:
+            got, remedy = f"a suite of {len(others) + 1} scenes", "give a scenario, or one sequence that was generated"
+            raise InputError(place="SOURCE", got=got, expected="one scene", remedy=remedy)
+        scene = Scene(entry.scenario, options.seed or 0, entry.repeat)
     if options.tracker is None:
-        raise InputError(
-            place="--tracker", got="nothing", expected="a tracker, or a run", remedy="give --tracker, or the run"
-        )
+        return scene, _tracked(source, options.run or Path(options.source))
     find(options.tracker)
     return scene, Subject(located(options.tracker), options.tracker)
-
-
-def _named_scene(options: MinimizeOptions) -> Scene:
-    entries = resolve(options.source)
-    if len(entries) > 1:
-        raise InputError(
-            place="SOURCE", got=f"a suite of {len(entries)} scenes", expected="one scene",
-            remedy="give a scenario, or one sequence that was generated",
-        )  # fmt: skip
-    return Scene(entries[0].scenario, options.seed or 0, entries[0].repeat)
 
 
 def _stored_scene(folder: Path, seed: int | None) -> Scene:
     from sim.io.store.seal import is_sequence, read_manifest
 
-    expected = "one generated sequence, a scenario, or tracks of one"
-    if not is_sequence(folder):
-        remedy = f"give the folder of one; {NO_RECORDING}"
-        raise InputError(file=folder, got="no generated sequence", expected=expected, remedy=remedy)
-    manifest = read_manifest(folder)
-    if seed is not None:
-        got, remedy = f"{seed} beside a sequence with a seed of its own", "leave it out"
-        raise InputError(place="--seed", got=got, expected="a scenario", remedy=remedy)
-    if "origin" in manifest or manifest.get("stride", 1) != 1:
+    got, manifest = "", read_manifest(folder) if is_sequence(folder) else None
+    if manifest is None:
+        got = "no generated sequence"
+    elif "origin" in manifest or manifest.get("stride", 1) != 1:
         got = "a replay of a recording" if "origin" in manifest else f"frames with stride {manifest['stride']}"
-        raise InputError(file=folder, got=got, expected=expected, remedy=f"generate a whole one; {NO_RECORDING}")
+    elif seed is not None:
+        got = f"--seed {seed} beside a sequence with a seed of its own"
+    if manifest is None or got:
+        expected, remedy = "one whole generated sequence, a scenario, or tracks of one", f"give one; {NO_RECORDING}"
+        raise InputError(file=folder, got=got, expected=expected, remedy=remedy)
     return Scene(load(folder / "scenario.toml"), manifest["seed"], manifest["repeat"])
 
 
@@ -133,10 +119,9 @@ def _sequence_of(run: Path) -> Path:
         for path in sorted(Path().glob(f"*/{pattern}")):
             if path.parent.name == info["sequence"] and read_manifest(path.parent)["truth_hash"] == info["truth_hash"]:
                 return path.parent
-    raise InputError(
-        file=run, got=f"tracks of {info['sequence']}, which is not below this folder", expected="a generated sequence",
-        remedy=f"give the sequence, too: flockscope minimize SEQUENCE RUN; {NO_RECORDING}",
-    )  # fmt: skip
+    got = f"tracks of {info['sequence']}, which is not below this folder"
+    remedy = f"give the sequence, too: flockscope minimize SEQUENCE RUN; {NO_RECORDING}"
+    raise InputError(file=run, got=got, expected="a generated sequence", remedy=remedy)
 
 
 def _tracked(source: Path, path: Path) -> Subject:
@@ -146,22 +131,19 @@ def _tracked(source: Path, path: Path) -> Subject:
     from tracking.app.stored_tracks import find_tracks, match_tracks
     from tracking.grouping.grouping_choice import default_grouping
 
-    if not source.is_dir():
-        got, remedy = f"a run beside {source}", "give the sequence that was tracked"
-        raise InputError(place="SOURCE", got=got, expected="a generated sequence", remedy=remedy)
     ((sequence, stored),) = match_tracks(open_source(source), find_tracks(path))
     stored.read(sequence)
-    info, rule = stored.info, stored.info.get("grouping")
-    if not info or info.get("background") not in (None, OWN_BACKGROUND, f"{BACKGROUNDS} frames"):
-        got = "tracks of another program" if not info else f"--background {info['background']}"
-        raise InputError(file=path, got=got, expected="a run that can be repeated", remedy="track it again without it")
+    info, rule, got = stored.info, stored.info.get("grouping"), ""
     if rule == default_grouping().as_dict():
         rule = None
+    if not info:
+        got = "tracks of another program"
+    elif info.get("background") not in (None, OWN_BACKGROUND, f"{BACKGROUNDS} frames"):
+        got = f"--background {info['background']}"
     elif rule is not None and rule.get("grouping") is not None:
-        raise InputError(
-            file=path, got="--grouping with a belief of another file", expected="the default belief, or a rule",
-            remedy="track it again without --grouping",
-        )  # fmt: skip
+        got = "--grouping with a belief of another file"
+    if got:
+        raise InputError(file=path, got=got, expected="a run that can be repeated", remedy="track it again without it")
     find(info["tracker"])
     return Subject(
         located(info["tracker"]), info["tracker"], info["config"] or None, info["detections"], info["sensor"] or {},
@@ -221,10 +203,10 @@ def _result(search: Search, scene: Scene, out: Path, outcomes: dict[int, Outcome
     fails = {seed: outcome.problem is None and failure.holds(outcome) for seed, outcome in outcomes.items()}
     fresh = [fails[seed] for seed in outcomes if seed != scene.seed]
     before, after = (_counts(s, o) for s, o in ((scene.scenario, search.first), (small, outcomes[scene.seed])))
-    table = table_of(small)
+    known = table_of(small)
     data = {
         "while": failure.text, "tracker": search.subject.name, "seed": scene.seed, "before": before, "after": after,
-        "needed": [piece.words(table) for piece in difficulties(small)], "complete": search.complete,
+        "needed": [piece.words(known) for piece in difficulties(small)], "complete": search.complete,
         "episodes": search.played, "fresh": len(fresh), "fails": sum(fresh),
         "seeds": [
             {"seed": seed, "fails": fails[seed], "scores": dict(outcome.scores)} for seed, outcome in outcomes.items()
@@ -236,34 +218,29 @@ def _result(search: Search, scene: Scene, out: Path, outcomes: dict[int, Outcome
 
 def _counts(scenario: Scenario, outcome: Outcome) -> dict[str, float]:
     """Returns how much there is of everything in a scene."""
-    obstacles = {NOUNS.get(key, key): len(getattr(scenario.world, key)) for key in OBSTACLES}
+    obstacles = {key: len(getattr(scenario.world, key)) for key in OBSTACLES}
     return {
         "people": outcome.people, "s": scenario.duration, "orders": len(scenario.event), **obstacles,
         "difficulties": len(difficulties(scenario)),
     }  # fmt: skip
 
 
-def _change(noun: str, before: float, after: float) -> str:
-    noun = SINGULAR.get(noun, noun) if before == 1 else noun
-    return f"{before:g} {noun} → {f'{after:g}' if after else 'none'}{' s' if noun == 's' else ''}"
-
-
-def _text(data: dict[str, Any]) -> Any:
-    from rich.console import Group
-
-    before, after = data["before"], data["after"]
-    changes = [_change(key, before[key], after[key]) for key in before if before[key]]
+def _text(data: dict[str, Any]) -> str:
+    before, after, complete = data["before"], data["after"], data["complete"]
+    changes = ", ".join(f"{before[key]:g} {key} → {after[key]:g}" for key in before if before[key])
     confirmed = f"fails on {data['fails']} of {counted(data['fresh'], 'fresh seed')}"
     confirmed = confirmed if data["fresh"] else "not confirmed on other seeds"
-    state = "no single piece can be removed" if data["complete"] else "stopped early: more can perhaps be removed"
-    lines = [f"{', '.join(changes)}; {confirmed}; {counted(data['episodes'], 'episode')}; {state}"]
-    left = "difficulties that it needs" if data["complete"] else "difficulties that are left"
-    lines += [f"{left}: {', '.join(data['needed'])}"] if data["needed"] else []
+    state = "no single piece can be removed" if complete else "stopped early: more can perhaps be removed"
+    lines = [f"{changes}; {confirmed}; {counted(data['episodes'], 'episode')}; {state}"]
+    if data["needed"]:
+        lines.append(f"difficulties that {'it needs' if complete else 'are left'}: {', '.join(data['needed'])}")
     scored = data["while"].split("<")[0].split(">")[0]
-    keys = list(dict.fromkeys([*LISTED, *([scored] if scored in data["seeds"][0]["scores"] else [])]))
-    table = new_table((), ["seed", data["while"], *keys])
-    for row in data["seeds"]:
-        cells = (number(key, row["scores"].get(key, float("nan"))) for key in keys)
-        table.add_row(str(row["seed"]), "yes" if row["fails"] else "no", *cells)
+    keys = [*LISTED, *({scored} & data["seeds"][0]["scores"].keys() - {*LISTED})]
+    rows = [
+        [str(row["seed"]), "yes" if row["fails"] else "no",
+         *(number(key, row["scores"].get(key, float("nan"))) for key in keys)]
+        for row in data["seeds"]
+    ]  # fmt: skip
     files = f"{data['file']}, and a replay of seed {data['seed']}: {data['page']}"
-    return Group(*map(printable, lines), "", table, "", *map(printable, data["commands"]), printable(files))
+    shown = table("", (), ["seed", data["while"], *keys], rows)
+    return "\n".join([*map(printable, lines), "", shown, *map(printable, data["commands"]), printable(files)])

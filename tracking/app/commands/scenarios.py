@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError
-from scenarios.loading.resolve import Entry, dump, load, names, read_suite, resolve, suite_file, suite_names
+from scenarios.loading.resolve import dump, load, names, read_suite, resolve, suite_file, suite_names
 from scenarios.loading.toml_files import SUITES
 from scenarios.schema.scenario import Scenario
 from tracking.app.command_options import ScenariosOptions
@@ -27,9 +27,7 @@ def scenarios(options: ScenariosOptions) -> CommandResult:
         if value:
             got, remedy = f"{option} without a scenario to explain", "name a scenario, and leave --schema out"
             raise InputError(place=option, got=got, expected="NAME", remedy=remedy)
-    if options.schema:
-        return list_keys()
-    return catalogue()
+    return list_keys() if options.schema else catalogue()
 
 
 def catalogue() -> CommandResult:
@@ -42,20 +40,18 @@ def catalogue() -> CommandResult:
 
 def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResult:
     """Returns a scenario in words with its plan, which it writes to `drawing` (SVG), or a suite's entries."""
-    entries = resolve(name, scenario_settings(settings))
-    if suite_file(name) is None:
-        return _explain_scenario(entries[0].scenario, drawing)
-    if drawing is not None:
-        raise InputError(
-            place="--out", got=f"the suite {name}", expected="one scenario", remedy="name one of its entries"
-        )
-    return _list_entries(name, entries)
-
-
-def _explain_scenario(scenario: Scenario, drawing: Path | None) -> CommandResult:
     from scenarios.drawing.plan import svg
     from scenarios.drawing.words import text
 
+    entries = resolve(name, scenario_settings(settings))
+    if suite_file(name) is not None:
+        if drawing is not None:
+            got, remedy = f"the suite {name}", "name one of its entries"
+            raise InputError(place="--out", got=got, expected="one scenario", remedy=remedy)
+        rows = {entry.name: entry.scenario.about for entry in entries}
+        shown = "\n".join([f"{name}: {len(rows)} entries", *_rows(rows)])
+        return CommandResult({"name": name, "entries": rows}, shown)
+    scenario = entries[0].scenario
     words = text(scenario)
     data = {"name": scenario.name, "about": scenario.about, "text": words, "toml": dump(scenario)}
     if drawing is None:
@@ -64,11 +60,6 @@ def _explain_scenario(scenario: Scenario, drawing: Path | None) -> CommandResult
 
     write_file(output_file(drawing, ".svg"), svg(scenario).encode())
     return CommandResult({**data, "drawing": drawing}, f"{words}\n{drawing}")
-
-
-def _list_entries(name: str, entries: list[Entry]) -> CommandResult:
-    rows = {entry.name: entry.scenario.about for entry in entries}
-    return CommandResult({"name": name, "entries": rows}, "\n".join([f"{name}: {len(rows)} entries", *_rows(rows)]))
 
 
 def _rows(about: dict[str, str]) -> list[str]:

@@ -2,95 +2,78 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence as SequenceOf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
-from sim.io.formats.options import BoxScale, parse_box_scale, refuse_options
+from sim.io.formats.options import refuse_options
 from sim.io.store.seal import tracked_hash
 from sim.types import Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_ranking import is_class, ranking, short_notes, sparse_notes
-from tracking.app.commands.score_tables import Means, SequenceScores, tables
-from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, score_sequence
-from tracking.app.sequence_workers import OpenedAs, results_over_sequences
-from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
+from tracking.app.commands.score_ranking import ranked_runs, ranking_result, scoring_notes
+from tracking.app.commands.score_tables import Means, SequenceScores, checked_key, tables
+from tracking.app.commands.scored_sequence import (
+    ScoredSequence,
+    ScoringJob,
+    box_scale_of,
+    is_class,
+    run_names,
+    score_sequence,
+    stored_runs,
+)
+from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.comparison import check_blocks
 from tracking.scoring.catalogue import ALL, CATALOGUE
+from tracking.scoring.evaluation import Scores
 from tracking.stats import mean_interval
 
 
-def score(options: ScoreOptions) -> CommandResult:
-    """Scores every sequence of the truth with its tracks."""
-    source = OpenedAs(
-        options.truth, options.fps, options.px_per_m, images=False, person_class=options.person_class
-    )  # fmt: skip
-    sequences = source.open()
+def score(options: ScoreOptions, ranked: bool = False) -> CommandResult:
+    """Scores every sequence of the truth with its tracks; ranks several runs, or with `ranked` also a single one."""
+    source = source_of(options, options.truth, without="box_scale")
+    sequences, first = source.open(), options.tracks[0]
     check_blocks(options.blocks, len(sequences))
-    if len(options.tracks) > 1 or is_class(options.tracks[0]):
-        return ranking(options, source, sequences)
-    refuse_options(vars(options), "by csv all", Path(options.tracks[0]), "one run", "only several are ranked")
-    scored = _score_all(options, source, sequences)
-    rows = [
-        SequenceScores(sequence.name, one.scores[0], one.given[0])
-        for sequence, one in zip(sequences, scored, strict=True)
-    ]
-    notes = [*sparse_notes([row.scores for row in rows]), *dict.fromkeys(one.note for one in scored if one.note)]
-    hashes = {sequence.name: tracked_hash(sequence) for sequence in sequences}
-    if options.blocks:
-        notes += short_notes(sequences[0], rows[0].scores)
-        return _result([(rows, _block_means(scored[0]))], hashes, notes)
+    ranked = ranked or len(options.tracks) > 1 or is_class(first)
+    if ranked:
+        refuse_options(vars(options), "box_scale", Path(first), "a ranking", "score the text alone")
+    else:
+        refuse_options(vars(options), "by", Path(first), "one run", "only several are ranked")
+    if options.by is not None:
+        checked_key(options.by)
+    names = run_names(options.tracks)
+    runs = stored_runs(names.values(), sequences)
+    how = (options.similarity, options.group_match, options.blocks, ranked, box_scale_of(options.box_scale, runs[0]))
+    jobs = [ScoringJob(sources, *how) for sources in zip(*runs, strict=True)]
+    found = list(over_sequences("score", score_sequence, sequences, jobs, source, options.workers))
+    if not ranked:
+        return _run_result(sequences, found)
+    return ranking_result(ranked_runs(list(names), sequences, found, options.by))
+
+
+def _run_result(sequences: list[Sequence], found: list[ScoredSequence]) -> CommandResult:
+    rows = [SequenceScores(s.name, one.scores[0], one.given[0]) for s, one in zip(sequences, found, strict=True)]
     parts = [[row for row in rows if row.given == given] for given in dict.fromkeys(row.given for row in rows)]
-    return _result([(part, summary(part)) for part in parts], hashes, notes)
-
-
-def _score_all(options: ScoreOptions, source: OpenedAs, sequences: list[Sequence]) -> list[ScoredSequence]:
-    found, box_scale = matched_tracks(sequences, Path(options.tracks[0]), options.box_scale)
-    how = (options.similarity, options.group_match, options.blocks)
-    jobs = [ScoringJob((stored,), *how, box_scale=box_scale) for stored in found]
-    return results_over_sequences("score", score_sequence, sequences, jobs, source, options.workers)
-
-
-def matched_tracks(
-    sequences: list[Sequence], tracks: Path, box_scale: str | None
-) -> tuple[list[StoredTracks], BoxScale | None]:
-    """Returns the stored tracks of each sequence, and the factors of --box-scale, which is for texts only."""
-    matched = match_tracks(sequences, find_tracks(tracks))
-    scale = None if box_scale is None else parse_box_scale(box_scale)
-    if scale is not None and all(stored.info for _, stored in matched):
-        raise InputError(
-            place="--box-scale", got="runs of `flockscope track`", expected="a text of another program",
-            remedy="give --box-scale to `flockscope track`",
-        )  # fmt: skip
-    return [stored for _, stored in matched], scale
-
-
-def _block_means(scored: ScoredSequence) -> Means:
-    assert scored.compared.blocks is not None
-    return {
-        key: {"mean": float(r.mean[0]), "low": float(r.low[0]), "high": float(r.high[0])}
-        for key, r in scored.compared.blocks.items()
-    }
-
-
-def _result(
-    parts: list[tuple[list[SequenceScores], Means]], hashes: Mapping[str, str | None], notes: list[str]
-) -> CommandResult:
-    from rich.console import Group
-
-    total = sum(len(rows) for rows, _ in parts)
-    texts = [tables(rows, means, notes, total) for rows, means in parts]
+    blocks = found[0].compared.blocks
+    means = [summary([row.scores for row in part]) for part in parts]
+    if blocks is not None:
+        means = [{}]
+        for key, r in blocks.items():
+            means[0][key] = {"mean": float(r.mean[0]), "low": float(r.low[0]), "high": float(r.high[0])}
+    notes, hashes = scoring_notes(sequences, found), {s.name: tracked_hash(s) for s in sequences}
     data = {
-        "sequences": [{**_row_data(row), "truth": hashes[row.sequence]} for rows, _ in parts for row in rows],
-        "mean": parts[0][1] if len(parts) == 1 else None,
-        "means": [{"given": rows[0].given, "sequences": len(rows), "mean": means} for rows, means in parts],
+        "sequences": [{**_row_data(row), "truth": hashes[row.sequence]} for part in parts for row in part],
+        "mean": means[0] if len(parts) == 1 else None,
+        "means": [
+            {"given": part[0].given, "sequences": len(part), "mean": mean}
+            for part, mean in zip(parts, means, strict=True)
+        ],
         "notes": notes,
     }
-    return CommandResult(data, Group(*texts))
+    texts = [tables(part, mean, notes, len(rows)) for part, mean in zip(parts, means, strict=True)]
+    return CommandResult(data, "\n".join(texts))
 
 
 def _row_data(row: SequenceScores) -> dict[str, Any]:
@@ -99,9 +82,9 @@ def _row_data(row: SequenceScores) -> dict[str, Any]:
     return {"name": row.sequence, **chosen, "frames_scored": s.frames, "label_step": s.step, **s}
 
 
-def summary(rows: list[SequenceScores]) -> Means:
+def summary(scores: SequenceOf[Scores]) -> Means:
     """Returns the mean over sequences of each score by key, with its 95 % interval, within the score's range."""
-    mean, low, high = mean_interval(np.array([[row.scores[key] for key in CATALOGUE] for row in rows]))
+    mean, low, high = mean_interval(np.array([[one[key] for key in CATALOGUE] for one in scores]))
     least, most = (np.array([getattr(score, end) for score in ALL]) for end in ("low", "high"))
     ends = (end.tolist() for end in (mean, np.maximum(low, least), np.minimum(high, most)))
     return {key: {"mean": m, "low": a, "high": b} for key, m, a, b in zip(CATALOGUE, *ends, strict=True)}

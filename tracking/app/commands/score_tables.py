@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from scenarios.errors import InputError, counted, printable
 from tracking.scoring.catalogue import CATALOGUE
@@ -57,36 +56,31 @@ class SequenceScores:
     given: str = ""  # what detections the tracker got, in words; "" without run.json
 
 
-def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), total: int = 0) -> Any:
-    """Returns, for rich to print, a table for each family of scores with a known mean, and how all was compared."""
-    from rich.console import Group
-
+def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), total: int = 0) -> str:
+    """Returns a table for each family of scores with a known mean, and how all was compared."""
     detections = f"detections {printable(rows[0].given) or 'unknown (no run.json)'}"
     people = _any_known(PEOPLE[1:], means)
     titles = TABLES if people else GROUP_TRACKER_TABLES
     known = {title: keys for title, keys in titles.items() if _any_known(keys, means)}
-    parts = [_table(title, keys, rows, means) for title, keys in known.items()]
+    parts = [_family(title, keys, rows, means) for title, keys in known.items()]
     lines = [LOWER, detections, *_comparison_lines(rows, people, "groups, strict" in known)]
     if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
         lines.append("intervals by weights of blocks of frames")
     partial = len(rows) < total
     head = [f"{len(rows)} of {total} sequences, {detections}", ""] if partial else []
-    return Group(*head, *parts, "\n".join([*lines, *notes]), *([""] if partial else []))
+    return "\n".join([*head, *parts, *lines, *notes, *([""] if partial else [])])
 
 
 def _any_known(keys: Sequence[str], means: Means) -> bool:
     return any(math.isfinite(means[key]["mean"]) for key in keys)
 
 
-def _table(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> Any:
-    table = new_table(["sequence"], [_heading(key, rows) for key in keys])
-    for row in rows:
-        table.add_row(printable(row.sequence), *(number(key, row.scores[key]) for key in keys))
+def _family(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> str:
+    shown = [[row.sequence, *(number(key, row.scores[key]) for key in keys)] for row in rows]
     if any(math.isfinite(means[key]["low"]) for key in keys):
         for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high"))[len(rows) == 1 :]:
-            cells = (number(key, means[key][part], mean=True) for key in keys)
-            table.add_row(name, *cells, style="bold" if part == "mean" else None)
-    return with_title(title, table)
+            shown.append([name, *(number(key, means[key][part], mean=True) for key in keys)])
+    return table(title, ["sequence"], [_heading(key, rows) for key in keys], shown)
 
 
 def _heading(key: str, rows: Sequence[SequenceScores]) -> str:
@@ -99,33 +93,30 @@ def _heading(key: str, rows: Sequence[SequenceScores]) -> str:
 def checked_key(key: str, better: Sequence[str] = ("higher", "lower")) -> str:
     """Returns the key of a score that was given with --by. Raises InputError for another, or of another direction."""
     if key not in CATALOGUE or CATALOGUE[key].better not in better:
-        raise InputError(
-            place="--by", got=key, expected=f"a score of which {' or '.join(better)} is better, such as HOTA",
-            remedy="docs/reference/metrics.md lists them",
-        )  # fmt: skip
+        expected = f"a score of which {' or '.join(better)} is better, such as HOTA"
+        raise InputError(place="--by", got=key, expected=expected, remedy="docs/reference/metrics.md lists them")
     return key
 
 
-def new_table(words: Iterable[str] = (), numbers: Iterable[str] = (), more: Iterable[str] = ()) -> Any:
-    """Returns a table of rich without frame and rows: columns of words, then of numbers, then of words again."""
-    from rich.table import Table
+def table(
+    title: str,
+    words: Iterable[str],
+    numbers: Iterable[str],
+    rows: Iterable[Sequence[str]],
+    more: Iterable[str] = (),
+    foot: str = "",
+) -> str:
+    """Returns a title, a table without frame, a foot and an empty line as text.
 
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in words:
-        table.add_column(name, overflow="fold")
-    for name in numbers:
-        table.add_column(name, justify="right", no_wrap=True)
-    for name in more:
-        table.add_column(name, overflow="fold")
-    return table
-
-
-def with_title(title: str, table: Any, foot: str = "") -> Any:
-    """Returns, for rich to print, the title, not wrapped to the table's width, the table and the foot."""
-    from rich.console import Group
-    from rich.text import Text
-
-    return Group(Text(title, style="italic"), table, *([foot] if foot else []), "")
+    words, numbers, more: names of its columns, of words, then of numbers, then of words again; rows: their cells.
+    """
+    before, middle, after = list(words), list(numbers), list(more)
+    cells = [[printable(cell) for cell in row] for row in ([*before, *middle, *after], *rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    sides = ["<"] * len(before) + [">"] * len(middle) + ["<"] * len(after)
+    forms = [f"{side}{width}" for side, width in zip(sides, widths, strict=True)]
+    lines = ["  ".join(map(format, row, forms)).rstrip() for row in cells]
+    return "\n".join([*([printable(title)] if title else []), *lines, *([foot] if foot else []), ""])
 
 
 def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) -> list[str]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from sim.io.formats.options import BoxScale
-from sim.types import Sequence
+from scenarios.errors import InputError
+from sim.io.formats.options import BoxScale, parse_box_scale
+from sim.types import DetectionMode, Sequence
 from tracking.app.commands.track import TrackerSetup
-from tracking.app.stored_tracks import StoredTracks
+from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.comparison import ComparedSequence, compare_one
 from tracking.running.run import TrackingRun, input_summary
 from tracking.scoring.evaluation import Scores
@@ -21,12 +23,14 @@ from tracking.scoring.people_comparison import Similarity
 MOVED = "all tracks are compared {plane}"
 SURFACE_WORDS = {"ground": "on the ground, boxes by their foot points", "image": "in the image, as some lie there"}
 
+Source = StoredTracks | str  # of the tracks of a sequence: stored ones, or the text that names a tracker class
+
 
 @dataclass(frozen=True)
 class ScoringJob:
     """What to score on a sequence, and how; similarity, group_match and blocks as of `compare`."""
 
-    sources: tuple[StoredTracks | str, ...]  # of each run, its stored tracks or the text that names a tracker class
+    sources: tuple[Source, ...]  # of each run
     similarity: Similarity | None = None
     group_match: GroupMatch = "hull"
     blocks: int = 0
@@ -53,6 +57,38 @@ class ScoredSequence:
         return [input_summary(info) for info in self.infos]
 
 
+def is_class(text: str) -> bool:
+    """Returns True if a text names a class, as file.py:Class or module:Class, and no path."""
+    return ":" in text and not Path(text).exists()
+
+
+def run_names(texts: list[str]) -> dict[str, str]:
+    """Returns the texts that name runs, by a short name. Raises InputError if one is given twice."""
+    short = [text.rpartition(":")[2] if is_class(text) else Path(text).name for text in texts]
+    if len(set(texts)) < len(texts):
+        twice = next(text for text in texts if texts.count(text) > 1)
+        raise InputError(place="TRACKS", got=f"{twice} twice", expected="each run once", remedy="leave one out")
+    return {name if short.count(name) == 1 and name else text: text for name, text in zip(short, texts, strict=True)}
+
+
+def stored_runs(texts: Iterable[str], sequences: list[Sequence]) -> list[list[Source]]:
+    """Returns for each run its tracks of each sequence."""
+    return [
+        [text] * len(sequences)
+        if is_class(text)
+        else [stored for _, stored in match_tracks(sequences, find_tracks(Path(text)))]
+        for text in texts
+    ]
+
+
+def box_scale_of(text: str | None, sources: Iterable[Source]) -> BoxScale | None:
+    """Returns the factors of --box-scale. Raises InputError if no source is a text of another program."""
+    if text is not None and all(isinstance(source, str) or source.info for source in sources):
+        got, expected = "runs of `flockscope track`", "a text of another program"
+        raise InputError(place="--box-scale", got=got, expected=expected, remedy="give it to `flockscope track`")
+    return None if text is None else parse_box_scale(text)
+
+
 def score_sequence(sequence: Sequence, job: ScoringJob) -> ScoredSequence:
     """Returns the scores of all runs of one sequence, compared alike."""
     return score_runs(sequence, read_runs(sequence, job), job)
@@ -60,7 +96,13 @@ def score_sequence(sequence: Sequence, job: ScoringJob) -> ScoredSequence:
 
 def read_runs(sequence: Sequence, job: ScoringJob) -> list[TrackingRun]:
     """Returns the runs of a job: stored tracks are read, tracker classes track."""
-    return [_tracks(source, sequence, job.box_scale) for source in job.sources]
+    mode: DetectionMode | None = "file" if sequence.has_detections else None
+    return [
+        TrackerSetup(source, detections=mode).run(sequence)
+        if isinstance(source, str)
+        else source.read(sequence, job.box_scale)
+        for source in job.sources
+    ]
 
 
 def score_runs(sequence: Sequence, runs: list[TrackingRun], job: ScoringJob) -> ScoredSequence:
@@ -75,9 +117,3 @@ def score_runs(sequence: Sequence, runs: list[TrackingRun], job: ScoringJob) -> 
     moved = {"ground" if run[0].plane != "image" else "image" for run in runs if len(run)} - {surface}
     note = MOVED.format(plane=SURFACE_WORDS[surface]) if moved else ""
     return ScoredSequence(compared, [run.info for run in runs], note)
-
-
-def _tracks(source: StoredTracks | str, sequence: Sequence, box_scale: BoxScale | None) -> TrackingRun:
-    if isinstance(source, str):
-        return TrackerSetup(source, detections="file" if sequence.has_detections else None).run(sequence)
-    return source.read(sequence, box_scale)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from sim.types import Array, DetectionMode
 from tracking.app import option_parsing
 from tracking.app.command_options import StressOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import checked_key, new_table, with_title
+from tracking.app.commands.score_tables import checked_key, table
 from tracking.app.progress import ProgressMeter
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval
@@ -123,8 +123,11 @@ def _by_scenario(sweep: Sweep, name: str) -> dict[str, dict[str, float | None]]:
     scores: dict[str, list[float]] = {}
     for scene in sweep.scenes.values():
         scores.setdefault(scene.source.name, []).append(sweep.score(name, scene))
-    means = {scenario: _means(np.array([found]).T) for scenario, found in scores.items()}
-    return {scenario: {key: value for key, (value,) in found.items()} for scenario, found in means.items()}
+    return {scenario: _first(_means(np.array([found]).T)) for scenario, found in scores.items()}
+
+
+def _first(means: dict[str, Any], k: int = 0) -> dict[str, float | None]:
+    return {key: means[key][k] for key in ("mean", "low", "high", "scenes")}
 
 
 def _on_axis(plan: Plan, point: BreakingPoint) -> dict[str, float | None]:
@@ -159,36 +162,30 @@ def _parquet(sweep: Sweep) -> bytes:
     return table_bytes(columns, {"axes": [axis.name for axis in sweep.plan.axes]})
 
 
-def _text(sweep: Sweep, data: dict[str, Any], out: Path, report: str) -> Any:
-    from rich.console import Group
-
+def _text(sweep: Sweep, data: dict[str, Any], out: Path, report: str) -> str:
     parts = _found(sweep, data) if data["found"] is not None else _curves(sweep, data)
-    return Group(*parts, *_notes(data), f"{counted(data['episodes'], 'episode')} stored in {out}; report: {report}")
+    end = f"{counted(data['episodes'], 'episode')} stored in {out}; report: {report}"
+    return "\n".join([*parts, *_notes(data), end])
 
 
-def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
-    plan, curves = sweep.plan, data["curves"]
-    scenes = f"{', '.join(plan.scenarios)}, {counted(sweep.seeds, 'seed')}"
-    over = f" over {' and '.join(axis.name for axis in plan.axes)}" if plan.axes else ""
+def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
+    plan, curves, axes = sweep.plan, data["curves"], [axis.name for axis in sweep.plan.axes]
+    over = f" over {' and '.join(axes)}" if axes else ""
+    title = f"{plan.by}{over} ({', '.join(plan.scenarios)}, {counted(sweep.seeds, 'seed')})"
     if data["matrix"] is not None:
         first, second = data["matrix"]["values"]
+        columns = [f"{axes[1]} {second[0]:g}", *(f"{value:g}" for value in second[1:])]
         for name, means in data["matrix"]["mean"].items():
-            table = _table(plan.axes[0].name, [f"{plan.axes[1].name} {second[0]:g}", *(f"{v:g}" for v in second[1:])])
-            for value, row in zip(first, means, strict=True):
-                table.add_row(f"{value:g}", *map(_number, row))
-            yield with_title(f"{name}: {plan.by}{over} ({scenes})", table)
+            rows = [[f"{value:g}", *map(_number, row)] for value, row in zip(first, means, strict=True)]
+            yield table(f"{name}: {title}", (), [axes[0], *columns], rows)
         return
-    if plan.axes:
-        table = _table(plan.axes[0].name, curves)
-        for k, (value,) in enumerate(sweep.values):
-            table.add_row(f"{value:g}", *(_interval(c["mean"][k], c["low"][k], c["high"][k]) for c in curves.values()))
-    else:
-        table = _table("", curves)
-        for scenario in data["by_scenario"][ORACLE]:
-            means = [of[scenario] for of in data["by_scenario"].values()]
-            table.add_row(scenario, *(_interval(m["mean"], m["low"], m["high"]) for m in means))
-        table.add_row("all", *(_interval(c["mean"][0], c["low"][0], c["high"][0]) for c in curves.values()))
-    yield with_title(f"{plan.by}{over} ({scenes})", table)
+    rows = []
+    for scenario in {} if axes else data["by_scenario"][ORACLE]:
+        rows.append([scenario, *(_interval(of[scenario]) for of in data["by_scenario"].values())])
+    for k, values in enumerate(sweep.values):
+        name = f"{values[0]:g}" if axes else "all"
+        rows.append([name, *(_interval(_first(curve, k)) for curve in curves.values())])
+    yield table(title, (), [axes[0] if axes else "", *curves], rows)
     yield from _break_lines(sweep, data)
 
 
@@ -200,15 +197,17 @@ def _break_lines(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
         yield f"{printable(name)} {_break_words(data['curves'][name]['break'], sweep.plan.share)}"
 
 
-def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[Any]:
+def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
     plan, tracker = sweep.plan, next(iter(sweep.trackers))
-    table = _table("scenario", ["seed", *(axis.name for axis in plan.axes), tracker, ORACLE, "shortfall"])
-    for f in data["found"]:
-        scores = (_number(f[key]) for key in ("score", "oracle", "shortfall"))
-        table.add_row(f["scenario"], str(f["seed"]), *(f"{value:g}" for value in f["values"]), *scores)
+    columns = ["scenario", "seed", *(axis.name for axis in plan.axes), tracker, ORACLE, "shortfall"]
+    rows = [
+        [f["scenario"], str(f["seed"]), *(f"{value:g}" for value in f["values"]),
+         *(_number(f[key]) for key in ("score", "oracle", "shortfall"))]
+        for f in data["found"]
+    ]  # fmt: skip
     scenes = f"{', '.join(plan.scenarios)}, {counted(len(sweep.scenes), 'scene')}"
-    yield with_title(f"where {tracker} is worst, next to the oracle: {plan.by} ({scenes})", table)
-    if not data["found"]:
+    yield table(f"where {tracker} is worst, next to the oracle: {plan.by} ({scenes})", (), columns, rows)
+    if not rows:
         yield f"{printable(tracker)} is nowhere worse than the oracle"
     for f in data["found"]:
         yield printable(f["command"].replace(" --set ", " \\\n    --set "), keep="\n")
@@ -223,24 +222,19 @@ def _notes(data: dict[str, Any]) -> Iterator[str]:
         yield printable(f"{counted(len(data['left_out']), 'scene')} left out, {where}")
 
 
-def _table(first: str, columns: Iterable[str]) -> Any:
-    return new_table((), [first, *map(printable, columns)])
-
-
 def _number(value: float | None) -> str:
     return "–" if value is None else f"{value:.3f}"
 
 
-def _interval(mean: float | None, low: float | None, high: float | None) -> str:
-    return _number(mean) + ("" if low is None or high is None else f" ± {(high - low) / 2:.3f}")
+def _interval(row: Mapping[str, float | None]) -> str:
+    low, high = row["low"], row["high"]
+    return _number(row["mean"]) + ("" if low is None or high is None else f" ± {(high - low) / 2:.3f}")
 
 
-def _break_words(point: dict[str, float | None], share: float) -> str:
+def _break_words(point: Mapping[str, float | None], share: float) -> str:
     level = f"{share:.0%} of its value at the easy end"
-    return f"does not fall to {level}" if point["at"] is None else f"falls to {level} at {_span(point)}"
-
-
-def _span(point: dict[str, float | None]) -> str:
+    if point["at"] is None:
+        return f"does not fall to {level}"
     known = sorted(v for v in (point["low"], point["high"]) if v is not None)
     ends = f"{known[0]:.3g} to {known[1]:.3g}" if len(known) == 2 else "its interval is not known: play more episodes"
-    return f"{point['at']:.3g} ({ends})"
+    return f"falls to {level} at {point['at']:.3g} ({ends})"

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
-from typing import Any
 
 from scenarios.errors import InputError
 from sim.io.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
-from sim.io.files.own_files import output_paths
-from sim.io.formats.mot_folder import frame_rate
-from sim.io.formats.options import refuse_options
-from sim.io.source import holds_sequences, open_source
-from sim.io.store.seal import WHOLE, is_run, is_sequence, run_folder
+from sim.io.source import open_source
+from sim.io.store.seal import is_run, is_sequence
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import CsvOptions, ParquetOptions, PedpyOptions, TrajnetOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
-from tracking.app.stored_tracks import StoredTracks, find_tracks, run_folders
+from tracking.app.stored_tracks import StoredTracks, find_tracks, holds_tracks, run_folders
 
 
 def export_csv(options: CsvOptions) -> CommandResult:
@@ -45,49 +40,37 @@ def export_pedpy(options: PedpyOptions) -> CommandResult:
 
 def _export(options: TrajnetOptions, form: Form, places: Places) -> CommandResult:
     option_parsing.output_folder(options.out)
-    path = options.source
-    own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)
-    stored = own or (path.is_dir() and not holds_sequences(path))
-    jobs = _of_runs(options, own) if stored else _of_sequences(options)
-    for folder, *_ in jobs:
+    jobs = _of_runs(options) if holds_tracks(options.source) else _of_sequences(options)
+    folders = run_folders([sequence for sequence, _ in jobs], options.source, options.out)
+    for folder in folders:
         if is_run(folder) or is_sequence(folder):
-            raise InputError(
-                file=folder, place="--out", got="a folder of tracks or of a sequence", expected="another folder",
-                remedy="choose another --out",
-            )  # fmt: skip
+            got, remedy = "a folder of tracks or of a sequence", "choose another --out"
+            raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=remedy)
     rows, lines = [], []
     with ProgressMeter("export", len(jobs)) as meter:
-        for folder, facts, make in jobs:
-            tables = make(places)
+        for (sequence, make), folder in zip(jobs, folders, strict=True):
+            tables, facts = make(places), {"sequence": sequence.name, "fps": sequence.fps}
             files = write_tables(tables, folder, form, facts)
             sizes = {name: len(table.to_arrow()) for name, table in vars(tables).items()}
             rows.append({**facts, "folder": folder, "files": files, "rows": sizes})
             people, groups, events = (sizes[name] for name in ("people_summary", "groups", "events"))
             lines.append(f"{folder}: people {people}, groups {groups}, events {events}")
-            meter.step(facts["sequence"])
+            meter.step(sequence.name)
     return CommandResult({"tables": rows}, "\n".join(lines))
 
 
-Job = tuple[Path, dict[str, Any], Callable[[Places], TidyTables]]
+Job = tuple[Sequence, Callable[[Places], TidyTables]]  # a sequence, or what stands for it, and what makes its tables
 
 
-def _of_runs(options: TrajnetOptions, own: bool) -> list[Job]:
-    found = find_tracks(options.source)
-    folders = [options.out] * own or output_paths(options.out, [str(s.name) for s in found], source=options.source)
+def _of_runs(options: TrajnetOptions) -> list[Job]:
     jobs: list[Job] = []
-    for stored, target in zip(found, folders, strict=True):
-        folder = stored.path if stored.path.is_dir() else stored.path.parent
+    for stored in find_tracks(options.source):
         stored.check()
         if not stored.info:
-            raise InputError(
-                file=stored.path, got="tracks of another program", expected="what `flockscope track` or `group` wrote",
-                remedy="give the text itself",
-            )  # fmt: skip
-        if "fps" in stored.info:
-            refuse_options(vars(options), "fps", folder, "a run", "run.json states it")
-        fps = frame_rate(options.fps, stored.info.get("fps"))
-        facts = {"sequence": stored.info.get("sequence", folder.name), "fps": fps}
-        jobs.append((target, facts, partial(_run, stored, fps)))
+            got, expected = "tracks of another program", "what `flockscope track` or `group` wrote"
+            raise InputError(file=stored.path, got=got, expected=expected, remedy="give the text itself")
+        sequence = stored.sequence(options.fps)
+        jobs.append((sequence, partial(_run, stored, sequence.fps)))
     return jobs
 
 
@@ -99,13 +82,10 @@ def _of_sequences(options: TrajnetOptions) -> list[Job]:
     sequences = open_source(options.source, fps=options.fps, images=False)
     for sequence in sequences:
         if sequence.load_truth is None:
-            raise InputError(
-                file=sequence.source.get("path", options.source), got="no labelled people",
-                expected="a run, or people with ids", remedy="`flockscope track` it, and give the --out of that",
-            )  # fmt: skip
-    folders = run_folders(sequences, options.source, options.out)
-    facts = [{"sequence": s.name, "fps": s.fps} for s in sequences]
-    return [(f, about, partial(_truth, s)) for f, about, s in zip(folders, facts, sequences, strict=True)]
+            file, expected = sequence.source.get("path", options.source), "a run, or people with ids"
+            remedy = "`flockscope track` it, and give the --out of that"
+            raise InputError(file=file, got="no labelled people", expected=expected, remedy=remedy)
+    return [(sequence, partial(_truth, sequence)) for sequence in sequences]
 
 
 def _truth(sequence: Sequence, places: Places) -> TidyTables:

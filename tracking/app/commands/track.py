@@ -15,8 +15,9 @@ from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.commands.group import LASTING, groups_of, lasting
 from tracking.app.progress import ProgressMeter, total_frames
-from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.app.stored_tracks import run_folders
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
@@ -63,28 +64,23 @@ def track(options: TrackOptions) -> CommandResult:
     option_parsing.output_folder(options.out)
     needs = find(setup.tracker).needs
     pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
-    source = OpenedAs(
-        options.source, options.fps, options.px_per_m, options.camera, pictures, options.background,
-        options.person_class, options.box_scale, options.min_score, options.boxes,
-    )  # fmt: skip
+    source = source_of(options, options.source, pictures)
     sequences = source.open()
     folders = run_folders(sequences, options.source, options.out)
-    rows = []
     with lock_folder(options.out):
         for folder in folders:
             reject_foreign(folder)
         _check_modes(setup, needs, sequences, options.background)
-        with setup.limited or nullcontext(), ProgressMeter("track", total_frames(sequences)) as meter:
-            if min(options.workers, len(sequences)) == 1:
-                for sequence, folder in zip(sequences, folders, strict=True):
-                    step = partial(_step, meter, sequence.name)
-                    rows.append(_track_sequence(setup, sequence, folder, step))
-            else:
-                given = pickle.dumps(options)  # a tracker class and its config cannot be pickled, their names can
-                jobs = [(given, folder) for folder in folders]
-                for row in over_sequences(_track_in_worker, sequences, jobs, source, options.workers):
-                    meter.step(row["sequence"], row["frames"])
-                    rows.append(row)
+        if min(options.workers, len(sequences)) > 1:
+            given = pickle.dumps(options)  # a tracker class and its config cannot be pickled, their names can
+            jobs = [(given, folder) for folder in folders]
+            rows = list(over_sequences("track", _track_in_worker, sequences, jobs, source, options.workers))
+        else:
+            with setup.limited or nullcontext(), ProgressMeter("track", total_frames(sequences)) as meter:
+                rows = [
+                    _track_sequence(setup, sequence, folder, partial(_step, meter, sequence.name))
+                    for sequence, folder in zip(sequences, folders, strict=True)
+                ]
     return CommandResult({"tracker": setup.tracker, "runs": rows}, "\n".join(map(_line, rows)))
 
 
@@ -136,12 +132,8 @@ def _config(tracker: str, params: str | None, settings: list[str]) -> Config | N
         return config.with_set(*settings)
     if params is None and not settings:
         return None
-    raise InputError(
-        place="--params" if params else f"--set {settings[0]}",
-        got=tracker,
-        expected="a tracker with parameters",
-        remedy="leave it out, or give the class a config_class (docs/guides/your-own-tracker.md)",
-    )
+    place, remedy = "--params" if params else f"--set {settings[0]}", "leave it out, or give the class a config_class"
+    raise InputError(place=place, got=tracker, expected="a tracker with parameters", remedy=remedy)
 
 
 def _check_modes(
@@ -154,12 +146,14 @@ def _check_modes(
 
 
 def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:
-    ids, groups = ({int(k) for tracks in run for k in getattr(tracks, name)} for name in ("id", "group"))
-    count = {"tracks": len(ids), "groups": len(groups - {-1})}
+    groups = groups_of(run, run.info["fps"])
+    tracks = len({id for t in run for id in t.id.tolist()})
+    count = {"tracks": tracks, "groups": len(groups), "lasting_groups": lasting(groups)}
     return {**{key: run.info[key] for key in ROW_KEYS}, **count, "folder": folder}
 
 
 def _line(row: dict[str, Any]) -> str:
     speed = f"{row['frames_per_second']:.0f} frames/s ({row['whole_frames_per_second']:.0f} with reading)"
     counts = ", ".join(counted(row[f"{name}s"], name) for name in ("frame", "track", "group"))
+    counts += f" ({row['lasting_groups']} of {LASTING:g} s or longer)" if row["groups"] else ""
     return printable(f"{row['sequence']}: {counts}, detections {input_summary(row)}, {speed} → {row['folder']}")

@@ -10,20 +10,19 @@ from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError, counted
 from sim.io.files.own_files import output_paths, refuse_foreign_file
-from sim.io.source import open_source
 from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_ranking import run_names, stored_runs
 from tracking.app.commands.score_tables import checked_key
-from tracking.app.commands.scored_sequence import ScoringJob, read_runs
+from tracking.app.commands.scored_sequence import ScoringJob, read_runs, run_names, stored_runs
 from tracking.app.progress import ProgressMeter, total_frames
-from tracking.app.sequence_workers import OpenedAs
-from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
+from tracking.app.sequence_workers import source_of
+from tracking.app.stored_tracks import find_tracks, match_tracks
 
 if TYPE_CHECKING:
     from tracking.errors.found import RunErrors
+    from tracking.running.run import TrackingRun
 
 INDEX = "index.html"  # the report in the folder of the pages
 
@@ -36,21 +35,18 @@ def view(options: ViewOptions) -> CommandResult:
     """Writes a replay page for each sequence, with its tracks if they are given, and a report on several sequences."""
     if options.by is not None:
         checked_key(options.by)
-    sequences, names = _open(options), run_names(options.tracks)
+    sequences = source_of(options, options.source, images=True).open()
+    names = run_names(options.tracks)
     if len(sequences) == 1:
         if len(names) > 2:
-            raise InputError(
-                place="TRACKS", got=counted(len(names), "run"), expected="one or two for a single sequence",
-                remedy="give two, or the whole dataset",
-            )  # fmt: skip
+            got, expected = counted(len(names), "run"), "one or two for a single sequence"
+            raise InputError(place="TRACKS", got=got, expected=expected, remedy="give two, or the whole dataset")
         return _pages(options, sequences, names)
-    _require_folder(options.out, ".html", sequences)
+    _files(sequences, options.out, ".html")  # refuses files of others before anything is tracked
     unlabelled = next((sequence.name for sequence in sequences if sequence.load_truth is None), None)
     if len(names) > 1 and unlabelled is not None:
-        raise InputError(
-            file=unlabelled, got="no labels", expected="labels, by which several runs are compared",
-            remedy="give one run, or one sequence",
-        )  # fmt: skip
+        expected, remedy = "labels, by which several runs are compared", "give one run, or one sequence"
+        raise InputError(file=unlabelled, got="no labels", expected=expected, remedy=remedy)
     reported = bool(names) and unlabelled is None and _can_report(options.out / INDEX, alone=len(names) > 1)
     return _report(options, sequences, names) if reported else _pages(options, sequences, names)
 
@@ -82,7 +78,9 @@ def _pages(
     from tracking.app.report.moments import shown_errors
 
     words = [*names] if len(names) > 1 else [""] * len(names)
-    runs = dict(zip((s.name for s in sequences), zip(*stored_runs(names, sequences), strict=True), strict=False))
+    runs = dict(
+        zip((s.name for s in sequences), zip(*stored_runs(names.values(), sequences), strict=True), strict=False)
+    )
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
         given = read_runs(sequence, ScoringJob(runs.get(sequence.name, ())))
@@ -91,8 +89,7 @@ def _pages(
         first, other = shown[0] if shown else Run(), shown[1] if len(shown) > 1 else None
         write_page(sequence, first, path, video=page_video(sequence, path, options.video, step), other=other)
 
-    pictures = _picture_count(sequences) if options.video != "none" else 0
-    return _write_each("view", sequences, options.out, ".html", write, pictures)
+    return _write_each("view", sequences, options.out, ".html", write, by_picture=options.video != "none")
 
 
 def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str]) -> CommandResult:
@@ -101,10 +98,7 @@ def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str,
     from tracking.app.report.page import write_report
 
     index, pages = options.out / INDEX, CommandResult({"files": []})
-    if len(names) == 1:
-        _files(sequences, options.out, ".html")  # refuses files of others before anything is tracked
-    source = OpenedAs(options.source, options.fps, options.px_per_m, options.camera, images=False)
-    found = judged_runs(names, sequences, source, options.workers)
+    found = judged_runs(names, sequences, source_of(options, options.source), options.workers)
     if len(names) == 1:
         known = {sequence.name: one.errors[0] for sequence, one in zip(sequences, found, strict=True)}
         pages = _pages(options, sequences, names, known)
@@ -117,52 +111,47 @@ def sheet(options: SheetOptions) -> CommandResult:
     """Writes a contact sheet, several frames in one PNG, for each sequence. The result's data: "files", their paths."""
     from tracking.app.pictures.contact_sheet import write_sheet
 
-    sequences = open_source(options.source, fps=options.fps, images=True)
-    stored = _stored(sequences, options.tracks)
+    sequences = source_of(options, options.source, images=True).open()
+    read = _reader(sequences, options.tracks)
 
     def write(sequence: Sequence, path: Path, _: Step) -> None:
-        found = stored.get(sequence.name)
-        write_sheet(sequence, path, options.frames, None if found is None else found.read(sequence))
+        write_sheet(sequence, path, options.frames, read(sequence))
 
-    return _write_each("sheet", sequences, options.out, ".png", write, 0)
+    return _write_each("sheet", sequences, options.out, ".png", write, by_picture=False)
 
 
 def overlay(options: OverlayOptions) -> CommandResult:
     """Writes a video for each sequence with tracks, truth or both drawn over its pictures."""
     from tracking.app.pictures.overlay import write_overlay
 
-    sequences = _open(options)
-    stored = _stored(sequences, options.tracks)
+    sequences = source_of(options, options.source, images=True).open()
+    read = _reader(sequences, options.tracks)
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
-        found = stored.get(sequence.name)
-        write_overlay(sequence, None if found is None else found.read(sequence), path, options.truth, step)
+        write_overlay(sequence, read(sequence), path, options.truth, step)
 
-    return _write_each("overlay", sequences, options.out, ".mp4", write, _picture_count(sequences))
-
-
-def _stored(sequences: list[Sequence], tracks: Path | None) -> dict[str, StoredTracks]:
-    return {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
+    return _write_each("overlay", sequences, options.out, ".mp4", write)
 
 
-def _open(options: ViewOptions | OverlayOptions) -> list[Sequence]:
-    return open_source(
-        options.source, fps=options.fps, px_per_m=options.px_per_m, camera=options.camera, images=True
-    )  # fmt: skip
+def _reader(sequences: list[Sequence], tracks: Path | None) -> Callable[[Sequence], TrackingRun | None]:
+    """Returns a function that reads the tracks of a sequence; None without tracks."""
+    stored = {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
 
+    def read(sequence: Sequence) -> TrackingRun | None:
+        return stored[sequence.name].read(sequence) if stored else None
 
-def _picture_count(sequences: list[Sequence]) -> int | None:
-    return total_frames(sequence for sequence in sequences if sequence.has_images)
+    return read
 
 
 def _write_each(
-    what: str, sequences: list[Sequence], out: Path, suffix: str, write: Write, pictures: int | None
+    what: str, sequences: list[Sequence], out: Path, suffix: str, write: Write, by_picture: bool = True
 ) -> CommandResult:
     files = _files(sequences, out, suffix)
-    with ProgressMeter(what, len(files) if pictures == 0 else pictures) as meter:
+    with_pictures = [sequence for sequence in sequences if sequence.has_images and by_picture]
+    with ProgressMeter(what, total_frames(with_pictures) if with_pictures else len(files)) as meter:
         for sequence, path in zip(sequences, files, strict=True):
             write(sequence, path, meter.step)
-            if pictures == 0:
+            if not with_pictures:
                 meter.step(sequence.name)
     return CommandResult({"files": files}, "\n".join(map(str, files)))
 
@@ -170,16 +159,10 @@ def _write_each(
 def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
     if len(sequences) == 1:
         return [option_parsing.output_file(out, suffix)]
-    _require_folder(out, suffix, sequences)
+    if out.suffix.lower() == suffix:
+        got, remedy = f"one file for {len(sequences)} sequences", "give a folder, or one sequence"
+        raise InputError(file=out, place="--out", got=got, expected="a folder", remedy=remedy)
     files = output_paths(out, [sequence.name for sequence in sequences], suffix)
     for file in files:
         refuse_foreign_file(file)
     return files
-
-
-def _require_folder(out: Path, suffix: str, sequences: list[Sequence]) -> None:
-    if out.suffix.lower() == suffix:
-        raise InputError(
-            file=out, place="--out", got=f"one file for {len(sequences)} sequences", expected="a folder",
-            remedy="give a folder, or one sequence",
-        )  # fmt: skip

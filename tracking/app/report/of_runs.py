@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 
 from scenarios.errors import counted
 from sim.types import Sequence
-from tracking.app.commands.score_ranking import RankedRuns, rank_words, ranked_runs, stored_runs, verdict
+from tracking.app.commands.score_ranking import RankedRuns, rank_words, ranked_runs, verdict
 from tracking.app.commands.score_tables import SIMILARITY
-from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, read_runs, score_runs
+from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, read_runs, score_runs, stored_runs
 from tracking.app.replay_page.page import Run
 from tracking.app.report.content import Played, Report, heat_map
 from tracking.app.report.moments import COSTS, cause_rows, moments, shown_errors
-from tracking.app.sequence_workers import OpenedAs, results_over_sequences
+from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.errors.found import RunErrors
 
 
@@ -32,9 +32,9 @@ def judged_runs(
     names: Mapping[str, str], sequences: list[Sequence], source: OpenedAs, workers: int
 ) -> list[JudgedRuns]:
     """Returns scores and errors of runs, by name the text of the command line: stored tracks or a tracker class."""
-    runs = stored_runs(names, sequences)
+    runs = stored_runs(names.values(), sequences)
     jobs = [ScoringJob(sources, oracles=True) for sources in zip(*runs, strict=True)]
-    return results_over_sequences("report", _judge, sequences, jobs, source, workers)
+    return list(over_sequences("report", _judge, sequences, jobs, source, workers))
 
 
 def report_of_runs(
@@ -45,7 +45,7 @@ def report_of_runs(
     files: Mapping[str, str],
 ) -> Report:
     """Returns the report on runs; files: by sequence, the address of its page."""
-    ranked = ranked_runs(list(names), sequences, [one.scored for one in found], by, [])
+    ranked = ranked_runs(list(names), sequences, [one.scored for one in found], by)
     played = list(_played(ranked))
 
     def replayed(one: Played, rival: str) -> tuple[Sequence, Run, Run | None]:

@@ -24,6 +24,7 @@ from tests.sealing import seal_again
 from tests.short_scene import write_short_scene
 from tracking import group
 from tracking.app.cli import run
+from tracking.app.commands.group import lasting
 
 FPS = 10.0
 Place = Callable[[float], tuple[float, float]]
@@ -87,7 +88,8 @@ def test_a_text(walk, tmp_path, capsys):
     (row,) = found["runs"]
     assert (row["sequence"], row["people"], row["people_in_groups"], row["plane"]) == ("walk", 6, 5, "ground")
     one, other = row["groups"]
-    assert (other["members"], other["size"]) == ([4, 6], 2)
+    known = (other["members"], other["size"], lasting([*row["groups"], {"seconds": 1.9}, {"seconds": 2.0}]))
+    assert known == ([4, 6], 2, 3)
     assert (one["members"], one["size"], one["end"]) == ([1, 2, 3], 3, 200)
     assert one["seconds"] == (200 - one["start"] + 1) / FPS
     assert {kind: n for kind, n in row["events"].items() if n} == {"merge": 1, "cross": 1}

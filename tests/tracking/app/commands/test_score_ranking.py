@@ -46,8 +46,6 @@ def test_the_ranking_is_that_of_compare(made: Path, capsys) -> None:
     assert [r["run"] for r in found["ranking"][:2]] == ["oracle from boxes (file)", "oracle from points (file)"]
     assert found["similarity"] == "ground"
     assert len(found["differences"]) == 3
-    assert run(["score", str(made / "data"), str(made / "good"), "--by", "HOTA", "--all"]) == 2
-    assert "got --by and --all; expected none for one run; leave them out" in capsys.readouterr().err
 
 
 def test_a_class_without_a_truth_hash_is_no_difference() -> None:
