@@ -9,7 +9,7 @@ TPE sampler, which looks at all trials.
 The parameters of trial n depend only on the seed, on n and on the trials finished before. A search that was killed and
 is resumed therefore finds what it would have found.
 
-The pruner stops a trial early when it surely loses to the best trial on the scenes that both were played on: the
+A trial is stopped early when it surely loses to the best trial on the scenes that both were played on: the
 p-value of a paired test lies below a limit. The test is Wilcoxon's signed-rank test (1945), one-sided, as in Optuna's
 WilcoxonPruner. *Ours*: p-values are exact with ties and zeros, too. Parameters that change nothing in most scenes give
 zeros and ties; scipy then draws permutations, which takes longer than an episode (figures: CONTRIBUTING.md). The test
@@ -24,7 +24,6 @@ from typing import Any, cast
 import numpy as np
 import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
-from optuna.pruners import BasePruner
 from optuna.samplers import BaseSampler, TPESampler
 from optuna.trial import FrozenTrial, TrialState
 
@@ -33,8 +32,7 @@ from tracking.config import Param
 from tracking.parameter_space import decode, encode
 from tracking.tuning.search_plan import SearchPlan
 
-# Attributes of a trial: number of the trial that it repeats, episodes played before pruning, error line.
-AGAIN, PRUNED, ERROR = "again", "pruned after", "error"
+PRUNED = "pruned after"  # Attribute of a trial: episodes played before it was stopped.
 
 MOVED = 3  # Number of parameters that are moved, on average.
 STEPS = (0.05, 1.0)  # Least and greatest standard deviation of a step; the range of a parameter is [-1, 1].
@@ -52,12 +50,6 @@ def distribution(p: Param) -> BaseDistribution:
     return FloatDistribution(p.low, p.high, log=p.scale == "log")
 
 
-def place_in_search(trials: Sequence[FrozenTrial], trial: FrozenTrial) -> int:
-    """Returns the place of a trial in the search, 0 for the defaults."""
-    number = trial.user_attrs.get(AGAIN, trial.number)
-    return sum(t.number < number and AGAIN not in t.user_attrs for t in trials)
-
-
 class HillClimbingSampler(BaseSampler):
     """Optuna sampler that moves a few parameters of one of the best trials; every fourth trial is drawn by TPE.
 
@@ -70,14 +62,12 @@ class HillClimbingSampler(BaseSampler):
         self._rng, self._tpe, self._use_tpe = np.random.default_rng(seed), TPESampler(seed=seed), False
 
     def before_trial(self, study: optuna.Study, trial: FrozenTrial) -> None:
-        """Seeds the generators for this trial from the seed of the search and the trial's place in the study."""
-        trials = study.get_trials(deepcopy=False)
-        place = place_in_search(trials, trial)
-        entropy = np.random.SeedSequence([self._plan.options.seed, place])
+        """Seeds the generators for this trial from the seed of the search and the trial's number."""
+        entropy = np.random.SeedSequence([self._plan.options.seed, trial.number])
         self._rng = np.random.default_rng(entropy)
         self._tpe = TPESampler(seed=int(entropy.generate_state(1)[0]), n_startup_trials=TPE_FROM)
-        complete = sum(t.state == TrialState.COMPLETE for t in trials)
-        self._use_tpe = place % TPE_EVERY == TPE_EVERY - 1 and complete >= TPE_FROM
+        complete = len(study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,)))
+        self._use_tpe = trial.number % TPE_EVERY == TPE_EVERY - 1 and complete >= TPE_FROM
 
     def infer_relative_search_space(self, study: optuna.Study, trial: FrozenTrial) -> dict[str, BaseDistribution]:
         """Returns the distributions by name that `sample_relative` draws from."""
@@ -132,25 +122,9 @@ def _reflected(point: Array) -> Array:
 LEAST_SCENES = 2
 
 
-class SignedRankPruner(BasePruner):
-    """Prunes a trial whose values on the scenes so far are surely worse than the best trial's on the same scenes.
-
-    A trial is pruned if the one-sided p-value of Wilcoxon's signed-rank test is below p; 0 never prunes. Values must be
-    reported with the number of the scene as step. For studies with one goal.
-    """
-
-    def __init__(self, p: float) -> None:
-        self.p = p
-
-    def prune(self, study: optuna.Study, trial: FrozenTrial) -> bool:
-        """Returns True if the trial is to be pruned."""
-        try:
-            best = study.best_trial.intermediate_values
-        except ValueError:
-            return False
-        sign = 1.0 if study.direction == optuna.study.StudyDirection.MAXIMIZE else -1.0
-        gains = [sign * (v - best[k]) for k, v in trial.intermediate_values.items() if k in best]
-        return len(gains) >= LEAST_SCENES and sum(gains) < 0 and signed_rank_p_value(gains) < self.p
+def surely_loses(gains: Sequence[float], p: float) -> bool:
+    """Returns True if gains over the best trial on the same scenes are surely negative: with a p-value below p."""
+    return len(gains) >= LEAST_SCENES and sum(gains) < 0 and signed_rank_p_value(gains) < p
 
 
 def signed_rank_p_value(gains: Sequence[float]) -> float:
