@@ -235,7 +235,8 @@ def _evaluated(plan: SearchPlan, study: SearchStudy, evaluator: HeldOutEvaluator
     taken_back = [name for name, value in plan.base.as_dict().items() if tried[name] != value == new[name]]
     return TuningResult(
         plan, config, front, tuple(candidates), tuple(study.records()), importance, tuple(comparisons),
-        tuple(taken_back), (default.validation, values), tuple(notes), study.optuna.study_name, tuple(evaluator.left_out.values()),
+        tuple(taken_back), (default.validation, values), tuple(notes), study.optuna.study_name,
+        tuple(evaluator.left_out.values()),
     )  # fmt: skip
 
 
