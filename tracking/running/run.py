@@ -71,22 +71,6 @@ def run_info(
     }
 
 
-def known_people_info(
-    sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, ground: Ground, begins: int | None
-) -> dict[str, Any]:
-    """Returns what run.json tells of the groups of a sequence's labelled people."""
-    given: dict[str, Any] = {
-        "tracker": "group",
-        "config": {},
-        "seed": None,
-        "detections": "truth",
-        "input": "boxes" if len(tracks) and tracks[0].plane == "image" else "points",
-        "sensor": {},
-        "background": None,
-    }
-    return {**given, **_facts(sequence, tracks, scale, ground, begins)}
-
-
 def _facts(
     sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, ground: Ground, begins: int | None
 ) -> dict[str, Any]:
@@ -123,9 +107,10 @@ def causal_from(sequence: Sequence) -> int | None:
 def input_summary(info: Mapping[str, Any]) -> str:
     """Returns one line on what a tracker was given, from the content of its run.json."""
     mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
+    settings = [f"{key} = {value}" for key, value in (sensor or {}).items()]
+    hidden = len(settings) - SENSOR_SETTINGS_SHOWN
     more = [f"background: {background}"] if background else []
-    more += [f"{key} = {value}" for key, value in list((sensor or {}).items())[:SENSOR_SETTINGS_SHOWN]]
-    more += [f"{len(sensor) - SENSOR_SETTINGS_SHOWN} more"] if sensor and len(sensor) > SENSOR_SETTINGS_SHOWN else []
+    more += [*settings[:SENSOR_SETTINGS_SHOWN], *([f"{hidden} more"] if hidden > 0 else [])]
     return f"{mode} ({', '.join(more)})" if more else str(mode or "")
 
 
@@ -243,21 +228,18 @@ def track(
     scale, pixels = prepared.scale(reported), prepared.mode == "image"
     camera, scene = prepared.context.camera, prepared.context.scene
     tracks, ground = completed(reported, sequence.fps, scale.px_per_m, rule, camera=camera, scene=scene, pixels=pixels)
-    named = names_groups(reported)
+    named, late, odd = names_groups(reported), late_groups(reported), list[str | None]()
     if named and chosen is not None:
-        warnings.warn(f"{prepared.name} names groups itself: --grouping has no effect", UserWarning, stacklevel=2)
-    elif not named:
-        late = late_groups(reported)
-        if late is not None:
-            warnings.warn(
-                f"{prepared.name}: names groups from frame {late} on, but not in its first answer with people: its "
-                "groups are replaced by derived ones. Report groups = Groups.none() as long as there is no group",
-                UserWarning,
-                stacklevel=2,
-            )
-        fault = velocity_warning(prepared.name, reported, sequence.fps, scale.px_per_m, rule)
-        if fault is not None and ground.camera is None:  # on the ground no velocity is reported
-            warnings.warn(fault, UserWarning, stacklevel=2)
+        odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
+    if late is not None:
+        odd.append(
+            f"{prepared.name}: names groups from frame {late} on, but not in its first answer with people: its "
+            "groups are replaced by derived ones. Report groups = Groups.none() as long as there is no group"
+        )
+    if not named and ground.camera is None:  # on the ground no velocity is reported
+        odd.append(velocity_warning(prepared.name, reported, sequence.fps, scale.px_per_m, rule))
+    for text in filter(None, odd):
+        warnings.warn(text, UserWarning, stacklevel=2)
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
     info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
     return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
@@ -297,14 +279,18 @@ def group(
     camera, pixels = sequence.camera, run is not None and run.info.get("detections") == "image"
     given = (people, sequence.fps, scale.px_per_m, rule)
     tracks, ground = completed(*given, camera=camera, scene=sequence.scene, pixels=pixels)
-    # on the ground no velocity is used
-    fault = None if ground.camera else velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule)
-    odd = implausible(sequence.name, people, sequence.fps, scale.px_per_m)
-    for text in (*odd, *([] if fault is None else [fault])):
+    odd: list[str | None] = [*implausible(sequence.name, people, sequence.fps, scale.px_per_m)]
+    if ground.camera is None:  # on the ground no velocity is used
+        odd.append(velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule))
+    for text in filter(None, odd):
         warnings.warn(text, UserWarning, stacklevel=2)
     begins = 1 if run is None else run.info.get("causal_from", 1)
-    info = known_people_info(sequence, tracks, scale, ground, begins)
-    if run is not None:
+    info = _facts(sequence, tracks, scale, ground, begins)
+    if run is None:
+        kind = "boxes" if len(tracks) and tracks[0].plane == "image" else "points"
+        info = {"tracker": "group", "config": {}, "seed": None, "detections": "truth", "input": kind, **info}
+        info |= {"sensor": {}, "background": None}
+    else:
         info = {**run.info, **{key: info[key] for key in OF_TRACKS}}
     return TrackingRun(tracks, {**info, "grouping": rule.as_dict()})
 
