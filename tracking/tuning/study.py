@@ -42,7 +42,7 @@ from tracking.stats import mean_of_known
 from tracking.tuning.comparison import TrialRecord
 from tracking.tuning.options import Progress
 from tracking.tuning.parallel_episodes import PlayEpisodes
-from tracking.tuning.sampler import PRUNED, HillClimbingSampler, distribution, surely_loses
+from tracking.tuning.sampler import PRUNED, distribution, propose, surely_loses, tpe_sampler
 from tracking.tuning.search_plan import SearchPlan
 
 SUFFIX = ".locks"  # What the name of the lock file adds to the name of the journal.
@@ -148,15 +148,19 @@ class SearchStudy:
         take_running: without locks, running trials are taken for abandoned.
         """
         with self._choosing():
-            begun = [t for t in self.trials() if t.state in (*FINISHED, TrialState.RUNNING)]
+            trials = self.trials()
+            begun = [t for t in trials if t.state in (*FINISHED, TrialState.RUNNING)]
             for t in begun:
                 if t.state == TrialState.RUNNING and self._lock_trial(t.number, take_running):
+                    self.optuna.sampler = tpe_sampler(self.plan, t.number)
                     trial = optuna.Trial(self.optuna, t._trial_id)
                     for name, choices in self._space.items():  # the process may have ended before it had chosen all
                         trial._suggest(name, choices)
                     return trial
             if len(begun) >= self.plan.options.trials:
                 return None
+            if len(trials) == len(begun):  # none is enqueued
+                propose(self.plan, self.optuna, len(trials))
             trial = self.optuna.ask(self._space)
             self._lock_trial(trial.number)
             return trial
@@ -214,7 +218,7 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
         try:
             study = optuna.create_study(
                 storage=JournalStorage(LockedJournal(file, locks)) if file and locks else url, study_name=name,
-                load_if_exists=True, sampler=HillClimbingSampler(plan),
+                load_if_exists=True,
                 directions=["maximize" if goal.higher else "minimize" for goal in plan.goals],
             )  # fmt: skip
         except OSError:
