@@ -17,7 +17,7 @@ from tests.toy_tracker import Toy, ToyConfig
 from tests.tuning_toys import TOY, toy_plan, tune_arguments
 from tracking.tuning.parallel_episodes import episode_player
 from tracking.tuning.search import tune
-from tracking.tuning.study import open_study, run_trials
+from tracking.tuning.study import LEFT_OUT, open_study, run_trials
 
 KILLED_AT = """
 import os, signal, sys
@@ -128,6 +128,7 @@ def test_two_processes_share_a_journal(tmp_path):
         other = in_another_process(tmp_path, -1)
         while len(study.finished()) < made.options.trials - 1:
             assert other.poll() is None
+        mine.set_user_attr(LEFT_OUT, [""] * 5)
         study.tell(mine, [0.0])
         run_trials(study, play, lambda done, total, what: None)
         assert other.wait(120) == 0
