@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 import os
 import pickle
-import queue
 import re
 import sys
 import threading
@@ -20,7 +19,6 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -31,8 +29,8 @@ from sim.workers.pool import THREAD_VARIABLES, OnLoss, R, RunItems, T, WorkResul
 ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):[0-9]+/?"
 SAME = "install the same on all (pip install -c constraints.txt) and restart the workers"
 CONNECT_TIMEOUT = 10.0  # s to reach a scheduler
-COUNT_INTERVAL = 1.0  # s between two counts of the cluster's workers
 NO_WORKERS_WARNING = 20.0  # s without any worker before a warning
+COUNT_INTERVAL = 1.0  # s between two counts of the cluster's workers
 REMEDY = "run the same command again: what is complete is kept"
 # earlier Pythons may deadlock in sys._current_frames, which dask's profiler calls (gh-106883)
 PROFILE_SAFE = (3, 11, 9)
@@ -45,23 +43,30 @@ def cluster_workers(address: str, workers: int = 1) -> Iterator[RunItems]:
     As many items are under way as the cluster has threads, at least `workers`, and the `ahead` of the call.
     """
     client = _connect(address)
+    try:
+        client.wait_for_workers(1, timeout=NO_WORKERS_WARNING)
+    except TimeoutError:
+        warnings.warn(f"{address} has no workers: waiting for some to come", stacklevel=2)
 
     def run(
         function: Callable[[T], R], items: Iterable[T], *, ahead: int = 0, on_loss: OnLoss[T, R] = None
     ) -> Iterator[tuple[T, R]]:
-        capacity = _ClusterCapacity(client, address, workers)
-        waiting, finished = iter(items), queue.SimpleQueue[str]()
-        under_way: dict[str, tuple[T, Any]] = {}
+        from distributed import as_completed
+
+        finished = as_completed(loop=client.loop, with_results=True, raise_errors=False)
+        waiting, under_way, threads, counted = iter(items), dict[Any, T](), 0, float("-inf")
         while True:
-            for item in islice(waiting, max(0, capacity.count() + ahead - len(under_way))):
+            if time.monotonic() - counted >= COUNT_INTERVAL:
+                threads, counted = _count_threads(client, address), time.monotonic()
+            for item in islice(waiting, max(0, max(workers, threads) + ahead - len(under_way))):
                 future = _submit(client, function, item)
-                under_way[future.key] = item, future
-                future.add_done_callback(lambda f: finished.put(f.key))
+                under_way[future] = item
+                finished.add(future)
             if not under_way:
                 return
-            ready = [under_way.pop(key) for key in _drain(finished)]
-            for (item, _), fetch in zip(ready, _fetchers(client, [f for _, f in ready]), strict=True):
-                yield item, _result(fetch, item, address, on_loss)
+            for future, answer in finished.next_batch():
+                item = under_way.pop(future)
+                yield item, _result(answer, item, address, on_loss)
 
     try:
         yield run
@@ -91,34 +96,13 @@ def _connect(address: str) -> Any:
         ) from None  # fmt: skip
 
 
-class _ClusterCapacity:
-    """How many items the cluster can run at a time: its worker threads, counted once a second, at least `least`.
-
-    State: the threads at the last count, its time, and since when there are none (None after the warning).
-    """
-
-    def __init__(self, client: Any, address: str, least: int) -> None:
-        self._client, self._address, self._least = client, address, least
-        self._threads, self._counted = 0, -COUNT_INTERVAL
-        self._empty_since: float | None = time.monotonic()
-
-    def count(self) -> int:
-        """Returns how many items can run at a time; warns once if there are no threads for 20 s."""
-        now = time.monotonic()
-        if now - self._counted >= COUNT_INTERVAL:
-            if self._client.status not in ("running", "connecting"):
-                raise lost_connection(self._address)
-            with suppress(OSError):  # a scheduler that is lost just now shows in its futures
-                self._threads, self._counted = sum(self._client.nthreads().values()), now
-            self._warn_if_empty(now)
-        return max(self._least, self._threads)
-
-    def _warn_if_empty(self, now: float) -> None:
-        if self._threads:
-            self._empty_since = now
-        elif self._empty_since is not None and now - self._empty_since >= NO_WORKERS_WARNING:
-            self._empty_since = None
-            warnings.warn(f"{self._address} has no workers: waiting for some to come", stacklevel=2)
+def _count_threads(client: Any, address: str) -> int:
+    """Returns the number of the cluster's threads, each of which runs one item at a time."""
+    if client.status != "running":
+        raise lost_connection(address)
+    with suppress(OSError):  # a scheduler that is lost just now shows in its futures
+        return sum(client.nthreads().values())
+    return 0
 
 
 def lost_connection(address: str) -> WorkError:
@@ -184,39 +168,25 @@ def _stop_profiler(worker: Any) -> None:
         stopped.wait(CONNECT_TIMEOUT)
 
 
-# Waits for the first finished future only, and only so long that the threads are counted in time.
-def _drain(finished: queue.SimpleQueue[str]) -> Iterator[str]:
-    with suppress(queue.Empty):
-        yield finished.get(timeout=COUNT_INTERVAL)
-        while True:
-            yield finished.get_nowait()
-
-
-def _fetchers(client: Any, futures: list[Any]) -> list[Callable[[], bytes]]:
-    # One request for all is faster.
-    """Returns for each finished future, in order, a call that returns its bytes or raises its error."""
-    if len(futures) > 1:
-        with suppress(Exception):  # one of them failed: its own result() raises the error
-            return [partial(bytes, body) for body in client.gather(futures)]
-    return [future.result for future in futures]
-
-
-def _result(fetch: Callable[[], bytes], item: T, address: str, on_loss: OnLoss[T, R]) -> R:
+def _result(answer: Any, item: T, address: str, on_loss: OnLoss[T, R]) -> R:
+    """Returns the result of a call; answer: bytes, an exception, or its type, itself and its traceback."""
     from distributed import CancelledError, KilledWorker
 
-    try:
-        outcome: WorkResult = pickle.loads(fetch())
-    except KilledWorker as error:
+    if isinstance(answer, bytes):
+        outcome: WorkResult = pickle.loads(answer)
+        result: R = outcome.result()
+        return result
+    error = answer[1] if isinstance(answer, tuple) else answer
+    if isinstance(error, KilledWorker):
         loss = worker_loss(error.allowed_failures + 1, f"the loss of {error.last_worker.address}")
         if on_loss is None:
-            raise loss from None
+            raise loss
         return on_loss(item, loss)
-    except (CancelledError, OSError) as error:
+    if isinstance(error, CancelledError | OSError):
         raise lost_connection(address) from error
-    except (ImportError, AttributeError) as error:
+    if isinstance(error, ImportError | AttributeError):
         raise WorkError(
             place="--cluster", got=f"a worker that cannot import flockscope ({error})",
             expected="flockscope as it is installed here", remedy=SAME,
-        ) from None  # fmt: skip
-    result: R = outcome.result()
-    return result
+        )  # fmt: skip
+    raise error

@@ -187,7 +187,7 @@ class Rollout:
         from tracking.running.run import TrackingRun
 
         context, mode, judge = self.prepared.context, self.prepared.mode, self.opened.judge
-        tracks = completed(
+        tracks, _ = completed(
             self.tracks, context.fps, px_per_m, camera=context.camera, scene=context.scene, pixels=mode == "image"
         )
         run = TrackingRun(tracks, {"detections": mode})

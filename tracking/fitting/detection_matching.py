@@ -66,19 +66,18 @@ def match_sequence(sequence: Sequence) -> MatchedRecording:
     or the boxes of either.
     """
     file, truth = sequence.source.get("path", sequence.name), sequence.truth
-    missing = (
-        ("no labelled people", truth is None or not len(truth.id)),
-        ("labels without boxes", truth is not None and truth.box is None),
-        ("no detections (det/det.txt)", not sequence.has_detections),
-    )
-    for got, wrong in missing:
-        if wrong:
-            expected = "labelled boxes and a detector's boxes of the same recording"
-            raise InputError(file=file, got=got, expected=expected, remedy="give a recording with gt and det")
+    expected, remedy = "labelled boxes and a detector's boxes of the same recording", "give a recording with gt and det"
     found = [f.detections for f in sequence.without_pictures() if f.detections is not None]
-    if any(d.box is None for d in found if len(d.pos)) or not any(len(d.pos) for d in found):
-        got = "detections without boxes" if any(len(d.pos) for d in found) else "no detection in any frame"
-        raise InputError(file=file, got=got, expected="a detector's boxes", remedy="give its boxes in det/det.txt")
+    faults = {
+        "no labelled people": truth is None or not len(truth.id),
+        "labels without boxes": truth is not None and truth.box is None,
+        "no detections (det/det.txt)": not sequence.has_detections,
+        "no detection in any frame": not any(len(d.pos) for d in found),
+        "detections without boxes": any(d.box is None for d in found if len(d.pos)),
+    }
+    for got, wrong in faults.items():
+        if wrong:
+            raise InputError(file=file, got=got, expected=expected, remedy=remedy)
     assert truth is not None
     truth, found, left_out = _annotated(truth, found, _left_out(sequence))
     return match_detections(truth, found, sequence.image_size, sequence.camera, left_out)

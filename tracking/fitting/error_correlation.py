@@ -9,7 +9,6 @@ threshold, and rho is the correlation of two such numbers that gives the observe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -23,15 +22,6 @@ TIMES = np.geomspace(0.05, 2 * REACH, 26)  # s: time constants that are tried, u
 LEAST = 0.03  # share of the variance: smaller parts are left out
 PAIRS = 12000  # about this many pairs of a lag are used
 FEW = 20  # a lag with fewer pairs is left out
-
-
-@dataclass(frozen=True)
-class Correlations:
-    """Correlations of errors over time at K lags, K may be 0."""
-
-    lag: Array  # (K,): time between two errors of one person, s, ascending
-    rho: Array  # (K,): their correlation
-    pairs: Array  # (K,): number of pairs of errors (from rows of the labels) behind each value
 
 
 def pairs_by_lag(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
@@ -51,13 +41,18 @@ def pairs_by_lag(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
     return found
 
 
-def correlations(truth: Truth, z: Array, keep: Bools) -> Correlations:
-    """Returns the correlations over time of errors z (R, D) of variance 1, pooled; keep (R,): the rows used."""
+def correlations(truth: Truth, z: Array, keep: Bools) -> Array:
+    """Returns the correlations over time of errors z (R, D) of variance 1, pooled; keep (R,): the rows used.
+
+    The columns of the result (K, 3) are the time between two errors of one person, s, ascending; their correlation; and
+    the number of pairs of rows behind it. K may be 0.
+    """
     return _table([(lag, float((z[i] * z[j]).mean()), len(i)) for lag, i, j in pairs_by_lag(truth, keep)])
 
 
-def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Correlations:
-    """Returns the tetrachoric correlations over time of misses (R,), whose probability is p_miss (R,)."""
+def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Array:
+    """Returns the tetrachoric correlations over time of misses (R,), whose probability is p_miss (R,); as
+    `correlations`."""
     from scipy.special import ndtri
 
     threshold = ndtri(np.clip(p_miss, 1e-3, 1.0 - 1e-3))
@@ -68,9 +63,8 @@ def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Correlation
     return _table(rows)
 
 
-def _table(rows: list[tuple[float, float, int]]) -> Correlations:
-    a = np.array(rows, dtype=float).reshape(-1, 3)
-    return Correlations(a[:, 0], a[:, 1], a[:, 2])
+def _table(rows: list[tuple[float, float, int]]) -> Array:
+    return np.array(rows, dtype=float).reshape(-1, 3)
 
 
 def bivariate_normal_cdf(a: Array, b: Array, rho: float) -> Array:
@@ -101,9 +95,9 @@ def _tetrachoric(a: Array, b: Array, both: float) -> float:
     return float(brentq(short, low, high, xtol=1e-4))
 
 
-def fit_memory(found: Sequence[Correlations]) -> tuple[Memory, ...]:
+def fit_memory(found: Sequence[Array]) -> tuple[Memory, ...]:
     """Returns at most two parts whose sum of share · exp(-lag / time) is nearest to the correlations; () if none is."""
-    lag, rho, pairs = (np.concatenate([getattr(c, name) for c in found] or [[]]) for name in ("lag", "rho", "pairs"))
+    lag, rho, pairs = np.concatenate([np.zeros((0, 3)), *found]).T
     if not len(lag):
         return ()
     weight = np.sqrt(pairs)

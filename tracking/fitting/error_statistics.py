@@ -39,23 +39,22 @@ def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]
     frames = sum(m.truth.length for m in recordings)
     alarms = [track for m in recordings for track in alarm_tracks(m)]
     seen = np.array([len(a.rows) for a in alarms], dtype=float)
+    stay = np.array([(np.ptp(a.frame) + 1) / a.recording.truth.fps for a in alarms])
     found["false alarms per frame"] = float(seen.sum()) / frames if frames else float("nan")
     found["false alarms: at people"] = _known(np.average, np.array([a.person >= 0 for a in alarms]), None, seen)
-    found["false alarms: mean stay, s"] = _known(
-        np.mean, np.array([(np.ptp(a.frame) + 1) / a.recording.truth.fps for a in alarms])
-    )
-    overlap, errors = zip(*(_iou_and_errors(m) for m in recordings), strict=True)
+    found["false alarms: mean stay, s"] = _known(np.mean, stay)
+    true = np.concatenate([np.zeros((0, 4)), *(m.truth.box[m.hit] for m in recordings if m.truth.box is not None)])
+    box = np.concatenate([m.box[m.match[m.hit]] for m in recordings])
+    e, overlap = box_errors(box, true), box_iou(true, box)
     for q in (0.1, 0.5, 0.9):
-        found[f"overlap, {q:.0%} quantile"] = _known(np.quantile, np.concatenate(overlap), q)
-    e = np.concatenate(errors)
+        found[f"overlap, {q:.0%} quantile"] = _known(np.quantile, overlap, q)
     for k, name in enumerate(("across", "foot", "top", "log width")):
         found[f"error {name}: mean"], found[f"error {name}: sd"] = _known(np.mean, e[:, k]), _known(np.std, e[:, k])
     for lag in LAGS:
         found[f"error correlation after {lag:g} s"] = _correlation(recordings, e, lag)
-    found["score of true, median"] = _known(
-        np.quantile, np.concatenate([m.score[m.match[m.hit]] for m in recordings]), 0.5
-    )
-    found["score of false, median"] = _known(np.quantile, np.concatenate([m.score[m.false] for m in recordings]), 0.5)
+    scores = {"true": [m.score[m.match[m.hit]] for m in recordings], "false": [m.score[m.false] for m in recordings]}
+    for name, parts in scores.items():
+        found[f"score of {name}, median"] = _known(np.quantile, np.concatenate(parts), 0.5)
     return found
 
 
@@ -69,12 +68,6 @@ def miss_runs(m: MatchedRecording) -> Ints:
         begins = lost & (start | np.concatenate([[True], ~lost[:-1]]))
         lengths.append(np.bincount(np.cumsum(begins)[lost] - 1) if lost.any() else np.zeros(0, np.int64))
     return np.concatenate([np.zeros(0, np.int64), *lengths])
-
-
-def _iou_and_errors(m: MatchedRecording) -> tuple[Array, Array]:
-    assert m.truth.box is not None
-    true, box = m.truth.box[m.hit], m.box[m.match[m.hit]]
-    return box_iou(true, box), box_errors(box, true)
 
 
 def _correlation(recordings: Sequence[MatchedRecording], e: Array, lag: float) -> float:

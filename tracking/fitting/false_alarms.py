@@ -56,10 +56,10 @@ def fit_false_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, Fal
     if len(tracks) < FEW:
         return rate, None
     life, seen = _life_and_seen(recordings, tracks)
-    at_people = [t for t in tracks if t.person >= 0]
-    elsewhere = [t for t in tracks if t.person < 0]
+    at_people, elsewhere = [t for t in tracks if t.person >= 0], [t for t in tracks if t.person < 0]
     near = sum(len(t.rows) for t in at_people) / sum(len(t.rows) for t in tracks)
-    found = {"life": life, "seen": seen, "near": round(near, 4), "aspect": _aspect(tracks), "jitter": _jitter(tracks)}
+    aspect = _robust_spread([float(np.log(t.box[:, 2] / t.box[:, 3]).mean()) for t in tracks], tracks)
+    found = {"life": life, "seen": seen, "near": round(near, 4), "aspect": aspect, "jitter": _jitter(tracks)}
     if len(at_people) >= FEW:
         found |= _fit_at_people(at_people)
     if len(elsewhere) >= FEW:
@@ -75,15 +75,13 @@ def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
         open_ = [rows for rows in found if m.frame[rows[-1]] >= index - pause]
         here = np.flatnonzero(m.false & (m.frame == index))
         iou = box_iou(m.box[[rows[-1] for rows in open_], None], m.box[here]) if open_ else np.zeros((0, len(here)))
-        used_tracks: set[int] = set()
-        used: set[int] = set()
-        for flat in np.argsort(-iou, axis=None, kind="stable"):
-            i, j = divmod(int(flat), len(here))
-            if iou[i, j] >= LINK and i not in used_tracks and j not in used:
-                open_[i].append(int(here[j]))
-                used_tracks.add(i)
-                used.add(j)
-        found += [[int(row)] for j, row in enumerate(here) if j not in used]
+        linked: set[int] = set()
+        while iou.size and iou.max() >= LINK:
+            i, j = divmod(int(iou.argmax()), len(here))
+            open_[i].append(int(here[j]))
+            iou[i], iou[:, j] = -1.0, -1.0
+            linked.add(j)
+        found += [[int(row)] for j, row in enumerate(here) if j not in linked]
     return [AlarmTrack(m, np.array(rows), _person_of_alarm(m, rows)) for rows in found]
 
 
@@ -99,10 +97,9 @@ def _person_of_alarm(m: MatchedRecording, rows: list[int]) -> int:
         on = box_intersections(box, people) / (box[2] * box[3])
         covered.append(float(on.sum()))
         away = (box[:2] + box[2:] * [0.5, 1.0] - people[:, :2] - people[:, 2:] * [0.5, 1.0]) / people[:, 3:]
-        for k in np.flatnonzero(on > 0):
-            id = int(m.truth.id[r][k])
-            share[id] = share.get(id, 0.0) + float(on[k])
-            offset.setdefault(id, []).append(away[k])
+        for id, part, distance in zip(m.truth.id[r][on > 0].tolist(), on[on > 0].tolist(), away[on > 0], strict=True):
+            share[id] = share.get(id, 0.0) + part
+            offset.setdefault(id, []).append(distance)
     if not share or np.median(covered) < ON:
         return -1
     candidates = [id for id, s in share.items() if s >= NEARLY * max(share.values())]
@@ -111,17 +108,16 @@ def _person_of_alarm(m: MatchedRecording, rows: list[int]) -> int:
 
 def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
     """Returns the mean life of a false alarm, s, and the probability that a living one is detected in a frame."""
-    lag, share, weight = [], [], []
+    found = []
     for m in recordings:
         frames_of_tracks = [set(t.frame.tolist()) for t in tracks if t.recording is m]
         for n in range(1, max(2, round(AGAIN * m.truth.fps))):
             before = [(f, frames) for frames in frames_of_tracks for f in frames if f + n <= m.truth.length]
             again = sum(f + n in frames for f, frames in before)
             if again:
-                lag.append(n / m.truth.fps)
-                share.append(again / len(before))
-                weight.append(again)
-    if not lag or max(share) < LEAST_AGAIN:
+                found.append((n / m.truth.fps, again / len(before), again))
+    lag, share, weight = np.array(found).reshape(-1, 3).T
+    if not len(lag) or share.max() < LEAST_AGAIN:
         return 0.0, 1.0
     if len(lag) == 1:
         return round(float(-lag[0] / np.log(min(share[0], 0.98))), 3), 1.0
@@ -130,8 +126,7 @@ def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[Alar
     if slope > -1.0 / LONGEST:
         slope, level = -1.0 / LONGEST, float(np.average(np.log(share), weights=weight))
     if level > 0.0:  # seen would exceed 1: fit a line through the origin
-        w = np.array(weight) * np.array(lag)
-        slope, level = float(w @ np.log(share) / (w @ np.array(lag))), 0.0
+        slope, level = float(weight * lag @ np.log(share) / (weight * lag @ lag)), 0.0
     return round(-1.0 / min(float(slope), -1.0 / LONGEST), 3), round(float(np.exp(max(level, np.log(0.2)))), 4)
 
 
@@ -141,10 +136,6 @@ def _robust_spread(values: Sequence[float], tracks: Sequence[AlarmTrack]) -> tup
     w, v = np.sqrt([len(t.rows) for t in tracks])[order], np.array(values)[order]
     low, middle, high = np.interp((0.16, 0.5, 0.84), (np.cumsum(w) - w / 2) / w.sum(), v)
     return round(float(middle), 4), round(float(high - low) / 2, 4)
-
-
-def _aspect(tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
-    return _robust_spread([float(np.log(t.box[:, 2] / t.box[:, 3]).mean()) for t in tracks], tracks)
 
 
 def _jitter(tracks: Sequence[AlarmTrack]) -> float:
@@ -180,21 +171,17 @@ def _fit_at_people(tracks: Sequence[AlarmTrack]) -> dict[str, tuple[float, float
 
 def _fit_elsewhere(tracks: Sequence[AlarmTrack]) -> dict[str, object]:
     """Returns height, drift and at of `FalseAlarms`, of alarms that belong to no person."""
-    height, place, velocity = [], [], []
+    height, place, velocity = [], list[Array](), []
     for t in tracks:
         ground = VisibleGround(t.recording.truth, t.recording.camera, np.array(t.recording.size, dtype=float))
-        middle, foot = t.box[:, 0] + t.box[:, 2] / 2, t.box[:, 1] + t.box[:, 3]
-        usual = [max(ground.usual_height(float(u), float(v)), 1.0) for u, v in zip(middle, foot, strict=True)]
+        foot = t.box[:, :2] + t.box[:, 2:] * [0.5, 1.0]
+        usual = [max(ground.usual_height(u, v), 1.0) for u, v in foot.tolist()]
         height.append(float(np.log(t.box[:, 3] / usual).mean()))
-        span = np.maximum(ground.high - ground.low, 1.0)
-        place += [
-            tuple(np.clip((np.array([u, v]) - ground.low) / span, 0, 1)) for u, v in zip(middle, foot, strict=True)
-        ]
-        seconds = (t.frame[-1] - t.frame[0]) / t.recording.truth.fps
+        place += [*np.clip((foot - ground.low) / np.maximum(ground.high - ground.low, 1.0), 0, 1)]
         if len(t.rows) >= 4:
-            way = np.array([middle[-1] - middle[0], foot[-1] - foot[0]])
-            velocity.append(way / (t.box[:, 3].mean() * seconds))
+            seconds = (t.frame[-1] - t.frame[0]) / t.recording.truth.fps
+            velocity.append((foot[-1] - foot[0]) / (t.box[:, 3].mean() * seconds))
     drift = float(np.sqrt(np.mean(np.square(velocity)))) if velocity else 0.0
     chosen = np.unique(np.round(np.linspace(0, len(place) - 1, min(PLACES, len(place)))).astype(int))
-    at = tuple((round(float(place[k][0]), 3), round(float(place[k][1]), 3)) for k in chosen)
+    at = tuple(tuple(np.round(place[k], 3).tolist()) for k in chosen)
     return {"height": _robust_spread(height, tracks), "drift": round(drift, 4), "at": at}

@@ -15,7 +15,7 @@ import numpy as np
 from scenarios.loading.resolve import Entry, resolve
 from sim.rng import rng
 from sim.sequence import simulate
-from sim.types import Array, Bools, Ints, Truth
+from sim.types import Bools, Ints, Truth
 from tracking.grouping.pair_evidence import evidence, frames_per_step, step_positions
 from tracking.tuning.grouping_episodes import SURVEYED, LabelErrors, with_label_errors
 
@@ -37,17 +37,6 @@ class PairScene:
     weight: int = 1  # number of times that the scene is named
 
 
-@dataclass(frozen=True)
-class Walkers:
-    """People of a scene whose positions a grouping sees, R rows."""
-
-    frame: Ints  # (R,): from 0
-    column: Ints
-    pos: Array  # (R, 2), m
-    labels: Ints  # (T, P): true group by frame and column, -1 alone or absent
-    fps: float  # frames per second
-
-
 def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScene]:
     """Yields two scenes for each entry of the named scenarios, suites or *.toml files and each seed.
 
@@ -58,7 +47,7 @@ def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScen
             truth = simulated(entry, seed)
             begin = BEGINS[seed % len(BEGINS)] if truth.length / truth.fps >= LEAST + max(BEGINS) else 0.0
             for rough in (False, True):
-                found = pair_scene(walkers(truth, seed, entry.repeat, rough, begin))
+                found = pair_scene(truth, seed, entry.repeat, rough, begin)
                 if found is not None:
                     yield replace(found, weight=weight)
 
@@ -70,37 +59,33 @@ def simulated(entry: Entry, seed: int) -> Truth:
     return truth
 
 
-def walkers(truth: Truth, seed: int, repeat: int, rough: bool, begin: float) -> Walkers:
-    """Returns the people of a truth from `begin` s on; rough: with a detector's errors, else those of labels."""
+def pair_scene(truth: Truth, seed: int, repeat: int, rough: bool, begin: float) -> PairScene | None:
+    """Returns the rows of pairs of people from `begin` s on, with the truth of each; None without pairs.
+
+    rough: with a detector's errors, else those of labels.
+    """
     erring = with_label_errors(truth, DETECTED if rough else SURVEYED, seed, repeat)
     assert erring.pos is not None
     every = 1 if rough else max(1, round(truth.fps / SLOW))
-    since = round(begin * truth.fps)
+    since, fps = round(begin * truth.fps), truth.fps / every
     ids, column = np.unique(truth.id, return_inverse=True)
     frame = truth.frame - 1 - since
     kept = (frame >= 0) & (frame % every == 0)
     if truth.truncation is not None:
         kept &= truth.truncation <= 0.5
+    # true group by frame and column, -1 alone or absent
     labels = np.full(((truth.length - since - 1) // every + 1, len(ids)), -1, np.int64)
     labels[frame[kept] // every, column[kept]] = truth.group[kept]
     if rough:
         kept &= rng(seed, "label", 0, repeat=repeat).random(len(kept)) >= MISSED
-    return Walkers(frame[kept] // every, column[kept], erring.pos[kept], labels, truth.fps / every)
-
-
-def pair_scene(people: Walkers) -> PairScene | None:
-    """Returns the rows of pairs of people, with the truth of each; None without pairs."""
-    size = frames_per_step(people.fps)
-    length, count = people.labels.shape
-    places, times = step_positions(people.frame, people.column, people.pos, length, count, people.fps)
-    parts = [
-        (r.pair, r.step, r.a, r.b, r.values.astype(np.float32)) for r in evidence(places, times, size / people.fps)
-    ]
+    size = frames_per_step(fps)
+    places, times = step_positions(frame[kept] // every, column[kept], erring.pos[kept], *labels.shape, fps)
+    parts = [(r.pair, r.step, r.a, r.b, r.values.astype(np.float32)) for r in evidence(places, times, size / fps)]
     if not parts:
         return None
     pair, step, a, b, values = (np.concatenate(x) for x in zip(*parts, strict=True))
-    first, second = (people.labels[step * size, p] for p in (a, b))
-    kept = np.flatnonzero(rng(len(pair), "label", 1).permutation(int(pair.max()) + 1)[pair] < MOST_PAIRS)
-    order = kept[np.lexsort((step[kept], pair[kept]))]
+    first, second = (labels[step * size, p] for p in (a, b))
+    drawn = np.flatnonzero(rng(len(pair), "label", 1).permutation(int(pair.max()) + 1)[pair] < MOST_PAIRS)
+    order = drawn[np.lexsort((step[drawn], pair[drawn]))]
     together = (first >= 0) & (first == second)
     return PairScene(pair[order], values[order], together[order])

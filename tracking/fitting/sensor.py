@@ -72,10 +72,9 @@ def fit_misses(recordings: Sequence[MatchedRecording]) -> tuple[DetectionProbabi
             chosen, likelihood, gain = other, better, 0.0
     if (~hit).sum() < FEW_MISSES:
         return chosen, ()
-    correlated = [
-        miss_correlations(m.truth, ~m.hit, 1.0 - chosen.at(m.truth.visibility, _heights(m))) for m in recordings
-    ]
-    return chosen, fit_memory(correlated)
+    p_miss = [1.0 - chosen.at(m.truth.visibility, _heights(m)) for m in recordings]
+    pairs = zip(recordings, p_miss, strict=True)
+    return chosen, fit_memory([miss_correlations(m.truth, ~m.hit, p) for m, p in pairs])
 
 
 def _heights(m: MatchedRecording) -> Array:
@@ -118,9 +117,9 @@ def _rows_per_independent_row(recordings: Sequence[MatchedRecording], probabilit
     for m in recordings:
         p = probability.at(m.truth.visibility, _heights(m))
         z = (m.hit - p) / np.sqrt(np.maximum(p * (1.0 - p), 1e-3))
-        over_time = correlations(m.truth, z[:, None], np.ones(len(z), bool))
-        if len(over_time.lag):
-            area = float(np.trapezoid(np.clip(over_time.rho, 0.0, 1.0), over_time.lag))
+        lag, rho, _ = correlations(m.truth, z[:, None], np.ones(len(z), bool)).T
+        if len(lag):
+            area = float(np.trapezoid(np.clip(rho, 0.0, 1.0), lag))
             found.append(1.0 + 2.0 * m.truth.fps * area)
     return max(found, default=1.0)
 
@@ -133,41 +132,49 @@ POINTS: tuple[Literal["own", "seen", "foot"], ...] = ("own", "seen", "foot")  # 
 FEW = 20  # with fewer half hidden rows, boxes are taken as amodal and errors as independent of visibility
 
 
-@dataclass(frozen=True)
-class ErrorSpread:
-    """A model of the errors of a box: mean + sd (1 + occluded (1 - visibility)) n, n random of variance 1."""
-
-    # (4,): mean error of middle, foot, top (box heights) and logarithm of the width, the same at any visibility
-    mean: Array
-    sd: Array  # (4,): standard deviation of the same errors for a person in full view (visibility 1)
-    occluded: float  # growth of the standard deviation with the hidden share 1 - visibility, 0 or more
-    likelihood: float  # log likelihood of the data the model was fitted to, up to a constant; 0 without data
-
-
 def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visible", "amodal"], BoxNoise]:
     """Returns whether detected boxes are of the visible part or of the whole person, and their errors.
 
     If no detected row is a quarter visible, means, standard deviations and `occluded` are 0, and `memory` is None.
     """
     kind: Literal["visible", "amodal"] = "visible" if _of_visible_part(recordings) else "amodal"
-    best = _fit_spread(recordings, kind)
+    errors = [_errors(m, kind) for m in recordings]
+    hidden = [1.0 - m.truth.visibility[m.hit] for m in recordings]
+    mean, sd, occluded = _fit_spread(np.concatenate(errors), np.concatenate(hidden))
     correlated, standardised = [], []
-    for m in recordings:
+    for m, e, share in zip(recordings, errors, hidden, strict=True):
         z = np.full((len(m.truth.id), 4), np.nan)
-        growth = 1.0 + best.occluded * (1.0 - m.truth.visibility[m.hit])
-        z[m.hit] = (_errors(m, kind) - best.mean) / np.maximum(best.sd * growth[:, None], 1e-9)
+        z[m.hit] = (e - mean) / np.maximum(sd * (1.0 + occluded * share)[:, None], 1e-9)
         correlated.append(correlations(m.truth, z, m.hit))
         standardised.append(z[m.hit])
-    pairs = [(round(float(a), 4), round(float(b), 4)) for a, b in zip(best.mean, best.sd, strict=True)]
-    across, foot, top, width = pairs
-    grown = round(best.occluded, 3)
-    parts = fit_memory(correlated) if best.sd.max() > 1e-6 else ()
+    across, foot, top, width = [(round(float(a), 4), round(float(b), 4)) for a, b in zip(mean, sd, strict=True)]
     heights = np.concatenate([_true(m, kind)[:, 3] for m in recordings])
-    least = float(best.sd[:3].min() * np.median(heights)) if len(heights) else 0.0
+    least = float(sd[:3].min() * np.median(heights)) if len(heights) else 0.0
     return kind, BoxNoise(
-        across=across, foot=foot, top=top, width=width, occluded=grown, tails=_tails(np.concatenate(standardised)),
-        floor_px=round(min(BoxNoise().floor_px, least), 4), memory=parts or None,
+        across=across, foot=foot, top=top, width=width, occluded=round(occluded, 3),
+        tails=_tails(np.concatenate(standardised)), floor_px=round(min(BoxNoise().floor_px, least), 4),
+        memory=(fit_memory(correlated) if sd.max() > 1e-6 else ()) or None,
     )  # fmt: skip
+
+
+def _fit_spread(e: Array, hidden: Array) -> tuple[Array, Array, float]:
+    """Returns mean (4,), standard deviation in full view (4,), and `occluded` of errors e (H, 4); hidden (H,):
+    1 - visibility. Of each `occluded` tried, the one of the greatest likelihood."""
+    clear = hidden <= 1.0 - BARELY
+    e, hidden = e[clear], hidden[clear]
+    if not len(e):
+        return np.zeros(4), np.zeros(4), 0.0
+    found = []
+    for k in GROWTH if (hidden > 1.0 - HALF[1]).sum() >= FEW else GROWTH[:1]:
+        growth = 1.0 + float(k) * hidden
+        weight = 1.0 / growth**2
+        mean = weight @ e / weight.sum()
+        sd = np.sqrt(np.mean((e - mean) ** 2 * weight[:, None], axis=0))
+        near = np.mean(np.abs(e - mean) / growth[:, None], axis=0)  # scale of the Laplace distribution
+        # of a Laplace distribution, which large errors influence little
+        likelihood = -len(e) * float(np.log(np.maximum(near, 1e-6)).sum()) - 4 * float(np.log(growth).sum())
+        found.append((likelihood, mean, sd, float(k)))
+    return max(found, key=lambda fit: fit[0])[1:]
 
 
 def _tails(z: Array) -> float:
@@ -210,29 +217,6 @@ def _true(m: MatchedRecording, kind: str) -> Array:
     if kind == "visible" and m.truth.visible_box is not None:
         true = np.where(np.isfinite(m.truth.visible_box), m.truth.visible_box, true)
     return true[m.hit]
-
-
-def _fit_spread(recordings: Sequence[MatchedRecording], kind: str) -> ErrorSpread:
-    e = np.concatenate([_errors(m, kind) for m in recordings])
-    hidden = np.concatenate([1.0 - m.truth.visibility[m.hit] for m in recordings])
-    clear = hidden <= 1.0 - BARELY
-    e, hidden = e[clear], hidden[clear]
-    if not len(e):
-        return ErrorSpread(np.zeros(4), np.zeros(4), 0.0, 0.0)
-    tried = GROWTH if (hidden > 1.0 - HALF[1]).sum() >= FEW else GROWTH[:1]
-    return max((_spread_of_growth(e, hidden, float(k)) for k in tried), key=lambda s: s.likelihood)
-
-
-def _spread_of_growth(e: Array, hidden: Array, k: float) -> ErrorSpread:
-    """Returns the spread of errors e (H, 4) if `occluded` is k; hidden (H,): 1 - visibility."""
-    growth = 1.0 + k * hidden
-    weight = 1.0 / growth**2
-    mean = weight @ e / weight.sum()
-    sd = np.sqrt(np.mean((e - mean) ** 2 * weight[:, None], axis=0))
-    near = np.mean(np.abs(e - mean) / growth[:, None], axis=0)  # scale of the Laplace distribution
-    # of a Laplace distribution, which large errors influence little
-    likelihood = -len(e) * float(np.log(np.maximum(near, 1e-6)).sum()) - 4 * float(np.log(growth).sum())
-    return ErrorSpread(mean, sd, k, likelihood)
 
 
 def fit_points(
@@ -285,30 +269,22 @@ def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
     kind, noise = fit_box_noise(recordings)
     rate, alarms = fit_false_alarms(recordings)
     points, noise_m = fit_points(recordings, kind)
-    true = np.concatenate([m.score[m.match[m.hit]] for m in recordings])
-    false = np.concatenate([m.score[m.false] for m in recordings])
     return Sensor(
-        detect_prob=_digits(detection.best),
-        clutter_rate=_digits(rate),
-        noise_m=Sensor().noise_m if noise_m is None else _digits(noise_m),
-        box=kind,
-        min_visibility=0.0,
-        small_px=detection.small,
-        by_visibility=tuple(_digits(c) for c in detection.curve),
-        miss_memory=miss_memory or None,
-        box_noise=noise,
-        points=points,
-        false_alarms=alarms,
-        true_scores=_quantiles(true),
-        false_scores=_quantiles(false),
-    )
+        detect_prob=_digits(detection.best), by_visibility=tuple(_digits(c) for c in detection.curve),
+        small_px=detection.small, min_visibility=0.0, miss_memory=miss_memory or None, box=kind, box_noise=noise,
+        points=points, noise_m=Sensor().noise_m if noise_m is None else _digits(noise_m),
+        clutter_rate=_digits(rate), false_alarms=alarms,
+        true_scores=_quantiles([m.score[m.match[m.hit]] for m in recordings]),
+        false_scores=_quantiles([m.score[m.false] for m in recordings]),
+    )  # fmt: skip
 
 
 def _digits(x: float) -> float:
     return float(f"{x:.4g}")
 
 
-def _quantiles(score: Array) -> tuple[float, ...] | None:
+def _quantiles(scores: list[Array]) -> tuple[float, ...] | None:
+    score = np.concatenate(scores)
     if len(score) < FEW_SCORES:
         return None
     return tuple(round(float(q), 4) for q in np.quantile(score, np.linspace(0.0, 1.0, SCORES)))

@@ -42,10 +42,15 @@ def can_stand(tracks: Sequence[Tracks], camera: Camera | None, pixels: bool) -> 
 
 
 def ground_below(tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, pixels: bool) -> Ground:
-    """Returns the ground to which tracks in the image can be moved, by the camera, else by the first boxes."""
+    """Returns the ground to which tracks in the image can be moved, by the camera, else by the first boxes.
+
+    Tracks of a tracker that names groups are moved by a camera only.
+    """
     if plane_of_run(tracks) != "image" or pixels or not boxed(tracks):
         return Ground()
-    return ground_of_boxes(tracks, px_per_m) if camera is None else Ground(camera)
+    if camera is not None:
+        return Ground(camera)
+    return Ground() if names_groups(tracks) else ground_of_boxes(tracks, px_per_m)
 
 
 def as_measured(pos: Array, camera: Camera) -> Array:
@@ -73,21 +78,22 @@ def completed(
     camera: Camera | None,
     scene: Scene | None,
     pixels: bool,
-) -> tuple[Tracks, ...]:
-    """Returns the tracks with groups and events, as `with_groups`, or from where boxes stand on the ground.
+) -> tuple[tuple[Tracks, ...], Ground]:
+    """Returns the tracks with groups and events, as `with_groups`, or from where boxes stand on the ground; and the
+    ground that was used.
 
     Without a camera the ground is that of the boxes, if they tell it.
     """
     if all(t.derived for t in tracks):
-        return tuple(tracks)
-    ground = ground_below(tracks, camera, px_per_m, pixels).camera
-    if ground is None:
-        return with_groups(tracks, fps, px_per_m, rule)
+        return tuple(tracks), Ground()
+    ground = ground_below(tracks, camera, px_per_m, pixels)
+    if ground.camera is None:
+        return with_groups(tracks, fps, px_per_m, rule), ground
     stairs = None if camera is None else scene  # the boxes tell no place in the scene
-    feet = [t.replace(pos=as_measured(t.pos, ground)) for t in standing(tracks, ground, stairs)]
-    grouped = with_groups(feet, fps, 1.0, rule)
-    named = names_groups(tracks)
-    return tuple(_grouped_as(t, g, named) for t, g in zip(with_velocities(tracks, fps), grouped, strict=True))
+    feet = [t.replace(pos=as_measured(t.pos, ground.camera)) for t in standing(tracks, ground.camera, stairs)]
+    grouped, named = with_groups(feet, fps, 1.0, rule), names_groups(tracks)
+    pairs = zip(with_velocities(tracks, fps), grouped, strict=True)
+    return tuple(_grouped_as(t, g, named) for t, g in pairs), ground
 
 
 def _grouped_as(t: Tracks, grouped: Tracks, named: bool) -> Tracks:

@@ -43,6 +43,11 @@ class Ground:
     camera: Camera | None = None
     frames: int = 0
 
+    @property
+    def source(self) -> str | None:
+        """What the ground is known from: "boxes", "camera", or None if it is unknown."""
+        return None if self.camera is None else "boxes" if self.frames else "camera"
+
 
 def ground_of_boxes(tracks: Sequence[Tracks], px_per_m: float) -> Ground:
     """Returns the ground by the first 300 measured boxes. px_per_m: the scale of the image, px per m, at the median of

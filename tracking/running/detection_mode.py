@@ -34,17 +34,17 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
     able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
     if requested in able or (requested is None and able):
         return requested or able[0]  # type: ignore[return-value]
-    other = "take another tracker or source"
-    if sequence.has_images and {"boxes", "points"} & set(needs):
-        other = "give a detector's boxes with --boxes FILE"
-    remedy = f"try --detections {able[0]}" if able else other
-    got = f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {_contents(sequence)}"
-    expected = "what detections of some kind need"
-    if requested:
-        missing = _missing(requested, needs)
-        expected = f"a sequence with {missing}" if missing else f"what --detections {requested} needs"
-        got += f", without {missing}" if missing else ""
-    raise InputError(place=f"--detections {requested or ''}".rstrip(), got=got, expected=expected, remedy=remedy)
+    there = {
+        "images": sequence.has_images, "a right image": sequence.has_right, "detections": sequence.has_detections,
+        "truth": sequence.load_truth is not None,
+    }  # fmt: skip
+    contents = ", ".join(name for name, known in there.items() if known) or "nothing"
+    raise InputError(
+        place=f"--detections {requested or ''}".rstrip(),
+        got=f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {contents}",
+        expected="what both have",
+        remedy=f"try --detections {able[0]}" if able else "take another, or give a detector's boxes with --boxes FILE",
+    )
 
 
 def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
@@ -52,23 +52,6 @@ def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
         return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
     takes = {"boxes", "points"} & set(needs)
     return bool(takes) and (sequence.has_detections if mode == "file" else sequence.load_truth is not None)
-
-
-def _missing(mode: DetectionMode, needs: tuple[str, ...]) -> str:
-    if mode == "image":
-        return "pictures" if "pixels" in needs else "right pictures" if "stereo" in needs else ""
-    takes = not {"boxes", "points"}.isdisjoint(needs)
-    return {"file": "stored detections", "truth": "labels"}[mode] if takes else ""
-
-
-def _contents(sequence: Sequence) -> str:
-    parts = {
-        "images": sequence.has_images,
-        "a right image": sequence.has_right,
-        "detections": sequence.has_detections,
-        "truth": sequence.load_truth is not None,
-    }
-    return ", ".join(name for name, there in parts.items() if there) or "nothing"
 
 
 def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, frames: Iterable[Frame]) -> InputKind:
@@ -99,15 +82,13 @@ def frames_with_detections(
 
 def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
     """Raises InputError if a frame's detections cannot be given to a tracker with these needs."""
-    rows = len(detections.pos)
-    arrays = [a for a in (detections.pos, detections.vel, detections.box, detections.score) if a is not None]
-    for a in arrays:
-        if not finite(a):
+    place = f"frame {detections.index}"
+    for a in (detections.pos, detections.vel, detections.box, detections.score):
+        if a is not None and not finite(a):
             row = int(np.argwhere(~np.isfinite(a.reshape(len(a), -1)).all(1))[0, 0])
-            place = f"frame {detections.index}: detection {row + 1}"
-            raise InputError(place=place, got="NaN or infinity", expected="finite numbers", remedy="correct this row")
-    if rows and detections.box is None and "points" not in needs:
-        place = f"frame {detections.index}"
+            got, place = "NaN or infinity", f"{place}: detection {row + 1}"
+            raise InputError(place=place, got=got, expected="finite numbers", remedy="correct this row")
+    if len(detections.pos) and detections.box is None and "points" not in needs:
         raise InputError(place=place, got="points", expected="boxes", remedy="take a tracker that takes points")
 
 

@@ -25,7 +25,6 @@ class ImageScale:
 
     px_per_m: float  # nan if unknown
     frames: int = 0  # the scale is that of the boxes of this many first frames; 0 if it has another source
-    ground_frames: int = 0  # the same of the ground below the boxes (tracking.grouping.ground_of_boxes)
 
 
 def required(px_per_m: float) -> float:

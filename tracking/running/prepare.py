@@ -10,9 +10,8 @@ from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -132,20 +131,16 @@ def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) 
             raise InputError(place="params", got=got, expected="a class or a name", remedy="configure the instance")
         return type(tracker).__name__, tracker, getattr(tracker, "config", None)
     name = tracker if isinstance(tracker, str) else tracker.__name__
-    found = tracker_registry.find(tracker) if isinstance(tracker, str) else tracker_registry.checked(tracker, name)
+    found: Any = tracker_registry.find(tracker) if isinstance(tracker, str) else tracker_registry.checked(tracker, name)
     kind: type[Config] | None = getattr(found, "config_class", None)
-    if kind is None:
-        if params is not None:
-            remedy = "leave the parameters out, or give the class a config_class (docs/guides/your-own-tracker.md)"
-            raise InputError(place="params", got=name, expected="a tracker with parameters", remedy=remedy)
-        return name, _instance(name, found if limited is None else partial(limited.make, None)), None
-    config = config_of(kind, params)
-    return name, _instance(name, found if limited is None else limited.make, config), config
-
-
-def _instance(name: str, tracker_class: Any, *arguments: Any) -> Tracker:
+    if kind is None and params is not None:
+        remedy = "leave the parameters out, or give the class a config_class (docs/guides/your-own-tracker.md)"
+        raise InputError(place="params", got=name, expected="a tracker with parameters", remedy=remedy)
+    config = None if kind is None else config_of(kind, params)
     with user_code(lambda error: tracker_failed(name, "__init__()", "before the first frame", error)):
-        return cast(Tracker, tracker_class(*arguments))
+        if limited is not None:
+            return name, limited.make(config), config
+        return name, found() if config is None else found(config), config
 
 
 def config_of(kind: type[Config], params: Params) -> Config:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -31,6 +31,7 @@ from tracking.running.time_limit import TimeLimited
 if TYPE_CHECKING:
     from sim.io.export.tidy_tables import TidyTables
     from tracking.grouping.belief import PairProbabilities
+    from tracking.grouping.ground_of_boxes import Ground
 
 
 PACKAGES = ("flockscope", "numpy", "scipy")  # Packages whose versions run.json holds.
@@ -44,6 +45,7 @@ def run_info(
     seed: int,
     sensor: Mapping[str, Any],
     scale: ImageScale,
+    ground: Ground,
     speeds: tuple[float, float],
 ) -> dict[str, Any]:
     """Returns what run.json tells of a run, as a dictionary. Two equal runs differ only in their speeds.
@@ -62,32 +64,20 @@ def run_info(
         "input": input_kind(prepared.tracker.needs, prepared.mode, prepared.sequence, prepared.frames_given or ()),
         "sensor": dict(sensor),
         "background": None if sample is None else prepared.sequence.source.get("background", f"{len(sample)} frames"),
-        **_facts(prepared.sequence, tracks, scale, begins),
+        **_facts(prepared.sequence, tracks, scale, ground, begins),
         "frames_per_second": speeds[0],
         "whole_frames_per_second": speeds[1],
         **({} if diagnostics is None else {"diagnostics": diagnostics}),
     }
 
 
-def known_people_info(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale) -> dict[str, Any]:
-    """Returns what run.json tells of the groups of a sequence's labelled people."""
-    given: dict[str, Any] = {
-        "tracker": "group",
-        "config": {},
-        "seed": None,
-        "detections": "truth",
-        "input": "boxes" if len(tracks) and tracks[0].plane == "image" else "points",
-        "sensor": {},
-        "background": None,
-    }
-    return {**given, **_facts(sequence, tracks, scale, 1)}
-
-
-def _facts(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, begins: int | None) -> dict[str, Any]:
+def _facts(
+    sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, ground: Ground, begins: int | None
+) -> dict[str, Any]:
     """Returns what run.json tells of tracks, whoever made them: of the sequence, plane, boxes, scale and causality."""
     from sim.io.store.track_files import box_source
 
-    begins = None if begins is None else max(begins, scale.frames, scale.ground_frames)
+    begins = None if begins is None else max(begins, scale.frames, ground.frames)
     return {
         "sequence": sequence.name,
         "plane": tracks[0].plane if len(tracks) else None,
@@ -95,6 +85,7 @@ def _facts(sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, be
         "fps": sequence.fps,
         "px_per_m": None if np.isnan(scale.px_per_m) else scale.px_per_m,
         "px_per_m_frames": scale.frames,
+        "ground": ground.source,
         "causal": begins is not None,
         "causal_from": begins,
         "frames": len(tracks),
@@ -116,9 +107,10 @@ def causal_from(sequence: Sequence) -> int | None:
 def input_summary(info: Mapping[str, Any]) -> str:
     """Returns one line on what a tracker was given, from the content of its run.json."""
     mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
+    settings = [f"{key} = {value}" for key, value in (sensor or {}).items()]
+    hidden = len(settings) - SENSOR_SETTINGS_SHOWN
     more = [f"background: {background}"] if background else []
-    more += [f"{key} = {value}" for key, value in list((sensor or {}).items())[:SENSOR_SETTINGS_SHOWN]]
-    more += [f"{len(sensor) - SENSOR_SETTINGS_SHOWN} more"] if sensor and len(sensor) > SENSOR_SETTINGS_SHOWN else []
+    more += [*settings[:SENSOR_SETTINGS_SHOWN], *([f"{hidden} more"] if hidden > 0 else [])]
     return f"{mode} ({', '.join(more)})" if more else str(mode or "")
 
 
@@ -132,7 +124,7 @@ def input_name(info: Mapping[str, Any]) -> str:
 
 
 # Keys of run.json that follow from tracks and sequence, whoever made the tracks.
-OF_TRACKS = ("sequence", "plane", "fps", "px_per_m", "px_per_m_frames", "frames")
+OF_TRACKS = ("sequence", "plane", "fps", "px_per_m", "px_per_m_frames", "ground", "causal", "causal_from", "frames")
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +209,7 @@ def track(
             fulfilled (mode "truth").
     """
     from sim.compiler import clock
-    from tracking.grouping.foot_points import completed, ground_below
+    from tracking.grouping.foot_points import completed
     from tracking.grouping.grouped_tracks import late_groups, names_groups
     from tracking.grouping.plausibility import velocity_warning
 
@@ -235,26 +227,21 @@ def track(
     whole = clock() - begun
     scale, pixels = prepared.scale(reported), prepared.mode == "image"
     camera, scene = prepared.context.camera, prepared.context.scene
-    ground = ground_below(reported, camera, scale.px_per_m, pixels)
-    tracks = completed(reported, sequence.fps, scale.px_per_m, rule, camera=camera, scene=scene, pixels=pixels)
-    named = names_groups(reported)
+    tracks, ground = completed(reported, sequence.fps, scale.px_per_m, rule, camera=camera, scene=scene, pixels=pixels)
+    named, late, odd = names_groups(reported), late_groups(reported), list[str | None]()
     if named and chosen is not None:
-        warnings.warn(f"{prepared.name} names groups itself: --grouping has no effect", UserWarning, stacklevel=2)
-    elif not named:
-        late = late_groups(reported)
-        if late is not None:
-            warnings.warn(
-                f"{prepared.name}: names groups from frame {late} on, but not in its first answer with people: its "
-                "groups are replaced by derived ones. Report groups = Groups.none() as long as there is no group",
-                UserWarning,
-                stacklevel=2,
-            )
-        fault = velocity_warning(prepared.name, reported, sequence.fps, scale.px_per_m, rule)
-        if fault is not None and ground.camera is None:  # on the ground no velocity is reported
-            warnings.warn(fault, UserWarning, stacklevel=2)
+        odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
+    if late is not None:
+        odd.append(
+            f"{prepared.name}: names groups from frame {late} on, but not in its first answer with people: its "
+            "groups are replaced by derived ones. Report groups = Groups.none() as long as there is no group"
+        )
+    if not named and ground.camera is None:  # on the ground no velocity is reported
+        odd.append(velocity_warning(prepared.name, reported, sequence.fps, scale.px_per_m, rule))
+    for text in filter(None, odd):
+        warnings.warn(text, UserWarning, stacklevel=2)
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
-    scale = replace(scale, ground_frames=ground.frames)
-    info = run_info(prepared, tracks, seed, sensor or {}, scale, speeds)
+    info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
     return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
 
 
@@ -273,7 +260,7 @@ def group(
             is unknown or not above 0, or labels or the file of the grouping cannot be read.
         WorkError: An order of a simulated script was not fulfilled.
     """
-    from tracking.grouping.foot_points import completed, ground_below
+    from tracking.grouping.foot_points import completed
     from tracking.grouping.grouped_tracks import without_groups
     from tracking.grouping.known_people import known_people
     from tracking.grouping.plausibility import implausible, velocity_warning
@@ -290,15 +277,20 @@ def group(
         got, remedy = "people in the image, without its scale", "give --px-per-m, pixels per metre"
         raise InputError(file=file, got=got, expected="metres, or a scale", remedy=remedy)
     camera, pixels = sequence.camera, run is not None and run.info.get("detections") == "image"
-    tracks = completed(people, sequence.fps, scale.px_per_m, rule, camera=camera, scene=sequence.scene, pixels=pixels)
-    ground = ground_below(people, camera, scale.px_per_m, pixels)
-    stands = ground.camera is not None  # then no velocity is used
-    fault = None if stands else velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule)
-    odd = implausible(sequence.name, people, sequence.fps, scale.px_per_m)
-    for text in (*odd, *([] if fault is None else [fault])):
+    given = (people, sequence.fps, scale.px_per_m, rule)
+    tracks, ground = completed(*given, camera=camera, scene=sequence.scene, pixels=pixels)
+    odd: list[str | None] = [*implausible(sequence.name, people, sequence.fps, scale.px_per_m)]
+    if ground.camera is None:  # on the ground no velocity is used
+        odd.append(velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule))
+    for text in filter(None, odd):
         warnings.warn(text, UserWarning, stacklevel=2)
-    info = known_people_info(sequence, tracks, replace(scale, ground_frames=ground.frames))
-    if run is not None:
+    begins = 1 if run is None else run.info.get("causal_from", 1)
+    info = _facts(sequence, tracks, scale, ground, begins)
+    if run is None:
+        kind = "boxes" if len(tracks) and tracks[0].plane == "image" else "points"
+        info = {"tracker": "group", "config": {}, "seed": None, "detections": "truth", "input": kind, **info}
+        info |= {"sensor": {}, "background": None}
+    else:
         info = {**run.info, **{key: info[key] for key in OF_TRACKS}}
     return TrackingRun(tracks, {**info, "grouping": rule.as_dict()})
 
@@ -312,4 +304,4 @@ def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...
     truth = sequence.truth if known.frames or not np.isfinite(known.px_per_m) else None
     px_per_m = known.px_per_m if truth is None else truth.px_per_m
     pixels = getattr(tracks, "info", {}).get("detections") == "image"
-    return completed(tracks, sequence.fps, px_per_m, camera=sequence.camera, scene=sequence.scene, pixels=pixels)
+    return completed(tracks, sequence.fps, px_per_m, camera=sequence.camera, scene=sequence.scene, pixels=pixels)[0]

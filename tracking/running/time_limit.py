@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import signal
 from dataclasses import fields
-from typing import Any, Self
+from typing import Any, Self, cast
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
@@ -70,12 +70,15 @@ class TimeLimited:
     def make(self, config: Config | None) -> RemoteTracker:
         """Returns a tracker made in the process, with this config; None for a tracker without parameters."""
         made = RemoteTracker(self, next(self._numbers), config)
-        self.call("create", made.made_from, None)
+        made.create()
         return made
 
-    def call(self, method: str, *arguments: Any) -> Any:
-        """Returns what the call ("create", "reset" or "step") returns in the process; "create" has no time limit."""
-        pipe = self._process.send(_call, (method, arguments, self.seconds + GRACE))
+    def call(self, number: int, method: str, *arguments: Any) -> Any:
+        """Returns what a method of a tracker ("create", "reset" or "step") returns in the process.
+
+        "create" has no time limit.
+        """
+        pipe = self._process.send(_call, (number, method, arguments, self.seconds + GRACE))
         if method != "create" and not pipe.poll(self.seconds):
             self.close()
             raise TimeoutError(f"no answer within {self.seconds:g} s (--step-timeout)")
@@ -93,56 +96,46 @@ class RemoteTracker:
     def __init__(self, host: TimeLimited, number: int, config: Config | None) -> None:
         self.needs, self.config = host.needs, config
         self.px_per_m = float("nan")
-        self.made_from = (number, host.tracker, None if config is None else config.as_dict())
-        self._host = host
+        self._host, self._number = host, number
+
+    def create(self) -> None:
+        """Makes the tracker in the process."""
+        values = None if self.config is None else self.config.as_dict()
+        self._host.call(self._number, "create", self._host.tracker, values)
 
     def reset(self, context: Context, seed: int) -> None:
-        """Resets the tracker; one whose process has ended is made again."""
-        self.px_per_m = self._host.call("reset", self.made_from, (context, seed))
+        """Resets the tracker, which is made again, as its process may have ended."""
+        self.create()
+        _, self.px_per_m = self._host.call(self._number, "reset", context, seed)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the tracker's tracks of the frame, which holds the detections."""
-        tracks, self.px_per_m = self._host.call("step", self.made_from, frame)
+        tracks, self.px_per_m = self._host.call(self._number, "step", frame, detections)
         return tracks  # type: ignore[no-any-return]
 
 
 _made: dict[int, Tracker] = {}  # In the process: the tracker by its number; at most one.
 
 
-def _call(request: tuple[str, tuple[Any, ...], float]) -> Any:
-    method, (made_from, given), limit = request
+def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
+    number, method, given, limit = request
     if method == "create":
-        return _create(*made_from)
+        spec, values = given
+        found: Any = tracker_registry.find(spec)
+        _made.clear()
+        _made[number] = found() if values is None else found(found.config_class.from_dict(values))
+        return None
+    if number not in _made:
+        raise RuntimeError("the process of this tracker was started again since its reset")
     signal.setitimer(signal.ITIMER_REAL, limit)  # without a handler this ends the process, also in compiled code
     try:
-        return _reset(made_from, *given) if method == "reset" else _step(made_from[0], given)
+        return getattr(_made[number], method)(*map(_frozen, given)), learned_by(_made[number])
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
-def _create(number: int, spec: str, values: dict[str, Any] | None) -> None:
-    found: Any = tracker_registry.find(spec)
-    made = found() if values is None else found(found.config_class.from_dict(values))
-    _made.clear()
-    _made[number] = made
-
-
-def _reset(made_from: tuple[int, str, dict[str, Any] | None], context: Context, seed: int) -> float:
-    if made_from[0] not in _made:
-        _create(*made_from)
-    tracker = _made[made_from[0]]
-    tracker.reset(_frozen(context), seed)
-    return learned_by(tracker)
-
-
-def _step(number: int, frame: Frame) -> tuple[Tracks, float]:
-    if number not in _made:
-        raise RuntimeError("the process of this tracker was started again since its reset")
-    frame, tracker = _frozen(frame), _made[number]
-    return tracker.step(frame, frame.detections), learned_by(tracker)
-
-
 def _frozen(value: Any) -> Any:
     # Arrays that were pickled can be written again.
-    changes = {f.name: _frozen(part) for f in fields(value) if isinstance(part := getattr(value, f.name), Frozen)}
-    return value.replace(**changes)
+    if not isinstance(value, Frozen):
+        return value
+    return value.replace(**{f.name: _frozen(getattr(value, f.name)) for f in fields(cast(Any, value))})

@@ -11,6 +11,7 @@ import importlib
 import importlib.util
 import inspect
 import sys
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, cast
@@ -145,10 +146,9 @@ def _class_fault(found: Any) -> str | None:
 
 
 def _takes(function: Any, count: int) -> bool:
-    try:
-        inspect.signature(function).bind(*range(count))
-    except TypeError:
-        return False
-    except ValueError:
-        return True
+    with suppress(ValueError):  # some functions of C have no signature
+        try:
+            inspect.signature(function).bind(*range(count))
+        except TypeError:
+            return False
     return True

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import Any
@@ -75,43 +75,41 @@ def _faults(tracks: Any, index: int, history: ReportHistory) -> Iterator[Any]:
     kinds = f"a tuple of kinds of events ({', '.join(EVENT_KINDS)}), always the same"
     good = tracks.own_events == own and isinstance(own, tuple) and set(own) <= set(EVENT_KINDS)
     yield not good and (f"own_events {tracks.own_events!r}", kinds)
-    yield from _row_faults(tracks)
-    history.ids.update(tracks.id.tolist())
-    people = history.ids if tracks.unit == "person" else frozenset[int]()
-    if tracks.groups is not None:
-        yield from _group_faults(tracks.groups, tracks.pos.shape[1], people)
-    yield not isinstance(tracks.events, tuple) and (
-        f"events of type {type(tracks.events).__name__}", "a tuple of sim.types.GroupEvent"
-    )  # fmt: skip
-    for event in tracks.events:
-        yield from _event_faults(event, index, people)
-    other = next((e.kind for e in tracks.events if own and e.kind not in own), None)
-    yield other and (f"an event of kind {other!r}", f"one of own_events, {', '.join(own)}")
-
-
-def _row_faults(tracks: Tracks) -> Iterator[Any]:
-    yield np.ndim(tracks.id) != 1 and (f"id of shape {np.shape(tracks.id)}", "(N,)")
-    n, d = len(tracks.id), 3 if tracks.plane == "space" else 2
-    shapes = {"group": (n,), "pos": (n, d), "vel": (n, d), "cov": (n, 2 * d, 2 * d), "score": (n,)}
-    for name, shape in (shapes if tracks.box is None else {**shapes, "box": (n, 4)}).items():
-        a = getattr(tracks, name)
-        number = isinstance(a, np.ndarray) and a.dtype.kind in "iuf"
-        yield not number and (f"{name} of type {getattr(a, 'dtype', type(a).__name__)}", "an array of numbers")
-        yield a.shape != shape and (f"{name} of shape {a.shape}", str(shape))
-        words = "finite numbers" + (", or nan for unknown" if name == "vel" else "")
-        yield not finite(a) and (name != "vel" or np.isinf(a).any()) and (f"NaN or infinity in {name}", words)
-    types = [getattr(a, "dtype", type(a).__name__) for a in (tracks.id, tracks.group)]
-    whole = isinstance(tracks.id, np.ndarray) and all(kind == np.int64 for kind in types)
-    yield not whole and (f"ids of type {types[0]}, groups of type {types[1]}", "int64")
-    seen = tracks.seen
-    flags = isinstance(seen, np.ndarray) and seen.dtype == bool and seen.shape == (n,)
-    kind = f"shape {seen.shape}, {seen.dtype}" if isinstance(seen, np.ndarray) else f"type {type(seen).__name__}"
-    yield not flags and (f"seen of {kind}", f"({n},), bool")
+    n, d = np.size(tracks.id), 3 if tracks.plane == "space" else 2
+    rows = {"id": ("i", n), "group": ("i", n), "seen": ("b", n), "score": ("f", n), "pos": ("f", n, d)}
+    rows |= {"vel": ("f", n, d), "cov": ("f", n, 2 * d, 2 * d)}
+    yield from _array_faults(tracks, "", rows if tracks.box is None else {**rows, "box": ("f", n, 4)}, ("vel",))
+    yield bool(np.isinf(tracks.vel).any()) and ("infinity in vel", "finite numbers, or nan for unknown")
     same = tracks.unit != "group" or np.array_equal(tracks.id, tracks.group)
     yield not same and ("group that is not id", "group equal to id where the unit is group")
     least = int(tracks.group.min(initial=0))
     yield least < -1 and (f"group {least}", "non-negative groups, -1 alone")
-    yield from _id_faults(tracks.id, "id")
+    yield _id_fault(tracks.id, "id")
+    history.ids.update(tracks.id.tolist())
+    people = history.ids if tracks.unit == "person" else frozenset[int]()
+    if tracks.groups is not None:
+        yield from _group_faults(tracks.groups, d, people)
+    good = isinstance(tracks.events, tuple) and all(isinstance(e, GroupEvent) for e in tracks.events)
+    yield not good and (f"events {tracks.events!r}", "a tuple of sim.types.GroupEvent")
+    for event in tracks.events:
+        yield from _event_faults(event, index, people)
+        yield own and event.kind not in own and (f"an event of kind {event.kind!r}", f"one of own_events, {own}")
+
+
+NUMBERS = {"i": "int64", "f": "numbers", "b": "bool"}  # By kind of dtype.
+
+
+def _array_faults(
+    owner: Any, prefix: str, arrays: Mapping[str, tuple[Any, ...]], unknown: tuple[str, ...] = ()
+) -> Iterator[Any]:
+    """Yields the faults of array fields; arrays: by name kind of dtype and shape; unknown: names of those that may be
+    nan."""
+    for name, (kind, *shape) in arrays.items():
+        a = getattr(owner, name)
+        good = isinstance(a, np.ndarray) and a.dtype.kind == kind and a.shape == (*shape,)
+        got = getattr(a, "dtype", type(a).__name__)
+        yield not good and (f"{prefix}{name} of shape {np.shape(a)}, {got}", f"{(*shape,)}, {NUMBERS[kind]}")
+        yield name not in unknown and not finite(a) and (f"NaN or infinity in {prefix}{name}", "finite numbers")
 
 
 def finite(a: Any) -> bool:
@@ -120,37 +118,33 @@ def finite(a: Any) -> bool:
     return isfinite(np.vdot(a, a)) or bool(np.isfinite(a).all())
 
 
-def _id_faults(id: Any, name: str) -> Iterator[Any]:
-    yield len(id) and id.min() < 0 and (f"{name} {id.min()}", f"non-negative {name}s")
-    yield len(set(id.tolist())) != len(id) and (f"the same {name} twice", f"unique {name}s in a frame")
+def _id_fault(id: Any, name: str) -> Fault | None:
+    if len(id) and id.min() < 0:
+        return f"{name} {id.min()}", f"non-negative {name}s"
+    return (f"the same {name} twice", f"unique {name}s in a frame") if len(set(id.tolist())) != len(id) else None
 
 
 def _group_faults(groups: Any, d: int, people: Iterable[int]) -> Iterator[Any]:
     yield not isinstance(groups, Groups) and (f"groups of type {type(groups).__name__}", "sim.types.Groups or None")
-    good = isinstance(groups.id, np.ndarray) and groups.id.ndim == 1 and groups.id.dtype == np.int64
-    yield not good and (
-        f"groups.id of type {getattr(groups.id, 'dtype', type(groups.id).__name__)}", "(G,) int64"
-    )  # fmt: skip
-    n = len(groups.id)
-    for name, shape in (("pos", (n, d)), ("vel", (n, d)), ("extent", (n, 2, 2)), ("size", (n,))):
-        a = getattr(groups, name)  # without groups any number of columns passes: Groups.none() has 2
-        good = isinstance(a, np.ndarray) and (a.shape == shape if n else a.shape[:1] == (0,))
-        yield not good and (f"groups.{name} of shape {np.shape(a)}", str(shape))
-        yield name == "pos" and not finite(a) and ("NaN or infinity in groups.pos", "finite numbers")
-    yield from _id_faults(groups.id, "group id")
+    n = np.size(groups.id)
+    arrays = {"id": ("i", n), "pos": ("f", n, d), "vel": ("f", n, d), "extent": ("f", n, 2, 2), "size": ("f", n)}
+    # without groups any number of columns passes: Groups.none() has 2
+    yield from _array_faults(groups, "groups.", arrays if n else {"id": ("i", 0)}, ("vel", "extent", "size"))
+    yield _id_fault(groups.id, "group id")
     for name in ("members", "hull"):
         items = getattr(groups, name)
-        got = f"{len(items)} groups.{name}" if isinstance(items, tuple) else f"groups.{name} {type(items).__name__}"
-        good = isinstance(items, tuple) and len(items) in (0, n)
-        yield not good and (got, f"a tuple of {n}, or an empty one")
+        good = isinstance(items, tuple) and len(items) in (0, n) and all(isinstance(a, np.ndarray) for a in items)
+        got = len(items) if isinstance(items, tuple) else type(items).__name__
+        yield not good and (f"{got} groups.{name}", f"a tuple of {n} arrays, or an empty one")
     for ids in groups.members:
-        good = isinstance(ids, np.ndarray) and ids.ndim == 1 and (not len(ids) or ids.dtype.kind == "i")
-        yield not good and ("groups.members that are no ids", "(k,) int64 each")
+        yield (ids.ndim != 1 or (len(ids) and ids.dtype.kind != "i")) and (
+            "groups.members that are no ids",
+            "(k,) int64",
+        )
         yield _member_fault(ids.tolist(), people, "groups.members")
     for hull in groups.hull:
-        good = isinstance(hull, np.ndarray) and hull.ndim == 2 and hull.shape[1] == 2 and hull.dtype.kind in "if"
-        yield not good and (f"groups.hull of shape {np.shape(hull)}", "(V, 2) each")
-        yield not finite(hull) and ("NaN or infinity in groups.hull", "finite numbers")
+        good = hull.ndim == 2 and hull.shape[1] == 2 and hull.dtype.kind in "if" and finite(hull)
+        yield not good and (f"groups.hull of shape {hull.shape}, or NaN in it", "(V, 2) finite numbers each")
 
 
 def _member_fault(members: Iterable[Any], people: Iterable[int], name: str) -> Fault | None:
@@ -158,24 +152,26 @@ def _member_fault(members: Iterable[Any], people: Iterable[int], name: str) -> F
     return (f"{strange[0]!r} in {name}", "ids that the tracker has reported") if strange else None
 
 
-def _event_faults(event: Any, index: int, people: Iterable[int]) -> Iterator[Any]:
-    yield not isinstance(event, GroupEvent) and (f"an event of type {type(event).__name__}", "sim.types.GroupEvent")
-    kind = event.kind
+def _event_faults(event: GroupEvent, index: int, people: Iterable[int]) -> Iterator[Any]:
+    kind, start = event.kind, event.start
     yield kind not in EVENT_KINDS and (f"an event of kind {kind!r}", "one of " + ", ".join(EVENT_KINDS))
-    for name in ("start", "end", "emitted"):
-        yield not _whole(getattr(event, name)) and (f"{kind}: {name} {getattr(event, name)!r}", "a whole number")
-    yield event.emitted != index and (f"{kind}: emitted {event.emitted}", f"{index}, the present frame, or None")
-    yield not 1 <= event.start <= index and (f"{kind}: start {event.start}", f"a frame from 1 to {index}")
-    yield event.end < event.start and (f"{kind}: end {event.end}", f"{event.start} or later: its start")
-    for name in ("before", "after"):
-        groups = getattr(event, name)
-        good = isinstance(groups, tuple) and all(_whole(g) and g >= -1 for g in groups)
-        yield not good and (f"{kind}: {name} {groups!r}", "a tuple of group ids, -1 for a person alone")
-    yield not isinstance(event.members, tuple) and (f"{kind}: members {event.members!r}", "a tuple of ids")
     number = (int, float, np.integer, np.floating)
-    good = np.shape(event.pos) == (2,) and all(isinstance(v, number) for v in event.pos)
-    yield not good and (f"{kind}: pos {event.pos!r}", "x, y")
+    checks = {
+        "start": (_whole(start) and 1 <= start <= index, f"a whole number from 1 to {index}"),
+        "end": (_whole(event.end) and _whole(start) and event.end >= start, f"a whole number, {start} or later"),
+        "emitted": (_whole(event.emitted) and event.emitted == index, f"{index}, the present frame, or None"),
+        "before": (_are_groups(event.before), "a tuple of group ids, -1 for a person alone"),
+        "after": (_are_groups(event.after), "a tuple of group ids, -1 for a person alone"),
+        "members": (isinstance(event.members, tuple), "a tuple of ids"),
+        "pos": (np.shape(event.pos) == (2,) and all(isinstance(v, number) for v in event.pos), "x, y"),
+    }
+    for name, (good, expected) in checks.items():
+        yield not good and (f"{kind}: {name} {getattr(event, name)!r}", expected)
     yield _member_fault(event.members, people, f"the members of a {kind}")
+
+
+def _are_groups(ids: Any) -> bool:
+    return isinstance(ids, tuple) and all(_whole(g) and g >= -1 for g in ids)
 
 
 def _whole(value: Any) -> bool:

@@ -126,7 +126,7 @@ def _in_image(truth: Truth, run: Sequence[Tracks], pixels: bool) -> Sequence[Tra
     if plane_of(truth, run) == "image":
         if not can_stand(run, truth.camera, pixels) or all(t.derived for t in run):
             return run
-        return completed(run, truth.fps, truth.px_per_m, camera=truth.camera, scene=truth.scene, pixels=pixels)
+        return completed(run, truth.fps, truth.px_per_m, camera=truth.camera, scene=truth.scene, pixels=pixels)[0]
     if not boxed(run):
         what = "groups without people" if any(t.unit == "group" for t in run) else "people without boxes"
         raise IncomparableError(f"runs in the image (px), and one on the ground (m) with {what}")

@@ -91,9 +91,8 @@ _trackers: dict[tuple[str | type[Tracker], float | None], TunedTracker] = {}
 
 
 def _tracker(name: str | type[Tracker], code: str, step_timeout: float | None) -> TunedTracker:
-    if (name, step_timeout) not in _trackers:
-        _trackers[name, step_timeout] = tuned_tracker(name, step_timeout)
-    tracker = _trackers[name, step_timeout]
+    tracker = _trackers.get((name, step_timeout)) or tuned_tracker(name, step_timeout)
+    _trackers[name, step_timeout] = tracker
     if tracker.code != code:
         raise WorkError(
             place="tracker", got=f"another {tracker.name} in a worker", expected="the file as it is here",

@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -99,7 +99,6 @@ def short(value: object) -> str:
 
 
 PACKAGES = ("flockscope", "optuna", "numpy", "scipy", "numba")  # Packages whose versions are written into the files.
-LONG = 40  # Characters of a setting that the text shows.
 MANY = 4  # Greatest number of sensor settings that the text shows one by one.
 
 
@@ -167,7 +166,7 @@ class TuningResult:
 
     def lines(self, chosen: Candidate | None = None) -> list[str]:
         """Returns lines of text: settings, counts, validation values, and the comparisons and notes on the winner."""
-        plan, seeds = self.plan, self.plan.seeds
+        plan, seeds = self.plan, {name: seeds_text(seeds) for name, seeds in self.plan.seeds.items()}
         names = ", ".join(goal.key for goal in plan.goals)
         chosen_similarity = plan.options.similarity
         compared = "" if chosen_similarity is None else f", people compared by {chosen_similarity}"
@@ -176,8 +175,7 @@ class TuningResult:
         lines = [
             f"{plan.tracker_name} tuned on {plan.suite_name}, detections {plan.detections}, for {names}{compared}",
             f"{counted(len(self.trials), 'trial')}, {self.episodes} of {every} episodes played, {counts}; "
-            f"training seeds {seeds_text(seeds.training)}, validation {seeds_text(seeds.validation)}, "
-            f"test {seeds_text(seeds.test)}",
+            f"training seeds {seeds['train']}, validation {seeds['val']}, test {seeds['test']}",
         ]
         if plan.scene_settings:
             lines.append("scenes with " + ", ".join(_short_settings(plan.scene_settings)))
@@ -204,15 +202,13 @@ class TuningResult:
 
     def as_dict(self) -> dict[str, Any]:
         """Returns everything as nested dicts and lists for JSON; an unknown number is nan."""
-        plan, seeds = self.plan, self.plan.seeds
+        plan, seeds = self.plan, {name: seeds_text(seeds) for name, seeds in self.plan.seeds.items()}
+        settings = {
+            "trials": plan.options.trials, "validation": seeds["val"], "test": seeds["test"],
+            "check": plan.check_name, "check_test": seeds["check"], "set": list(plan.scene_settings),
+        }  # fmt: skip
         return {
-            "settings": plan.identity()
-            | {
-                "trials": plan.options.trials, "validation": seeds_text(seeds.validation),
-                "test": seeds_text(seeds.test),
-                "check": plan.check_name, "check_test": seeds_text(seeds.check),
-                "set": list(plan.scene_settings),
-            },
+            "settings": plan.identity() | settings,
             "counts": {
                 "trials": len(self.trials), "episodes": self.episodes, "pruned": self.pruned,
                 "impossible": self.impossible,
@@ -268,11 +264,8 @@ def _without_nan(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _short_settings(settings: Sequence[str]) -> Iterator[str]:
+def _short_settings(settings: Sequence[str]) -> list[str]:
     sensor = [setting for setting in settings if setting.startswith("sensor.")]
-    profile = len(sensor) > MANY
-    if profile:
-        yield f"a detector of {len(sensor)} settings"
-    for setting in settings:
-        if not (profile and setting in sensor):
-            yield setting if len(setting) <= LONG else setting[: LONG - 2] + " …"
+    if len(sensor) <= MANY:
+        return list(settings)
+    return [f"a detector of {len(sensor)} settings", *(setting for setting in settings if setting not in sensor)]

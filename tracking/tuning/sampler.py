@@ -9,7 +9,7 @@ TPE sampler, which looks at all trials.
 The parameters of trial n depend only on the seed, on n and on the trials finished before. A search that was killed and
 is resumed therefore finds what it would have found.
 
-The pruner stops a trial early when it surely loses to the best trial on the scenes that both were played on: the
+A trial is stopped early when it surely loses to the best trial on the scenes that both were played on: the
 p-value of a paired test lies below a limit. The test is Wilcoxon's signed-rank test (1945), one-sided, as in Optuna's
 WilcoxonPruner. *Ours*: p-values are exact with ties and zeros, too. Parameters that change nothing in most scenes give
 zeros and ties; scipy then draws permutations, which takes longer than an episode (figures: CONTRIBUTING.md). The test
@@ -24,8 +24,7 @@ from typing import Any, cast
 import numpy as np
 import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
-from optuna.pruners import BasePruner
-from optuna.samplers import BaseSampler, TPESampler
+from optuna.samplers import TPESampler
 from optuna.trial import FrozenTrial, TrialState
 
 from sim.types import Array
@@ -33,8 +32,7 @@ from tracking.config import Param
 from tracking.parameter_space import decode, encode
 from tracking.tuning.search_plan import SearchPlan
 
-# Attributes of a trial: number of the trial that it repeats, episodes played before pruning, error line.
-AGAIN, PRUNED, ERROR = "again", "pruned after", "error"
+PRUNED = "pruned after"  # Attribute of a trial: episodes played before it was stopped.
 
 MOVED = 3  # Number of parameters that are moved, on average.
 STEPS = (0.05, 1.0)  # Least and greatest standard deviation of a step; the range of a parameter is [-1, 1].
@@ -52,76 +50,49 @@ def distribution(p: Param) -> BaseDistribution:
     return FloatDistribution(p.low, p.high, log=p.scale == "log")
 
 
-def place_in_search(trials: Sequence[FrozenTrial], trial: FrozenTrial) -> int:
-    """Returns the place of a trial in the search, 0 for the defaults."""
-    number = trial.user_attrs.get(AGAIN, trial.number)
-    return sum(t.number < number and AGAIN not in t.user_attrs for t in trials)
+def tpe_sampler(plan: SearchPlan, number: int) -> TPESampler:
+    """Returns the TPE sampler of trial `number`."""
+    seed = np.random.SeedSequence([plan.options.seed, number]).generate_state(1)[0]
+    return TPESampler(seed=int(seed), n_startup_trials=TPE_FROM)
 
 
-class HillClimbingSampler(BaseSampler):
-    """Optuna sampler that moves a few parameters of one of the best trials; every fourth trial is drawn by TPE.
+def propose(plan: SearchPlan, study: optuna.Study, number: int) -> None:
+    """Enqueues the parameters of trial `number` in the study, unless the study's sampler, TPE, is to draw them."""
+    study.sampler = tpe_sampler(plan, number)
+    complete = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
+    if number % TPE_EVERY != TPE_EVERY - 1 or len(complete) < TPE_FROM:
+        rng = np.random.default_rng(np.random.SeedSequence([plan.options.seed, number]))
+        study.enqueue_trial(_moved(plan, study, complete, rng))
 
-    State: of the current trial its random generator, its TPE sampler, and whether TPE is used.
-    """
 
-    def __init__(self, plan: SearchPlan) -> None:
-        seed = plan.options.seed
-        self._plan, self._space = plan, {p.name: distribution(p) for p in plan.space}
-        self._rng, self._tpe, self._use_tpe = np.random.default_rng(seed), TPESampler(seed=seed), False
+def _moved(
+    plan: SearchPlan, study: optuna.Study, complete: Sequence[FrozenTrial], rng: np.random.Generator
+) -> dict[str, Any]:
+    space, parent = plan.space, _parent(plan, study, complete, rng)
+    base = plan.config(parent)
+    chosen = rng.random(len(space)) < MOVED / len(space)
+    chosen[rng.integers(len(space))] = True
+    low, high = np.log(STEPS)
+    step = np.exp(rng.uniform(low, high, len(space))) * rng.standard_normal(len(space))
+    point = encode(space, base)
+    categorical = np.array([p.scale == "categorical" for p in space])
+    target = np.where(categorical, rng.uniform(-1, 1, len(space)), _reflected(point + step))
+    config = decode(space, np.where(chosen, target, point), base)
+    moved = {p.name: getattr(config, p.name) for p, is_chosen in zip(space, chosen, strict=True) if is_chosen}
+    return {**parent, **moved}
 
-    def before_trial(self, study: optuna.Study, trial: FrozenTrial) -> None:
-        """Seeds the generators for this trial from the seed of the search and the trial's place in the study."""
-        trials = study.get_trials(deepcopy=False)
-        place = place_in_search(trials, trial)
-        entropy = np.random.SeedSequence([self._plan.options.seed, place])
-        self._rng = np.random.default_rng(entropy)
-        self._tpe = TPESampler(seed=int(entropy.generate_state(1)[0]), n_startup_trials=TPE_FROM)
-        complete = sum(t.state == TrialState.COMPLETE for t in trials)
-        self._use_tpe = place % TPE_EVERY == TPE_EVERY - 1 and complete >= TPE_FROM
 
-    def infer_relative_search_space(self, study: optuna.Study, trial: FrozenTrial) -> dict[str, BaseDistribution]:
-        """Returns the distributions by name that `sample_relative` draws from."""
-        return self._tpe.infer_relative_search_space(study, trial) if self._use_tpe else self._space
-
-    def sample_relative(
-        self, study: optuna.Study, trial: FrozenTrial, search_space: dict[str, BaseDistribution]
-    ) -> dict[str, Any]:
-        """Returns a dict of values by parameter name."""
-        return self._tpe.sample_relative(study, trial, search_space) if self._use_tpe else self._moved(study)
-
-    def sample_independent(
-        self, study: optuna.Study, trial: FrozenTrial, param_name: str, param_distribution: BaseDistribution
-    ) -> Any:
-        """Returns the value that TPE draws for the parameter `param_name` alone."""
-        return self._tpe.sample_independent(study, trial, param_name, param_distribution)
-
-    def _moved(self, study: optuna.Study) -> dict[str, Any]:
-        space, rng = self._plan.space, self._rng
-        parent = self._parent(study)
-        base = self._plan.config(parent)
-        chosen = rng.random(len(space)) < MOVED / len(space)
-        chosen[rng.integers(len(space))] = True
-        low, high = np.log(STEPS)
-        step = np.exp(rng.uniform(low, high, len(space))) * rng.standard_normal(len(space))
-        point = encode(space, base)
-        categorical = np.array([p.scale == "categorical" for p in space])
-        target = np.where(categorical, rng.uniform(-1, 1, len(space)), _reflected(point + step))
-        config = decode(space, np.where(chosen, target, point), base)
-        moved = {p.name for p, is_chosen in zip(space, chosen, strict=True) if is_chosen}
-        return {name: getattr(config, name) if name in moved else value for name, value in parent.items()}
-
-    def _parent(self, study: optuna.Study) -> dict[str, Any]:
-        trials = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
-        whole = [t for t in trials if PRUNED not in t.user_attrs and t.params.keys() == self._plan.defaults.keys()]
-        if not whole:
-            return dict(self._plan.defaults)
-        if len(self._plan.goals) > 1:
-            whole = study.best_trials
-            return dict(whole[self._rng.integers(len(whole))].params)
-        goal = self._plan.goals[0]
-        ranked = sorted(whole, key=lambda t: goal.gain(t.values[0], 0.0))
-        rank = min(int(self._rng.geometric(0.6)) - 1, PARENTS - 1, len(ranked) - 1)
-        return dict(ranked[rank].params)
+def _parent(
+    plan: SearchPlan, study: optuna.Study, complete: Sequence[FrozenTrial], rng: np.random.Generator
+) -> dict[str, Any]:
+    whole = [t for t in complete if PRUNED not in t.user_attrs]
+    if not whole:
+        return dict(plan.defaults)
+    if len(plan.goals) > 1:
+        front = study.best_trials
+        return dict(front[rng.integers(len(front))].params)
+    ranked = sorted(whole, key=lambda t: plan.goals[0].gain(t.values[0], 0.0))
+    return dict(ranked[min(int(rng.geometric(0.6)) - 1, PARENTS - 1, len(ranked) - 1)].params)
 
 
 def _reflected(point: Array) -> Array:
@@ -132,25 +103,9 @@ def _reflected(point: Array) -> Array:
 LEAST_SCENES = 2
 
 
-class SignedRankPruner(BasePruner):
-    """Prunes a trial whose values on the scenes so far are surely worse than the best trial's on the same scenes.
-
-    A trial is pruned if the one-sided p-value of Wilcoxon's signed-rank test is below p; 0 never prunes. Values must be
-    reported with the number of the scene as step. For studies with one goal.
-    """
-
-    def __init__(self, p: float) -> None:
-        self.p = p
-
-    def prune(self, study: optuna.Study, trial: FrozenTrial) -> bool:
-        """Returns True if the trial is to be pruned."""
-        try:
-            best = study.best_trial.intermediate_values
-        except ValueError:
-            return False
-        sign = 1.0 if study.direction == optuna.study.StudyDirection.MAXIMIZE else -1.0
-        gains = [sign * (v - best[k]) for k, v in trial.intermediate_values.items() if k in best]
-        return len(gains) >= LEAST_SCENES and sum(gains) < 0 and signed_rank_p_value(gains) < self.p
+def surely_loses(gains: Sequence[float], p: float) -> bool:
+    """Returns True if gains over the best trial on the same scenes are surely negative: with a p-value below p."""
+    return len(gains) >= LEAST_SCENES and sum(gains) < 0 and signed_rank_p_value(gains) < p
 
 
 def signed_rank_p_value(gains: Sequence[float]) -> float:

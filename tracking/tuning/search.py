@@ -9,22 +9,21 @@ docs/reference/tuning.md describes the method and what may be concluded from its
 
 Candidates are then played on held-out scenes, which the search did not use: validation scenes first, then test scenes.
 `HeldOutEvaluator.validated` plays the best trials on the validation scenes. `simplified` resets the parameters of the
-winner that bring nothing there. `compared` measures the gain on the test scenes. `stored_in_study` keeps the episodes
-in the study, so that a search that was killed after its last trial does not play them again.
+winner that bring nothing there. `compared` measures the gain on the test scenes. The study keeps the episodes, so that
+a search that was killed after its last trial does not play them again.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, counted
+from scenarios.errors import FlockscopeError, InputError, WorkError, counted
 from sim.dataset.generate import LEFT_OUT
 from sim.io.files.own_files import Marks, refuse_foreign_file
 from sim.types import Tracker
@@ -33,11 +32,13 @@ from tracking.environment.episodes import Episode, Source
 from tracking.keyword_options import documented, from_keywords
 from tracking.tuning.comparison import Candidate, Comparison, Goal, TrialRecord, compare_episodes, pareto_front
 from tracking.tuning.options import Scenes, TuneOptions
-from tracking.tuning.parallel_episodes import EpisodeOrError, PlayEpisodes, episode_player
+from tracking.tuning.parallel_episodes import PlayEpisodes, episode_player
 from tracking.tuning.result import TuningResult
 from tracking.tuning.search_plan import SearchPlan, search_plan
 
 if TYPE_CHECKING:
+    import optuna
+
     from tracking.tuning.study import SearchStudy
 
 
@@ -49,11 +50,18 @@ STORED = "judged "  # Prefix of the study attributes in which episodes are store
 
 @dataclass(frozen=True)
 class HeldOutEvaluator:
-    """Plays configs on the validation and test scenes, which the search did not use."""
+    """Plays configs on the validation and test scenes, which the search did not use.
+
+    State: scenes, all that were counted, by key of their source; left_out, a line for each that was left out, because
+    its script did not come true.
+    """
 
     plan: SearchPlan
     play: PlayEpisodes
+    study: optuna.Study
     report: Callable[[str], None] = field(default=lambda text: None)
+    scenes: set[object] = field(default_factory=set)
+    left_out: dict[object, str] = field(default_factory=dict)
 
     def validated(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """Returns the candidates that can be played, with validation values and gain over the first, the defaults."""
@@ -61,7 +69,7 @@ class HeldOutEvaluator:
         defaults: Sequence[Episode] = ()
         for k, candidate in enumerate(candidates):
             self.report(f"validation, {k + 1} of {len(candidates)}")
-            episodes = self._episodes(self.plan.validation, candidate.config, self.plan.needs_every_score)
+            episodes = self._validation(candidate.config)
             if isinstance(episodes, FlockscopeError):
                 if k == 0:
                     raise episodes
@@ -82,12 +90,9 @@ class HeldOutEvaluator:
                 simpler = type(config).from_dict({**config.as_dict(), name: self.plan.defaults[name]})
             except FlockscopeError:
                 continue
-            episodes = self._episodes(self.plan.validation, simpler, self.plan.needs_every_score)
-            if isinstance(episodes, FlockscopeError):
-                continue
-            reached = goal.mean(episodes)
-            if goal.gain(value, reached) >= 0:
-                config, value = simpler, reached
+            episodes = self._validation(simpler)
+            if not isinstance(episodes, FlockscopeError) and goal.gain(value, goal.mean(episodes)) >= 0:
+                config, value = simpler, goal.mean(episodes)
         return config, value
 
     def compared(self, config: Config) -> tuple[list[Comparison], list[str]]:
@@ -108,46 +113,43 @@ class HeldOutEvaluator:
             found += [comparison for comparison in made if comparison is not None]
         return found, notes
 
+    def _validation(self, config: Config) -> list[Episode] | FlockscopeError:
+        return self._episodes(self.plan.validation, config, self.plan.needs_every_score)
+
     def _episodes(
         self, sources: Sequence[Source], config: Config, every_score: bool
     ) -> list[Episode] | FlockscopeError:
-        found = []
-        for result in self.play(sources, config.as_dict(), every_score):
-            if isinstance(result, FlockscopeError):
-                return result
-            found.append(result)
+        """Returns one episode per source, stored in the study; or the error of a config that cannot be played."""
+        parts = ([source.key for source in sources], config.as_dict(), every_score)
+        key = STORED + hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()[:16]
+        found = [Episode(*fields) for fields in self.study.user_attrs.get(key, ())]
+        if not found:
+            kept = {*COMPARED_KEYS, *(goal.key for goal in self.plan.goals)}
+            for result in self.play(sources, config.as_dict(), every_score):
+                if isinstance(result, FlockscopeError):
+                    return result
+                found.append(replace(result, scores={k: v for k, v in result.scores.items() if k in kept}))
+            self.study.set_user_attr(key, [astuple(episode) for episode in found])
+        self.count(sources, [episode.left_out for episode in found])
         return found
 
+    def count(self, sources: Sequence[Source], reasons: Sequence[str]) -> None:
+        """Counts scenes; reasons: why each was left out, "" if it was not."""
+        self.scenes.update(source.key for source in sources)
+        for source, reason in zip(sources, reasons, strict=True):
+            if reason:
+                self.left_out[source.key] = f"{source.name} seed {source.seed}: {reason}"
 
-def stored_in_study(study: SearchStudy, play: PlayEpisodes) -> PlayEpisodes:
-    """Returns a function like `play` that stores complete sets of episodes in the study and takes them from there."""
-    kept = {*COMPARED_KEYS, *(goal.key for goal in study.plan.goals)}
-
-    def stored(
-        sources: Sequence[Source], values: dict[str, Any], every_score: bool
-    ) -> Generator[EpisodeOrError, None, None]:
-        key = STORED + _digest([source.key for source in sources], values, every_score)
-        known = study.optuna.user_attrs.get(key)
-        if known is not None:
-            yield from (Episode(*fields) for fields in known)
-            return
-        played = []
-        for result in play(sources, values, every_score):
-            if isinstance(result, FlockscopeError):
-                yield result
-                return
-            played.append(replace(result, scores={k: v for k, v in result.scores.items() if k in kept}))
-            yield played[-1]
-        study.optuna.set_user_attr(key, [astuple(episode) for episode in played])
-
-    return stored
+    def require_most(self) -> None:
+        """Raises WorkError if more than 5 % of the scenes were left out."""
+        if len(self.left_out) > LEFT_OUT * len(self.scenes):
+            first = next(iter(self.left_out.values()))
+            raise WorkError(
+                place="--suite", got=f"{len(self.left_out)} of {len(self.scenes)} scenes without their events: {first}",
+                expected="at most 5 % of the scenes left out", remedy="mend these scenes, or choose another suite",
+            )  # fmt: skip
 
 
-def _digest(*parts: object) -> str:
-    return hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()[:16]
-
-
-UNFULFILLED = "unfulfilled"  # Attribute of a study: for each training scene why it is left out, "" if it is not.
 JOURNAL = ".journal"  # Suffix of the journal beside `--out`.
 
 # What every .json file of a search has.
@@ -192,63 +194,13 @@ def _search(options: TuneOptions) -> TuningResult:
     ):
         run_trials(study, play, progress)
         report = partial(progress, options.trials, options.trials)
-        scenes = PlayedScenes(stored_in_study(study, play))
-        known = study.optuna.user_attrs.get(UNFULFILLED)
-        if known is None:
-            known = [_unfulfilled(source) for source in plan.training]
-            study.optuna.set_user_attr(UNFULFILLED, known)
-        for source, reason in zip(plan.training, known, strict=True):
-            scenes.record(source, reason)
-        found = replace(_evaluated(plan, study, scenes, report), left_out=tuple(scenes.left_out.values()))
+        evaluator = HeldOutEvaluator(plan, play, study.optuna, report)
+        evaluator.count(plan.training, study.left_out())
+        found = _evaluated(plan, study, evaluator)
     if target is not None:
         found.write(target)
-    scenes.require_most()
+    evaluator.require_most()
     return found
-
-
-def _unfulfilled(source: Source) -> str:
-    try:
-        _ = source.open().truth
-    except OrderError as error:
-        return error.line()
-    return ""
-
-
-class PlayedScenes:
-    """Plays episodes and keeps a record of the scenes that are left out, because their script did not come true.
-
-    State: scenes, all that were counted, by key of their source; left_out, a line for each that was left out.
-    """
-
-    def __init__(self, play: PlayEpisodes) -> None:
-        self.play = play
-        self.scenes: set[object] = set()
-        self.left_out: dict[object, str] = {}
-
-    def __call__(
-        self, sources: Sequence[Source], values: dict[str, Any], every_score: bool
-    ) -> Generator[EpisodeOrError, None, None]:
-        """Yields one result per source, as `play` does."""
-        with closing(self.play(sources, values, every_score)) as results:
-            given = iter(sources)
-            for result in results:  # to its end, as `stored_in_study` stores behind the last one
-                self.record(next(given), result.left_out if isinstance(result, Episode) else "")
-                yield result
-
-    def record(self, source: Source, reason: str) -> None:
-        """Counts a scene; reason: why it was left out, "" if it was not."""
-        self.scenes.add(source.key)
-        if reason:
-            self.left_out[source.key] = f"{source.name} seed {source.seed}: {reason}"
-
-    def require_most(self) -> None:
-        """Raises WorkError if more than 5 % of the scenes were left out."""
-        if len(self.left_out) > LEFT_OUT * len(self.scenes):
-            first = next(iter(self.left_out.values()))
-            raise WorkError(
-                place="--suite", got=f"{len(self.left_out)} of {len(self.scenes)} scenes without their events: {first}",
-                expected="at most 5 % of the scenes left out", remedy="mend these scenes, or choose another suite",
-            )  # fmt: skip
 
 
 def require_optuna(place: str) -> None:
@@ -268,29 +220,23 @@ def _checked_target(out: Path) -> Path:
     return out
 
 
-def _evaluated(plan: SearchPlan, study: SearchStudy, play: PlayEpisodes, report: Callable[[str], None]) -> TuningResult:
-    evaluator = HeldOutEvaluator(plan, play, report)
+def _evaluated(plan: SearchPlan, study: SearchStudy, evaluator: HeldOutEvaluator) -> TuningResult:
     candidates = evaluator.validated(_candidates(plan, study))
-    importance = study.importance()
-    default, several, goal = candidates[0], len(plan.goals) > 1, plan.goals[0]
-    front = pareto_front(candidates, plan.goals) if several else []
+    importance, default, goal = study.importance(), candidates[0], plan.goals[0]
+    front = tuple(pareto_front(candidates, plan.goals)) if len(plan.goals) > 1 else ()
     better = [c for c in candidates if c.gain is not None and c.gain.verdict == "better"]
-    best = (
-        next(iter(front), default)
-        if several
-        else max([default, *better], key=lambda c: goal.gain(0.0, c.validation[0]))
-    )
+    best = front[0] if front else max([default, *better], key=lambda c: goal.gain(0.0, c.validation[0]))
     config, values = best.config, best.validation
-    if not several and best is not default:
-        least_first = sorted(importance, key=lambda name: importance[name])
-        config, value = evaluator.simplified(best.config, best.validation[0], least_first)
+    if len(plan.goals) == 1 and best is not default:
+        config, value = evaluator.simplified(config, values[0], sorted(importance, key=lambda name: importance[name]))
         values = (value,)
-    old, best_values, new = plan.base.as_dict(), best.config.as_dict(), config.as_dict()
-    taken_back = [name for name in best_values if best_values[name] != old[name] and new[name] == old[name]]
     comparisons, notes = evaluator.compared(config) if config != plan.base else ([], _why_defaults(candidates, goal))
+    tried, new = best.config.as_dict(), config.as_dict()
+    taken_back = [name for name, value in plan.base.as_dict().items() if tried[name] != value == new[name]]
     return TuningResult(
-        plan, config, tuple(front), tuple(candidates), tuple(study.records()), importance, tuple(comparisons),
+        plan, config, front, tuple(candidates), tuple(study.records()), importance, tuple(comparisons),
         tuple(taken_back), (default.validation, values), tuple(notes), study.optuna.study_name,
+        tuple(evaluator.left_out.values()),
     )  # fmt: skip
 
 
@@ -307,13 +253,11 @@ def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
 
 def _candidates(plan: SearchPlan, study: SearchStudy) -> list[Candidate]:
     played = [t for t in study.records() if not t.pruned and not t.error]
-    defaults, goal = next(t for t in played if t.params == plan.defaults), plan.goals[0]
-    if len(plan.goals) > 1:
-        best = study.best()
-        played = [t for t in played if t.number in best]
-    finalists = plan.options.finalists
+    defaults, goal, finalists = played[0], plan.goals[0], plan.options.finalists
     ranked = sorted(played, key=lambda t: goal.gain(t.values[0], 0.0))
-    ranked = _spread(ranked, finalists) if len(plan.goals) > 1 else ranked
+    if len(plan.goals) > 1:
+        front = {t.number for t in study.optuna.best_trials}
+        ranked = _spread([t for t in ranked if t.number in front], finalists)
     found = [Candidate(defaults.number, plan.base, defaults.values)]
     for trial in ranked:
         config = plan.config(trial.params)

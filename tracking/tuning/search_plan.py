@@ -27,39 +27,34 @@ from tracking.config import Config, Param, Value
 from tracking.environment.episodes import Source, sources
 from tracking.parameter_space import space_of
 from tracking.tuning.comparison import FAST_KEYS, SPEED, Goal, goals_of
-from tracking.tuning.options import Scenes, TuneOptions
+from tracking.tuning.options import TuneOptions
 from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
-EPISODES = {"train": 16, "val": 48, "test": 100}  # Least number of episodes that the default seeds of each split make.
+# Of each split: name of its option, name in texts, least number of episodes that its default seeds make.
+SPLIT_OPTIONS = {
+    "train": ("seeds", "training", 16),
+    "val": ("validation", "validation", 48),
+    "test": ("test", "test", 100),
+}
 
 LEAST_SEEDS = 2  # Least number of default seeds of each scene.
 
-OPTION = {"train": "--seeds", "val": "--validation", "test": "--test"}
-WORD = {"train": "training", "val": "validation", "test": "test"}
 CHECK_SUITES = ("friends-meet", "crossing")  # Candidates for the default of --check, in order of preference.
-
-
-def suite_names(suite: Scenes) -> tuple[str, ...]:
-    """Returns the names of suites, scenarios or files as texts, in the order given."""
-    return (str(suite),) if isinstance(suite, str | Path) else tuple(map(str, suite))
 
 
 def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
     """Returns the seeds, or the default of the split if they are None."""
     low, high = next((low, high) for name, low, high in SPLITS if name == split)
+    option, word, episodes = SPLIT_OPTIONS[split]
     if seeds is None:
-        return range(low, low + max(LEAST_SEEDS, -(-EPISODES[split] // scenes)))
-    if not isinstance(seeds, range):
-        got, remedy = repr(seeds), f"write for example range({low}, {low + 4})"
-        raise InputError(place=OPTION[split], got=got, expected="a range of seeds", remedy=remedy)
+        return range(low, low + max(LEAST_SEEDS, -(-episodes // scenes)))
     try:
-        allowed = split_of(seeds) == split
+        allowed = isinstance(seeds, range) and split_of(seeds) == split
     except InputError:
         allowed = False
     if not allowed:
         raise InputError(
-            place=OPTION[split], got=f"{seeds.start}:{seeds.stop}",
-            expected=f"{WORD[split]} seeds, out of {low}:{high}",
+            place=f"--{option}", got=seeds_text(seeds), expected=f"{word} seeds, a range out of {low}:{high}",
             remedy=f"write for example {low}:{low + 4}: training, validation and test are kept apart",
         )  # fmt: skip
     return seeds
@@ -99,16 +94,6 @@ def _files(name: str) -> list[str]:
 
 
 @dataclass(frozen=True)
-class SearchSeeds:
-    """The seeds that every scene is played with."""
-
-    training: range
-    validation: range
-    test: range
-    check: range  # test seeds of the second suite
-
-
-@dataclass(frozen=True)
 class SearchPlan:
     """A search whose options fit together."""
 
@@ -118,7 +103,7 @@ class SearchPlan:
     space: tuple[Param, ...]  # the parameters to search
     suite: tuple[str, ...]  # names of what is tuned on
     check: str | None  # second suite to test on
-    seeds: SearchSeeds
+    seeds: dict[str, range]  # by name of the split, and "check": test seeds of the second suite
     goals: tuple[Goal, ...]  # at least one; the first decides
     detections: DetectionMode
     scene_settings: tuple[str, ...]  # "key=value" overrides of the scenes
@@ -156,20 +141,20 @@ class SearchPlan:
     @cached_property
     def training(self) -> tuple[Source, ...]:
         """The sources of the training episodes of each trial: every scene of the suite with every training seed."""
-        return sources(self.suite, self.seeds.training, self.scene_settings)
+        return sources(self.suite, self.seeds["train"], self.scene_settings)
 
     @cached_property
     def validation(self) -> tuple[Source, ...]:
         """The sources of the episodes that choose among the best trials."""
-        return sources(self.suite, self.seeds.validation, self.scene_settings)
+        return sources(self.suite, self.seeds["val"], self.scene_settings)
 
     @cached_property
     def tests(self) -> dict[str, tuple[Source, ...]]:
         """The sources of the test episodes, by `suite_name` and `check_name`."""
-        found = {self.suite_name: sources(self.suite, self.seeds.test, self.scene_settings)}
+        found = {self.suite_name: sources(self.suite, self.seeds["test"], self.scene_settings)}
         if self.check is not None and self.check_name is not None:
             sensor = [setting for setting in self.scene_settings if setting.startswith("sensor.")]
-            found[self.check_name] = sources((self.check,), self.seeds.check, sensor)
+            found[self.check_name] = sources((self.check,), self.seeds["check"], sensor)
         return found
 
     def identity(self) -> dict[str, Any]:
@@ -179,7 +164,7 @@ class SearchPlan:
             "code": self.tracker.code,
             "versions": _digest(runtime().values()),
             "suite": self.suite_name,
-            "seeds": seeds_text(self.seeds.training),
+            "seeds": seeds_text(self.seeds["train"]),
             "motions": _digest(source.key for source in self.training),
             "detections": self.detections,
             "similarity": self.options.similarity or "by the data",
@@ -196,7 +181,7 @@ def search_plan(options: TuneOptions) -> SearchPlan:
     """Returns the plan that follows from the options, with defaults for everything that the options leave open."""
     tracker = tuned_tracker(options.tracker, options.step_timeout)
     fixed, scene_settings = _split_settings(options.set)
-    suite = suite_names(options.suite)
+    suite = (str(options.suite),) if isinstance(options.suite, str | Path) else tuple(map(str, options.suite))
     scenes = count_scenes(suite, scene_settings, "--suite")
     check = default_check_suite(suite) if options.check == "" else options.check
     check_scenes = _count_check_scenes(suite, check)
@@ -207,12 +192,9 @@ def search_plan(options: TuneOptions) -> SearchPlan:
             place="--sensor, --set sensor", got=f"--detections {detections}", expected="file", remedy=remedy
         )
     space = _space(base, fixed, tuple(options.only), detections)
-    seeds = SearchSeeds(
-        chosen_seeds(options.seeds, "train", scenes),
-        chosen_seeds(options.validation, "val", scenes),
-        chosen_seeds(options.test, "test", scenes),
-        chosen_seeds(options.test, "test", check_scenes),
-    )
+    given = {"train": options.seeds, "val": options.validation, "test": options.test}
+    seeds = {split: chosen_seeds(own, split, scenes) for split, own in given.items()}
+    seeds["check"] = chosen_seeds(options.test, "test", check_scenes)
     keys = (options.objective,) if isinstance(options.objective, str) else tuple(options.objective)
     goals = goals_of(keys or (tracker.objective,))
     plan = SearchPlan(options, tracker, base, space, suite, check, seeds, goals, detections, scene_settings)
@@ -222,7 +204,7 @@ def search_plan(options: TuneOptions) -> SearchPlan:
 
 def seeds_text(seeds: range) -> str:
     """Returns a range of seeds as "start:stop", stop excluded, as the option `--seeds` takes it."""
-    return f"{seeds.start}:{seeds.stop}"
+    return f"{seeds.start}:{seeds.stop}" if isinstance(seeds, range) else repr(seeds)
 
 
 def _split_settings(settings: Iterable[str]) -> tuple[list[str], tuple[str, ...]]:
@@ -250,15 +232,12 @@ def _count_check_scenes(suite: Sequence[str], check: str | None) -> int:
 
 def _space(base: Config, settings: Sequence[str], only: tuple[str, ...], mode: DetectionMode) -> tuple[Param, ...]:
     fixed = {setting.removeprefix("tracker.").partition("=")[0].strip() for setting in settings}
-    useful = space_of(type(base), mode)
+    useful = [p for p in space_of(type(base), mode) if p.name not in fixed]
+    found = tuple(p for p in useful if p.name in only or not only)
     for name in only:
-        param = base.known(name, "--only")
-        reason = "set" if name in fixed else "not tunable" if not param.tunable else ""
-        reason = reason or ("without effect with these detections" if param not in useful else "")
-        if reason:
-            got, expected = f"{name}, which is {reason}", "parameters to search"
-            raise InputError(place="--only", got=got, expected=expected, remedy="remove it")
-    found = tuple(p for p in useful if p.name in only or not (only or p.name in fixed))
+        if base.known(name, "--only") not in found:
+            expected = "tunable parameters that have an effect with these detections and are not set"
+            raise InputError(place="--only", got=name, expected=expected, remedy="remove it")
     if not found:
         got = "all of them set" if fixed else f"{type(base).__name__}, which declares none"
         raise InputError(place="tracker", got=got, expected="parameters to search", remedy="leave one free")

@@ -6,10 +6,10 @@ The file of a study serves several processes at once, any of which may be killed
 with three differences:
 
 - Locks are system locks (fcntl) on bytes of FILE.locks: byte 0 while a trial is chosen, byte 1 while lines are written,
-  byte 2 + n while trial n is played. The system releases the locks of a process that dies, so other processes see that
-  its trial was abandoned.
+  byte 2 + n while trial n is played. The system releases the locks of a process that dies, so another process sees that
+  its trial was abandoned, and plays it.
 - An incomplete last line is removed before the next line is written.
-- Lines are not flushed to the disk one by one. They survive a killed process but not a power cut.
+- Lines are not flushed to the disk one by one.
 
 `run_trials` is the loop of a search: one trial (set of parameters) after the other, each played on the training scenes
 until it surely loses. It surely loses if the p-value of a paired test against the best trial, after any scene, is below
@@ -20,37 +20,29 @@ from __future__ import annotations
 
 import fcntl
 import json
+import math
 import os
 import time
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, closing, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlparse
 
 import numpy as np
 import optuna
 from optuna.exceptions import UpdateFinishedTrialError
-from optuna.storages import BaseStorage
+from optuna.storages import JournalStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
 from scenarios.errors import FlockscopeError, InputError
 from tracking.environment.episodes import Episode
 from tracking.stats import mean_of_known
-from tracking.tuning.comparison import Goal, TrialRecord
+from tracking.tuning.comparison import TrialRecord
 from tracking.tuning.options import Progress
 from tracking.tuning.parallel_episodes import PlayEpisodes
-from tracking.tuning.sampler import (
-    AGAIN,
-    ERROR,
-    PRUNED,
-    HillClimbingSampler,
-    SignedRankPruner,
-    distribution,
-    place_in_search,
-)
+from tracking.tuning.sampler import PRUNED, distribution, propose, surely_loses, tpe_sampler
 from tracking.tuning.search_plan import SearchPlan
 
 SUFFIX = ".locks"  # What the name of the lock file adds to the name of the journal.
@@ -68,9 +60,15 @@ class TrialLocks:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
 
-    def lock(self, byte: int, wait: bool = True) -> None:
-        """Locks a byte (offset in the file) for this process. Raises OSError if it is taken and `wait` is False."""
-        fcntl.lockf(self._file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB, 1, byte)
+    def lock(self, byte: int, wait: bool = True) -> bool:
+        """Locks a byte (offset in the file) for this process; returns False if another has it and `wait` is False."""
+        try:
+            fcntl.lockf(self._file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB), 1, byte)
+        except OSError:
+            if wait:
+                raise
+            return False
+        return True
 
     def release(self, byte: int) -> None:
         """Releases this process's lock on a byte; does nothing if it holds none."""
@@ -85,64 +83,36 @@ class TrialLocks:
         finally:
             self.release(byte)
 
-    def hold_trial(self, number: int) -> None:
-        """Locks trial `number` (from 0) for this process until `release_trial` or `close`."""
-        self.lock(FIRST_TRIAL + number)
-
-    def release_trial(self, number: int) -> None:
-        """Releases this process's lock on trial `number` (from 0); does nothing if it holds none."""
-        self.release(FIRST_TRIAL + number)
-
-    def is_abandoned(self, number: int) -> bool:
-        """Returns True if no other process holds the lock on trial `number` (from 0)."""
-        try:
-            self.lock(FIRST_TRIAL + number, wait=False)
-        except OSError:
-            return False
-        self.release_trial(number)
-        return True
-
     def close(self) -> None:
         """Closes the file and so releases every lock."""
         os.close(self._file)
 
 
 class LockedJournal(JournalFileBackend):
-    """Optuna's journal file at `path`, written under `locks`, without incomplete last lines."""
+    """Optuna's journal file at `path`, written under `locks`. Lines survive a killed process but not a power cut."""
 
     def __init__(self, path: Path, locks: TrialLocks) -> None:
         self._path, self._locks = path, locks
         super().__init__(str(path))
-        with locks.locked(WRITING):
-            self._check_head()
-            self._remove_incomplete_line()
+        self.append_logs([])
 
     def append_logs(self, logs: list[dict[str, Any]]) -> None:
-        """Appends one JSON line per log (a dict); removes an incomplete last line first. No logs append nothing."""
-        text = "".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs)
-        with self._locks.locked(WRITING):
-            self._remove_incomplete_line()
-            with open(self._path, "ab") as file:
-                file.write(text.encode())
-
-    def _check_head(self) -> None:
-        with open(self._path, "rb") as file:
-            head = file.read(len(HEAD))
-        if not HEAD.startswith(head):
-            raise ValueError("no journal of Optuna")
-
-    def _remove_incomplete_line(self) -> None:
-        with open(self._path, "r+b") as file:
-            size = file.seek(0, os.SEEK_END)
-            if size == 0:
-                return
-            file.seek(size - 1)
-            if file.read(1) != b"\n":
+        """Appends one JSON line per log. Raises ValueError if the file is no journal."""
+        with self._locks.locked(WRITING), open(self._path, "a+b") as file:
+            size = file.tell()
+            file.seek(0)
+            if not HEAD.startswith(file.read(len(HEAD))):
+                raise ValueError("no journal of Optuna")
+            file.seek(max(size - 1, 0))
+            if file.read(1) not in (b"", b"\n"):
                 file.seek(0)
                 file.truncate(file.read().rfind(b"\n") + 1)
+            file.write("".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs).encode())
 
 
 SETTINGS = "settings"  # Attribute of a study that holds the identity of its plan.
+# Attributes of a trial: why its parameters are impossible; of the first: for each scene why it was left out, or "".
+ERROR, LEFT_OUT = "error", "left out"
 
 # States of a finished trial. PRUNED means impossible parameters; one stopped early is COMPLETE with an estimate.
 FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
@@ -155,13 +125,13 @@ class SearchStudy:
     """
 
     def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, storage: object = None) -> None:
-        self.plan, self.optuna, self._locks = plan, study, locks
+        self.plan, self.optuna, self.locks = plan, study, locks
         self._space = {p.name: distribution(p) for p in plan.space}
         with self._choosing():
-            _check_identity(plan, study, storage)
-            if SETTINGS not in study.user_attrs:
+            if not self.trials() and SETTINGS not in study.user_attrs:
                 study.set_user_attr(SETTINGS, plan.identity())
-            if not study.get_trials(deepcopy=False):
+            _check_identity(plan, study, storage)
+            if not self.trials():
                 study.enqueue_trial(dict(plan.defaults))
 
     def trials(self) -> list[FrozenTrial]:
@@ -172,49 +142,52 @@ class SearchStudy:
         """Returns the finished trials by number: complete, stopped early, or with impossible parameters."""
         return [t for t in self.trials() if t.state in FINISHED]
 
-    def ask(self, retry_unfinished: bool = False) -> optuna.Trial | None:
-        """Returns the next trial to play, locked for this process."""
+    def ask(self, take_running: bool = False) -> optuna.Trial | None:
+        """Returns the next trial to play, locked for this process: first one that another process has abandoned.
+
+        take_running: without locks, running trials are taken for abandoned.
+        """
         with self._choosing():
-            for t in self.trials():
-                if t.state == TrialState.RUNNING and (
-                    retry_unfinished if self._locks is None else self._locks.is_abandoned(t.number)
-                ):
-                    self._repeat(t)
-            taken = [t for t in self.trials() if t.state in (*FINISHED, TrialState.RUNNING)]
-            if len(taken) >= self.plan.options.trials:
+            trials = self.trials()
+            begun = [t for t in trials if t.state in (*FINISHED, TrialState.RUNNING)]
+            for t in begun:
+                if t.state == TrialState.RUNNING and self._lock_trial(t.number, take_running):
+                    self.optuna.sampler = tpe_sampler(self.plan, t.number)
+                    trial = optuna.Trial(self.optuna, t._trial_id)
+                    for name, choices in self._space.items():  # the process may have ended before it had chosen all
+                        trial._suggest(name, choices)
+                    return trial
+            if len(begun) >= self.plan.options.trials:
                 return None
+            if len(trials) == len(begun):  # none is enqueued
+                propose(self.plan, self.optuna, len(trials))
             trial = self.optuna.ask(self._space)
-            if self._locks is not None:
-                self._locks.hold_trial(trial.number)
+            self._lock_trial(trial.number)
             return trial
+
+    def _lock_trial(self, number: int, without_locks: bool = True) -> bool:
+        return without_locks if self.locks is None else self.locks.lock(FIRST_TRIAL + number, wait=False)
 
     def tell(self, trial: optuna.Trial, values: Sequence[float] | None) -> None:
         """Stores the values of a trial, one per goal, and releases its lock."""
         state = TrialState.PRUNED if values is None else TrialState.COMPLETE
         self.optuna.tell(trial, values, state, skip_if_finished=True)
-        if self._locks is not None:
-            self._locks.release_trial(trial.number)
-
-    def place(self, trial: optuna.Trial) -> int:
-        """Returns the place of a trial in the search, 0 for the defaults."""
-        trials = self.trials()
-        return place_in_search(trials, trials[trial.number])
+        if self.locks is not None:
+            self.locks.release(FIRST_TRIAL + trial.number)
 
     def records(self) -> list[TrialRecord]:
-        """Returns the finished trials in the order of the search, numbered by their place in it, 0 for the defaults."""
-        trials = self.trials()
-        return sorted((self._record(t, place_in_search(trials, t)) for t in self.finished()), key=lambda r: r.number)
+        """Returns the finished trials by number, 0 for the defaults."""
+        return [self._record(t) for t in self.finished()]
 
-    def _record(self, t: FrozenTrial, place: int) -> TrialRecord:
+    def _record(self, t: FrozenTrial) -> TrialRecord:
         if ERROR in t.user_attrs:
-            return TrialRecord(place, (), dict(t.params), 0, error=t.user_attrs[ERROR])
+            return TrialRecord(t.number, (), dict(t.params), 0, error=t.user_attrs[ERROR])
         episodes = t.user_attrs.get(PRUNED, len(self.plan.training))
-        return TrialRecord(place, tuple(t.values or ()), dict(t.params), episodes, PRUNED in t.user_attrs)
+        return TrialRecord(t.number, tuple(t.values or ()), dict(t.params), episodes, PRUNED in t.user_attrs)
 
-    def best(self) -> set[int]:
-        """Returns the places in the search of the best trials, or of the Pareto front, pruned ones included."""
-        trials = self.trials()
-        return {place_in_search(trials, t) for t in self.optuna.best_trials}
+    def left_out(self) -> list[str]:
+        """Returns why each training scene was left out, "" if it was not."""
+        return list(self.trials()[0].user_attrs[LEFT_OUT])
 
     def importance(self) -> dict[str, float]:
         """Returns the share (0 to 1) of each parameter in the first goal's training values (PED-ANOVA)."""
@@ -229,66 +202,38 @@ class SearchStudy:
             warnings.simplefilter("ignore", UserWarning)
             return dict(get_param_importances(self.optuna, params=names, target=lambda t: sign * t.values[0]))
 
-    @property
-    def knows_running_trials(self) -> bool:
-        """True if it is known which running trials other processes still play."""
-        return self._locks is not None
-
     def _choosing(self) -> AbstractContextManager[None]:
-        return nullcontext() if self._locks is None else self._locks.locked(CHOOSING)
-
-    def _repeat(self, abandoned: FrozenTrial) -> None:
-        number = abandoned.user_attrs.get(AGAIN, abandoned.number)
-        repeated = any(t.user_attrs.get(AGAIN) == number and t.number > abandoned.number for t in self.trials())
-        if not repeated:
-            values = {**abandoned.system_attrs.get("fixed_params", {}), **abandoned.params}
-            self.optuna.enqueue_trial(values, user_attrs={AGAIN: number})
-        self.optuna.tell(abandoned.number, state=TrialState.FAIL, skip_if_finished=True)
+        return nullcontext() if self.locks is None else self.locks.locked(CHOOSING)
 
 
 @contextmanager
 def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Iterator[SearchStudy]:
     """Opens or creates the study `name` for the time of the context, and yields it as a `SearchStudy`."""
-    with quiet_optuna():
-        place = storage if storage is None or "://" in str(storage) else Path(storage)
-        locks = TrialLocks(place.with_name(place.name + SUFFIX)) if isinstance(place, Path) else None
+    url = str(storage) if "://" in str(storage) else None
+    file = Path(storage) if storage is not None and url is None else None
+    with quiet_optuna(), ExitStack() as opened:
+        locks = None if file is None else TrialLocks(file.with_name(file.name + SUFFIX))
+        if locks is not None:
+            opened.callback(locks.close)
         try:
-            study = _create(plan, place, _optuna_storage(place, locks), name)
-            yield SearchStudy(plan, study, locks, storage)
-        finally:
-            if locks is not None:
-                locks.close()
-
-
-def _create(plan: SearchPlan, place: str | Path | None, storage: BaseStorage | str | None, name: str) -> optuna.Study:
-    try:
-        return optuna.create_study(
-            storage=storage, study_name=name, load_if_exists=True, sampler=HillClimbingSampler(plan),
-            pruner=_pruner(plan), directions=[_direction(goal) for goal in plan.goals],
-        )  # fmt: skip
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
-        got = f"{type(error).__name__}: {error}".partition("\n")[0]
-        expected = "a storage that `flockscope tune` wrote"
-        raise InputError(
-            file=place, place="--storage", got=got, expected=expected, remedy="choose another --out or --storage"
-        ) from error
-
-
-def _direction(goal: Goal) -> optuna.study.StudyDirection:
-    return optuna.study.StudyDirection.MAXIMIZE if goal.higher else optuna.study.StudyDirection.MINIMIZE
-
-
-def _pruner(plan: SearchPlan) -> optuna.pruners.BasePruner:
-    if plan.options.prune == 0 or len(plan.goals) > 1:
-        return optuna.pruners.NopPruner()
-    return SignedRankPruner(plan.options.prune)
+            study = optuna.create_study(
+                storage=JournalStorage(LockedJournal(file, locks)) if file and locks else url, study_name=name,
+                load_if_exists=True,
+                directions=["maximize" if goal.higher else "minimize" for goal in plan.goals],
+            )  # fmt: skip
+        except OSError:
+            raise
+        except Exception as error:  # each database has its own
+            raise InputError(
+                file=storage, place="--storage", got=f"{type(error).__name__}: {error}".partition("\n")[0],
+                expected="a journal that `flockscope tune` wrote, or the URL of a database, with its driver installed",
+                remedy="correct it, or choose another --out or --storage",
+            ) from error  # fmt: skip
+        yield SearchStudy(plan, study, locks, storage)
 
 
 def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> None:
-    mine, stored = plan.identity(), study.user_attrs.get(SETTINGS)
-    if stored is None and not study.get_trials(deepcopy=False):
-        return
-    stored = stored or {}
+    mine, stored = plan.identity(), study.user_attrs.get(SETTINGS, {})
     different = [key for key in mine if stored.get(key) != mine[key]]
     if different:
         key = different[0]
@@ -297,28 +242,6 @@ def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> N
             expected=f"{key} {stored.get(key)}, not {mine[key]}",
             remedy="choose another --out or --study, or repeat the command that began it",
         )  # fmt: skip
-
-
-def _optuna_storage(place: str | Path | None, locks: TrialLocks | None) -> BaseStorage | str | None:
-    from optuna.storages import GrpcStorageProxy, JournalStorage
-    from optuna.storages.journal import JournalRedisBackend
-
-    try:
-        if isinstance(place, Path):
-            assert locks is not None, "a journal file has locks"
-            return JournalStorage(LockedJournal(place, locks))
-        if place is not None and place.startswith("redis"):
-            return JournalStorage(JournalRedisBackend(place))
-        if place is not None and place.startswith("grpc://"):
-            url = urlparse(place)
-            return GrpcStorageProxy(host=url.hostname or "localhost", port=url.port or 13000)
-        return None if place is None else optuna.storages.RDBStorage(place)
-    except OSError:
-        raise
-    except Exception as error:
-        got = f"{type(error).__name__}: {error}".partition("\n")[0]
-        expected = "a journal file, or the URL of a storage that Optuna knows, with its driver installed"
-        raise InputError(file=place, place="--storage", got=got, expected=expected, remedy="check it") from error
 
 
 @contextmanager
@@ -341,18 +264,19 @@ LEAST_LOSS = 1e-12  # Least difference between the best value and the estimate o
 
 def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> None:
     """Plays trials until the study has as many finished ones as planned, by this process or by others."""
-    retry_unfinished, planned = False, study.plan.options.trials
+    take_running, planned = False, study.plan.options.trials
     while True:
         progress(len(study.finished()), planned, _best_so_far(study))
-        trial = study.ask(retry_unfinished)
+        trial = study.ask(take_running)
         if trial is not None:
-            _play_trial(study, trial, play)
+            with suppress(UpdateFinishedTrialError):  # another process plays it, too, and was faster
+                _play_trial(study, trial, play)
         elif len(study.finished()) >= planned:
             return
-        elif study.knows_running_trials:
+        elif study.locks is not None:
             time.sleep(PAUSE)
         else:
-            retry_unfinished = True
+            take_running = True
 
 
 def _best_so_far(study: SearchStudy) -> str:
@@ -361,31 +285,38 @@ def _best_so_far(study: SearchStudy) -> str:
 
 
 def _play_trial(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -> None:
-    with suppress(UpdateFinishedTrialError):
-        values = _trial_values(study, trial, play)
-        if isinstance(values, FlockscopeError):
-            if study.place(trial) == 0:
-                raise values
-            trial.set_user_attr(ERROR, values.line())
-        study.tell(trial, None if isinstance(values, FlockscopeError) else values)
+    values = _trial_values(study, trial, play)
+    if isinstance(values, FlockscopeError):
+        if trial.number == 0:
+            raise values
+        trial.set_user_attr(ERROR, values.line())
+    study.tell(trial, None if isinstance(values, FlockscopeError) else values)
 
 
 def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -> list[float] | FlockscopeError:
-    plan, played = study.plan, dict[int, Episode]()
+    plan, played, goal = study.plan, dict[int, Episode](), study.plan.goals[0]
     try:
         config = plan.config(trial.params).as_dict()
     except FlockscopeError as error:
         return error
     # Each trial has an order of its own, so that no few scenes decide about all trials.
-    order = np.random.default_rng([plan.options.seed, study.place(trial)]).permutation(len(plan.training)).tolist()
+    order = np.random.default_rng([plan.options.seed, trial.number]).permutation(len(plan.training)).tolist()
+    reported = study.trials()[trial.number].intermediate_values  # by a process that was killed
     with closing(play([plan.training[k] for k in order], config, plan.needs_every_score)) as results:
         for k, result in zip(order, results, strict=True):
             if isinstance(result, FlockscopeError):
                 return result
             played[k] = result
-            if _should_prune(trial, k, result, plan) and len(played) < len(order):
+            if len(plan.goals) > 1 or math.isnan(goal.of(result)):
+                continue
+            if k not in reported:
+                trial.report(goal.of(result), k)
+            estimate = _estimate_if_losing(study, played)
+            if estimate is not None and len(played) < len(order) and trial.number > 0:
                 trial.set_user_attr(PRUNED, len(played))
-                return [_estimate(study.optuna.best_trial, plan.goals[0], played)]
+                return [estimate]
+    if trial.number == 0:
+        trial.set_user_attr(LEFT_OUT, [played[k].left_out for k in sorted(played)])
     values = [goal.mean([played[k] for k in sorted(played)]) for goal in plan.goals]
     unknown = [goal.key for goal, value in zip(plan.goals, values, strict=True) if value != value]
     if unknown:
@@ -394,17 +325,15 @@ def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -
     return values
 
 
-def _should_prune(trial: optuna.Trial, scene: int, episode: Episode, plan: SearchPlan) -> bool:
-    value = plan.goals[0].of(episode)
-    if len(plan.goals) > 1 or value != value:
-        return False
-    trial.report(value, scene)
-    return trial.should_prune()
-
-
-def _estimate(best: optuna.trial.FrozenTrial, goal: Goal, played: dict[int, Episode]) -> float:
-    assert best.value is not None
-    pairs = [(goal.of(e), best.intermediate_values[k]) for k, e in played.items() if k in best.intermediate_values]
-    gain = mean_of_known(goal.gain(theirs, own) for own, theirs in pairs)
-    gain = min(gain, -LEAST_LOSS) if gain == gain else -LEAST_LOSS
-    return best.value + gain if goal.higher else best.value - gain
+def _estimate_if_losing(study: SearchStudy, played: dict[int, Episode]) -> float | None:
+    """Returns an estimate of the value of a trial that surely loses to the best one by these scenes, else None."""
+    goal = study.plan.goals[0]
+    if not any(t.state == TrialState.COMPLETE for t in study.trials()):
+        return None
+    best = study.optuna.best_trial
+    both = [(best.intermediate_values[k], goal.of(e)) for k, e in played.items() if k in best.intermediate_values]
+    gains = [goal.gain(theirs, own) for theirs, own in both if own == own]
+    if best.value is None or not surely_loses(gains, study.plan.options.prune):
+        return None
+    loss = max(-mean_of_known(gains), LEAST_LOSS)
+    return best.value - loss if goal.higher else best.value + loss

@@ -25,6 +25,8 @@ class TunedTracker:
     name: str
     needs: tuple[str, ...]
     code: str = ""  # hash of the file that defines the tracker, "" if there is none
+    objective: str = "objective"  # key of the score that it is tuned for by default
+    detections: DetectionMode = "file"  # its input by default
     # in a process of its own, with a limit of time for each step; never for a class and the rule
     limited: TimeLimited | None = None
 
@@ -45,34 +47,20 @@ class TunedTracker:
         if self.limited is not None:
             self.limited.close()
 
-    @property
-    def objective(self) -> str:
-        """Key of the score that it is tuned for by default."""
-        return "pairwise_F1" if self.name == RULE else "objective"
-
-    @property
-    def detections(self) -> DetectionMode:
-        """The tracker's input by default."""
-        if self.name == RULE:
-            return "truth"
-        return "file" if {"boxes", "points"} & {*self.needs} else "image"
-
     def check_input(self, source: Source, detections: DetectionMode, similarity: Similarity | None) -> None:
         """Raises InputError if the tracker cannot work on this source with these detections and this similarity."""
         from tracking.running.detection_mode import choose_mode
 
-        known = get_args(Similarity)
-        if similarity not in (None, *known):
-            expected = ", ".join(known)
-            raise InputError(place="--similarity", got=similarity, expected=expected, remedy="correct it")
-        if self.name == RULE:
+        rule = self.name == RULE
+        known: tuple[object, ...] = (None,) if rule else (None, *get_args(Similarity))
+        if rule and detections != "truth":
             remedy = "remove the option: the rule is tuned on people whose identity is known"
-            if detections != "truth":
-                raise InputError(place="--detections", got=detections, expected="truth", remedy=remedy)
-            if similarity is not None:
-                raise InputError(place="--similarity", got=similarity, expected="none", remedy=remedy)
-            return
-        choose_mode(self.needs, source.open(streams_for(self.tracker, detections)), detections)
+            raise InputError(place="--detections", got=detections, expected="truth", remedy=remedy)
+        if similarity not in known:
+            expected = ", ".join(map(str, known))
+            raise InputError(place="--similarity", got=similarity, expected=expected, remedy="correct or remove it")
+        if not rule:
+            choose_mode(self.needs, source.open(streams_for(self.tracker, detections)), detections)
 
     def play(
         self,
@@ -100,9 +88,10 @@ def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = Non
         if step_timeout is not None:
             remedy = "leave it out: the rule has no steps"
             raise InputError(place="--step-timeout", got=step_timeout, expected="a tracker", remedy=remedy)
-        return TunedTracker(RULE, RULE, ("points", "boxes"))
+        return TunedTracker(RULE, RULE, ("points", "boxes"), objective="pairwise_F1", detections="truth")
     name = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
     found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, name)
     spec = located(tracker) if isinstance(tracker, str) else tracker  # workers of a cluster run in another folder
     limited = None if step_timeout is None else TimeLimited(cast(str, spec), step_timeout)
-    return TunedTracker(spec, name, tuple(found.needs), code_hash(found), limited)
+    mode: DetectionMode = "file" if {"boxes", "points"} & {*found.needs} else "image"
+    return TunedTracker(spec, name, tuple(found.needs), code_hash(found), detections=mode, limited=limited)

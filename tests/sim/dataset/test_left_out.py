@@ -7,7 +7,8 @@ import pytest
 from scenarios.errors import OrderError, WorkError
 from sim.dataset import generate as sequence_job
 from sim.dataset.generate import generate
-from tracking.tuning.search import PlayedScenes, _unfulfilled
+from tests.tuning_toys import toy_plan
+from tracking.tuning.search import HeldOutEvaluator
 
 store = sequence_job.simulate_and_store
 
@@ -39,24 +40,13 @@ def test_more_than_five_per_cent_are_a_failure(tmp_path, monkeypatch, simulate):
         generate(["cross"], range(1), tmp_path / "one", streams=())
 
 
-def test_a_search_counts_its_scenes():
-    class Scene:
-        def __init__(self, seed):
-            self.name, self.seed, self.key = "cross", seed, seed
-
-        def open(self):
-            if self.seed == 7:
-                raise OrderError(place="event m1", got="no merge", expected="one", remedy="mend it")
-            return self
-
-        truth = None
-
-    scenes = PlayedScenes(lambda *_: iter(()))
-    for seed in range(20):
-        scenes.record(one := Scene(seed), _unfulfilled(one))
+def test_a_search_counts_its_scenes(tmp_path):
+    plan = toy_plan(tmp_path, seeds=range(20))
+    scenes = HeldOutEvaluator(plan, None, None)
+    scenes.count(plan.training, ["", "no merge", *[""] * 18])
     scenes.require_most()
-    assert [line.split(":")[0] for line in scenes.left_out.values()] == ["cross seed 7"]
-    few = PlayedScenes(lambda *_: iter(()))
-    few.record(Scene(7), _unfulfilled(Scene(7)))
+    assert list(scenes.left_out.values()) == ["one seed 1: no merge"]
+    few = HeldOutEvaluator(plan, None, None)
+    few.count(plan.training[:1], ["no merge"])
     with pytest.raises(WorkError, match="1 of 1 scenes"):
         few.require_most()

@@ -113,7 +113,7 @@ OPTIONS = {
     "score {made}/data {made}/scene.toml": "{made}/scene.toml: got a .toml file, no … made by `flockscope track`",
     "score {made}/data {made}/people.ndjson": "people.ndjson: got a .ndjson file, no tracks; … or MOTChallenge text",
     "track blob {walk} --detections image --out {tmp}/x":
-        "with truth, without pictures; expected a sequence with pictures; … try --detections truth",
+        "with truth; expected what both have; try --detections truth",
     "track blob {made}/data --camera {made}/scene.toml --out {tmp}/x":
         "{made}/scene.toml: --camera: got a TOML file; expected a camera.json … describes a view",
     "generate crossing --seeds 0": "flockscope generate: got missing option '--out'; … generate --help",

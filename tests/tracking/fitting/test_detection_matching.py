@@ -20,7 +20,6 @@ from tests.hand_made import with_rows
 from tests.recordings import mot_folder
 from tracking.fitting import detection_matching as matching
 from tracking.fitting.error_correlation import (
-    Correlations,
     bivariate_normal_cdf,
     correlations,
     fit_memory,
@@ -153,16 +152,16 @@ def test_correlations_of_errors_and_of_what_is_behind_misses() -> None:
     truth = people(240)
     z = drawn(truth, PARTS)
     seen = correlations(truth, z, np.ones(len(z), bool))
-    assert seen.lag[0] == pytest.approx(0.1)
-    assert seen.rho == pytest.approx(wanted(seen.lag), abs=0.08)
+    assert seen[0, 0] == pytest.approx(0.1)
+    assert seen[:, 1] == pytest.approx(wanted(seen[:, 0]), abs=0.08)
     p_miss = np.where(truth.id % 2 == 0, 0.15, 0.4)  # the chance differs from person to person, the memory does not
     behind = miss_correlations(truth, ndtr(z[:, 0]) < p_miss, p_miss)
-    assert behind.rho == pytest.approx(wanted(behind.lag), abs=0.12)
+    assert behind[:, 1] == pytest.approx(wanted(behind[:, 0]), abs=0.12)
 
 
 def test_exponentials_come_back() -> None:
     lag = np.geomspace(0.1, 10.0, 14)
-    found = fit_memory([Correlations(lag, wanted(lag), np.full(14, 1000.0))])
+    found = fit_memory([np.column_stack([lag, wanted(lag), np.full(14, 1000.0)])])
     at = np.array([0.1, 0.5, 2.0, 8.0])
     assert sum(m.share * np.exp(-at / m.time) for m in found) == pytest.approx(wanted(at), abs=0.01)
     assert sum(m.share for m in found) <= 1.0

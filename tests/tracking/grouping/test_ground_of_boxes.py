@@ -8,8 +8,8 @@ import pytest
 from sim.scene.body import person_boxes
 from sim.scene.camera import camera_rotation
 from sim.types import Camera, Tracks
-from tracking.grouping.foot_points import as_measured
-from tracking.grouping.ground_of_boxes import ground_of_boxes
+from tracking.grouping.foot_points import as_measured, ground_below
+from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 
 
 @pytest.mark.parametrize(("tilt", "height", "known"), [(15, 6, True), (40, 8, True), (85, 20, False), (3, 1.8, False)])
@@ -20,8 +20,11 @@ def test_ground_is_that_of_the_camera_or_unknown(tilt: float, height: float, kno
     feet = np.column_stack([r.uniform(-3, 3, 400), away * r.uniform(0.7, 1.6, 400), np.zeros(400)])
     box = person_boxes(camera, feet, np.zeros(400), r.normal(1.7, 0.08, 400))
     one = (np.arange(400), np.full(400, -1), box[:, :2], box[:, :2], np.zeros((400, 4, 4)), box)
-    found = ground_of_boxes([Tracks(1, 0.0, "image", "person", *one)], np.median(box[:, 3]) / 1.7).camera
-    assert (found is not None) == known
+    tracks, px_per_m = Tracks(1, 0.0, "image", "person", *one), np.median(box[:, 3]) / 1.7
+    ground = ground_below([tracks], None, px_per_m, pixels=False)
+    found = ground.camera
+    assert (ground.source, found is not None) == ("boxes" if known else None, known)
+    assert ground_below([tracks.replace(group=one[0])], None, px_per_m, pixels=False) == Ground(), "it names groups"
     if found is not None:
         assert [found.position[2] / height, *found.rotation[2]] == pytest.approx([1, *view[2]], abs=0.15)
         far = as_measured(np.array([[0.0, 1000.0], [0.0, 1001.0]]), camera)

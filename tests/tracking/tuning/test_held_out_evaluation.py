@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import optuna
 import pytest
 
 from scenarios.errors import WorkError
@@ -66,7 +67,9 @@ def test_what_brings_nothing_is_taken_back(made):
     """`skip` costs, `colour` brings nothing, `reach` brings all."""
     game = Game({("reach", 1.0): 0.5, ("skip", 3): -0.1})
     winner = ToyConfig(reach=1.0, skip=3, colour="green")
-    kept, value = HeldOutEvaluator(made, game).simplified(winner, 0.4 + 0.01, ["colour", "skip", "reach", "forbidden"])
+    kept, value = HeldOutEvaluator(made, game, optuna.create_study()).simplified(
+        winner, 0.4 + 0.01, ["colour", "skip", "reach", "forbidden"]
+    )
     assert kept == ToyConfig(reach=1.0)
     assert value == pytest.approx(0.5 + 0.01 * (1 + 2 + 0 + 1) / 4)
     assert len(game.seen) == 3, "what is at its default is not tried"
@@ -75,14 +78,14 @@ def test_what_brings_nothing_is_taken_back(made):
 def test_who_cannot_be_played_on_validation_scenes_is_out(made):
     game = Game({}, refused={"skip": 3})
     candidates = [Candidate(0, ToyConfig(), (0.1,)), Candidate(4, ToyConfig(skip=3), (0.9,))]
-    assert [c.trial for c in HeldOutEvaluator(made, game).validated(candidates)] == [0]
+    assert [c.trial for c in HeldOutEvaluator(made, game, optuna.create_study()).validated(candidates)] == [0]
     with pytest.raises(WorkError):
-        HeldOutEvaluator(made, game).validated(candidates[::-1])
+        HeldOutEvaluator(made, game, optuna.create_study()).validated(candidates[::-1])
 
 
 def test_a_winner_that_fails_on_test_scenes_is_told(made):
     game = Game({}, refused={"skip": 3})
-    found, notes = HeldOutEvaluator(made, game).compared(ToyConfig(skip=3))
+    found, notes = HeldOutEvaluator(made, game, optuna.create_study()).compared(ToyConfig(skip=3))
     assert found == []
     assert [note.partition(":")[0] for note in notes] == ["one.toml", "two.toml"]
 

@@ -103,7 +103,7 @@ def test_a_lock_lives_as_long_as_its_process(tmp_path):
     path = tmp_path / "locks"
     hold = (
         "import sys; from pathlib import Path; from tracking.tuning.study import TrialLocks\n"
-        "locks = TrialLocks(Path(sys.argv[1])); locks.hold_trial(7); print('held', flush=True); sys.stdin.read()"
+        "locks = TrialLocks(Path(sys.argv[1])); locks.lock(7); print('held', flush=True); sys.stdin.read()"
     )
     other = subprocess.Popen(
         [sys.executable, "-c", hold, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
@@ -111,11 +111,11 @@ def test_a_lock_lives_as_long_as_its_process(tmp_path):
     )  # fmt: skip
     assert other.stdout.readline() == "held\n"
     locks = TrialLocks(path)
-    assert not locks.is_abandoned(7)
-    assert locks.is_abandoned(8)
+    assert not locks.lock(7, wait=False)
+    assert locks.lock(8, wait=False)
     other.kill()
     other.communicate()
-    assert locks.is_abandoned(7)
+    assert locks.lock(7, wait=False)
     locks.close()
 
 
