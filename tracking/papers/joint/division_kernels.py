@@ -157,7 +157,7 @@ def place_newcomers(points: Array, label: Ints, uniforms: Array, sharpness: floa
                 total[head, 0], total[head, 1], size[head] = total[g, 0], total[g, 1], size[g]
                 size[max(person, g)] = 0.0
                 for k in range(n):
-                    if k == person or k == g or groups[k] == g + 1:
+                    if k in (person, g) or groups[k] == g + 1:
                         groups[k] = 1 + head
 
 
