@@ -35,8 +35,7 @@ class ParticleSet:
     one weight all columns are equal. pos (P, K, 2): m. vel (P, K, 2): m/s. exist (P, K): probability that the person
     exists, given the particle's path (ours: it is computed, not drawn). pairs (N, 2): people i < j whose relation is
     kept, in order of j, then i; all others do not walk together. related (N, P) bool: in which particles a pair walks
-    together. ancestor (P, K): the particle from which each slot's state descends, since `ancestor` was last set to
-    the particles' own numbers.
+    together.
     """
 
     count: int
@@ -47,15 +46,13 @@ class ParticleSet:
     exist: Array
     pairs: Ints
     related: Bools
-    ancestor: Ints
 
     @classmethod
     def empty(cls, count: int) -> ParticleSet:
         """Returns `count` particles without people."""
         flat, two = np.zeros((count, 0)), np.zeros((count, 0, 2))
-        none = np.zeros((count, 0), np.int64)
         pairs, related = np.zeros((0, 2), np.int64), np.zeros((0, count), bool)
-        return cls(count, False, flat, two, two.copy(), flat.copy(), pairs, related, none)
+        return cls(count, False, flat, two, two.copy(), flat.copy(), pairs, related)
 
     @property
     def people(self) -> int:
@@ -108,11 +105,11 @@ class ParticleSet:
             weights = np.ascontiguousarray(self.weights[:, person])  # of one column numpy sums in another order
             chosen[:, column] = residual_resample(weights, uniforms[column])
         if self.one_weight:
-            for values in (self.pos, self.vel, self.exist, self.ancestor):
+            for values in (self.pos, self.vel, self.exist):
                 values[:] = values[chosen[:, 0]]
             self.related = np.ascontiguousarray(self.related[:, chosen[:, 0]])
         else:
-            for values in (self.pos, self.vel, self.exist, self.ancestor):
+            for values in (self.pos, self.vel, self.exist):
                 values[:, few] = values[chosen, few]
             # a relation is drawn with each person alone: particles of both are independent then
             for person, own in zip(few.tolist(), chosen.T, strict=True):
@@ -141,7 +138,6 @@ class ParticleSet:
         self.pos, self.vel = np.compress(slots, self.pos, 1), np.compress(slots, self.vel, 1)
         rows, number = slots[self.pairs].all(axis=1), np.cumsum(slots) - 1
         self.pairs, self.related = number[self.pairs[rows]], self.related[rows]
-        self.ancestor = np.compress(slots, self.ancestor, 1)
 
     def add(self, pos: Array, vel: Array, exist: float) -> None:
         """Add M slots with places pos (P, M, 2) and velocities vel (P, M, 2), the same existence in each particle, and
@@ -152,8 +148,6 @@ class ParticleSet:
         self.pos = np.concatenate([self.pos, np.ascontiguousarray(pos)], axis=1)
         self.vel = np.concatenate([self.vel, np.ascontiguousarray(vel)], axis=1)
         self.exist = np.concatenate([self.exist, np.full((count, new), exist)], axis=1)
-        own = np.repeat(np.arange(count)[:, None], new, axis=1)
-        self.ancestor = np.concatenate([self.ancestor, own], axis=1)
 
     def hold(self, pairs: Ints) -> None:
         """Keep relations of further pairs i < j (N', 2), in any order; others do not walk together."""
@@ -208,18 +202,16 @@ def join(
     velocities (ours). Where these sum to less than 1, the person is alone with what is missing. People whose belonging
     is below FAR in all particles are left out, so that the cost of a person is that of the neighbours.
     """
-    particles, n = label.shape
+    old = label.shape[1] - len(points)
     low, high = pos.min(axis=0), pos.max(axis=0)
     apart = np.maximum(np.maximum(low - points[:, None], points[:, None] - high), 0.0)
-    near = belonging(np.sqrt(np.square(apart).sum(axis=2)), 0.0, rules) >= FAR
-    near &= np.arange(n) < np.arange(n - len(points), n)[:, None]
-    some, ends = np.nonzero(near)[1], near.sum(axis=1).cumsum()
-    found = transition_kernels.join(pos, exist, label, points, some, ends, share, uniforms, rules)
-    new, other, particle = found.reshape(-1, 3).T
-    kept, row = np.zeros(near.shape, bool), np.empty(near.shape, np.int64)
-    kept[new, other] = True
-    new_one, old_one = np.nonzero(kept)
-    row[kept] = np.arange(len(new_one))
-    related = np.zeros((len(new_one), particles), bool)
-    related[row[new, other], particle] = True
-    return np.stack([old_one, new_one + n - len(points)], axis=1), related
+    close = belonging(np.sqrt(np.square(apart).sum(axis=2)), 0.0, rules) >= FAR
+    pairs, relations = [np.zeros((0, 2), np.int64)], [np.zeros((0, len(pos)), bool)]
+    for m, point in enumerate(points):
+        new, related = old + m, np.zeros((old + m, len(pos)), bool)
+        near = np.flatnonzero(close[m, :new])
+        transition_kernels.join(pos, exist, label, point, near, new, share, uniforms[m], rules, related)
+        others = np.flatnonzero(related.any(axis=1))
+        pairs.append(np.column_stack([others, np.full(len(others), new)]))
+        relations.append(related[others])
+    return np.concatenate(pairs), np.concatenate(relations)
