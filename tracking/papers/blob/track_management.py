@@ -19,7 +19,7 @@ second, nominal covariance, which is updated with the nominal R (variance of a m
 
 from __future__ import annotations
 
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
@@ -44,18 +44,11 @@ LEAST_VIEW = 5.0  # m: least width and height of the field of view
 DOUBLES = 0.05  # boxes per frame that a person has beside the own one, on average
 DOUBLE_SPREAD = 0.3  # m: standard deviation of centre, height and width of such a box
 
-SCALE, RHO, BORN, SCORE = range(4)  # Rows of `numbers`, followed by the states of existence.
-STATES = slice(4, 7)
-CONFIRMED, MEASURED = range(2)  # Rows of `flags`.
-# Attributes that are views of the rows of `numbers` and `flags`.
-VIEWS = ("scale", "rho", "born", "score", "states", "confirmed", "measured")
-
 
 class TrackedPeople:
-    """The table of N tracks of `blob`: their filters, ages and flags. Tracks are columns of the stacked arrays.
+    """The table of N tracks of `blob`: their filters, ages and flags.
 
-    Made from config, its nominal filter at the frame rate, and context. State; `numbers` (7, N) and `flags` (2, N)
-    stack the named rows, so that few arrays change their length:
+    Made from config, its nominal filter at the frame rate, and context. State:
         bank (5, N, 4)      Kalman filters of x, y, h, w (tracking.filters.kalman); places px, covariances m^2
         id (N,)             never used again; next_id: that of the next track, from 1
         scale (N,)          px per m
@@ -73,13 +66,19 @@ class TrackedPeople:
     what `follow` derives.
     """
 
+    # Axis of the tracks in each column of the table.
+    columns: ClassVar[dict[str, int]] = {
+        "bank": 1, "id": 0, "scale": 0, "rho": 0, "born": 0, "score": 0, "states": 1, "confirmed": 0, "measured": 0
+    }  # fmt: skip
+
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
         self.context, self.px_per_m = context, context.px_per_m
         self.top = context.camera is not None and context.camera.kind == "top"
         self.view_low, self.view_high = np.full(2, np.inf), np.full(2, -np.inf)
         self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
-        self.detectable, self.unseen_time = np.zeros(0), existence.LIFETIME
-        self._bind(np.zeros((7, 0)), np.zeros((2, 0), bool))
+        self.scale, self.rho, self.born, self.score, self.detectable = np.zeros((5, 0))
+        self.confirmed, self.measured = np.zeros((2, 0), bool)
+        self.states, self.unseen_time = np.zeros((3, 0)), existence.LIFETIME
         self.follow(config, dynamics)
 
     def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
@@ -94,19 +93,6 @@ class TrackedPeople:
         self.tentative_limit = max(config.tentative_time, confirmation)
         frames = int(np.ceil(config.coast_time * self.context.fps - 1e-6))
         self.death_rho = track_uncertainty.after_misses(dynamics, frames - 1)
-
-    def __getstate__(self) -> dict[str, Any]:
-        # A copy of a view has memory of its own: the rows are bound anew in the copy.
-        return {name: value for name, value in self.__dict__.items() if name not in VIEWS}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._bind(self.numbers, self.flags)
-
-    def _bind(self, numbers: Array, flags: Bools) -> None:
-        self.numbers, self.flags, self.states = numbers, flags, numbers[STATES]
-        self.scale, self.rho, self.born, self.score = numbers[: STATES.start]
-        self.confirmed, self.measured = flags
 
     def predict(self) -> None:
         """Predict all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence; a
@@ -246,8 +232,8 @@ class TrackedPeople:
 
     def keep_only(self, rows: Ints) -> None:
         """Delete all tracks except those at table positions `rows` (K,); they are in the order of `rows` afterwards."""
-        self.bank, self.id = self.bank.take(rows, 1), self.id.take(rows)
-        self._bind(self.numbers.take(rows, 1), self.flags.take(rows, 1))
+        for name, axis in self.columns.items():
+            setattr(self, name, getattr(self, name).take(rows, axis))
 
     def _outside(self, place: Array) -> Bools:
         if self.context.image_size is None:
@@ -260,14 +246,17 @@ class TrackedPeople:
         n = len(z)
         if not n:
             return
-        numbers, flags = np.zeros((7, n)), np.zeros((2, n), bool)
-        numbers[SCALE], numbers[RHO], numbers[BORN] = self._scale_of(z), self.birth_rho, t
-        numbers[SCORE], numbers[STATES] = score, existence.newborn(person)
-        flags[CONFIRMED], flags[MEASURED] = self.by_existence & (person >= LIKELY), True
-        self.id = np.concatenate([self.id, np.arange(self.next_id, self.next_id + n)])
+        self._append(
+            bank=kalman.born(z[:, :4], self.noise, self.dynamics.birth_rate_var),
+            id=np.arange(self.next_id, self.next_id + n), scale=self._scale_of(z), rho=np.full(n, self.birth_rho),
+            born=np.full(n, t), score=score, states=existence.newborn(person),
+            confirmed=self.by_existence & (person >= LIKELY), measured=np.ones(n, bool),
+        )  # fmt: skip
         self.next_id += n
-        self._bind(np.concatenate([self.numbers, numbers], 1), np.concatenate([self.flags, flags], 1))
-        self.bank = np.concatenate([self.bank, kalman.born(z, self.noise, self.dynamics.birth_rate_var)], 1)
+
+    def _append(self, **new: Array | Ints | Bools) -> None:
+        for name, values in new.items():
+            setattr(self, name, np.concatenate([getattr(self, name), values], self.columns[name]))
 
     def rows_to_report(self) -> Ints:
         """Returns the table positions (K,), ascending, of the tracks to report (ours)."""
@@ -306,6 +295,8 @@ class TrackedEllipses(TrackedPeople):
     direction's variance in a frame. In `bank` the coordinates are x, y, h, w: centre and full axes of the ellipse.
     """
 
+    columns: ClassVar[dict[str, int]] = {**TrackedPeople.columns, "angle": 1, "nominal": 1, "look": 0}
+
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
         self.angle, self.nominal, self.look = np.zeros((2, 0)), np.zeros((5, 0, 4)), person_look_kernels.unknown(0)
         super().__init__(config, dynamics, context)
@@ -333,19 +324,13 @@ class TrackedEllipses(TrackedPeople):
         """Returns the bounding boxes (N, 4) of the tracks' ellipses: centre x, y, height, width, px."""
         return upright(self.bank[kalman.PLACE], self.angle[kalman.DIRECTION])
 
-    def keep_only(self, rows: Ints) -> None:
-        """Delete all tracks except those at table positions `rows` (K,); they are in the order of `rows` afterwards."""
-        self.angle, self.nominal = self.angle.take(rows, 1), self.nominal.take(rows, 1)
-        self.look = self.look.take(rows, 0)
-        super().keep_only(rows)
-
     def start_tracks(self, z: Array, score: Array, t: float, person: Array) -> None:
         """Append a track at rest for each ellipse z (K, 5): centre x, y, full axes h, w (px), direction theta (rad)."""
-        super().start_tracks(z[:, :4], score, t, person)
-        new = np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)])
-        self.angle = np.concatenate([self.angle, new], 1)
-        self.look = np.concatenate([self.look, person_look_kernels.unknown(len(z))])
-        self.nominal = np.concatenate([self.nominal, self.bank[:, self.bank.shape[1] - len(z) :]], 1)
+        super().start_tracks(z, score, t, person)
+        self._append(
+            angle=np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)]), look=person_look_kernels.unknown(len(z)),
+            nominal=self.bank[:, self.bank.shape[1] - len(z) :],
+        )  # fmt: skip
 
     def direction_distances(self, z: Array, angle_var: Array) -> Array:
         """Returns the direction's part y^2 / S of the squared distance d^2 (eq. 9) of N tracks and M ellipses, (N,
