@@ -114,7 +114,7 @@ def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
 def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints, *, others: bool = True) -> Array:
     """Returns the `QUANTITIES` (R, 10) of all pairs of rows i, j (R,) within 4 m in their steps.
 
-    pos, vel (N, 2): m, m/s, by person and step. others: False: `OTHERS` are nan, as only beliefs about events need them.
+    pos, vel (N, 2): m, m/s, by person and step. others: False: `OTHERS`, which only beliefs about events need, are nan.
     """
     apart, change, mean = pos[j] - pos[i], vel[j] - vel[i], (vel[i] + vel[j]) / 2
     distance, differ, pace = (np.hypot(*x.T) for x in (apart, change, mean))
