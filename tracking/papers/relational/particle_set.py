@@ -76,6 +76,18 @@ class ParticleSet:
         particle_set_kernels.group_labels(self.pairs, self.related, label)
         return label
 
+    def together(self) -> Array:
+        """Returns the probability (K, K) that two people walk together, given that both exist; 1 on the diagonal, 0 for
+        a pair that does not exist."""
+        i, j = self.pairs.T
+        both = (
+            self.weights[:, j] * self.exist[:, i] * self.exist[:, j] * (1.0 if self.one_weight else self.weights[:, i])
+        )
+        total, out = both.sum(axis=0), np.eye(self.people)
+        share = np.divide((both * self.related.T).sum(axis=0), total, out=np.zeros(len(i)), where=total > 0)
+        out[i, j] = out[j, i] = share
+        return out
+
     def share_weights(self, one_weight: bool) -> None:
         """Give each particle one weight, the product of the people's, or each person weights of the own."""
         if one_weight and not self.one_weight and self.people:
@@ -134,8 +146,8 @@ class ParticleSet:
     def keep(self, slots: Bools) -> None:
         """Remove all slots but those where `slots` (K,) is True."""
         # np.compress keeps arrays C-contiguous: kernels are compiled once more for another layout
-        self.weights, self.exist = np.compress(slots, self.weights, 1), np.compress(slots, self.exist, 1)
-        self.pos, self.vel = np.compress(slots, self.pos, 1), np.compress(slots, self.vel, 1)
+        for name in ("weights", "exist", "pos", "vel"):
+            setattr(self, name, np.compress(slots, getattr(self, name), 1))
         rows, number = slots[self.pairs].all(axis=1), np.cumsum(slots) - 1
         self.pairs, self.related = number[self.pairs[rows]], self.related[rows]
 
@@ -144,10 +156,14 @@ class ParticleSet:
         no relations; their weights are equal, or the particles' one weight."""
         count, k, new = self.count, self.people, pos.shape[1]
         weights = self.weights[:, :1] if self.one_weight and k else np.full((count, 1), 1 / count)
-        self.weights = np.concatenate([self.weights, np.repeat(weights, new, axis=1)], axis=1)
-        self.pos = np.concatenate([self.pos, np.ascontiguousarray(pos)], axis=1)
-        self.vel = np.concatenate([self.vel, np.ascontiguousarray(vel)], axis=1)
-        self.exist = np.concatenate([self.exist, np.full((count, new), exist)], axis=1)
+        added = {
+            "weights": np.repeat(weights, new, axis=1),
+            "pos": pos,
+            "vel": vel,
+            "exist": np.full((count, new), exist),
+        }
+        for name, values in added.items():
+            setattr(self, name, np.concatenate([getattr(self, name), np.ascontiguousarray(values)], axis=1))
 
     def hold(self, pairs: Ints) -> None:
         """Keep relations of further pairs i < j (N', 2), in any order; others do not walk together."""

@@ -338,7 +338,7 @@ class Relational(Particle):
     def _report(self, frame: Frame) -> Tracks:
         tracks, p = super()._report(frame), self.particles
         if self.belief is None:
-            self.together = particle_set_kernels.pairs_together(p.pairs, p.related, p.exist, p.weights, p.one_weight)
+            self.together = p.together()
         else:
             self.together = 1 / (1 + np.exp(-_log_odds(self.belief)))
             np.fill_diagonal(self.together, 1.0)
