@@ -101,7 +101,7 @@ def inliers(value: Floats, m: Array, sd: Array, inlier: Bools) -> tuple[bool, in
     """Compute one pixel's mean E, standard deviation sigma and inlier frames in turn until they settle; all in place.
 
     value (K, 3): the pixel's grey levels at gain 1 in K frames. m, sd (3,): E and sigma of each channel; they hold
-    first guesses on entry. inlier (K,) bool: overwritten; True for a frame whose channels lie within INLIER sigmas of E.
+    first guesses on entry. inlier (K,) bool: overwritten; True for a frame whose channels lie within INLIER sigmas.
 
     Returns whether all frames of the pixel are clean, and the number of inliers. E stays at 1 or above, sigma at the
     least sigma or above, also if no frame is an inlier.
