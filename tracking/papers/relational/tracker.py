@@ -207,10 +207,10 @@ class Particle(PointTracker):
         points, sizes = self.points(detections)
         missed = self.slots.missed > 0
         sight = sensor.Sight(self._detection_probability(), missed, self.cut, self.eye)
-        said = sensor.weigh(self.particles, points, sight, self.noise, self.config)
-        self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
+        pairs, measured, nobody = sensor.weigh(self.particles, points, sight, self.noise, self.config)
+        self.slots.measure(measured, pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
-        new = said.nobody >= BIRTH_DOUBT
+        new = nobody >= BIRTH_DOUBT
         if new.any():
             self._start(points[new], sizes[new])
 
