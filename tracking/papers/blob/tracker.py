@@ -35,8 +35,8 @@ switches it off, one holds in the preset `paper`, too.
 - deletion: also missed tracks outside the image. Paper: ρ. Why: they do not come back.
 - ρ of deletion, with "rho": tentative tracks at its value at birth or at `tentative_time`, confirmed ones 2 % early.
   Paper: one value. Why: false alarms end early.
-- several boxes of one track, with "rho": the nearest counts. Paper: all are assigned (frame 367), not how. Why: a
-  filter takes one.
+- several boxes or blobs of one track, with "rho": the nearest counts. Paper: all are assigned (frame 367), not how.
+  Why: a filter takes one.
 - `management`: by an existence probability (existence). Paper: ρ. Why: rates hold at any frame rate and detector.
 - association: one to one, most likely, against false and new boxes. Paper: nearest gated track. Why: a wide gate must
   not win.
@@ -72,8 +72,6 @@ Departures from pixels only:
   all gates. Why: people enter as one blob.
 - sizes (`split`): return to those of a person at that place. Paper: free. Why: templates measure none.
 - ρ: of a nominal covariance without θ. Paper: of the filter. Why: noise must not count.
-- pieces, without `split`: the ellipse of all pixels of the blobs centred in the predicted box, if in the gate, nearer
-  than the own blob, and of a person's size. Paper: all are assigned (frame 367), not how. Why: a filter takes one.
 - report from pixels: boxes, by the usual ratio to ellipses. Paper: ellipses. Why: scores need boxes.
 - too much foreground (`background`): prediction and deletion only. Paper: none. Why: light has changed.
 - background: adapts where no confirmed track is, ghosts anywhere (`background`). Paper: trained once. Why: light
