@@ -211,4 +211,4 @@ def sphere_groups(pos: Array, radius: float, least: int) -> Ints:
     i, j = cKDTree(pos).query_pairs(2 * radius, output_type="ndarray").T
     label = connected_components(coo_array((np.ones(len(i)), (i, j)), (M, M)), directed=False)[1]
     large = np.bincount(label) >= least  # labels are in the order of first points
-    return np.where(large, np.cumsum(large) - 1, -1)[label]
+    return np.asarray(np.where(large, np.cumsum(large) - 1, -1)[label])
