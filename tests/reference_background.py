@@ -24,13 +24,13 @@ def spread(values):
     for place in np.ndindex(*size):
         colours = values[:, *place]
         first = guess(colours, held)
-        valid[place] = first[1].max() <= background_training.WIDEST
+        valid[place] = first[1].max() <= background_training_kernels.WIDEST
         mean[place], sigma[place], inlier[:, *place] = settle(colours, *first)
         others = colours[~inlier[:, *place]]
         if len(others) < fewest:
             continue
         other = guess(others, max(fewest, held * len(others) // frames))
-        if other[1].max() <= background_training.WIDEST:
+        if other[1].max() <= background_training_kernels.WIDEST:
             second[place] = other[0]
             settled = settle(colours, *other)
             if settled[2].sum() > inlier[:, *place].sum():
@@ -41,11 +41,11 @@ def spread(values):
 
 def settle(colours, mean, sigma):
     """Mean and sigma of the inliers of one pixel's colours (K, 3), and the inliers (K,)."""
-    for _ in range(background_training.ROUNDS):
-        inlier = np.all(np.abs(colours - mean) <= background_training.INLIER * sigma, axis=-1)
+    for _ in range(background_training_kernels.ROUNDS):
+        inlier = np.all(np.abs(colours - mean) <= background_training_kernels.INLIER * sigma, axis=-1)
         if inlier.any():
             mean, sigma = colours[inlier].mean(0), colours[inlier].std(0)
-        mean, sigma = np.maximum(mean, 1.0), np.maximum(sigma, background_training.FLOOR)
+        mean, sigma = np.maximum(mean, 1.0), np.maximum(sigma, background_training_kernels.FLOOR)
     return mean, sigma, inlier
 
 
@@ -59,8 +59,8 @@ def guess(colours, held):
         mean[k], length, _ = shortest(cluster[:, k], (len(cluster) + 1) // 2)
         sigma[k] = length / 2 * background_training_kernels.HALF_AS_SIGMA
     mean[main], length, _ = middle, *shortest(colours[:, main], held)[1:]
-    sigma[main] = length / 2 * background_training.AS_SIGMA
-    return mean, np.maximum(sigma, background_training.FLOOR)
+    sigma[main] = length / 2 * background_training_kernels.AS_SIGMA
+    return mean, np.maximum(sigma, background_training_kernels.FLOOR)
 
 
 def shortest(values, held):
@@ -76,7 +76,7 @@ def normalisers(values, mean, sigma, inlier):
     length = np.sqrt(np.sum(np.square(mean / sigma), axis=-1))
     n = np.maximum(inlier.sum(axis=0), 1)
     s, b = (np.sqrt(np.sum(np.square(q), axis=0, where=inlier) / n) for q in ((alpha - 1) * length, cd))
-    least = background_training.FLOOR / sigma.mean(axis=-1)
+    least = background_training_kernels.FLOOR / sigma.mean(axis=-1)
     return np.maximum(s, least), np.maximum(b, np.sqrt(2) * least)
 
 
@@ -98,7 +98,7 @@ def adapt(image, classes, protected, mean, var, gain, rows, fast, slow):
     moves = ~protected[..., None] & rows[:, None, None] & ~((image == 255) & (gain * mean >= 255))
     seen = (classes == 0)[..., None]
     away = image / gain - mean
-    spread = np.maximum(var + fast * (np.square(away * gain) - var), background_training.FLOOR**2)
+    spread = np.maximum(var + fast * (np.square(away * gain) - var), background_training_kernels.FLOOR**2)
     moved = np.maximum(mean + np.where(seen, fast, slow) * away, 1.0)
     return np.where(moves, moved, mean), np.where(moves & seen, spread, var)
 

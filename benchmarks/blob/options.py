@@ -35,7 +35,6 @@ CHANGES: dict[str, dict[str, object]] = {
     "managed by ρ": {"management": "rho"},
     "`hidden_time` 1 s": {"hidden_time": 1.0},
     "`detect_prob` 0.7": {"detect_prob": 0.7},
-    "`birth_rate` 2 /s": {"birth_rate": 2.0},
     "`clutter_rate` 2 /frame": {"clutter_rate": 2.0},
 }
 PARTS: dict[str, Replacement] = {
@@ -43,8 +42,6 @@ PARTS: dict[str, Replacement] = {
     "no spells without detection": (existence, "SHOWN_TIME", 1e9),
     "false boxes last 0.15 s": (existence, "CLUTTER_TIME", 0.15),
     "nobody hides anybody": (TrackedPeople, "visible_shares", lambda people: np.ones(len(people.id))),
-    "no second boxes": (track_management, "DOUBLES", 0.0),
-    "tracks on one body stay": (track_management, "SAME_BODY", 0.0),
     "sizes change on": (update_from_boxes, "SIZE_RATE_TIME", 1e9),
     "reported while they exist": (track_management, "BODY", 1e9),
 }

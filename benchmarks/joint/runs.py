@@ -22,7 +22,7 @@ Row = dict[str, float]
 SHARES = ("1-FP", "1-FN", "GDSR", "MOTA")
 PX_PER_M = 40.0
 OTHERS = (
-    "event F1", "latency, s (median)", "pairwise F1", "HOTA", "effective share", "of the least person", "ancestors",
+    "event F1", "latency, s (median)", "pairwise F1", "HOTA",
     "frames/s",
 )  # fmt: skip
 
@@ -37,12 +37,11 @@ class Variant:
 
 
 def measured(sequence: Recording, variant: Variant, seeds: Iterable[int], settings: Sequence[str] = ()) -> list[Row]:
-    """Returns the scores of a variant for each filter seed, with frames/s and the tracker's diagnostics."""
+    """Returns the scores of a variant for each filter seed, with frames/s."""
     params, rows = JointConfig.from_dict(dict(variant.params)).with_set(*settings), []
     for seed in seeds:
         run = track("joint", sequence, params=params, detections=variant.detections, seed=seed)
-        own = {k: v for k, v in run.info.get("diagnostics", {}).items() if v is not None}
-        rows.append({**evaluate(sequence.truth, run), **own, "speed": run.info["frames_per_second"]})
+        rows.append({**evaluate(sequence.truth, run), "speed": run.info["frames_per_second"]})
     return rows
 
 
@@ -86,14 +85,13 @@ def pooled(rows: Sequence[Row], end: str) -> list[str]:
 
 
 def others(rows: Sequence[Row]) -> list[str]:
-    """Returns cells of event F1, latency, pairwise F1, HOTA, effective shares, ancestors and frames/s: means."""
+    """Returns cells of event F1, latency, pairwise F1, HOTA and frames/s: means."""
 
     def mean(key: str) -> str:
         values = [row.get(key, np.nan) for row in rows]
         return tables.number(float(np.nanmean(values)) if np.isfinite(values).any() else np.nan)
 
-    keys = ("pairwise_F1", "HOTA", "effective_particles", "effective_particles_of_a_person", "distinct_ancestors")
-    return [mean("event_F1"), median_latency(rows), *(mean(key) for key in keys), mean("speed").partition(".")[0]]
+    return [mean("event_F1"), median_latency(rows), mean("pairwise_F1"), mean("HOTA"), mean("speed").partition(".")[0]]
 
 
 def median_latency(rows: Sequence[Row]) -> str:

@@ -36,7 +36,8 @@ from tracking.detect.background_kernels import HIGHLIGHT as HIGHLIGHT
 from tracking.detect.background_kernels import SHADOW as SHADOW
 from tracking.detect.background_kernels import Floats
 from tracking.detect.background_settings import BRIGHT, FOREGROUND_SLOWER, BackgroundSettings
-from tracking.detect.background_training import FLOOR, check_frame, thresholds, train
+from tracking.detect.background_training import check_frame, thresholds, train
+from tracking.detect.background_training_kernels import FLOOR
 
 INTERLEAVE = 4  # Each frame adapts every fourth row, with the rate of four frames; four frames adapt all rows.
 

@@ -33,6 +33,7 @@ from scenarios.errors import InputError
 from sim.types import Bools, Image, Ints
 from tracking.detect import background_training_kernels as kernels
 from tracking.detect.background_kernels import Floats
+from tracking.detect.background_training_kernels import BINS, SPAN
 
 POINTS = 6000  # About so many pixels, on a regular grid, are used for the estimate.
 # Grey levels between which a pixel is usable: noise dominates below, the camera clips above.
@@ -79,23 +80,12 @@ def frame_gains(sample: Image) -> Floats:
 
 
 LEAST_FRAMES = 10  # Fewest frames of a sample: SHARE of fewer frames are too few values for a standard deviation.
-# Grey levels: least sigma, and least noise from which the normalisers are computed. Compressed frames stay constant and
-# then jump by a level or two. With a lower floor these jumps would be foreground. OpenCV's MOG2 has 2, too.
-FLOOR = 2.0
-INLIER = 3.5  # A frame is an inlier of a pixel if all its channels lie within so many sigmas of E.
 # Share of the frames in which the background must be visible; a thing at rest in so many frames may replace it.
 SHARE = 0.35
 # Least share of the frames that are no inliers, where there is a second colour; people who walk cover a pixel for less.
 SECOND_SHARE = 0.1
-AS_SIGMA = 2.2  # Standard deviation of a Gaussian over half the length of the central interval that holds SHARE of it.
-ROUNDS = 10  # Most rounds of step 1; inliers settle after three or four.
-# Sigmas: a pixel with any frame beyond was covered by something; all its frames are left out of the thresholds.
-CLEAN = 6.0
-WIDEST = 20.0  # Grey levels: a pixel whose first sigma is larger has no background (`valid` is False).
 # Thresholds are taken from the clean pixels if these have at least this share of the values of all inliers.
 FEWEST_CLEAN = 0.05
-# Number of bins of the histograms, which reach from -SPAN to SPAN; values beyond are counted in the end bins.
-BINS, SPAN = 4000, 20.0
 
 
 @dataclass(frozen=True)
@@ -130,9 +120,8 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
     s, b, valid = np.empty(size, np.float32), np.empty(size, np.float32), np.empty(size, bool)
     second, counts = np.empty((*size, 3), np.float32), np.zeros((2, 2, BINS), np.int64)
     held = max(int(np.ceil(SHARE * len(sample))), 3)
-    rules = AS_SIGMA, FLOOR, WIDEST, INLIER, CLEAN, ROUNDS
     fewest = max(int(np.ceil(SECOND_SHARE * len(sample))), 3)
-    kernels.learn(sample, gains, held, fewest, rules, (BINS, SPAN), mean, sigma, s, b, valid, second, counts)
+    kernels.learn(sample, gains, held, fewest, mean, sigma, s, b, valid, second, counts)
     if valid.mean() < 0.5:
         raise InputError(
             place="background",

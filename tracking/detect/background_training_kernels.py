@@ -17,6 +17,23 @@ INLIERS, CLEAN_PIXELS = range(2)
 """First axis of `counts`: all inliers, or all frames of the pixels that nothing covered."""
 BRIGHTNESS, CHROMATICITY = range(2)
 """Second axis of `counts`: the normalised distortions."""
+FLOOR = 2.0
+"""Grey levels: least sigma, and least noise from which the normalisers are computed. Compressed frames stay constant
+and then jump by a level or two. With a lower floor these jumps would be foreground. OpenCV's MOG2 has 2, too."""
+INLIER = 3.5
+"""A frame is an inlier of a pixel if all its channels lie within so many sigmas of E."""
+AS_SIGMA = 2.2
+"""Standard deviation of a Gaussian over half the length of the central interval that holds SHARE of it."""
+HALF_AS_SIGMA = 1.48
+"""Standard deviation of a Gaussian over half the length of the central interval that holds half of it."""
+ROUNDS = 10
+"""Most rounds of step 1; inliers settle after three or four."""
+CLEAN = 6.0
+"""Sigmas: a pixel with any frame beyond was covered by something; all its frames are left out of the thresholds."""
+WIDEST = 20.0
+"""Grey levels: a pixel whose first sigma is larger has no background (`valid` is False)."""
+BINS, SPAN = 4000, 20.0
+"""Number of bins of the histograms, which reach from -SPAN to SPAN; values beyond are counted in the end bins."""
 
 
 @njit(cache=True)
@@ -45,14 +62,8 @@ def shortest(values: Floats, held: int) -> tuple[int, float]:
     return first, best
 
 
-HALF_AS_SIGMA = 1.48
-"""Standard deviation of a Gaussian over half the length of the central interval that holds half of it."""
-
-
 @njit(cache=True)
-def guess(
-    value: Floats, shown: Bools, held: int, as_sigma: float, least: float, order: Floats, m: Array, sd: Array
-) -> None:
+def guess(value: Floats, shown: Bools, held: int, order: Floats, m: Array, sd: Array) -> None:
     """Writes a first mean and standard deviation of one pixel's colour, m and sd (3,), from the frames `shown` (K,).
 
     Of value (K, 3), the channel in which these frames differ most is taken, and its shortest interval that holds `held`
@@ -70,7 +81,7 @@ def guess(
             main, reach = k, order[n - 1] - order[0]
             first, length = shortest(order[:n], held)
             low, high = order[first], order[first + held - 1]
-            m[k], sd[k] = order[first + held // 2], 0.5 * length * as_sigma
+            m[k], sd[k] = order[first + held // 2], 0.5 * length * AS_SIGMA
     for k in range(3):
         if k != main:
             n = 0
@@ -82,36 +93,31 @@ def guess(
             half = (n + 1) // 2
             first, length = shortest(order[:n], half)
             m[k], sd[k] = order[first + half // 2], 0.5 * length * HALF_AS_SIGMA
-        sd[k] = max(sd[k], least)
+        sd[k] = max(sd[k], FLOOR)
 
 
 @njit(cache=True)
-def inliers(
-    value: Floats, m: Array, sd: Array, inlier: Bools, rules: tuple[float, float, float, int]
-) -> tuple[bool, int]:
+def inliers(value: Floats, m: Array, sd: Array, inlier: Bools) -> tuple[bool, int]:
     """Compute one pixel's mean E, standard deviation sigma and inlier frames in turn until they settle; all in place.
 
     value (K, 3): the pixel's grey levels at gain 1 in K frames. m, sd (3,): E and sigma of each channel; they hold
-    first guesses on entry. inlier (K,) bool: overwritten; True for a frame whose channels all lie within so many sigmas
-    of E. rules: least sigma (grey levels); sigmas within which a frame is an inlier; sigmas within which a frame is
-    clean; most rounds (at least 1).
+    first guesses on entry. inlier (K,) bool: overwritten; True for a frame whose channels lie within INLIER sigmas.
 
     Returns whether all frames of the pixel are clean, and the number of inliers. E stays at 1 or above, sigma at the
     least sigma or above, also if no frame is an inlier.
     """
-    least, inside, untouched, rounds = rules
     clean, n = True, 0
     inlier[:] = False
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         clean, settled = True, True
         n, sums, squares = 0, np.zeros(3), np.zeros(3)
         for t in range(len(value)):
             away = 0.0
             for k in range(3):
                 away = max(away, abs(value[t, k] - m[k]) / sd[k])
-            settled = settled and inlier[t] == (away <= inside)
-            inlier[t] = away <= inside
-            clean = clean and away <= untouched
+            settled = settled and inlier[t] == (away <= INLIER)
+            inlier[t] = away <= INLIER
+            clean = clean and away <= CLEAN
             if inlier[t]:
                 n += 1
                 for k in range(3):
@@ -122,7 +128,7 @@ def inliers(
         for k in range(3):
             shift = sums[k] / many
             m[k] = max(m[k] + shift, 1.0)  # E (eq. 3) and sigma (eq. 4) of the inliers
-            sd[k] = max(np.sqrt(max(squares[k] / many - shift * shift, 0.0)), least)
+            sd[k] = max(np.sqrt(max(squares[k] / many - shift * shift, 0.0)), FLOOR)
         if settled:
             break
     return clean, n
@@ -162,8 +168,6 @@ def learn(
     gains: Floats,
     held: int,
     fewest: int,
-    rules: tuple[float, float, float, float, float, int],
-    bins: tuple[int, float],
     mean: Floats,
     sigma: Floats,
     s: Floats,
@@ -176,18 +180,13 @@ def learn(
 
     gains (K, 3): gain (brightness factor) of each frame and channel, by which grey levels are divided. held: number of
     frames in the shortest interval of a channel's grey levels, whose middle is the first guess of the mean. fewest:
-    number of frames that are no inliers, from which on there is a second colour. rules: sigma over half the interval's
-    length; least sigma, grey levels; widest sigma of a valid pixel, grey levels; sigmas of an inlier; sigmas of a clean
-    frame; most rounds. bins: number and span of the histograms, which reach from -span to span; values beyond are
-    counted in the end bins.
+    number of frames that are no inliers, from which on there is a second colour.
 
     Written: mean, sigma (H, W, 3), mean colour and its standard deviation in grey levels; s, b (H, W), normalisers of
     brightness and chromaticity distortion; valid (H, W), False where no background shows; second (H, W, 3), the second
-    colour, nan where there is none. counts (2, 2, number): the values of valid pixels are added; first axis inliers or
+    colour, nan where there is none. counts (2, 2, BINS): the values of valid pixels are added; first axis inliers or
     all frames of clean pixels, second axis normalised brightness or chromaticity distortion.
     """
-    as_sigma, least, widest, inside, untouched, rounds = rules
-    number, span = bins
     frames, high, wide, _ = sample.shape
     value, order = np.empty((frames, 3), np.float32), np.empty(frames, np.float32)
     every, inlier, outlier = np.ones(frames, np.bool_), np.empty(frames, np.bool_), np.empty(frames, np.bool_)
@@ -199,25 +198,25 @@ def learn(
                 second[r, c, k] = np.nan
                 for t in range(frames):
                     value[t, k] = np.float32(sample[t, r, c, k]) / gains[t, k]
-            guess(value, every, held, as_sigma, least, order, m, sd)
-            good = max(sd[0], sd[1], sd[2]) <= widest
-            clean, found = inliers(value, m, sd, inlier, (least, inside, untouched, rounds))
+            guess(value, every, held, order, m, sd)
+            good = max(sd[0], sd[1], sd[2]) <= WIDEST
+            clean, found = inliers(value, m, sd, inlier)
             out = frames - found
             if out >= fewest:
                 for t in range(frames):
                     outlier[t] = not inlier[t]
-                guess(value, outlier, max(fewest, held * out // frames), as_sigma, least, order, other, other_sd)
-                if max(other_sd[0], other_sd[1], other_sd[2]) <= widest:
+                guess(value, outlier, max(fewest, held * out // frames), order, other, other_sd)
+                if max(other_sd[0], other_sd[1], other_sd[2]) <= WIDEST:
                     for k in range(3):
                         second[r, c, k] = other[k]
-                    if inliers(value, other, other_sd, outlier, (least, inside, untouched, rounds))[1] > found:
+                    if inliers(value, other, other_sd, outlier)[1] > found:
                         for k in range(3):
                             second[r, c, k] = m[k]
                         clean = False
                         m, sd, inlier, other, other_sd, outlier = other, other_sd, outlier, m, sd, inlier
             sa, sb = distortions(value, m, sd, inlier, alpha, cd)
-            noise = 3 * least / (sd[0] + sd[1] + sd[2])
-            # s = a |E / sigma| (eq. 7) and b (eq. 8); of noise `least` alone s would be `noise`, and b sqrt(2) times it
+            noise = 3 * FLOOR / (sd[0] + sd[1] + sd[2])
+            # s = a |E / sigma| (eq. 7) and b (eq. 8); of noise FLOOR alone s would be `noise`, and b sqrt(2) times it
             sa, sb = max(sa, noise), max(sb, np.sqrt(2.0) * noise)
             for k in range(3):
                 mean[r, c, k], sigma[r, c, k] = m[k], sd[k]
@@ -226,11 +225,9 @@ def learn(
                 continue
             for t in range(frames):
                 # bins of (alpha - 1) / a (eq. 9) and CD / b (eq. 10)
-                i = int((alpha[t] / sa + span) / (2 * span) * number)
-                j = int((cd[t] / sb + span) / (2 * span) * number)
-                if inlier[t]:
-                    counts[INLIERS, BRIGHTNESS, min(max(i, 0), number - 1)] += 1
-                    counts[INLIERS, CHROMATICITY, min(max(j, 0), number - 1)] += 1
-                if clean:
-                    counts[CLEAN_PIXELS, BRIGHTNESS, min(max(i, 0), number - 1)] += 1
-                    counts[CLEAN_PIXELS, CHROMATICITY, min(max(j, 0), number - 1)] += 1
+                i = min(max(int((alpha[t] / sa + SPAN) / (2 * SPAN) * BINS), 0), BINS - 1)
+                j = min(max(int((cd[t] / sb + SPAN) / (2 * SPAN) * BINS), 0), BINS - 1)
+                counts[INLIERS, BRIGHTNESS, i] += inlier[t]
+                counts[INLIERS, CHROMATICITY, j] += inlier[t]
+                counts[CLEAN_PIXELS, BRIGHTNESS, i] += clean
+                counts[CLEAN_PIXELS, CHROMATICITY, j] += clean

@@ -88,7 +88,7 @@ class Features:
         window_time: s that a feature must have lived; spacing: least distance of a new feature from others, px;
         deviations (3,): standard deviations of u, v and d, px.
         """
-        self._resize(max(round(window_time * self.fps), 1) + 1)
+        self.world = last_frames(self.world, max(round(window_time * self.fps), 1) + 1)
         if self.grey is not None and len(self.uv):
             self._follow(self.grey, grey, mask)
         self._thin(spacing)
@@ -104,14 +104,6 @@ class Features:
         """Drop all features, after a lost picture for instance; returns nothing."""
         self.grey = None
         self._keep(np.zeros(len(self.uv), bool))
-
-    def _resize(self, frames: int) -> None:
-        have = self.world.shape[1]
-        if have > frames:
-            self.world = self.world[:, have - frames :]
-        elif have < frames:
-            missing = np.full((len(self.world), frames - have, 3), np.nan)
-            self.world = np.concatenate([missing, self.world], 1)
 
     def _keep(self, kept: Bools) -> None:
         self.id, self.uv = self.id[kept], self.uv[kept]
@@ -168,6 +160,12 @@ class Features:
         cov = point_covariances(self.camera, pos, var)
         vel, spread = slopes(world, known, np.arange(frames) / self.fps)
         return SpacePoints(self.id[old], pos, cov, vel, cov / spread[:, None, None])
+
+
+def last_frames(world: Array, frames: int) -> Array:
+    """Returns the last frames of points (N, K, 3), (N, frames, 3), nan before the first of them."""
+    kept = world[:, -frames:]
+    return np.concatenate([np.full((len(kept), frames - kept.shape[1], 3), np.nan), kept], 1)
 
 
 def slopes(points: Array, known: Bools, times: Array) -> tuple[Array, Array]:

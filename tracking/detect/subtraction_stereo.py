@@ -1,25 +1,24 @@
 """Subtraction stereo: disparities inside the foreground only (Hoshikawa et al. 2011, sec. 2).
 
-The matcher is OpenCV's block matcher (`cv2.StereoBM`: grey values, sub-pixel by a parabola), written anew so that it
-works at the pixels of the foreground alone. Block matching is local, so that their disparities are those of the whole
-picture to the last bit. Its left-right check compares pixels of the foreground with each other only. It removes the
-parts of people that another person hides from the right camera.
+The matcher is OpenCV's block matcher (`cv2.StereoBM`: grey values, sub-pixel by a parabola, uniqueness, left-right
+check). Block matching is local, so that it works on the part of the pictures round the foreground alone; the
+disparities are those of the whole picture to the last bit. The left-right check removes the parts of people that
+another person hides from the right camera.
 
 Ours: the background is subtracted from the left picture only.
 """
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.types import Array, Bools, Image
-from tracking.detect.subtraction_stereo_kernels import block_match, filtered_pair, left_right, reach
 
-MULTIPLE = 16  # Numbers of disparities are multiples of it, as those of OpenCV's matcher.
+MULTIPLE = 16  # Numbers of disparities are multiples of it, and steps of a disparity per px, in OpenCV's matcher.
 LEAST_BLOCK = 5  # px: least width of the compared block that OpenCV allows.
 LEAST_UNIQUE = 5  # Percent by which the best match must be better than the second best.
-SHORT_BLOCK = 22  # px: widest block whose sums of differences, and 5 % more, are below 32768.
 
 Disparities = NDArray[np.float32]
 
@@ -39,31 +38,23 @@ class SubtractionStereo:
     def match(self, left: Image, right: Image, mask: Bools) -> Disparities:
         """Returns the disparities (H, W), px, inside `mask` (H, W), the foreground of the left picture; nan without a
         match."""
-        half, D = self.block // 2, self.disparities
         found = np.full(mask.shape, np.nan, np.float32)
-        high, wide = mask.shape
-        inside = np.zeros_like(mask)
-        room = slice(half, max(high - half, half)), slice(D - 1 + half, max(wide - half, D - 1 + half))
-        inside[room] = mask[room]
-        own = runs(inside)
-        needed = runs(reach(own, half, mask.shape))
-        filters = np.empty((2, high, wide), np.int16)
-        filtered_pair(left, right, needed, half, D, filters)
-        sad = np.empty((wide, D), np.int16 if self.block <= SHORT_BLOCK else np.int32)
-        cost = np.empty(mask.shape, np.int32)
-        block_match(own, needed, half, LEAST_UNIQUE, filters, sad, found, cost)
-        left_right(own, found, cost)
+        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        reach = self.disparities + self.block  # of a match to the left, and of what it is checked against to the right
+        if not len(rows) or mask.shape[0] <= self.block or mask.shape[1] <= reach:
+            return found
+        part = (
+            slice(max(rows[0] - self.block, 0), rows[-1] + self.block + 1),
+            slice(max(columns[0] - reach, 0), columns[-1] + reach + 1),
+        )
+        # made anew for each pair, as trackers are copied, and OpenCV's objects cannot be
+        matcher = cv2.StereoBM.create(self.disparities, self.block)
+        matcher.setUniquenessRatio(LEAST_UNIQUE)
+        matcher.setTextureThreshold(0)
+        matcher.setDisp12MaxDiff(1)
+        raw = matcher.compute(left[part], right[part])
+        found[part] = np.where((raw > 0) & mask[part], raw / np.float32(MULTIPLE), np.float32(np.nan))
         return found
-
-
-def runs(mask: Bools) -> NDArray[np.int32]:
-    """Returns row, first column and last column + 1 of each run of True pixels in a row of a mask, (R, 3), in order."""
-    high, wide = mask.shape
-    padded = np.zeros(1 + high * (wide + 1), bool)  # False before the first row and after each
-    padded[1:].reshape(high, wide + 1)[:, :wide] = mask
-    edges = np.flatnonzero(padded[1:] != padded[:-1])
-    row, first = np.divmod(edges[::2], wide + 1)
-    return np.column_stack([row, first, edges[1::2] - row * (wide + 1)]).astype(np.int32)
 
 
 def sampled(disparity: Disparities, uv: Array | Disparities, half: int) -> Array:

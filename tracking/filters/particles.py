@@ -1,4 +1,4 @@
-"""Resampling of weighted particles by given uniforms, and how many particles the weights are worth.
+"""Resampling of weighted particles by given uniforms.
 
 The schemes are those of filterpy.monte_carlo, which draws from the global generator. Here the uniforms are arguments,
 so that the result is repeatable and can be tested at their ends. Weights (P,) are not negative and sum to 1.
@@ -9,44 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Ints
-
-SPAN = 1.0  # Time over which ancestors are counted, s.
-
-
-class ParticleHealth:
-    """How many particles the weights are worth: means over the frames of a sequence.
-
-    told: sum and number of the values of each diagnostic. span: SPAN in frames; age: frames since the last span began.
-    """
-
-    def __init__(self, fps: float, *names: str) -> None:
-        self.told: dict[str, tuple[float, int]] = dict.fromkeys((*names, "distinct_ancestors"), (0.0, 0))
-        self.span, self.age = max(1, round(SPAN * fps)), 0
-
-    def add(self, name: str, value: float) -> None:
-        """Add the value of a diagnostic in a frame."""
-        total, count = self.told[name]
-        self.told[name] = total + value, count + 1
-
-    def resampled(self, ancestor: Ints) -> None:
-        """Note that a frame is over; at the end of a span the distinct ancestors (P, K) are counted and begin anew, in
-        place."""
-        self.age += 1
-        if self.age < self.span:
-            return
-        if ancestor.size:
-            self.add("distinct_ancestors", float(np.mean([len(np.unique(k)) / len(k) for k in ancestor.T])))
-        ancestor[:] = np.arange(len(ancestor))[:, None]
-        self.age = 0
-
-    def summary(self) -> dict[str, float | None]:
-        """Returns the mean of each diagnostic; None without a value."""
-        return {name: total / count if count else None for name, (total, count) in self.told.items()}
-
-
-def effective_number(weights: Array) -> float:
-    """Returns the effective number of particles, 1 / sum(w^2): P for equal weights, 1 if one particle has all."""
-    return float(1.0 / np.square(weights).sum())
 
 
 def residual_resample(weights: Array, uniforms: Array) -> Ints:

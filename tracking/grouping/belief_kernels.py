@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
-from sim.elementary_kernels import find_root
 from sim.types import Array, Ints
 
 
@@ -74,71 +73,36 @@ def linked_groups(
     cut (S + 1,): where the rows of each step begin in a, b, values (R,). label (S, P): filled with the lowest member
     of each person's group; -1, as given, where a person is alone.
     """
-    # Only people whose value is positive with somebody can be in a group: linkage runs in each connected component
-    # of these pairs alone, in a table of the component's size.
+    # Only people whose value is positive with somebody can be in a group: the table of a step has these alone.
     steps, people = label.shape
-    root, place, size = np.empty(people, np.int64), np.empty(people, np.int64), np.empty(people, np.int64)
-    start, node, member = np.empty(people, np.int64), np.empty(people, np.int64), np.empty(people, np.int64)
+    place, node = np.empty(people, np.int64), np.empty(people, np.int64)
     for p in range(people):
-        root[p], place[p] = p, -1
+        place[p] = -1
     for s in range(steps):
         before = label[max(s - 1, 0)]
         rows = range(cut[s], cut[s + 1])
         for r in rows:
             if values[r] + _memory(before, a[r], b[r], stay, come) > 0:
                 place[a[r]] = place[b[r]] = 0
-                i, j = find_root(root, a[r]), find_root(root, b[r])
-                root[max(i, j)] = min(i, j)
         count = 0
         for p in range(people):
             if place[p] == 0:
-                node[count] = p
+                node[count], place[p] = p, count
                 count += 1
-        for n in range(count):
-            p = node[n]
-            size[p], start[p] = 0, -1
-        total = 0
-        for n in range(count):
-            p = node[n]
-            i = find_root(root, p)
-            place[p] = size[i]
-            size[i] += 1
-        for n in range(count):
-            p = node[n]
-            if root[p] == p:
-                start[p] = total
-                total += size[p] * size[p]
-        table = np.empty(total)
-        for n in range(total):
-            table[n] = unseen
+        x = np.empty((count, count))
+        for u in range(count):
+            for v in range(count):
+                x[u, v] = unseen + _memory(before, node[u], node[v], stay, come)
         for r in rows:
-            i = find_root(root, a[r])
-            if place[a[r]] >= 0 and i == find_root(root, b[r]):
-                table[start[i] + place[a[r]] * size[i] + place[b[r]]] = values[r]
-                table[start[i] + place[b[r]] * size[i] + place[a[r]]] = values[r]
-        for k in range(count):
-            i = node[k]
-            if root[i] == i:
-                m = 0
-                for n in range(count):
-                    p = node[n]
-                    if find_root(root, p) == i:
-                        member[m] = p
-                        m += 1
-                x = np.empty((m, m))
-                for u in range(m):
-                    for v in range(m):
-                        x[u, v] = table[start[i] + u * m + v] + _memory(before, member[u], member[v], stay, come)
-                group = _average_linkage(x)
-                for u in range(m):
-                    alone = True
-                    for v in range(m):
-                        alone &= v == u or group[v] != group[u]
-                    if not alone:
-                        label[s, member[u]] = member[group[u]]
-        for n in range(count):
-            p = node[n]
-            root[p], place[p] = p, -1
+            u, v = place[a[r]], place[b[r]]
+            if u >= 0 and v >= 0:
+                x[u, v] = x[v, u] = values[r] + _memory(before, a[r], b[r], stay, come)
+        group = _average_linkage(x)
+        for u in range(count):
+            place[node[u]] = -1
+            for v in range(u):
+                if group[v] == group[u]:
+                    label[s, node[u]] = label[s, node[v]] = node[group[u]]
 
 
 @njit(cache=True)

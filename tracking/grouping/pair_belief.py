@@ -36,7 +36,7 @@ class PairBelief:
     """
 
     def __init__(self, fps: float, decision: str = NOW) -> None:
-        self.column = DECISIONS.index(decision)
+        self.column, self.others = DECISIONS.index(decision), decision != NOW
         self.fps, self.size = fps, frames_per_step(fps)
         self.seconds = self.size / fps
         self.frames = self.steps = 0
@@ -57,7 +57,7 @@ class PairBelief:
         if len(fresh):
             # new people have no past: the evidence of this moment stands for all times
             means = ExponentialMeans(len(fresh), self.seconds)
-            now = instant_evidence(state[:, :2], state[:, 2:], i, j)[fresh]
+            now = instant_evidence(state[:, :2], state[:, 2:], i, j, others=self.others)[fresh]
             self._judge(i[fresh], j[fresh], means.add(np.zeros(len(fresh), np.int64), np.arange(len(fresh)), now))
 
     def keep(self, rows: Bools) -> None:
@@ -93,7 +93,8 @@ class PairBelief:
         i, j = self._pairs(pos)
         if len(i):
             step = np.full(len(i), self.steps)
-            self._judge(i, j, self.means.add(step, self._rows(i, j), instant_evidence(pos, vel, i, j)))
+            values = instant_evidence(pos, vel, i, j, others=self.others)
+            self._judge(i, j, self.means.add(step, self._rows(i, j), values))
         self.steps += 1
 
     def _judge(self, i: Ints, j: Ints, values: Array) -> None:

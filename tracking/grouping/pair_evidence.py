@@ -111,10 +111,10 @@ def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
         yield PairRows(step[i[r]], column[i[r]], column[j[r]], pair[r], values)
 
 
-def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints) -> Array:
+def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints, *, others: bool = True) -> Array:
     """Returns the `QUANTITIES` (R, 10) of all pairs of rows i, j (R,) within 4 m in their steps.
 
-    pos, vel (N, 2): m, m/s, by person and step.
+    pos, vel (N, 2): m, m/s, by person and step. others: False: `OTHERS`, which only beliefs about events need, are nan.
     """
     apart, change, mean = pos[j] - pos[i], vel[j] - vel[i], (vel[i] + vel[j]) / 2
     distance, differ, pace = (np.hypot(*x.T) for x in (apart, change, mean))
@@ -126,12 +126,16 @@ def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints) -> Array:
     first, second = speed[i] >= STANDING, speed[j] >= STANDING
     both = first & second
     cosine = (vel[i] * vel[j]).sum(axis=1) / np.where(both, speed[i] * speed[j], 1.0)
+    near = np.full((2, len(i)), np.nan)
+    if others:
+        linked = (distance < MERGE_DISTANCE) & (differ < SPLIT_VELOCITY)
+        near[:] = _nearer(i, j, distance), _common(i, j, linked)
     return np.column_stack([
         distance, differ, np.where(walks, across, distance), np.where(walks, along, np.nan),
         (apart * change).sum(axis=1) / np.maximum(distance, TOUCHING),
         np.where(both, np.arccos(np.clip(cosine, -1.0, 1.0)), np.nan),
         np.where(both, differ, np.nan), np.where(np.isfinite(differ), first != second, np.nan),
-        _nearer(i, j, distance), _common(i, j, (distance < MERGE_DISTANCE) & (differ < SPLIT_VELOCITY)),
+        *near,
     ])  # fmt: skip
 
 

@@ -18,7 +18,8 @@ from tracking.detect.background import (
     fused_foreground,
 )
 from tracking.detect.background_settings import BRIGHT, BackgroundSettings
-from tracking.detect.background_training import FLOOR, train
+from tracking.detect.background_training import train
+from tracking.detect.background_training_kernels import FLOOR
 
 SIGMA = np.array([3.0, 2.0, 4.0])
 FPS = 10.0

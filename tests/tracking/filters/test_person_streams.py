@@ -10,7 +10,7 @@ import pytest
 from filterpy.monte_carlo import resampling
 from scipy import stats
 
-from tracking.filters.particles import effective_number, residual_resample, systematic_resample_rows
+from tracking.filters.particles import residual_resample, systematic_resample_rows
 from tracking.filters.person_streams import NOBODY, PersonStreams, birth_keys
 
 PLACES = np.random.default_rng(0).uniform(-50, 50, (400, 2))
@@ -94,8 +94,3 @@ def test_particles_without_weight_are_never_taken(u):
     weights = np.array([0.0, 0.45, 0.0, 0.55, 0.0])
     assert set(residual_resample(weights, np.full(5, u)).tolist()) <= {1, 3}
     assert set(systematic_resample_rows(weights[None], np.array([u]))[0].tolist()) <= {1, 3}
-
-
-def test_effective_number():
-    assert effective_number(np.full(8, 1 / 8)) == pytest.approx(8)
-    assert effective_number(np.array([0.0, 1.0])) == 1

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Bools
+from sim.types import Array
 
 
 def centred_from_ltwh(box: Array) -> Array:
@@ -60,9 +60,3 @@ def covered_share(place: Array, others: Array) -> Array:
         high = np.minimum(place[:, centre, None] + half, others[:, centre] + other_half)
         shared *= np.maximum(high - low, 0.0)
     return np.asarray(shared / np.maximum(place[:, 2] * place[:, 3], 1e-9)[:, None])
-
-
-def points_inside(points: Array, boxes: Array) -> Bools:
-    """Returns flags (N, M): True where point n lies in box m or on its edge."""
-    away = np.abs(points[:, None, :2] - boxes[:, :2]) <= boxes[:, :1:-1] / 2
-    return np.asarray(away[..., 0] & away[..., 1])

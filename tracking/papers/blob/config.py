@@ -41,7 +41,6 @@ class BlobConfig(BackgroundSettings):
         "existence: a person who can be detected is detected in a frame")
     hidden_time: float = param(0.5, (0.05, 10.0), "s",
         "existence: mean time in which a person cannot be detected", "log")
-    birth_rate: float = param(0.5, (0.001, 100.0), "1/s", "existence: new people", "log")
     clutter_rate: float = param(0.5, (0.001, 100.0), "1/frame", "existence: new false boxes", "log")
     confirm_ratio: float = param(1.5, (1.01, 2.0), "", "rho: a track is confirmed at or below this value of rho")
     coast_time: float = param(1.5, (0.0, 10.0), "s",

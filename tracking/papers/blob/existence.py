@@ -24,6 +24,7 @@ LEARNED = 2000  # boxes after which the calibration of scores is kept
 DOUBT = 10.0  # boxes of each kind that each range of scores has in advance
 LIFETIME = 15.0  # s: mean time that a person is in view
 CLUTTER_TIME = 0.05  # s: mean time that a false box lasts
+BIRTH_RATE = 0.5  # 1/s: new people
 SHOWN_TIME = 1.0  # s: mean time in which a person can be detected
 
 

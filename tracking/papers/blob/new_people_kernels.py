@@ -1,4 +1,4 @@
-"""Kernels of new people in person_template: first guesses of places, and the number of templates that explains most.
+"""Kernels of new people in person_template: the number of templates that explains most.
 
 Templates (K, 4) are upright ellipses x (middle), foot (lower edge), h, w, px. foreground (H, W) bool; cover (H, W)
 int16: the number of templates over each pixel, plus EXPLAINED = 1000 where a blob of one person explains it. A
@@ -10,70 +10,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Bools, Ints
-from tracking.detect.blobs import Labels
+from sim.types import Array, Bools
 from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob import person_template_search_kernels as search
 from tracking.papers.blob.person_look_kernels import POINTS
 from tracking.papers.blob.person_template_kernels import Cover, kernel
 
-LOWEST = 0.98  # quantile of the rows of a part's pixels at which its foot is guessed
 REACH = (
     search.MOST_STEPS + search.SWEEPS * search.FINE_STEPS
 )  # most coarse steps that fit_places moves a template, and some more
 ROUNDING = 1e-9  # added to an upper bound, so that rounding excludes nothing
-
-
-@kernel
-def part_feet(label: Labels, which: int, box: Ints, most: int) -> Array:
-    """Returns where the parts of a region stand, (1 + 2 + … + most, 2): x and foot, px, of the 1, 2, … `most` parts.
-
-    The region has the label `which` in label (H, W), the box (4,) left, top, width, height, px, and at least `most`
-    pixels. It is cut into parts of as many pixels each (the first ones have one more), from left to right. x is the
-    mean of a part's columns at the pixels' centres, foot the 0.98 quantile of its rows at their lower edges.
-    """
-    left, top, wide, high = box
-    per_row = np.zeros(high, np.int64)
-    pixels = 0
-    for row in range(top, top + high):
-        for column in range(left, left + wide):
-            pixels += label[row, column] == which
-    found = np.empty((most * (most + 1) // 2, 2))
-    n = 0
-    for count in range(1, most + 1):
-        size, more = pixels // count, pixels % count
-        taken, total, part = 0, 0, 0
-        per_row[:] = 0
-        for column in range(left, left + wide):
-            for row in range(top, top + high):
-                if label[row, column] == which:
-                    taken, total = taken + 1, total + column
-                    per_row[row - top] += 1
-                    if taken == size + (part < more):
-                        found[n, 0], found[n, 1] = total / taken + 0.5, quantile(per_row, taken, LOWEST, top) + 1
-                        n, part, taken, total = n + 1, part + 1, 0, 0
-                        per_row[:] = 0
-    return found
-
-
-@kernel
-def quantile(counts: Ints, n: int, q: float, least: int) -> float:
-    """Returns the quantile q (0 to 1) of n whole numbers, interpolated linearly as numpy.quantile does.
-
-    counts[k] of the numbers are equal to least + k; n, at least 1, is the sum of the counts.
-    """
-    place = q * (n - 1)
-    low = int(place)
-    below, above, passed = -1, -1, 0
-    for value in range(len(counts)):
-        passed += counts[value]
-        if below < 0 and passed > low:
-            below = value
-        if passed > min(low + 1, n - 1):
-            above = value
-            break
-    below, above, t = below + least, above + least, place - low
-    return above - (above - below) * (1 - t) if t >= 0.5 else below + (above - below) * t
 
 
 @kernel

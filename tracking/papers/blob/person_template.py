@@ -32,6 +32,7 @@ from tracking.papers.blob.person_template_kernels import ELLIPSE
 
 LEAST = 0.3  # a region smaller than this share of a person's area is ignored
 MOST = 6  # most people found in one region in a frame
+LOWEST = 0.98  # quantile of the rows of a part's pixels at which its foot is guessed
 ROAM = 0.25  # standard deviation of a first guess, of a person's height
 EVIDENCE = 1000.0  # log-likelihood of full support: so large that the first guess hardly restrains a template
 
@@ -101,7 +102,7 @@ def find_new_people(scene: ExplainedForeground, size: PersonSize, support: float
     if not len(rows):
         return np.zeros((0, 4))
     most = np.minimum((found.area[rows] / person[rows]).astype(int) + 2, MOST)
-    guesses = _guesses(found, rows, most, size)
+    guesses = [_guesses(found, row, n, size) for row, n in zip(rows.tolist(), most.tolist(), strict=True)]
     return np.concatenate([_in_region(scene, g, p, support) for g, p in zip(guesses, person[rows], strict=True)])
 
 
@@ -114,20 +115,17 @@ def _in_region(scene: ExplainedForeground, guesses: Array, person: float, suppor
     return new.fit_new_people(scene.foreground, scene.cover, guesses, most, person, support, spread, EVIDENCE)
 
 
-def _guesses(found: blobs.Blobs, rows: Ints, most: Ints, size: PersonSize) -> list[Array]:
-    if size.above:
-        return [_from_above(found, row, n, size) for row, n in zip(rows.tolist(), most.tolist(), strict=True)]
-    box = found.box.astype(int)
-    feet = [new.part_feet(found.label, k + 1, box[k], n) for k, n in zip(rows.tolist(), most.tolist(), strict=True)]
-    stand = np.concatenate(feet)
-    return np.split(np.column_stack([stand, size.at(stand)]), np.cumsum([len(f) for f in feet])[:-1])
-
-
-def _from_above(found: blobs.Blobs, row: int, most: int, size: PersonSize) -> Array:
+def _guesses(found: blobs.Blobs, row: int, most: int, size: PersonSize) -> Array:
+    """Returns first places of 1, 2, … `most` people in a region, who stand in parts of as many pixels each."""
     left, top, wide, high = found.box[row].astype(int)
-    at = np.argwhere(found.label[top : top + high, left : left + wide] == row + 1)[:, ::-1] + (left, top) + 0.5
-    axis = np.linalg.eigh(np.cov(at.T))[1][:, -1]
-    order = np.argsort(at @ axis, kind="stable")
-    middle = np.array([at[p].mean(0) for n in range(1, most + 1) for p in np.array_split(order, n)])
-    extent = size.at(middle)
-    return np.column_stack([middle[:, 0], middle[:, 1] + extent[:, 0] / 2, extent])
+    at = np.argwhere(found.label[top : top + high, left : left + wide] == row + 1)[:, ::-1] + (left, top)
+    centre = at + 0.5
+    along = centre @ np.linalg.eigh(np.cov(at.T))[1][:, -1] if size.above else at[:, 0]
+    order = np.argsort(along, kind="stable")
+    parts = [part for n in range(1, most + 1) for part in np.array_split(order, n)]
+    if size.above:
+        middle = np.array([centre[part].mean(0) for part in parts])
+        extent = size.at(middle)
+        return np.column_stack([middle[:, 0], middle[:, 1] + extent[:, 0] / 2, extent])
+    stand = np.array([[at[part, 0].mean() + 0.5, np.quantile(at[part, 1], LOWEST) + 1] for part in parts])
+    return np.column_stack([stand, size.at(stand)])

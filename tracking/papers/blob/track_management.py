@@ -5,8 +5,7 @@ Two kinds of `management`:
   innovation: the uncertainty of a track, no unit, 1 in the steady state (tracking.filters.track_uncertainty).
 - existence (ours): by the probability that a track is a person (existence). A measurement is associated where that is
   more likely than that it is false or new. A track is reported if it is a person, and where predicted, with the
-  probability LIKELY. A person whose feet are nearer to the camera hides others. A track on the body of another is not
-  hidden, and merged with it.
+  probability LIKELY. A person whose feet are nearer to the camera hides others.
 
 Also here: the tracks of `blob` from pixels, with a direction and a nominal covariance for each track.
 
@@ -19,7 +18,7 @@ second, nominal covariance, which is updated with the nominal R (variance of a m
 
 from __future__ import annotations
 
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
@@ -37,25 +36,14 @@ LIKELY = 0.5  # least probability of a confirmed track, and of a reported box
 LEAST_EXISTENCE = 0.01  # a track with a lower existence probability is deleted, or not started
 BODY = 0.35  # m: a box is right if its middle is so near to the person
 IN_FRONT = 0.15  # m in the image: whose feet are lower by more stands in front
-SAME_BODY = 0.15  # m in the image: tracks whose feet are nearer are on one body
-DOUBLE_TIME = 3.0  # s: mean time after which two tracks on one body are one person
 SIZE_SPREAD = 0.3  # m: standard deviation of height and width of false boxes
 LEAST_VIEW = 5.0  # m: least width and height of the field of view
-DOUBLES = 0.05  # boxes per frame that a person has beside the own one, on average
-DOUBLE_SPREAD = 0.3  # m: standard deviation of centre, height and width of such a box
-
-SCALE, RHO, BORN, SCORE = range(4)  # Rows of `numbers`, followed by the states of existence.
-STATES = slice(4, 7)
-CONFIRMED, MEASURED = range(2)  # Rows of `flags`.
-# Attributes that are views of the rows of `numbers` and `flags`.
-VIEWS = ("scale", "rho", "born", "score", "states", "confirmed", "measured")
 
 
 class TrackedPeople:
-    """The table of N tracks of `blob`: their filters, ages and flags. Tracks are columns of the stacked arrays.
+    """The table of N tracks of `blob`: their filters, ages and flags.
 
-    Made from config, its nominal filter at the frame rate, and context. State; `numbers` (7, N) and `flags` (2, N)
-    stack the named rows, so that few arrays change their length:
+    Made from config, its nominal filter at the frame rate, and context. State:
         bank (5, N, 4)      Kalman filters of x, y, h, w (tracking.filters.kalman); places px, covariances m^2
         id (N,)             never used again; next_id: that of the next track, from 1
         scale (N,)          px per m
@@ -68,18 +56,24 @@ class TrackedPeople:
         measured (N,)       True if measured in this frame
         view_low, view_high (2,)   corners x, y of the field of view, px; inf and -inf before it is known
     detectable (N,): probability that a person who exists and is shown is measured in this frame; unseen_time: s,
-    birth_rate times it is the expected number of people in view without a track; px_per_m: the image's scale; from
+    BIRTH_RATE times it is the expected number of people in view without a track; px_per_m: the image's scale; from
     pixels that of the frame. Also config, context, dynamics (the nominal filter), top (True from straight above), and
     what `follow` derives.
     """
+
+    # Axis of the tracks in each column of the table.
+    columns: ClassVar[dict[str, int]] = {
+        "bank": 1, "id": 0, "scale": 0, "rho": 0, "born": 0, "score": 0, "states": 1, "confirmed": 0, "measured": 0
+    }  # fmt: skip
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
         self.context, self.px_per_m = context, context.px_per_m
         self.top = context.camera is not None and context.camera.kind == "top"
         self.view_low, self.view_high = np.full(2, np.inf), np.full(2, -np.inf)
         self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
-        self.detectable, self.unseen_time = np.zeros(0), existence.LIFETIME
-        self._bind(np.zeros((7, 0)), np.zeros((2, 0), bool))
+        self.scale, self.rho, self.born, self.score, self.detectable = np.zeros((5, 0))
+        self.confirmed, self.measured = np.zeros((2, 0), bool)
+        self.states, self.unseen_time = np.zeros((3, 0)), existence.LIFETIME
         self.follow(config, dynamics)
 
     def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
@@ -95,31 +89,11 @@ class TrackedPeople:
         frames = int(np.ceil(config.coast_time * self.context.fps - 1e-6))
         self.death_rho = track_uncertainty.after_misses(dynamics, frames - 1)
 
-    def __getstate__(self) -> dict[str, Any]:
-        # A copy of a view has memory of its own: the rows are bound anew in the copy.
-        return {name: value for name, value in self.__dict__.items() if name not in VIEWS}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        self._bind(self.numbers, self.flags)
-
-    def _bind(self, numbers: Array, flags: Bools) -> None:
-        self.numbers, self.flags, self.states = numbers, flags, numbers[STATES]
-        self.scale, self.rho, self.born, self.score = numbers[: STATES.start]
-        self.confirmed, self.measured = flags
-
     def predict(self) -> None:
-        """Predict all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence; a
-        track on the body of another is merged with it, that is, deleted, unless it is likely another person."""
+        """Predict all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
         self.rho[:] = self.compute_rho()
         self.states[:] = self.transition @ self.states
-        if self.by_existence:
-            doubled = self._doubled()
-            self.states[:, doubled] *= np.exp(-self.dynamics.dt / DOUBLE_TIME)
-            merged = doubled & (self.existence() < LIKELY)
-            if merged.any():
-                self.keep_only((~merged).nonzero()[0])
         self.detectable = self.config.detect_prob * self.visible_shares()
 
     def compute_rho(self) -> Array:
@@ -146,16 +120,6 @@ class TrackedPeople:
         in_front = foot - foot[:, None] > IN_FRONT * self.scale[:, None]
         covered = np.where(in_front, box_geometry.covered_share(place, place), 0.0) * self.existence()
         return np.asarray(1 - covered.max(1) * self._well_placed())
-
-    def _doubled(self) -> Bools:
-        """Returns flags (N,): True where a track, missed before, is on the body of a more probable person."""
-        if len(self.id) < 2:
-            return np.zeros(len(self.id), bool)
-        place, r = self.upright_boxes(), self.existence()
-        foot = np.column_stack([place[:, 0], place[:, 1] + place[:, 2] / 2])
-        near = np.square(foot[:, None] - foot).sum(2) < np.square(SAME_BODY * self.scale)
-        order = np.lexsort((self.id, -r)).argsort()
-        return np.asarray((near & (order < order[:, None])).any(1) & ~self.measured)
 
     def _well_placed(self) -> Array:
         from scipy.special import erf
@@ -188,7 +152,7 @@ class TrackedPeople:
         return assignment.optimal(np.where(np.isfinite(d2), cost, np.inf), 0.0)
 
     def _new_people(self, ratio: Array | float) -> Array | float:
-        return self.config.birth_rate * self.unseen_time * self.config.detect_prob * ratio
+        return existence.BIRTH_RATE * self.unseen_time * self.config.detect_prob * ratio
 
     def record_measured(
         self, rows: Ints, near: Bools, score: Array, evidence: Array, ratio: Array | float = 1.0
@@ -212,24 +176,14 @@ class TrackedPeople:
         size = np.maximum(place[:, 2], place[:, 3]) / PERSON_HEIGHT
         return np.asarray(np.clip(size, whole / LARGEST_SCALE, whole * LARGEST_SCALE))
 
-    def new_people(self, z: Array, free: Bools, ratio: Array | float = 1.0) -> Array:
-        """Returns the probability (M,) that each box z (M, 4), as no track's, is of a person without a track.
-
-        It may also be false, or a second box of a measured person or of an earlier one of the boxes `free` (M,), which
-        no track has. Also counts the people without a track.
-        """
+    def new_people(self, count: int, ratio: Array | float = 1.0) -> Array:
+        """Returns the probability (M,) that each of M = count boxes, as no track's, is of a person without a track; it
+        may also be false. Also counts the people without a track."""
         c, new = self.config, self._new_people(ratio)
-        person = new / (new + c.clutter_rate) * np.ones(len(z))
-        earlier = np.tri(len(z), k=-1) * np.where(free, person, 0.0)
-        owned = np.concatenate([np.tile(self.existence() * self.measured, (len(z), 1)), earlier], 1)
-        place, scale = np.concatenate([self.bank[kalman.PLACE], z]), np.concatenate([self.scale, self._scale_of(z)])
-        d2 = np.square((z[:, None] - place) / (DOUBLE_SPREAD * scale[:, None])).sum(2)
-        density = np.exp(-0.5 * d2) / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self._false_density(scale)
-        double = c.clutter_rate * DOUBLES * (density * owned).sum(1)
-        if len(z) or len(self.id):
+        if count or len(self.id):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
             self.unseen_time = stay * (1 - c.detect_prob) * self.unseen_time + self.dynamics.dt
-        return np.asarray(new / (new + c.clutter_rate + double))
+        return np.asarray(new / (new + c.clutter_rate) * np.ones(count))
 
     def delete_tracks(self, t: float) -> None:
         """Delete tracks from the table at time t, s (sec. 5, and ours)."""
@@ -246,8 +200,8 @@ class TrackedPeople:
 
     def keep_only(self, rows: Ints) -> None:
         """Delete all tracks except those at table positions `rows` (K,); they are in the order of `rows` afterwards."""
-        self.bank, self.id = self.bank.take(rows, 1), self.id.take(rows)
-        self._bind(self.numbers.take(rows, 1), self.flags.take(rows, 1))
+        for name, axis in self.columns.items():
+            setattr(self, name, getattr(self, name).take(rows, axis))
 
     def _outside(self, place: Array) -> Bools:
         if self.context.image_size is None:
@@ -260,14 +214,17 @@ class TrackedPeople:
         n = len(z)
         if not n:
             return
-        numbers, flags = np.zeros((7, n)), np.zeros((2, n), bool)
-        numbers[SCALE], numbers[RHO], numbers[BORN] = self._scale_of(z), self.birth_rho, t
-        numbers[SCORE], numbers[STATES] = score, existence.newborn(person)
-        flags[CONFIRMED], flags[MEASURED] = self.by_existence & (person >= LIKELY), True
-        self.id = np.concatenate([self.id, np.arange(self.next_id, self.next_id + n)])
+        self._append(
+            bank=kalman.born(z[:, :4], self.noise, self.dynamics.birth_rate_var),
+            id=np.arange(self.next_id, self.next_id + n), scale=self._scale_of(z), rho=np.full(n, self.birth_rho),
+            born=np.full(n, t), score=score, states=existence.newborn(person),
+            confirmed=self.by_existence & (person >= LIKELY), measured=np.ones(n, bool),
+        )  # fmt: skip
         self.next_id += n
-        self._bind(np.concatenate([self.numbers, numbers], 1), np.concatenate([self.flags, flags], 1))
-        self.bank = np.concatenate([self.bank, kalman.born(z, self.noise, self.dynamics.birth_rate_var)], 1)
+
+    def _append(self, **new: Array | Ints | Bools) -> None:
+        for name, values in new.items():
+            setattr(self, name, np.concatenate([getattr(self, name), values], self.columns[name]))
 
     def rows_to_report(self) -> Ints:
         """Returns the table positions (K,), ascending, of the tracks to report (ours)."""
@@ -306,6 +263,8 @@ class TrackedEllipses(TrackedPeople):
     direction's variance in a frame. In `bank` the coordinates are x, y, h, w: centre and full axes of the ellipse.
     """
 
+    columns: ClassVar[dict[str, int]] = {**TrackedPeople.columns, "angle": 1, "nominal": 1, "look": 0}
+
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
         self.angle, self.nominal, self.look = np.zeros((2, 0)), np.zeros((5, 0, 4)), person_look_kernels.unknown(0)
         super().__init__(config, dynamics, context)
@@ -333,19 +292,13 @@ class TrackedEllipses(TrackedPeople):
         """Returns the bounding boxes (N, 4) of the tracks' ellipses: centre x, y, height, width, px."""
         return upright(self.bank[kalman.PLACE], self.angle[kalman.DIRECTION])
 
-    def keep_only(self, rows: Ints) -> None:
-        """Delete all tracks except those at table positions `rows` (K,); they are in the order of `rows` afterwards."""
-        self.angle, self.nominal = self.angle.take(rows, 1), self.nominal.take(rows, 1)
-        self.look = self.look.take(rows, 0)
-        super().keep_only(rows)
-
     def start_tracks(self, z: Array, score: Array, t: float, person: Array) -> None:
         """Append a track at rest for each ellipse z (K, 5): centre x, y, full axes h, w (px), direction theta (rad)."""
-        super().start_tracks(z[:, :4], score, t, person)
-        new = np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)])
-        self.angle = np.concatenate([self.angle, new], 1)
-        self.look = np.concatenate([self.look, person_look_kernels.unknown(len(z))])
-        self.nominal = np.concatenate([self.nominal, self.bank[:, self.bank.shape[1] - len(z) :]], 1)
+        super().start_tracks(z, score, t, person)
+        self._append(
+            angle=np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)]), look=person_look_kernels.unknown(len(z)),
+            nominal=self.bank[:, self.bank.shape[1] - len(z) :],
+        )  # fmt: skip
 
     def direction_distances(self, z: Array, angle_var: Array) -> Array:
         """Returns the direction's part y^2 / S of the squared distance d^2 (eq. 9) of N tracks and M ellipses, (N,

@@ -35,18 +35,17 @@ switches it off, one holds in the preset `paper`, too.
 - deletion: also missed tracks outside the image. Paper: ρ. Why: they do not come back.
 - ρ of deletion, with "rho": tentative tracks at its value at birth or at `tentative_time`, confirmed ones 2 % early.
   Paper: one value. Why: false alarms end early.
-- several boxes of one track, with "rho": the nearest counts. Paper: all are assigned (frame 367), not how. Why: a
-  filter takes one.
+- several boxes or blobs of one track, with "rho": the nearest counts. Paper: all are assigned (frame 367), not how.
+  Why: a filter takes one.
 - `management`: by an existence probability (existence). Paper: ρ. Why: rates hold at any frame rate and detector.
 - association: one to one, most likely, against false and new boxes. Paper: nearest gated track. Why: a wide gate must
   not win.
 - scores of boxes: likelihood ratios, learned from the existence of the boxes' tracks. Paper: none. Why: any unit.
-- births from boxes: by the odds of new people to false boxes and second boxes of people; from pixels the odds are the
-  first existence. Paper: a measurement in no gate. Why: people near others must start tracks.
+- births: by the odds of new people to false boxes, the first existence. Paper: a measurement in no gate. Why: people
+  near others must start tracks.
 - hidden people: detected as far as no other in front covers them, and not at all for `hidden_time`. Paper: none. Why:
   misses come in rows.
 - rates of height and width, from boxes: return to zero. Paper: constant. Why: a missed person's size settles.
-- tracks on one body: merged. Paper: they compete (frame 357). Why: one body is one person.
 - report: boxes that are right with a probability of at least 0.5, and not leaving while missed. Paper: not stated.
   Why: fewer false positives.
 
@@ -73,8 +72,6 @@ Departures from pixels only:
   all gates. Why: people enter as one blob.
 - sizes (`split`): return to those of a person at that place. Paper: free. Why: templates measure none.
 - ρ: of a nominal covariance without θ. Paper: of the filter. Why: noise must not count.
-- pieces, without `split`: the ellipse of all pixels of the blobs centred in the predicted box, if in the gate, nearer
-  than the own blob, and of a person's size. Paper: all are assigned (frame 367), not how. Why: a filter takes one.
 - report from pixels: boxes, by the usual ratio to ellipses. Paper: ellipses. Why: scores need boxes.
 - too much foreground (`background`): prediction and deletion only. Paper: none. Why: light has changed.
 - background: adapts where no confirmed track is, ghosts anywhere (`background`). Paper: trained once. Why: light

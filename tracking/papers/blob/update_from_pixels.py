@@ -11,10 +11,9 @@ Order of a frame, with the paper's sections:
     rho: confirm, delete, start tracks                                        secs. 4.5, 5 (track_management)
     adapt the background, except where confirmed tracks are                   ours
 
-A blob that is associated with no track may start one. Without `split` neither a blob inside any gate starts a track nor
-pieces of a person whose union is inside. At frame 367 of Gonzalez et al. (2006, sec. 5) pieces "still lie within the
-gate" and "are assigned to the existing tracker"; the paper does not say how. Here they are one measurement: the ellipse
-of all their pixels, for which the gate holds.
+A blob that is associated with no track may start one; without `split` no blob inside any gate does. At frame 367 of
+Gonzalez et al. (2006, sec. 5) pieces "still lie within the gate" and "are assigned to the existing tracker"; the paper
+does not say how. Here the nearest one is the measurement.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Image, Ints
-from tracking.detect import blobs
 from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground, Segmented
 from tracking.detect.person_size import KEPT, PersonSize
@@ -34,37 +32,6 @@ from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 from tracking.papers.blob.track_management import TrackedEllipses
 from tracking.running import image_scale
-
-
-def owners(centre: Array, predicted: Array, d2: Array, free: Bools) -> Ints:
-    """Returns the row (M,) of the track of which each blob may be a piece, -1 for none."""
-    found = np.full(len(centre), -1)
-    if not len(predicted):
-        return found
-    inside = box_geometry.points_inside(centre, predicted).T & free
-    held = inside.any(0)
-    found[held] = np.where(inside, d2, np.inf).argmin(0)[held]
-    return found
-
-
-def hull(box: Array) -> Array:
-    """Returns the box (1, 4) round boxes (K, 4), K at least 1; left, top, width, height, px."""
-    low, high = box[:, :2].min(0), (box[:, :2] + box[:, 2:]).max(0)
-    return np.concatenate([low, high - low])[None]
-
-
-def union(area: Array, ellipse: Array) -> tuple[Array, float]:
-    """Returns the ellipse (5,) of all pixels of several blobs, and the variance of its direction, rad^2."""
-    share, c, s = area / area.sum(), np.cos(ellipse[:, 4]), np.sin(ellipse[:, 4])
-    axes = np.square(ellipse[:, 2:4] / 4)
-    turn = np.stack([np.stack([c, -s], 1), np.stack([s, c], 1)], 1)
-    cov = turn @ (axes[:, :, None] * turn.transpose(0, 2, 1))
-    centre = share @ ellipse[:, :2]
-    away = ellipse[:, :2] - centre
-    whole = np.tensordot(share, cov + away[:, :, None] * away[:, None], 1)
-    made, angle_var = blobs.ellipses(np.array([area.sum()]), centre[None], whole[None])
-    return made[0], float(angle_var[0])
-
 
 SIZE_TIME = 0.5  # s between pictures from which sizes are learned once enough is remembered: it must be of many people
 EVIDENCE = 10.0  # nats, log-likelihood of a template with full support; d^2 / 2 of its place is subtracted
@@ -175,12 +142,8 @@ class PixelUpdater:
         columns = lone.nonzero()[0]
         z, angle_var = found.ellipse[columns], found.angle_var[columns] + ANGLE_NOISE
         made, taken, d2 = self._associate(z, angle_var)
-        unexplained = np.delete(z, taken, 0)
-        if not split:
-            gated = np.isfinite(self._gated(d2, angle_var)).any(0)
-            made, used = self._with_pieces(made, taken, found, d2)
-            unexplained = z[~used & ~gated]
-        else:
+        unexplained = np.delete(z, taken, 0) if split else z[~np.isfinite(self._gated(d2, angle_var)).any(0)]
+        if split:
             scene = ExplainedForeground(seen.mask)
             scene.mark_explained(found.label, columns)
             for confirmed in (True, False):
@@ -196,7 +159,7 @@ class PixelUpdater:
             self._learn_looks(seen.image, made.rows)
         near = away <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
         people.record_measured(made.rows, near, made.support, evidence)
-        person = people.new_people(unexplained[:, :4], np.ones(len(unexplained), bool))
+        person = people.new_people(len(unexplained))
         people.delete_tracks(t)
         people.start_tracks(unexplained, np.ones(len(unexplained)), t, person)
 
@@ -240,26 +203,6 @@ class PixelUpdater:
     def _gated(self, d2: Array, angle_var: Array) -> Array:
         directed = kalman.directed(self._gated_direction(angle_var)).astype(int)
         return np.where(d2 <= self.gates[directed], d2, np.inf)
-
-    def _with_pieces(self, made: Measured, taken: Ints, found: Blobs, d2: Array) -> tuple[Measured, Bools]:
-        used = np.isin(np.arange(len(found)), taken)
-        owner = owners(found.ellipse, self.people.upright_boxes(), d2, ~used)
-        own = dict(zip(made.rows.tolist(), taken.tolist(), strict=True))
-        for row in np.unique(owner[owner >= 0]).tolist():
-            mine = (owner == row) | (np.arange(len(found)) == own.get(row, -1))
-            whole, var = union(found.area[mine], found.ellipse[mine])
-            z, angle_var = whole[None], np.array([var + ANGLE_NOISE])
-            if self.size.reliable and not self.size.one_person(hull(found.box[mine]), z)[0]:
-                continue
-            away = self._gated(self.people.directed_innovations(z, self._gated_direction(angle_var))[0], angle_var)[
-                row, 0
-            ]
-            if away < (d2[row, own[row]] if row in own else np.inf):
-                used |= mine
-                rest = made.rows != row
-                made = Measured(*(part[rest] for part in made))
-                made = made.joined(Measured(np.array([row]), z, self.people.noise[None], angle_var, np.ones(1)))
-        return made, used
 
     def _measure_by_templates(
         self, scene: ExplainedForeground, image: Image, expected: Array, rows: Ints, confirmed: bool

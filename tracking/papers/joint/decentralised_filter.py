@@ -12,7 +12,7 @@ components can be resampled one by one (ours).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -44,8 +44,7 @@ class Nested:
     """The particles after steps 1 and 3 of a frame, before step 2.
 
     x (N_x, K, D): X. z (N_x, N_z, ...): Z. log_q (N_x, N_z): log of qbar (step 3), normalised over j. log_w (N_x, K):
-    what the components add to log w (step 1). log_rest (N_x,): what X as a whole adds. ancestor (N_x, K): the
-    particle from which each component descends since these were counted last.
+    what the components add to log w (step 1). log_rest (N_x,): what X as a whole adds.
     """
 
     x: Array
@@ -53,29 +52,26 @@ class Nested:
     log_q: Array
     log_w: Array
     log_rest: Array
-    ancestor: Ints = field(default_factory=lambda: np.zeros((0, 0), np.int64))
 
     @classmethod
     def empty(cls, shape: tuple[int, int], size: int) -> Nested:
         """Returns particles of no component; shape: N_x, N_z; size: D."""
         log_q = np.full(shape, -np.log(shape[1]))
         x, z, log_w = np.zeros((shape[0], 0, size)), np.zeros((*shape, 0), np.int64), np.zeros((shape[0], 0))
-        return cls(x, z, log_q, log_w, np.zeros(shape[0]), np.zeros((shape[0], 0), np.int64))
+        return cls(x, z, log_q, log_w, np.zeros(shape[0]))
 
     def kept(self, rows: Bools) -> Nested:
         """Returns the particles of the components where `rows` (K,) is True; parts of Z are numbered anew."""
         z = np.ascontiguousarray(self.z[..., rows])
         relabel(z)
         x = np.ascontiguousarray(self.x[:, rows])
-        return Nested(x, z, self.log_q, self.log_w[:, rows], self.log_rest, self.ancestor[:, rows])
+        return Nested(x, z, self.log_q, self.log_w[:, rows], self.log_rest)
 
     def joined(self, x: Array) -> Nested:
         """Returns the particles with new components x (N_x, M, D), of label 0 in Z."""
         z = np.concatenate([self.z, np.zeros((*self.z.shape[:2], x.shape[1]), np.int64)], axis=2)
         log_w = np.concatenate([self.log_w, np.zeros(x.shape[:2])], axis=1)
-        own = np.repeat(np.arange(len(x))[:, None], x.shape[1], axis=1)
-        ancestor = np.concatenate([self.ancestor, own], axis=1)
-        return Nested(np.concatenate([self.x, x], axis=1), z, self.log_q, log_w, self.log_rest, ancestor)
+        return Nested(np.concatenate([self.x, x], axis=1), z, self.log_q, log_w, self.log_rest)
 
     def weights(self) -> Array:
         """Returns the weights w of step 1, (N_x,), sum 1."""
@@ -100,7 +96,7 @@ def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
     log_y = model.energy(new, z)
     log_group = log_sum(log_y)
     log_rest = log_dynamics + log_group - np.log(log_y.shape[1])  # step 1
-    return Nested(new, z, log_y - log_group[:, None], log_w, log_rest, old.ancestor)  # step 3
+    return Nested(new, z, log_y - log_group[:, None], log_w, log_rest)  # step 3
 
 
 def joint_indices(nested: Nested, uniform: float) -> Ints:

@@ -9,7 +9,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
-from tracking.papers.joint.partition_kernels import APART, SCATTER, nearest_place, validity_of
+from tracking.papers.joint.partition_kernels import validity_of
 
 MOST_LISTED = 6
 """Largest group of which all divisions into two parts are tried."""
@@ -125,76 +125,40 @@ def place_newcomers(points: Array, label: Ints, uniforms: Array, sharpness: floa
     of apart and together are proportional to exp(-sharpness d_cl) of the two clusters apart and as one.
     """
     particles, partitions, n = label.shape
-    # by the head of a cluster: sum and mean of the places, number of members, 0 if it is none, the last of them
-    total, centre, alive = np.empty((n, 2)), np.empty((n, 2)), np.empty(n, np.bool_)
-    size, last = np.empty(n), np.empty(n, np.int64)
-    # next member of a person's cluster, -1 at its end; heads by x of the mean place, and where each is in them
-    following, order, position = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
-    x, own, other = np.empty(n), np.empty(points.shape[2]), np.empty(points.shape[2])
+    dims = points.shape[2]
+    total, size = np.empty((n, 2)), np.empty(n)  # by the head of a cluster: sum of the places, number of members
+    own, side = np.empty((n, dims)), np.empty(n, np.int64)  # the person and the nearest cluster; 0 and 1
+    centre, scatter = np.empty((n, dims)), np.empty(n)
     for i in range(particles):
         for j in range(partitions):
-            groups, count = label[i, j], 0
+            groups = label[i, j]
             for k in range(n):
-                head = k if groups[k] == 0 else groups[k] - 1
-                if head == k:
-                    total[k, 0], total[k, 1], size[k] = 0.0, 0.0, 0.0
-                    order[count] = k
-                    count += 1
-                else:
-                    following[last[head]] = k
-                last[head], following[k], alive[k] = k, -1, head == k
-                _add(points[i], k, head, total, size)
-            for at in range(count):
-                g = order[at]
-                centre[g, 0], centre[g, 1] = total[g, 0] / size[g], total[g, 1] / size[g]
-                x[g] = centre[g, 0]
-            sort_by(x, order[:count])
-            for at in range(count):
-                position[order[at]] = at
+                total[k, 0], total[k, 1], size[k] = 0.0, 0.0, 0.0
+                _add(points[i], k, k if groups[k] == 0 else groups[k] - 1, total, size)
             for person in range(n - uniforms.shape[2], n):
-                if groups[person] > 0:
+                g = _nearest_cluster(total, size, person)
+                if groups[person] > 0 or g < 0:
                     continue
-                g = nearest_place(centre, alive, order[:count], position[person])
-                if g < 0:
+                count = 0
+                for k in range(-1, n):
+                    member = person if k < 0 else k
+                    if k < 0 or k == g or groups[k] == g + 1:
+                        side[count] = min(count, 1)
+                        for d in range(dims):
+                            own[count, d] = points[i, member, d]
+                        count += 1
+                apart = validity_of(own[:count], side, 2, scales, centre, scatter)
+                side[:count] = 0
+                together = validity_of(own[:count], side, 1, scales, centre, scatter)
+                if uniforms[i, j, person - n] >= 1 / (1 + math.exp(min(sharpness * (together - apart), 700.0))):
                     continue
-                join = _join_probability(points[i], person, g, following, size[g], sharpness, scales, own, other)
-                if uniforms[i, j, person - n] >= join:
-                    continue
-                _add(points[i], person, g, total, size)
                 head = min(person, g)
+                _add(points[i], person, g, total, size)
                 total[head, 0], total[head, 1], size[head] = total[g, 0], total[g, 1], size[g]
-                alive[max(person, g)] = False
-                centre[head, 0], centre[head, 1] = total[head, 0] / size[head], total[head, 1] / size[head]
-                _put(head, centre, order[:count], position)
-                _link(person, g, following)
-                k = head
-                while k >= 0:
-                    groups[k] = 1 + head
-                    k = following[k]
-
-
-@njit(cache=True)
-def _put(head, centre, order, position):  # type: ignore[no-untyped-def]
-    """Moves a head, whose centre has changed, to its place in the order."""
-    at = position[head]
-    for step in (-1, 1):
-        while 0 <= at + step < len(order) and step * (centre[order[at + step], 0] - centre[head, 0]) < 0:
-            order[at] = order[at + step]
-            position[order[at]] = at
-            at += step
-    order[at], position[head] = head, at
-
-
-@njit(cache=True)
-def _link(person, head, following):  # type: ignore[no-untyped-def]
-    """Adds a person to the members of a cluster, which are linked in ascending order."""
-    if person < head:
-        following[person] = head
-        return
-    before = head
-    while 0 <= following[before] < person:
-        before = following[before]
-    following[person], following[before] = following[before], person
+                size[max(person, g)] = 0.0
+                for k in range(n):
+                    if k in (person, g) or groups[k] == g + 1:
+                        groups[k] = 1 + head
 
 
 @njit(cache=True)
@@ -205,43 +169,11 @@ def _add(points, k, head, total, size):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _join_probability(points, person, g, following, count, sharpness, scales, own, other):  # type: ignore[no-untyped-def]
-    s0, apart = scales[SCATTER], scales[APART]
-    single, all_of_them = _scatter(points, person, g, following, count, s0, own, other)
-    away = 0.0
-    for d in range(len(own)):
-        away += (points[person, d] - other[d]) ** 2
-    ratio = (s0 / 2 + single) / max(math.sqrt(away), s0)
-    separate = (max(s0 / 2 / apart, ratio) + max(single / apart, ratio)) / 2
-    return 1 / (1 + math.exp(min(sharpness * (all_of_them / apart - separate), 700.0)))
-
-
-@njit(cache=True)
-def _scatter(points, person, g, following, count, s0, both, other):  # type: ignore[no-untyped-def]
-    dims = len(both)
-    for d in range(dims):
-        both[d], other[d] = points[person, d], 0.0
-    k = g
-    while k >= 0:
-        for d in range(dims):
-            both[d] += points[k, d]
-            other[d] += points[k, d]
-        k = following[k]
-    for d in range(dims):
-        both[d] /= count + 1
-        other[d] /= count
-    without, with_person = s0, s0 + _distance(points, person, both)
-    k = g
-    while k >= 0:
-        without += _distance(points, k, other) if count > 1 else 0.0
-        with_person += _distance(points, k, both)
-        k = following[k]
-    return without / (count + 1), with_person / (count + 2)
-
-
-@njit(cache=True)
-def _distance(points, k, mean):  # type: ignore[no-untyped-def]
-    total = 0.0
-    for d in range(len(mean)):
-        total += (points[k, d] - mean[d]) ** 2
-    return math.sqrt(total)
+def _nearest_cluster(total, size, own):  # type: ignore[no-untyped-def]
+    best, least = -1, np.inf
+    for g in range(len(size)):
+        if size[g] > 0 and g != own:
+            x, y = total[g, 0] / size[g] - total[own, 0] / size[own], total[g, 1] / size[g] - total[own, 1] / size[own]
+            if x * x + y * y < least:
+                best, least = g, x * x + y * y
+    return best

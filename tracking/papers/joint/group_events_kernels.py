@@ -17,7 +17,7 @@ from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
 from tracking.papers.joint.division_kernels import divide
-from tracking.papers.joint.partition_kernels import clusters, nearest_place, same_row
+from tracking.papers.joint.partition_kernels import clusters, same_row
 
 X, Y, VX, VY, XX, XY, YY, SPREAD, SIZE = range(9)
 """Columns of moments (G, 9): mean place and velocity, covariance of the places shrunk to PRIOR, mean squared distance
@@ -43,12 +43,24 @@ PLACE, CROSS, RATE = range(3)
 def nearest_places(places: Array, count: int, nearest: Ints) -> None:
     """Writes the nearest other one of the first `count` places (K, 2 or more) to each, of equal ones the first; -1
     without."""
-    x, order, alive = np.empty(count), np.empty(count, np.int64), np.empty(count, np.bool_)
+    x, order = np.empty(count), np.empty(count, np.int64)
     for k in range(count):
-        x[k], order[k], alive[k] = places[k, 0], k, True
+        x[k], order[k] = places[k, 0], k
     sort_by(x, order)
     for at in range(count):
-        nearest[order[at]] = nearest_place(places, alive, order, at)
+        own, best, least = order[at], -1, np.inf
+        for step in (-1, 1):
+            n = at + step
+            while 0 <= n < count:
+                other = order[n]
+                dx, dy = places[other, 0] - places[own, 0], places[other, 1] - places[own, 1]
+                if dx * dx > least:  # so are all beyond
+                    break
+                far = dx * dx + dy * dy
+                if far < least or (far == least and other < best):
+                    best, least = other, far
+                n += step
+        nearest[own] = best
 
 
 @njit(cache=True)

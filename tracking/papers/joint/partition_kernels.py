@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from sim.compiler import njit
-from sim.types import Array, Bools, Ints
+from sim.types import Array, Ints
 
 SCATTER, APART = range(2)
 """Slots of `scales` (2,): prior scatter s_0, virtual distance D_0; m."""
@@ -72,27 +72,6 @@ def clusters(label: Ints, cluster: Ints, head: Ints) -> int:
         else:
             cluster[k] = cluster[label[k] - 1]
     return count
-
-
-@njit(cache=True)
-def nearest_place(places: Array, alive: Bools, order: Ints, at: int) -> int:
-    """Returns the nearest other place to that of order[at], of equally near ones the first; -1 without.
-
-    places (K, 2 or more): x, y; only those with `alive` (K,) count; order (G,): places sorted by x.
-    """
-    own, best, least = order[at], -1, np.inf
-    for step in (-1, 1):
-        n = at + step
-        while 0 <= n < len(order):
-            other = order[n]
-            x, y = places[other, 0] - places[own, 0], places[other, 1] - places[own, 1]
-            if x * x > least:  # so are all beyond
-                break
-            far = x * x + y * y
-            if alive[other] and (far < least or (far == least and other < best)):
-                best, least = other, far
-            n += step
-    return best
 
 
 @njit(cache=True)

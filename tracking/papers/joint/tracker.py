@@ -79,14 +79,13 @@ Departures. A star marks those that stay in the preset `paper`:
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from sim.truth.identity import Identities
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
 from tracking.detect.point_detections import PointTracker, boxes_at
-from tracking.filters.particles import ParticleHealth, effective_number
 from tracking.filters.person_streams import NOBODY, PersonStreams
 from tracking.grouping.belief import EVENTS, default_belief
 from tracking.grouping.pair_belief import PairBelief
@@ -113,7 +112,7 @@ class Joint(PointTracker):
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
     particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; events: those of
-    the reported groups; belief: of pairs; health: how many particles the weights are worth; streams, the random
+    the reported groups; belief: of pairs; streams, the random
     numbers; shown (K, 4): boxes of the people reported last, px, or None.
     """
 
@@ -133,7 +132,6 @@ class Joint(PointTracker):
         self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
         self.events = ReportedEvents(context.fps)
         self.belief = PairBelief(context.fps, EVENTS)
-        self.health = ParticleHealth(context.fps, "effective_particles", "effective_particles_of_a_person")
         self.streams = PersonStreams(seed)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
@@ -161,11 +159,6 @@ class Joint(PointTracker):
             self._newcomers(points[free], sizes[free])
         return tracks
 
-    @property
-    def diagnostics(self) -> dict[str, Any]:
-        """What run.json tells of the particles: means over frames of shares of effective particles and ancestors."""
-        return self.health.summary()
-
     def _associate(self, points: Array) -> tuple[Ints, Ints]:
         c, ahead = self.config, moved(self.nested.x, self.dt)
         weights = np.full(ahead.shape[:2], 1 / len(ahead))
@@ -191,11 +184,6 @@ class Joint(PointTracker):
         if not people:
             return
         uniforms = self.streams.uniforms(RESAMPLING, np.append(self.people.key, NOBODY), 1, 1)[0, :, 0]
-        own_weights = nested.component_weights()
-        whole = nested.rest_weights() if self.config.own_weights else nested.weights()
-        self.health.add("effective_particles", effective_number(whole) / len(whole))
-        least = min(effective_number(own_weights[:, k]) / len(whole) for k in range(people))
-        self.health.add("effective_particles_of_a_person", least)
         if not self.config.own_weights:
             chosen = decentralised_filter.joint_indices(nested, float(uniforms[-1]))
             own = np.repeat(chosen[:, None], people, axis=1)
@@ -204,9 +192,7 @@ class Joint(PointTracker):
             own = single[chosen]
         columns = np.arange(people)
         x, z, log_q = nested.x[own, columns], nested.z[chosen], nested.log_q[chosen]
-        ancestor = nested.ancestor[own, columns]
-        self.nested = Nested(x, z, log_q, np.zeros_like(nested.log_w), np.zeros_like(nested.log_rest), ancestor)
-        self.health.resampled(ancestor)
+        self.nested = Nested(x, z, log_q, np.zeros_like(nested.log_w), np.zeros_like(nested.log_rest))
 
     def _keep(self, rows: Bools) -> None:
         if rows.all():

@@ -35,8 +35,7 @@ class ParticleSet:
     one weight all columns are equal. pos (P, K, 2): m. vel (P, K, 2): m/s. exist (P, K): probability that the person
     exists, given the particle's path (ours: it is computed, not drawn). pairs (N, 2): people i < j whose relation is
     kept, in order of j, then i; all others do not walk together. related (N, P) bool: in which particles a pair walks
-    together. ancestor (P, K): the particle from which each slot's state descends, since `ancestor` was last set to
-    the particles' own numbers.
+    together.
     """
 
     count: int
@@ -47,15 +46,13 @@ class ParticleSet:
     exist: Array
     pairs: Ints
     related: Bools
-    ancestor: Ints
 
     @classmethod
     def empty(cls, count: int) -> ParticleSet:
         """Returns `count` particles without people."""
         flat, two = np.zeros((count, 0)), np.zeros((count, 0, 2))
-        none = np.zeros((count, 0), np.int64)
         pairs, related = np.zeros((0, 2), np.int64), np.zeros((0, count), bool)
-        return cls(count, False, flat, two, two.copy(), flat.copy(), pairs, related, none)
+        return cls(count, False, flat, two, two.copy(), flat.copy(), pairs, related)
 
     @property
     def people(self) -> int:
@@ -78,6 +75,18 @@ class ParticleSet:
         label = np.empty(self.exist.shape, np.int64)
         particle_set_kernels.group_labels(self.pairs, self.related, label)
         return label
+
+    def together(self) -> Array:
+        """Returns the probability (K, K) that two people walk together, given that both exist; 1 on the diagonal, 0 for
+        a pair that does not exist."""
+        i, j = self.pairs.T
+        both = (
+            self.weights[:, j] * self.exist[:, i] * self.exist[:, j] * (1.0 if self.one_weight else self.weights[:, i])
+        )
+        total, out = both.sum(axis=0), np.eye(self.people)
+        share = np.divide((both * self.related.T).sum(axis=0), total, out=np.zeros(len(i)), where=total > 0)
+        out[i, j] = out[j, i] = share
+        return out
 
     def share_weights(self, one_weight: bool) -> None:
         """Give each particle one weight, the product of the people's, or each person weights of the own."""
@@ -108,11 +117,11 @@ class ParticleSet:
             weights = np.ascontiguousarray(self.weights[:, person])  # of one column numpy sums in another order
             chosen[:, column] = residual_resample(weights, uniforms[column])
         if self.one_weight:
-            for values in (self.pos, self.vel, self.exist, self.ancestor):
+            for values in (self.pos, self.vel, self.exist):
                 values[:] = values[chosen[:, 0]]
             self.related = np.ascontiguousarray(self.related[:, chosen[:, 0]])
         else:
-            for values in (self.pos, self.vel, self.exist, self.ancestor):
+            for values in (self.pos, self.vel, self.exist):
                 values[:, few] = values[chosen, few]
             # a relation is drawn with each person alone: particles of both are independent then
             for person, own in zip(few.tolist(), chosen.T, strict=True):
@@ -137,23 +146,24 @@ class ParticleSet:
     def keep(self, slots: Bools) -> None:
         """Remove all slots but those where `slots` (K,) is True."""
         # np.compress keeps arrays C-contiguous: kernels are compiled once more for another layout
-        self.weights, self.exist = np.compress(slots, self.weights, 1), np.compress(slots, self.exist, 1)
-        self.pos, self.vel = np.compress(slots, self.pos, 1), np.compress(slots, self.vel, 1)
+        for name in ("weights", "exist", "pos", "vel"):
+            setattr(self, name, np.compress(slots, getattr(self, name), 1))
         rows, number = slots[self.pairs].all(axis=1), np.cumsum(slots) - 1
         self.pairs, self.related = number[self.pairs[rows]], self.related[rows]
-        self.ancestor = np.compress(slots, self.ancestor, 1)
 
     def add(self, pos: Array, vel: Array, exist: float) -> None:
         """Add M slots with places pos (P, M, 2) and velocities vel (P, M, 2), the same existence in each particle, and
         no relations; their weights are equal, or the particles' one weight."""
         count, k, new = self.count, self.people, pos.shape[1]
         weights = self.weights[:, :1] if self.one_weight and k else np.full((count, 1), 1 / count)
-        self.weights = np.concatenate([self.weights, np.repeat(weights, new, axis=1)], axis=1)
-        self.pos = np.concatenate([self.pos, np.ascontiguousarray(pos)], axis=1)
-        self.vel = np.concatenate([self.vel, np.ascontiguousarray(vel)], axis=1)
-        self.exist = np.concatenate([self.exist, np.full((count, new), exist)], axis=1)
-        own = np.repeat(np.arange(count)[:, None], new, axis=1)
-        self.ancestor = np.concatenate([self.ancestor, own], axis=1)
+        added = {
+            "weights": np.repeat(weights, new, axis=1),
+            "pos": pos,
+            "vel": vel,
+            "exist": np.full((count, new), exist),
+        }
+        for name, values in added.items():
+            setattr(self, name, np.concatenate([getattr(self, name), np.ascontiguousarray(values)], axis=1))
 
     def hold(self, pairs: Ints) -> None:
         """Keep relations of further pairs i < j (N', 2), in any order; others do not walk together."""
@@ -208,18 +218,16 @@ def join(
     velocities (ours). Where these sum to less than 1, the person is alone with what is missing. People whose belonging
     is below FAR in all particles are left out, so that the cost of a person is that of the neighbours.
     """
-    particles, n = label.shape
+    old = label.shape[1] - len(points)
     low, high = pos.min(axis=0), pos.max(axis=0)
     apart = np.maximum(np.maximum(low - points[:, None], points[:, None] - high), 0.0)
-    near = belonging(np.sqrt(np.square(apart).sum(axis=2)), 0.0, rules) >= FAR
-    near &= np.arange(n) < np.arange(n - len(points), n)[:, None]
-    some, ends = np.nonzero(near)[1], near.sum(axis=1).cumsum()
-    found = transition_kernels.join(pos, exist, label, points, some, ends, share, uniforms, rules)
-    new, other, particle = found.reshape(-1, 3).T
-    kept, row = np.zeros(near.shape, bool), np.empty(near.shape, np.int64)
-    kept[new, other] = True
-    new_one, old_one = np.nonzero(kept)
-    row[kept] = np.arange(len(new_one))
-    related = np.zeros((len(new_one), particles), bool)
-    related[row[new, other], particle] = True
-    return np.stack([old_one, new_one + n - len(points)], axis=1), related
+    close = belonging(np.sqrt(np.square(apart).sum(axis=2)), 0.0, rules) >= FAR
+    pairs, relations = [np.zeros((0, 2), np.int64)], [np.zeros((0, len(pos)), bool)]
+    for m, point in enumerate(points):
+        new, related = old + m, np.zeros((old + m, len(pos)), bool)
+        near = np.flatnonzero(close[m, :new])
+        transition_kernels.join(pos, exist, label, point, near, new, share, uniforms[m], rules, related)
+        others = np.flatnonzero(related.any(axis=1))
+        pairs.append(np.column_stack([others, np.full(len(others), new)]))
+        relations.append(related[others])
+    return np.concatenate(pairs), np.concatenate(relations)

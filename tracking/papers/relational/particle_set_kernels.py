@@ -109,29 +109,3 @@ def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, c
         for a in range(4):
             for b in range(a):
                 cov[k, b, a] = cov[k, a, b]
-
-
-@njit(cache=True)
-def pairs_together(pairs: Ints, related: Bools, exist: Array, weights: Array, one_weight: bool) -> Array:
-    """Returns the probability (K, K) that i and j walk together, given that both exist; 1 on the diagonal.
-
-    pairs (N, 2), related (N, P): relations; exist (P, K): probabilities of existence; weights (P, K): of the particles;
-    one_weight: whether all columns are one weight, else a pair has the product. 0 for a pair that does not exist.
-    """
-    particles, n = exist.shape
-    out = np.zeros((n, n))
-    for k in range(n):
-        out[k, k] = 1.0
-    for k in range(len(pairs)):
-        j, i = pairs[k, 0], pairs[k, 1]
-        both, same = 0.0, 0.0
-        for p in range(particles):
-            w = weights[p, i] * exist[p, i] * exist[p, j]
-            if not one_weight:
-                w *= weights[p, j]
-            both += w
-            if related[k, p]:
-                same += w
-        if both > 0:
-            out[i, j] = out[j, i] = same / both
-    return out

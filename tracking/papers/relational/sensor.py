@@ -29,19 +29,6 @@ LEAST_MISS = 1e-6  # Least weight of a person without detection in the average o
 
 
 @dataclass(frozen=True)
-class Weighing:
-    """What a frame's detections say, over P particles, K people and M detections.
-
-    pairs (K, M): probability that person and detection belong together, weighted over particles. seen (K,): probability
-    that the person, if existing, is measured. nobody (M,): probability that the detection is no known person's.
-    """
-
-    pairs: Array
-    seen: Array
-    nobody: Array
-
-
-@dataclass(frozen=True)
 class Sight:
     """What is known of K people before a frame's detections.
 
@@ -56,11 +43,17 @@ class Sight:
     eye: Array
 
 
-def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, config: ParticleConfig) -> Weighing:
-    """Multiply the weights of the particles by p(z_t | s^a_t), update existence, and return what the detections say."""
+def weigh(
+    particles: ParticleSet, points: Array, sight: Sight, noise: float, config: ParticleConfig
+) -> tuple[Array, Array, Array]:
+    """Multiply the weights of the particles by p(z_t | s^a_t), update existence, and return what the detections say.
+
+    Returned are the probabilities that person and detection belong together, (K, M), weighted over particles; that each
+    person, if existing, is measured, (K,); and that each detection is no known person's, (M,).
+    """
     people, count, certain = particles.people, len(points), config.certain_sensor
     if not people:
-        return Weighing(np.zeros((0, count)), np.zeros(0), np.ones(count))
+        return np.zeros((0, count)), np.zeros(0), np.ones(count)
     particles.share_weights(certain)
     if certain:
         pairs, logs, marginals = _complete(particles, points, noise)
@@ -81,7 +74,7 @@ def weigh(particles: ParticleSet, points: Array, sight: Sight, noise: float, con
     found[pairs[:, 0], pairs[:, 1]] = column_sums(particles.weights.take(pairs[:, 0], 1), marginals)
     exist = particles.existence
     seen = np.divide(found.sum(axis=1), exist, out=np.zeros(people), where=exist > 0)
-    return Weighing(found, seen, 1.0 - found.sum(axis=0))
+    return found, seen, 1.0 - found.sum(axis=0)
 
 
 def _complete(particles: ParticleSet, points: Array, noise: float) -> tuple[Ints, Array, Array]:

@@ -79,7 +79,6 @@ import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
 from tracking.detect.point_detections import PersonTable, PointTracker, boxes_at, followed_sizes
-from tracking.filters.particles import ParticleHealth
 from tracking.filters.person_streams import PersonStreams, birth_keys
 from tracking.grouping.belief import UNSEEN
 from tracking.grouping.pair_belief import PairBelief
@@ -139,7 +138,7 @@ class Particle(PointTracker):
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
     the people; streams, the random numbers of each person; hidden (K,): probability that each person is behind a known
     pillar or wall, or behind another person; cut (K,): that the feet are behind another person; shown: the tracks
-    reported last, None before; health: how many particles the weights are worth.
+    reported last, None before.
     """
 
     config_class: ClassVar[type[ParticleConfig]] = ParticleConfig
@@ -156,7 +155,6 @@ class Particle(PointTracker):
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
         self.streams = PersonStreams(seed)
         self.hidden = np.zeros(0)
-        self.health = ParticleHealth(context.fps, "effective_particles_of_a_person")
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the people of the frame as Tracks; updates all particles.
@@ -178,13 +176,7 @@ class Particle(PointTracker):
             few = self.particles.resample(1.0 if one else RESAMPLE_SHARE, self._uniforms)
             if not one and len(few):
                 self.particles.spread(few, KERNEL_WIDTH, self._normals(few))
-            self.health.resampled(self.particles.ancestor)
         return tracks
-
-    @property
-    def diagnostics(self) -> dict[str, float | None]:
-        """What run.json tells of the particles: means of the shares of effective particles and of ancestors."""
-        return self.health.summary()
 
     def _forecast(self) -> None:
         p, c = self.particles, self.config
@@ -215,13 +207,10 @@ class Particle(PointTracker):
         points, sizes = self.points(detections)
         missed = self.slots.missed > 0
         sight = sensor.Sight(self._detection_probability(), missed, self.cut, self.eye)
-        said = sensor.weigh(self.particles, points, sight, self.noise, self.config)
-        if self.particles.people:
-            least = float(self.particles.effective().min())
-            self.health.add("effective_particles_of_a_person", least / self.particles.count)
-        self.slots.measure(said.seen, said.pairs, sizes, self.dt * (1 - self.hidden))
+        pairs, measured, nobody = sensor.weigh(self.particles, points, sight, self.noise, self.config)
+        self.slots.measure(measured, pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
-        new = said.nobody >= BIRTH_DOUBT
+        new = nobody >= BIRTH_DOUBT
         if new.any():
             self._start(points[new], sizes[new])
 
@@ -349,7 +338,7 @@ class Relational(Particle):
     def _report(self, frame: Frame) -> Tracks:
         tracks, p = super()._report(frame), self.particles
         if self.belief is None:
-            self.together = particle_set_kernels.pairs_together(p.pairs, p.related, p.exist, p.weights, p.one_weight)
+            self.together = p.together()
         else:
             self.together = 1 / (1 + np.exp(-_log_odds(self.belief)))
             np.fill_diagonal(self.together, 1.0)

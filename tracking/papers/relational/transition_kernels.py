@@ -150,61 +150,32 @@ def relate(
 
 @njit(cache=True)
 def join(
-    pos: Array, exist: Array, label: Ints, points: Array, some: Ints, ends: Ints, share: float, uniforms: Array,
-    rules: Array,
-) -> Ints:  # fmt: skip
-    """Writes the groups label (P, K) of M new people, the last slots, and returns their relations: three numbers for
-    each, the new person, the other one, the particle.
+    pos: Array, exist: Array, label: Ints, point: Array, near: Ints, new: int, share: float, uniforms: Array,
+    rules: Array, related: Bools,
+) -> None:  # fmt: skip
+    """Writes the group label[:, new] of a new person in each particle, and the relations (K, P) to all others.
 
-    Arguments as of `particle_set.join`; some (S,): who is near the new people, ends (M,): where each one's end in it.
+    Arguments as of `particle_set.join`, of one person; near (S,): who is near, all before `new`.
     """
-    particles, n, _ = pos.shape
-    old = n - len(points)
-    near, groups, weight = np.zeros(n), np.empty(n, np.int64), np.empty(n)
-    last, following = np.empty(n, np.int64), np.empty(n, np.int64)
-    found, count = np.empty(16 * n, np.int64), 0
-    for p in range(particles):
-        for i in range(old):
-            following[i] = -1
-            if label[p, i] < i:
-                following[last[label[p, i]]] = i
-            last[label[p, i]] = i
-        begin = 0
-        for m in range(len(points)):
-            new, first, begin = old + m, begin, ends[m]
-            label[p, new], last[new], following[new] = new, new, -1
-            if uniforms[m, p] >= share:  # alone, whoever is near
-                continue
-            for row in range(first, begin):
-                i = some[row]
-                dx, dy = pos[p, i, 0] - points[m, 0], pos[p, i, 1] - points[m, 1]
-                g = exist[p, i] * _belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
-                near[label[p, i]] = max(near[label[p, i]], g)
-            total, several = 0.0, 0
-            for row in range(first, begin):
-                g = label[p, some[row]]
-                if near[g] > 0:
-                    total += near[g]
-                    at = several
-                    while at > 0 and groups[at - 1] > g:
-                        groups[at], weight[at] = groups[at - 1], weight[at - 1]
-                        at -= 1
-                    groups[at], weight[at] = g, near[g]
-                    near[g], several = 0.0, several + 1
-            left = uniforms[m, p] * max(total, 1.0)
-            for k in range(several):
-                left -= share * weight[k]
-                if left < 0:
-                    g = groups[k]
-                    i, label[p, new] = g, g
-                    while i >= 0:
-                        if count + 3 > len(found):
-                            longer = np.empty(2 * count, np.int64)
-                            for r in range(count):  # a copy of a slice takes a second to compile
-                                longer[r] = found[r]
-                            found = longer
-                        found[count], found[count + 1], found[count + 2] = m, i, p
-                        i, count = following[i], count + 3
-                    following[last[g]] = last[g] = new
-                    break
-    return found[:count]
+    belongs = np.zeros(new)  # by groups
+    for p in range(len(pos)):
+        joined = label[p, new] = new
+        if uniforms[p] >= share:  # alone, whoever is near
+            continue
+        for i in near:
+            dx, dy = pos[p, i, 0] - point[0], pos[p, i, 1] - point[1]
+            likely = exist[p, i] * _belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
+            belongs[label[p, i]] = max(belongs[label[p, i]], likely)
+        total = 0.0
+        for g in range(new):
+            total += belongs[g]
+        left = uniforms[p] * max(total, 1.0)
+        for g in range(new):
+            left -= share * belongs[g]
+            belongs[g] = 0.0
+            if left < 0 and joined == new:
+                joined = g
+        if joined < new:
+            label[p, new] = joined
+            for i in range(new):
+                related[i, p] = label[p, i] == joined

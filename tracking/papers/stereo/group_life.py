@@ -210,9 +210,5 @@ def sphere_groups(pos: Array, radius: float, least: int) -> Ints:
         return np.full(M, 0 if least <= M else -1)
     i, j = cKDTree(pos).query_pairs(2 * radius, output_type="ndarray").T
     label = connected_components(coo_array((np.ones(len(i)), (i, j)), (M, M)), directed=False)[1]
-    large = np.bincount(label) >= least
-    _, first = np.unique(label, return_index=True)
-    rank = np.full(len(large), -1)
-    order = np.argsort(first)
-    rank[order[large[order]]] = np.arange(large.sum())
-    return np.asarray(rank[label], np.int64)
+    large = np.bincount(label) >= least  # labels are in the order of first points
+    return np.asarray(np.where(large, np.cumsum(large) - 1, -1)[label])

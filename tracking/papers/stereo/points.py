@@ -29,7 +29,7 @@ from sim.arrays import no_ids
 from sim.scene.camera import back_project, point_covariances
 from sim.types import Array, Bools, Camera, Context, Image
 from tracking.detect.blobs import Blobs, odd
-from tracking.detect.features import Features, SpacePoints, slopes
+from tracking.detect.features import Features, SpacePoints, last_frames, slopes
 from tracking.detect.foreground import Foreground
 from tracking.detect.subtraction_stereo import Disparities, SubtractionStereo
 from tracking.filters.assignment import optimal
@@ -156,8 +156,8 @@ class PointLinks:
     def step(self, xyz: Array, config: StereoConfig) -> SpacePoints:
         """Returns the detections xyz (M, 3), m, of the next frame as points in space, in the same order."""
         frames, M = max(round(config.window_time * self.fps), 1) + 1, len(xyz)
-        past = self._past(frames)
-        cost = np.linalg.norm(self._predicted(past)[:, None] - xyz, axis=2)
+        past = last_frames(self.world, frames)
+        cost = np.linalg.norm((past[:, -1] + self._motion(past)[0] / self.fps)[:, None] - xyz, axis=2)
         cost[cost > FASTEST / self.fps + 3 * config.point_noise] = np.inf
         rows, columns = optimal(cost, 1e6)
         world, id = np.full((M, frames, 3), np.nan), np.full(M, -1)
@@ -173,27 +173,16 @@ class PointLinks:
         """End all links, after a frame without detections; returns nothing."""
         self.id, self.world = no_ids(), np.zeros((0, 2, 3))
 
-    def _past(self, frames: int) -> Array:
-        kept = self.world[:, -frames:]
-        return np.concatenate([np.full((len(kept), frames - kept.shape[1], 3), np.nan), kept], 1)
-
-    def _predicted(self, past: Array) -> Array:
-        known = np.isfinite(past[..., 0])
+    def _motion(self, world: Array) -> tuple[Array, Array]:
+        known = np.isfinite(world[..., 0])
         moving = known.sum(1) > 1
-        place = past[:, -1].copy()
-        if moving.any():
-            times = np.arange(past.shape[1]) / self.fps
-            place[moving] += slopes(past[moving], known[moving], times)[0] / self.fps
-        return place
+        vel, spread = np.zeros((len(world), 3)), np.full(len(world), np.nan)
+        times = np.arange(world.shape[1]) / self.fps
+        vel[moving], spread[moving] = slopes(world[moving], known[moving], times)
+        return vel, spread
 
     def _points(self, config: StereoConfig) -> SpacePoints:
-        M, unit = len(self.id), np.eye(3)
-        known = np.isfinite(self.world[..., 0])
-        moving = known.sum(1) > 1
-        vel, vel_cov = np.zeros((M, 3)), np.repeat(SPEED**2 * unit[None], M, 0)
-        if moving.any():
-            times = np.arange(self.world.shape[1]) / self.fps
-            vel[moving], spread = slopes(self.world[moving], known[moving], times)
-            vel_cov[moving] = config.point_noise**2 / spread[:, None, None] * unit
-        cov = np.repeat(config.point_noise**2 * unit[None], M, 0)
-        return SpacePoints(self.id, self.world[:, -1].copy(), cov, vel, vel_cov)
+        vel, spread = self._motion(self.world)
+        vel_var = np.where(np.isnan(spread), SPEED**2, config.point_noise**2 / spread)
+        cov = np.repeat(config.point_noise**2 * np.eye(3)[None], len(self.id), 0)
+        return SpacePoints(self.id, self.world[:, -1].copy(), cov, vel, vel_var[:, None, None] * np.eye(3))

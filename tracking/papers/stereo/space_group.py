@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -42,73 +42,35 @@ POS, VEL = [0, 2, 4], [1, 3, 5]  # Entries of the state that are the position an
 TOP = 0.9  # Share of a group's features, by weight, that are below its top.
 
 
-class Measurement(Protocol):
-    """What a filter measures of a position: the functions of eq. 6."""
+@dataclass(frozen=True)
+class Measurement:
+    """What a filter measures of a position (eq. 6): Z = (u, v, d), px, by a stereo camera (eqs 4, 6 with the camera's
+    pose), or, without a camera, Z = (x, y, z), m: points whose places are measured directly."""
+
+    camera: Camera | None = None
 
     def z(self, xyz: Array) -> Array:
         """Returns the measurement (3, 1) of a position (3,), m."""
-        ...
+        return xyz[:, None] if self.camera is None else project_pair(self.camera, xyz[None]).T
 
     def jacobian(self, xyz: Array) -> Array:
         """Returns dZ/d(x, y, z) (3, 3) at a position (3,), m."""
-        ...
+        return np.eye(3) if self.camera is None else np.asarray(pair_jacobian(self.camera, xyz[None])[0])
 
     def weights(self, points: SpacePoints, width: float) -> Array:
         """Returns the weights (M,) of M points in their group's mean position; width: of the kernel of density, m."""
-        ...
+        # each point is a person, but a person may have any number of features
+        return np.ones(len(points)) if self.camera is None else inverse_densities(points, width)
 
     def rise(self, z: Array, weights: Array, top_offset: float) -> float:
-        """Returns how far, m, the middle of bodies is above the mean of M points with heights z (M,) and weights."""
-        ...
-
-
-class PairMeasurement:
-    """Z = (u, v, d) in px, by a stereo camera (eqs 4, 6 with the camera's pose)."""
-
-    def __init__(self, camera: Camera) -> None:
-        self.camera = camera
-
-    def z(self, xyz: Array) -> Array:
-        """Returns u, v, d (3, 1) in px of a position (3,), m."""
-        return project_pair(self.camera, xyz[None]).T
-
-    def jacobian(self, xyz: Array) -> Array:
-        """Returns d(u, v, d)/d(x, y, z) (3, 3) in px/m."""
-        return np.asarray(pair_jacobian(self.camera, xyz[None])[0])
-
-    def weights(self, points: SpacePoints, width: float) -> Array:
-        """Returns `inverse_densities` (M,): a person may have any number of features."""
-        return inverse_densities(points, width)
-
-    def rise(self, z: Array, weights: Array, top_offset: float) -> float:
-        """Returns how far, m, `top_offset` below the top of M features is above their mean; 0 if it is 0 (ours)."""
+        """Returns how far, m, the middle of bodies is above the mean of M points with heights z (M,) and weights:
+        `top_offset` below the top of features (ours); 0 from points, or if top_offset is 0."""
+        if self.camera is None or not top_offset:
+            return 0.0
         # others and the edge of the picture hide legs, but seldom heads: the mean height changes with what is seen
         order = np.argsort(z)
         top = min(int(np.searchsorted(np.cumsum(weights[order]), TOP)), len(z) - 1)
-        return float(z[order[top]] - top_offset - weights @ z) if top_offset else 0.0
-
-
-class PlaceMeasurement:
-    """Z = (x, y, z) in m: points whose places are measured directly."""
-
-    def z(self, xyz: Array) -> Array:
-        """Returns the position (3,) as a column (3, 1), m."""
-        return xyz[:, None]
-
-    def jacobian(self, xyz: Array) -> Array:
-        """Returns the unit matrix (3, 3)."""
-        del xyz
-        return np.eye(3)
-
-    def weights(self, points: SpacePoints, width: float) -> Array:
-        """Returns ones (M,): each point is a person."""
-        del width
-        return np.ones(len(points))
-
-    def rise(self, z: Array, weights: Array, top_offset: float) -> float:
-        """Returns 0: the height of a point is that of its person."""
-        del z, weights, top_offset
-        return 0.0
+        return float(z[order[top]] - top_offset - weights @ z)
 
 
 def inverse_densities(points: SpacePoints, width: float) -> Array:

@@ -91,8 +91,6 @@ from tracking.papers.stereo.space_group import (
     POS,
     VEL,
     Measurement,
-    PairMeasurement,
-    PlaceMeasurement,
     SpaceGroup,
     associated,
     measure,
@@ -133,9 +131,7 @@ class Stereo:
         self.ids = GroupIds()
         self.pictures = None if context.background is None else PicturePoints(self.config, context)
         self.links, self.motion = PointLinks(context.fps), motion_model(self.config, 1 / context.fps)
-        self.measurement: Measurement = (
-            PlaceMeasurement() if self.pictures is None else PairMeasurement(self.pictures.camera)
-        )
+        self.measurement = Measurement(None if self.pictures is None else self.pictures.camera)
         flat = context.camera is None and context.px_per_m > 0
         self.plane: Plane = "space" if self.pictures is not None else "image" if flat else "ground"
         self.scale = 1.0

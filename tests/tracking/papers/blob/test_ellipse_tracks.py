@@ -7,9 +7,7 @@ import pytest
 
 from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context
-from tracking.detect import blobs
 from tracking.filters import kalman
-from tracking.papers.blob import update_from_pixels as blob_pieces
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.track_management import TrackedEllipses
 
@@ -68,30 +66,3 @@ def test_from_straight_above_nobody_is_behind_anybody():
     one = TrackedEllipses(settings, settings.dynamics(FPS), Context(FPS, 20.0, camera=camera, image_size=(320, 240)))
     one.start_tracks(np.array([[100.0, 100, 12, 8, UP], [100, 106, 12, 12, UP]]), np.ones(2), 0.0, np.ones(2))
     assert one.visible_shares().tolist() == [1.0, 1.0]
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_union_of_pieces_is_the_blob_of_their_pixels(seed):
-    r = np.random.default_rng(seed)
-    mask = np.zeros((80, 90), bool)
-    for k in range(3):
-        top, left, high, wide = 25 * k + 2, *r.integers(4, 30, 1), *r.integers(8, 20, 2)
-        mask[top : top + high, left : left + wide] = True
-    pieces = blobs.find(mask, 1)
-    assert len(pieces) == 3
-    found, var = blob_pieces.union(pieces.area, pieces.ellipse)
-    v, u = np.nonzero(mask)
-    at = np.stack([u, v], 1) + 0.5
-    n, cov = np.array([float(len(at))]), np.cov(at.T, bias=True)[None] + np.eye(2) / 12
-    expected, expected_var = blobs.ellipses(n, at.mean(0)[None], cov)
-    assert found == pytest.approx(expected[0])
-    assert var == pytest.approx(expected_var[0])
-
-
-def test_a_piece_belongs_to_the_nearest_track_that_holds_it():
-    boxes = np.array([[100.0, 100, 60, 20], [104, 100, 60, 20], [300, 100, 60, 20]])
-    centre = np.array([[102.0, 90], [300, 120], [200, 100], [101, 100]])
-    d2 = np.array([[30.0, 9, 9, 1], [20, 9, 9, 2], [99, 50, 9, 9]])
-    free = np.array([True, True, True, False])
-    assert blob_pieces.owners(centre, boxes, d2, free).tolist() == [1, 2, -1, -1]
-    assert blob_pieces.owners(centre, boxes[:0], d2[:0], free).tolist() == [-1] * 4

@@ -44,7 +44,7 @@ def region(seed):
 def test_guesses_are_the_slow_way(seed):
     mask, (h, w) = region(seed)
     found = blobs.find(mask, 20)
-    got = person_template._guesses(found, np.array([0]), np.array([6]), Fixed(h, w))[0]
+    got = person_template._guesses(found, 0, 6, Fixed(h, w))
     assert np.array_equal(got, np.concatenate(slow.guesses(found.label == 1, 6, Fixed(h, w))))
 
 

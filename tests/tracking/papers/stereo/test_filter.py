@@ -11,7 +11,7 @@ from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
 from tracking.papers.stereo import space_group
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.space_group import POS, VEL, PairMeasurement, PlaceMeasurement
+from tracking.papers.stereo.space_group import POS, VEL, Measurement
 
 DT = 1 / 30
 FIT = {"tilt": 20.0, "focal": 1000.0, "baseline": 0.5, "height": 3.0}
@@ -29,7 +29,7 @@ def cloud(seed: int, count: int, centre, sd: float = 0.3) -> np.ndarray:
 
 
 def test_the_state_jacobian_is_that_of_central_differences() -> None:
-    measurement, step = PairMeasurement(rig(40.0)), 1e-5
+    measurement, step = Measurement(rig(40.0)), 1e-5
     x = np.array([[1.5, 0.7, 6.0, -0.3, 1.1, 0.1]]).T
     numeric = [
         (
@@ -45,7 +45,7 @@ def test_a_linear_measurement_makes_it_a_kalman_filter() -> None:
     config = StereoConfig()
     motion, r = space_group.motion_model(config, DT), np.random.default_rng(0)
     points = at_places(cloud(1, 8, [1, 2, 1]), np.repeat(0.01 * np.eye(3)[None], 8, 0))
-    group = space_group.newborn(points, PlaceMeasurement(), motion, 0.0)
+    group = space_group.newborn(points, Measurement(), motion, 0.0)
     kf = KalmanFilter(dim_x=6, dim_z=3)
     kf.x, kf.P, kf.F, kf.Q = group.ekf.x.copy(), group.ekf.P.copy(), motion.Phi, motion.Q
     kf.H = np.eye(6)[POS]
@@ -53,7 +53,7 @@ def test_a_linear_measurement_makes_it_a_kalman_filter() -> None:
         space_group.predict(group, motion)
         kf.predict()
         pos = points.pos + DT * k * np.array([1.0, 0.3, 0.0]) + 0.1 * r.standard_normal((8, 3))
-        space_group.measure(group, at_places(pos, points.cov), PlaceMeasurement(), motion, DT * k)
+        space_group.measure(group, at_places(pos, points.cov), Measurement(), motion, DT * k)
         kf.update(pos.mean(0)[:, None], R=(0.01 / 8 + config.centroid_noise**2) * np.eye(3))
         assert np.abs(group.ekf.x - kf.x).max() < 1e-12
         assert np.abs(group.ekf.P - kf.P).max() < 1e-12
@@ -65,7 +65,7 @@ def test_errors_have_the_stated_covariance(depth: float) -> None:
     """NEES of the state over 60 runs of 2 s: 6 in the mean, within 99 % of chi-square."""
     camera = rig(**FIT)
     config = StereoConfig(centroid_noise=0.05, accel_noise=0.5, density_width=20.0)
-    measurement, motion, n, runs = PairMeasurement(camera), space_group.motion_model(config, DT), 12, 60
+    measurement, motion, n, runs = Measurement(camera), space_group.motion_model(config, DT), 12, 60
     deviations, nees = np.array([0.3, 0.3, 0.25]), []
     for run in range(runs):
         r = np.random.default_rng([run, int(depth)])
@@ -104,7 +104,7 @@ def test_depth_has_no_bias_where_members_stand_at_many_depths() -> None:
     pos = camera.position + z[:, None] * camera.rotation[2]
     d = project_pair(camera, pos)[:, 2]
     assert 246 * 0.12 / d.mean() - 8.0 < -0.1
-    config, measurement = StereoConfig(density_width=20.0), PairMeasurement(camera)
+    config, measurement = StereoConfig(density_width=20.0), Measurement(camera)
     motion = space_group.motion_model(config, DT)
     points = at_places(pos, point_covariances(camera, pos, np.square([0.3, 0.3, 0.15])))
     group = space_group.newborn(points, measurement, motion, 0.0)

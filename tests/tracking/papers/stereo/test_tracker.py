@@ -18,12 +18,12 @@ from tracking.papers.stereo import space_group
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.group_life import overlap, pooled, separation, sphere_groups
 from tracking.papers.stereo.points import stereo_camera
-from tracking.papers.stereo.space_group import VEL, PairMeasurement, PlaceMeasurement
+from tracking.papers.stereo.space_group import VEL, Measurement
 from tracking.papers.stereo.tracker import Stereo
 
 FPS = 30.0
 PICTURE = np.zeros((4, 4, 3), np.uint8)
-PLACE = PlaceMeasurement()
+PLACE = Measurement()
 
 
 def scripted(steps, config: StereoConfig | None = None, camera=None):
@@ -32,7 +32,7 @@ def scripted(steps, config: StereoConfig | None = None, camera=None):
     tracker = Stereo(config)
     tracker.reset(Context(FPS, 30.0, camera=camera), 0)
     given = iter(steps)
-    tracker.measurement, tracker.plane = PairMeasurement(camera), "space"
+    tracker.measurement, tracker.plane = Measurement(camera), "space"
     tracker.pictures = SimpleNamespace(
         config=tracker.config, camera=camera, points=lambda *_: next(given),
         features=SimpleNamespace(forget=lambda: next(given)),
