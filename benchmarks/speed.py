@@ -74,7 +74,7 @@ ASKED: dict[str, Callable[[Renderer], Callable[[int], object]]] = {
     "empty": lambda s: lambda i: s.background(i % 50),
 }
 RENDERING: Parts = {
-    "places, outlines": [(renderer.FrameBatch, name) for name in ("__init__", "people", "in_view")],
+    "places, outlines": [(renderer.Renderer, "_people")],
     "shadows": [(weather_kernels, "draw_shadows")],
     "people": [(people_kernels, "draw_people")],
     "blur, light, noise": [(renderer.Renderer, "_finish")],

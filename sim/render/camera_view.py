@@ -111,13 +111,15 @@ OCCLUDER = -2  # id of walls and pillars in id maps
 class CameraView:
     """The empty scene as one camera sees it; each part is computed when first needed, and kept.
 
-    State: canvases that were given back, for the next frame. plants is None without plants.
+    State: canvases that were given back, for the next frame. side: 0 the left camera, 1 the right one. plants is None
+    without plants.
     """
 
     def __init__(
-        self, camera: Camera, motion: Motion, light: Illumination, picture: Picture, plants: Foliage | None
+        self, camera: Camera, side: int, motion: Motion, light: Illumination, picture: Picture, plants: Foliage | None
     ) -> None:
-        self.camera, self.motion, self.light, self.picture, self.plants = camera, motion, light, picture, plants
+        self.camera, self.side, self.motion = camera, side, motion
+        self.light, self.picture, self.plants = light, picture, plants
         self.width, self.height = camera.image
         self.rays: PixelRays = pixel_rays(camera)
         self.solids: Solids = solids_of(motion.scene)
@@ -147,7 +149,7 @@ class CameraView:
 
         size = self.height, self.width
         depth, kind, place = np.empty(size, np.float32), np.empty(size, np.uint8), np.empty((*size, 3), np.float32)
-        trace_pixels(self.rays.origin, self.rays.direction, self.solids, depth, kind, place)
+        trace_pixels(self.rays, self.solids, depth, kind, place)
         return PixelGeometry(depth, kind, place)
 
     @cached_property
@@ -165,9 +167,9 @@ class CameraView:
         # In the order of the slots CONTRAST, SLAB_WIDTH, PLANT_KEY, PLANT_LEVEL.
         style = np.array([self.picture.texture, slab, *((plants.key, plants.level) if plants else (0.0, np.inf))])
         paint_pixels(
-            (self.rays.origin, self.rays.direction), self.picture.samples, signed_scale(self.camera), light.sun,
-            light.shadow, light.penumbra, self.solids, np.array(self.motion.scene.size, dtype=float), style,
-            np.clip(palette, 20, 240), key, colour, direct, green,
+            self.rays, self.picture.samples, signed_scale(self.camera), light.sun, light.shadow, light.penumbra,
+            self.solids, np.array(self.motion.scene.size, dtype=float), style, np.clip(palette, 20, 240), key,
+            colour, direct, green,
         )  # fmt: skip
         return EmptyScene(colour, direct, green)
 

@@ -177,7 +177,7 @@ def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repea
     pattern, cover = np.empty((2, -(-height // SAMPLE_STEP), -(-width // SAMPLE_STEP)))
     rays, size = pixel_rays(camera), np.array(scene.size, dtype=float)
     scale = picture.samples * signed_scale(camera)  # leaves show farther away
-    sample_plants((rays.origin, rays.direction), scale, SAMPLE_STEP, solids_of(scene), size, key, pattern, cover)
+    sample_plants(rays, scale, SAMPLE_STEP, solids_of(scene), size, key, pattern, cover)
     # The level above which plants cover the wanted share of the image.
     order = np.argsort(-pattern, axis=None, kind="stable")
     covered = np.cumsum(cover.ravel()[order])
