@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sim.truth.crossing_events import crossings, net_crossings
-from sim.truth.queue_detection import detect_queues, queues
+from sim.truth.queue_detection import queues
 
 FPS = 10.0
 T = np.arange(120)[:, None] / FPS
@@ -132,9 +132,9 @@ def served(people=5, service=2.0, spacing=0.8):
 
 
 def test_advancing_is_waiting():
-    (line,) = detect_queues(*crowd(served()), FPS)
-    assert line.order in ((0, 1, 2, 3, 4), (4, 3, 2, 1, 0))
-    assert (line.first, line.last) == (0, pytest.approx(79, abs=2))
+    (line,) = queued(served())
+    assert line.members == (1, 2, 3, 4, 5)
+    assert (line.start, line.end) == (1, pytest.approx(80, abs=2))
 
 
 @pytest.mark.parametrize("people", [3, 5, 8])
