@@ -36,8 +36,8 @@ MAX_CELLS = 2_000_000  # numbers handled together: bounds memory
 class QueueShapes(NamedTuple):
     """M lines of people who stand behind one another."""
 
-    # (M, n) row numbers, in the table of positions, of the people in order along the line; only the first `number` (M,) of
-    # each are valid
+    # (M, n) row numbers, in the table of positions, of the people in order along the line; only the first `number`
+    # (M,) of each are valid
     rows: Ints
     number: Ints
     u: Array  # (M, 2) unit vector along the line from the first person towards the last
