@@ -24,7 +24,7 @@ from scenarios.errors import WorkError
 from scenarios.schema.scenario import Scenario
 from sim.clock import PHYSICS_RATE, SCRIPT_RATE, STEPS, FrameTimes
 from sim.crowd.errands import Errands
-from sim.crowd.forces import WAYPOINT, GroupArrays, Obstacles, PeopleArrays, Steering
+from sim.crowd.forces import WAYPOINT, GroupArrays, Obstacles, PeopleArrays
 from sim.crowd.group_state import GroupState
 from sim.crowd.heading import facings, headings
 from sim.crowd.navigation import Navigator, blocked, scene_of
@@ -42,30 +42,28 @@ READ = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.VELOCITY
 WRITE = pymunk.batch.BodyFields.FORCE
 
 
-def run(scenario: Scenario, seed: int, repeat: int = 0, steering: Steering | None = None) -> Motion:
+def run(scenario: Scenario, seed: int, repeat: int = 0) -> Motion:
     """Returns the whole motion of a scenario for a seed, without the warm-up."""
-    world = World(scenario, seed, repeat, steering or Steering())
-    return world.run()
+    return World(scenario, seed, repeat).run()
 
 
 def accelerate(
-    state: Array, people: PeopleArrays, groups: GroupArrays, obstacles: Obstacles,
-    dt: float, rules: Array, push: Array, out: Array,
+    state: Array, people: PeopleArrays, groups: GroupArrays, obstacles: Obstacles, dt: float, push: Array, out: Array,
 ) -> bool:  # fmt: skip
     """Overwrites out (N, 2) with the accelerations of all people, and advances ways and strides by dt (s).
 
-    state (N, 4): x, y, vx, vy. rules (21,): Steering.array(). push (G, 2): scratch. Returns False, with nothing
-    written, if a state is not below 1e9.
+    state (N, 4): x, y, vx, vy. push (G, 2): scratch. Returns False, with nothing written, if a state is not below
+    1e9.
     """
     from sim.crowd.forces_avoidance_kernels import avoid
     from sim.crowd.forces_goal_kernels import drive, sway
 
     stairs = obstacles.stairs if len(obstacles.stairs) else None
-    if not drive(state, *people, *groups, stairs, dt, rules, out):
+    if not drive(state, *people, *groups, stairs, dt, out):
         return False
     sway(people.wanted, people.gait, dt, out)
     walls = obstacles.walls if len(obstacles.walls) + len(obstacles.pillars) else None
-    avoid(people.calm, people.tag, groups.status, walls, obstacles.pillars, rules, push, out)
+    avoid(people.calm, people.tag, groups.status, walls, obstacles.pillars, push, out)
     return True
 
 
@@ -79,13 +77,12 @@ class World:
     all frames lie on ticks.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, repeat: int, steering: Steering) -> None:
+    def __init__(self, scenario: Scenario, seed: int, repeat: int) -> None:
         self.scenario, self.seed, self.repeat = scenario, seed, repeat
         self.scene: Scene = scene_of(scenario.world)
         self.entering: list[EnteringGroup] = draw_population(scenario, self.scene, seed, repeat)
         self.waiting = list(self.entering)
         self.members = [m for group in self.entering for m in group.members]
-        self.rules = steering.array()
         slowdown = scenario.crowd.slowdown_per_member
         self.groups = GroupState(self.entering, groups_made(scenario), Navigator(self.scene), slowdown)
         self.orders = OrderExecution(scenario, self.groups, script_placement(scenario, seed, repeat), seed, repeat)
@@ -157,9 +154,7 @@ class World:
         noise.take(self.columns, axis=0, out=self.people.noise, mode="clip")
         out = self.force[:n]
         for step in range(1, STEPS + 1):
-            if not accelerate(
-                self.state, self.people, self.groups.arrays, self.obstacles, STEP_TIME, self.rules, self.push, out
-            ):
+            if not accelerate(self.state, self.people, self.groups.arrays, self.obstacles, STEP_TIME, self.push, out):
                 raise self._blown_up()
             pymunk.batch.set_space_bodies(self.space, WRITE, self._write_buffer)
             self.space.step(STEP_TIME)
