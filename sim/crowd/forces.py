@@ -53,10 +53,10 @@ COS, SIN, SWAY_X, SWAY_Y, AMPLITUDE = range(5)
     MEAN_LEFT,
 ) = range(12)  # fmt: skip
 
-# columns of Obstacles.walls (W, 4), .pillars (P, 3) and .stairs (S, 7)
+# columns of Obstacles.walls (W, 4) and .pillars (P, 3); the last one of .stairs (S, 10), after those of `terrain`
 X1, Y1, X2, Y2 = range(4)
 PILLAR_X, PILLAR_Y, PILLAR_RADIUS = range(3)
-FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, WIDTH, SLOWDOWN = range(7)
+SLOWDOWN = 9
 
 # parameters
 RELAXATION = 0.5  # s: time in which a person takes up the wanted velocity
@@ -147,6 +147,4 @@ class Obstacles(NamedTuple):
 
     walls: Array  # (W, 4) x1, y1, x2, y2 of the two ends
     pillars: Array  # (P, 3) x, y of the middle, radius
-    # (S, 7) x, y of the middle of the foot's edge; unit vector from foot to head x, y; length; width; share of the
-    # speed kept on them (0 to 1)
-    stairs: Array
+    stairs: Array  # (S, 10) rows of `sim.scene.terrain.flight_rows`, and the share of the speed kept on them (0 to 1)

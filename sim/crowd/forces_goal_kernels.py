@@ -12,15 +12,16 @@ from sim.compiler import njit
 # isort: off
 # fmt: off
 from sim.crowd.forces import (
-    ALIGNMENT, AMPLITUDE, AVOIDED, AXIS_X, AXIS_Y, COHESION_TIME, COS, COUNT, END, FOOT_X, FOOT_Y, GATHER,
-    GATHER_RADIUS, GROUP, HASTE, LENGTH, MAX_OFF_PLACE, MEAN_AHEAD, MEAN_LEFT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y,
+    ALIGNMENT, AMPLITUDE, AVOIDED, COHESION_TIME, COS, COUNT, END, GATHER,
+    GATHER_RADIUS, GROUP, HASTE, MAX_OFF_PLACE, MEAN_AHEAD, MEAN_LEFT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y,
     MODE, NARROW, PASS, PASS_RADIUS, RADIUS, RELAXATION, SIN, SLOW_TIME, SLOWDOWN, STAND, STRAY_AHEAD, STRAY_LEFT,
-    SWAY_X, SWAY_Y, TO_TARGET, TURN_TIME, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, WAYPOINT, WIDTH,
+    SWAY_X, SWAY_Y, TO_TARGET, TURN_TIME, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, WAYPOINT,
     X, Y,
 )
 # fmt: on
 # isort: on
 from sim.elementary_kernels import atan2, cos, sin
+from sim.scene.terrain import AXIS_X, AXIS_Y, FOOT_X, FOOT_Y, HALF_WIDTH, LENGTH
 
 STRIDES = 0.807  # strides per s at 1 m/s: 0.0064 m of step per step/min (Sekiya & Nagasaki 1998)
 SWAYLESS = 2.70  # m/s: on the line through amplitudes of 0.0350 m at 0.7 m/s and 0.0193 m at 1.6 m/s (Orendurff 2004)
@@ -248,7 +249,7 @@ def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
         dx, dy = x - stairs[k, FOOT_X], y - stairs[k, FOOT_Y]
         s = dx * stairs[k, AXIS_X] + dy * stairs[k, AXIS_Y]
         t = dy * stairs[k, AXIS_X] - dx * stairs[k, AXIS_Y]
-        if 0.0 <= s <= stairs[k, LENGTH] and abs(t) <= stairs[k, WIDTH] / 2:
+        if 0.0 <= s <= stairs[k, LENGTH] and abs(t) <= stairs[k, HALF_WIDTH]:
             return stairs[k, SLOWDOWN]
     return 1.0
 
@@ -269,7 +270,7 @@ def drive(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Overwrites out (N, 2) with the accelerations towards goals, and advances the groups' ways by dt (s).
 
-    Returns False, with nothing written, if a state is not below 1e9. state (N, 4), stairs (S, 7), None without stairs:
+    Returns False, with nothing written, if a state is not below 1e9. state (N, 4), stairs (S, 10), None without stairs:
     columns as in `forces`. The others are the fields of PeopleArrays and GroupArrays.
     """
     for i in range(len(state)):

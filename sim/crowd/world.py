@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import pymunk
@@ -32,6 +31,7 @@ from sim.crowd.order_execution import OrderExecution, groups_made
 from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, fluctuations, script_placement
 from sim.elementary import cos, length, sin
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
+from sim.scene.terrain import flight_rows
 from sim.types import Array, Ints, Motion, Scene, States
 
 STEP_TIME = 1 / PHYSICS_RATE  # s
@@ -109,19 +109,14 @@ class World:
         fps, duration = self.scenario.camera.fps, self.scenario.duration
         count = max(1, math.ceil(duration * SCRIPT_RATE - 1e-9))
         frames = FrameTimes.of(max(1, round(duration * fps)), fps)
-        ticks = _Record.empty(count, len(self.members))
-        if self.between is None:
-            for tick, (state, group) in enumerate(self.ticks(count)):
-                ticks.state[tick], ticks.intent[tick] = state, group
-            return self._motion(ticks, ticks, frames)
-        shown = _Record.empty(len(frames.tick), len(self.members))
-        for tick, (state, group) in enumerate(self.ticks(max(count, int(frames.tick[-1]) + 2))):
-            if tick:  # what lies between two ticks is known at the second one
-                shown.state[frames.within(tick - 1)] = frames.states(tick - 1, self.between)
-            shown.intent[frames.within(tick)] = group
-            if tick < count:
-                ticks.state[tick], ticks.intent[tick] = state, group
-        return self._motion(ticks, shown, frames)
+        people, needed = len(self.members), count if self.between is None else max(count, int(frames.tick[-1]) + 2)
+        states, intents = np.empty((needed, people, 4)), np.empty((needed, people), np.int64)
+        shown = states[: len(frames.tick)] if self.between is None else np.empty((len(frames.tick), people, 4))
+        for tick, (state, group) in enumerate(self.ticks(needed)):
+            states[tick], intents[tick] = state, group
+            if tick and self.between is not None:  # what lies between two ticks is known at the second one
+                shown[frames.within(tick - 1)] = frames.states(tick - 1, self.between)
+        return self._motion(states[:count], intents[:count], shown, intents[frames.tick], frames)
 
     def ticks(self, length: int) -> Iterator[tuple[Array, Ints]]:
         """Yields the states (P, 4) and group indices (P,) at `length` ticks after the warm-up; the next overwrites
@@ -234,18 +229,17 @@ class World:
         self.groups.fill(self.people, self.columns)
         self.people.gait[:] = self.gait[self.columns]
 
-    def _motion(self, ticks: _Record, shown: _Record, frames: FrameTimes) -> Motion:
+    def _motion(self, ticks: Array, groups: Ints, state: Array, intent: Ints, frames: FrameTimes) -> Motion:
+        """Returns the Motion of states and group indices at the ticks, and in the frames."""
         height = np.array([m.height for m in self.members])
-        pos, vel = ticks.state[..., :2], ticks.state[..., 2:]
+        pos, vel = ticks[..., :2], ticks[..., 2:]
         present = np.isfinite(pos[..., 0])
-        facing = facings(pos, vel, present, ticks.intent, SCRIPT_RATE)
-        measured = States(SCRIPT_RATE, pos, vel, headings(facing), present, ticks.intent)
-        count = len(frames.tick)  # fewer than ticks where the duration is no whole number of them
-        state, intent = shown.state[:count], shown.intent[:count]
+        facing = facings(pos, vel, present, groups, SCRIPT_RATE)
+        measured = States(SCRIPT_RATE, pos, vel, headings(facing), present, groups)
         there = np.isfinite(state[..., 0])
         if self.between is None:
             # All frames lie on ticks.
-            heading = measured.heading[:count]
+            heading = measured.heading[: len(state)]
         else:
             heading = np.where(there, headings(frames.between_ticks(facing, present)), np.nan)
         return Motion(
@@ -257,24 +251,8 @@ class World:
         )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Record:
-    """State (K, P, 4) and group index (K, P) of the people at K times; nan, -1: absent."""
-
-    state: Array
-    intent: Ints
-
-    @classmethod
-    def empty(cls, times: int, people: int) -> _Record:
-        return cls(np.empty((times, people, 4)), np.empty((times, people), np.int64))
-
-
 def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
-    stairs = np.zeros((len(scene.stairs), 7))
-    for row, s, spec in zip(stairs, scene.stairs, scenario.world.stairs, strict=True):
-        along = s.head - s.foot
-        far = float(length(along))
-        row[:] = (*s.foot, *(along / far), far, s.width, spec.slowdown)
+    stairs = np.column_stack([flight_rows(scene), [spec.slowdown for spec in scenario.world.stairs]])
     return Obstacles(np.array(scene.walls).reshape(-1, 4), np.array(scene.pillars), stairs)
 
 
