@@ -38,7 +38,7 @@ from scenarios.schema.scenario import Scenario
 from sim.crowd.world import run
 from sim.io.source import open_source
 from sim.render import people_kernels, renderer, weather_kernels
-from sim.render.renderer import Renderer, make_renderer
+from sim.render.renderer import Renderer
 from sim.scene.camera_placement import place_camera
 from sim.sequence import simulate
 from sim.truth.crossing_events import crossings
@@ -127,7 +127,7 @@ def walkers(people: int, duration: float, **camera: object) -> Scenario:
 def renderer_of(people: int) -> Renderer:
     scenario = walkers(people, 10.0)
     motion = run(scenario, 1)
-    return make_renderer(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
+    return Renderer(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
 
 
 def frame_rate(draw: Callable[[int], object], frames: int) -> float:

@@ -18,6 +18,7 @@ The empty scene as one camera sees it, traced and painted once for all frames of
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from typing import TYPE_CHECKING
@@ -27,7 +28,7 @@ from numpy.typing import NDArray
 
 from scenarios.limits import PICTURE_SIDE
 from sim.render.canvas import MOST, TILE_H, TILE_W, UNIT, FrameCanvas
-from sim.render.weather import Foliage, Illumination, SampledField
+from sim.render.weather import Foliage, Illumination
 from sim.rng import rng
 from sim.scene.raycast import GROUND, NOTHING, PILLAR, WALL, PixelRays, Solids, pixel_rays, signed_scale, solids_of
 from sim.types import Array, Camera, Ints, Motion
@@ -194,6 +195,7 @@ class CameraView:
 
     def empty_ids(self) -> NDArray[np.int64]:
         """Returns a new id map (H, W) of the empty scene: OCCLUDER where a wall or pillar shows, else 0."""
+        # Zeros are quicker than a copy of zeros.
         return np.zeros((self.height, self.width), np.int64) if self._occluders is None else self._occluders.copy()
 
     @cached_property
@@ -219,7 +221,7 @@ class CameraView:
         return field.reshape(-(-self.height // NODE_STEP) + 1, -1).astype(np.float32)
 
     @cached_property
-    def _clouds(self) -> SampledField:
+    def _clouds(self) -> Callable[[float], Array]:
         return self.light.clouds.sampled(*self._nodes)
 
     def brightness(self, t: float, key: int) -> NDArray[np.float32]:
@@ -230,20 +232,19 @@ class CameraView:
         gain = self.light.gain(t, key)
         if self.light.clouds.amplitude == 0:
             return np.full((1, 1), gain, np.float32)
-        return self._grid(gain * np.exp(self._clouds.at(t)))
+        return self._grid(gain * np.exp(self._clouds(t)))
 
     @cached_property
-    def _sway(self) -> tuple[SampledField, SampledField]:
+    def _sway(self) -> list[Callable[[float], Array]]:
         assert self.plants is not None
         places, _ = self._nodes
-        across, down = (waves.sampled(places, np.zeros(len(places))) for waves in self.plants.sway)
-        return across, down
+        return [waves.sampled(places, np.zeros(len(places))) for waves in self.plants.sway]
 
     def wind(self, t: float) -> NDArray[np.float32]:
         """Returns the sway of plants at time t (s) at the nodes, (2, J, I): px across, px down."""
         assert self.plants is not None
         strength = self.plants.strength(t)
-        return np.stack([self._grid(strength * field.at(t)) for field in self._sway])
+        return np.stack([self._grid(strength * field(t)) for field in self._sway])
 
     @cached_property
     def plant_runs(self) -> Ints:

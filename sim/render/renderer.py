@@ -70,13 +70,19 @@ class Renderer:
     drawn with the Motion's seed.
     """
 
-    def __init__(self, motion: Motion, camera: Camera, light: Light, picture: Picture) -> None:
+    def __init__(
+        self, motion: Motion, camera: Camera, light: Light | None = None, picture: Picture | None = None
+    ) -> None:
+        """Takes light and picture as in a scenario, None: the default; raises InputError if the lens distorts."""
+        from scenarios.schema.scenario import Light, Picture
+
         if camera.radial != 0:
             raise InputError(
                 place="camera.radial", got=f"{camera.radial:g}", expected="0: a lens that does not distort",
                 remedy="render with the same camera and radial 0",
             )  # fmt: skip
-        self.motion, self.camera, self.light, self.picture = motion, camera, light, picture
+        self.motion, self.camera = motion, camera
+        self.light, self.picture = light or Light(), picture or Picture()
         self._first, self._bodies, self._seen = 0, recorded_bodies(motion, 1, 1), dict[CameraView, Seen]()
 
     @cached_property
@@ -247,25 +253,3 @@ class Renderer:
             code = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, self.picture.jpeg])[1]
             image = np.asarray(cv2.imdecode(code, cv2.IMREAD_COLOR), np.uint8)
         return image
-
-
-def make_renderer(
-    motion: Motion, camera: Camera, light: Light | None = None, picture: Picture | None = None
-) -> Renderer:
-    """Returns a Renderer of a Motion as this camera sees it.
-
-    Args:
-        motion: Positions of people over time, and the scene.
-        camera: A camera without lens distortion.
-        light: As in a scenario; None: the default.
-        picture: As in a scenario; None: the default.
-
-    Returns:
-        The renderer; it draws a frame when asked for.
-
-    Raises:
-        InputError: The lens distorts.
-    """
-    from scenarios.schema.scenario import Light, Picture
-
-    return Renderer(motion, camera, light or Light(), picture or Picture())
