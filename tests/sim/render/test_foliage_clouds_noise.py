@@ -92,7 +92,7 @@ def test_clouds_pass_over_the_ground(view: str) -> None:
     near = (np.abs(place - [8, 5]) < [8, 5]).all(axis=2)
     for index in (1, 12):
         flat = place[near]
-        wanted = np.exp(draw_illumination(light, 7).clouds.sampled(flat, np.zeros(len(flat))).at((index - 1) / 10))
+        wanted = np.exp(draw_illumination(light, 7).clouds.sampled(flat, np.zeros(len(flat)))((index - 1) / 10))
         image = made.frame(index).astype(float)
         found, shown = image.sum(axis=2)[near] / plain[near], (image < 255).all(axis=2)[near]
         assert shown.mean() > 0.8
