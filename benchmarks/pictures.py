@@ -28,7 +28,7 @@ from benchmarks.support.options import new_parser
 from benchmarks.support.tables import head, row
 from scenarios.loading.resolve import load, names
 from sim.crowd.world import run
-from sim.render.renderer import Renderer, make_renderer
+from sim.render.renderer import Renderer
 from sim.scene.camera_placement import place_camera
 from sim.truth.label import bodies
 from sim.types import Camera, Motion
@@ -54,7 +54,7 @@ def differences_from_slow(motion: Motion, camera: Camera, index: int) -> tuple[f
     The last two are nan for a camera without a second view.
     """
     paired = camera.kind == "pinhole" and camera.baseline > 0
-    found = make_renderer(motion, camera).pixels(index, disparity=paired)
+    found = Renderer(motion, camera).pixels(index, disparity=paired)
     wrong = 1e5 * float((found.ids != reference_render.look(camera, motion, index).ids).mean())
     if not paired:
         return wrong, np.nan, np.nan
@@ -90,7 +90,7 @@ def exactness(args: argparse.Namespace) -> None:
         motion = run(scenario, args.seed)
         camera = place_camera(scenario.camera, motion)
         wrong = differences_from_slow(motion, half_size(camera), len(motion.present) // 2)
-        off, edge = differences_from_geometry(make_renderer(motion, camera), args.step)
+        off, edge = differences_from_geometry(Renderer(motion, camera), args.step)
         every.append(off)
         size = np.abs(off)
         shares = [f"{v:.3f}" for v in (off.mean(), size.mean(), np.percentile(size, 95), size.max())]
@@ -105,7 +105,7 @@ def gallery_renderer(name: str) -> Renderer:
     settings = ["camera.kind=top"] if name == "mixed" else []
     scenario = load(name, settings)
     motion = run(scenario, GALLERY_SEED)
-    return make_renderer(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
+    return Renderer(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
 
 
 def truth_picture(made: Renderer, index: int) -> np.ndarray:

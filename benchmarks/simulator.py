@@ -27,7 +27,6 @@ from benchmarks.support.options import new_parser
 from benchmarks.support.tables import head, row
 from scenarios.schema.scenario import Scenario
 from sim.clock import SCRIPT_RATE, STEPS
-from sim.crowd.forces import Steering
 from sim.crowd.world import STEP_TIME, WRITE, World
 
 RUNNER = Path(__file__).parent / "peers" / "run_jupedsim.py"
@@ -72,7 +71,7 @@ def episodes(people: int) -> int:
 
 def populated_world(people: int) -> tuple[World, Iterator]:
     """Returns a world after its first frame, in which everybody is present, and its further frames."""
-    world = World(scenario(people), 0, 0, Steering())
+    world = World(scenario(people), 0, 0)
     frames = world.ticks(round(SECONDS * SCRIPT_RATE))
     next(frames)
     return world, frames
@@ -114,7 +113,7 @@ def physics_rate(people: int) -> float:
 
 def peer_input(people: int) -> str:
     """Returns the same people as JSON for the peer, each with a start, goal and speed of their own."""
-    world = World(scenario(people), 0, 0, Steering())
+    world = World(scenario(people), 0, 0)
     scene = {"start": [], "goal": [], "speed": []}
     for group in world.entering:
         for member, pos in zip(group.members, group.pos.tolist(), strict=True):

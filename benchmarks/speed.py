@@ -24,7 +24,7 @@ from benchmarks.support.timing import best_times, machine_load
 from scenarios.schema.scenario import Scenario
 from sim.crowd.world import run
 from sim.render import people_kernels, renderer, weather_kernels
-from sim.render.renderer import Renderer, make_renderer
+from sim.render.renderer import Renderer
 from sim.scene.camera_placement import place_camera
 
 STRETCH = 10  # frames
@@ -39,7 +39,7 @@ ASKED: dict[str, Callable[[Renderer], Callable[[int], object]]] = {
     "empty": lambda s: lambda i: s.background(i % 50),
 }
 RENDERING: Parts = {
-    "places, outlines": [(renderer.FrameBatch, name) for name in ("__init__", "people", "in_view")],
+    "places, outlines": [(renderer.Renderer, "_people")],
     "shadows": [(weather_kernels, "draw_shadows")],
     "people": [(people_kernels, "draw_people")],
     "blur, light, noise": [(renderer.Renderer, "_finish")],
@@ -83,7 +83,7 @@ def walkers(people: int, duration: float, **camera: object) -> Scenario:
 def renderer_of(people: int) -> Renderer:
     scenario = walkers(people, 10.0)
     motion = run(scenario, 1)
-    return make_renderer(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
+    return Renderer(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
 
 
 def frame_rate(draw: Callable[[int], object], frames: int) -> float:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim.clock import check_stride, every_nth
-from sim.render.renderer import RenderedFrame, make_renderer
+from sim.render.renderer import RenderedFrame, Renderer
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.camera_placement import place_camera
 from sim.streams import check_streams
@@ -70,7 +70,7 @@ def observe(
     check_stride(stride, motion.fps)
     camera = place_camera(scenario.camera, motion)
     wanted = frozenset(check_streams(streams, "png"))
-    renderer = make_renderer(motion, camera, scenario.light, scenario.picture) if wanted else None
+    renderer = Renderer(motion, camera, scenario.light, scenario.picture) if wanted else None
     if renderer is not None and not wanted.isdisjoint({"right", "disparity"}):
         renderer.check_pair()
     left, right, disparity = ("left" in wanted, "right" in wanted, "disparity" in wanted)

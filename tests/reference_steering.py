@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.crowd.forces import AVOIDED, COUNT, GROUP, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, QUEUE, RADIUS, Steering
+from sim.crowd import forces as s
+from sim.crowd.forces import AVOIDED, COUNT, GROUP, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, QUEUE, RADIUS
 from sim.types import Array, Ints
 
 
@@ -23,30 +24,30 @@ def power_law(d: Array, w: Array, radius: float, strength: float, horizon: float
     return np.asarray(f * min(1.0, cap / max(np.linalg.norm(f), 1e-12)))
 
 
-def between_people(state: Array, tag: Ints, s: Steering) -> Array:
+def between_people(state: Array, tag: Ints) -> Array:
     """Separation within groups and queues, avoidance and shoving between strangers, (N, 2)."""
     out = np.zeros((len(state), 2))
     for i in range(len(state)):
         for j in range(len(state)):
             d = state[i, :2] - state[j, :2]
             distance = np.linalg.norm(d)
-            if i == j or distance >= s.person_range:
+            if i == j or distance >= s.PERSON_RANGE:
                 continue
             if tag[i, GROUP] == tag[j, GROUP]:
-                reach, strength = s.separation_range, s.separation
+                reach, strength = s.SEPARATION_RANGE, s.SEPARATION
             elif tag[i, QUEUE] >= 0 and tag[i, QUEUE] == tag[j, QUEUE]:
-                reach, strength = 0.5, s.separation
-            elif distance < 2 * s.person_radius:
-                reach, strength = 2 * s.person_radius, s.shove
+                reach, strength = 0.5, s.SEPARATION
+            elif distance < 2 * s.PERSON_RADIUS:
+                reach, strength = 2 * s.PERSON_RADIUS, s.SHOVE
             else:
                 w = state[i, 2:] - state[j, 2:]
-                out[i] += power_law(d, w, 2 * s.person_radius, s.avoid_person, s.avoid_time, s.avoid_max)
+                out[i] += power_law(d, w, 2 * s.PERSON_RADIUS, s.AVOID_PERSON, s.AVOID_TIME, s.AVOID_MAX)
                 continue
             out[i] += strength * max(0.0, 1 - distance / reach) * d / max(distance, 1e-9)
     return out
 
 
-def between_groups(status: Array, s: Steering) -> Array:
+def between_groups(status: Array) -> Array:
     """Acceleration of each group as a whole, (G, 2), `status` as in sim.crowd.forces; the larger of two yields less."""
     out = np.zeros((len(status), 2))
     for a in range(len(status)):
@@ -56,15 +57,15 @@ def between_groups(status: Array, s: Steering) -> Array:
                 status[a, MEAN_VX : MEAN_VY + 1] - status[b, MEAN_VX : MEAN_VY + 1],
             )
             alone = status[a, COUNT] == status[b, COUNT] == 1
-            if a == b or alone or not status[a, AVOIDED] or not status[b, AVOIDED] or np.linalg.norm(d) > s.group_range:
+            if a == b or alone or not status[a, AVOIDED] or not status[b, AVOIDED] or np.linalg.norm(d) > s.GROUP_RANGE:
                 continue
-            radius = status[a, RADIUS] + status[b, RADIUS] + 2 * s.person_radius
+            radius = status[a, RADIUS] + status[b, RADIUS] + 2 * s.PERSON_RADIUS
             share = 2 * status[b, COUNT] / (status[a, COUNT] + status[b, COUNT])
-            out[a] += share * power_law(d, w, radius, s.avoid_group, s.avoid_time, s.avoid_max)
+            out[a] += share * power_law(d, w, radius, s.AVOID_GROUP, s.AVOID_TIME, s.AVOID_MAX)
     return out
 
 
-def from_things(state: Array, walls: Array, pillars: Array, s: Steering) -> Array:
+def from_things(state: Array, walls: Array, pillars: Array) -> Array:
     """Repulsion of walls within 1.2 m and of pillars within 6 m of their edge, and anticipation of pillars, (N, 2)."""
     out, body = np.zeros((len(state), 2)), 0.2
     for i, (x, v) in enumerate(zip(state[:, :2], state[:, 2:], strict=True)):
@@ -72,12 +73,12 @@ def from_things(state: Array, walls: Array, pillars: Array, s: Steering) -> Arra
             a, u = wall[:2], wall[2:] - wall[:2]
             d = x - a - np.clip((x - a) @ u / (u @ u + 1e-9), 0, 1) * u
             r = np.linalg.norm(d)
-            out[i] += (r < 1.2) * s.wall * np.exp(-(r - body) / s.wall_range) * d / max(r, 1e-9)
+            out[i] += (r < 1.2) * s.WALL * np.exp(-(r - body) / s.WALL_RANGE) * d / max(r, 1e-9)
         for pillar in pillars:
             d, radius = x - pillar[:2], pillar[2]
             r = np.linalg.norm(d)
             if r < radius + 6:
-                out[i] += s.wall * np.exp(-(r - body - radius) / s.wall_range) * d / max(r, 1e-9)
-                wide = radius + 1.2 * s.person_radius
-                out[i] += power_law(d, v, wide, s.avoid_person, s.avoid_time, s.avoid_max)
+                out[i] += s.WALL * np.exp(-(r - body - radius) / s.WALL_RANGE) * d / max(r, 1e-9)
+                wide = radius + 1.2 * s.PERSON_RADIUS
+                out[i] += power_law(d, v, wide, s.AVOID_PERSON, s.AVOID_TIME, s.AVOID_MAX)
     return out

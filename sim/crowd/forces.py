@@ -7,7 +7,7 @@ Forces on a person, in the order in which they are computed:
 - away from other people, other groups, walls and pillars: `forces_avoidance_kernels`.
 
 `sim.crowd.world.accelerate` adds them up. A body weighs 1 kg, so a force is an acceleration in m/s². The sum of the
-avoidance forces and the goal force is capped at `Steering.max_acceleration`. If the whole scene is turned or moved, the
+avoidance forces and the goal force is capped at MAX_ACCELERATION. If the whole scene is turned or moved, the
 forces turn or move with it. The order of people changes them by rounding only.
 
 Model: boids inside a group (separation: members repel each other; alignment: they take up the group's velocity;
@@ -18,7 +18,6 @@ waits at its gathering point until all members are there.
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -54,48 +53,33 @@ COS, SIN, SWAY_X, SWAY_Y, AMPLITUDE = range(5)
     MEAN_LEFT,
 ) = range(12)  # fmt: skip
 
-# columns of Obstacles.walls (W, 4), .pillars (P, 3) and .stairs (S, 7)
+# columns of Obstacles.walls (W, 4) and .pillars (P, 3); the last one of .stairs (S, 10), after those of `terrain`
 X1, Y1, X2, Y2 = range(4)
 PILLAR_X, PILLAR_Y, PILLAR_RADIUS = range(3)
-FOOT_X, FOOT_Y, AXIS_X, AXIS_Y, LENGTH, WIDTH, SLOWDOWN = range(7)
+SLOWDOWN = 9
 
-# slots of Steering.array(), in the order of the fields of Steering
-(
-    RELAXATION, COHESION_TIME, ALIGNMENT, SEPARATION, SEPARATION_RANGE, HASTE, TURN_TIME, SLOW_TIME, AVOID_PERSON,
-    AVOID_GROUP, AVOID_TIME, PERSON_RADIUS, PERSON_RANGE, GROUP_RANGE, AVOID_MAX, SHOVE, WALL, WALL_RANGE,
-    GATHER_RADIUS, PASS_RADIUS, MAX_ACCELERATION,
-) = range(21)  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class Steering:
-    """Parameters of the forces on people, in the order of the slots of the kernels' array (21,)."""
-
-    relaxation: float = 0.5  # s: time in which a person takes up the wanted velocity
-    cohesion_time: float = 1.6  # s: time in which a member returns to its place in the formation
-    alignment: float = 0.25  # 1/s: rate at which a member takes up the group's mean velocity
-    separation: float = 2.5  # m/s²: repulsion between two members at distance zero
-    separation_range: float = 0.6  # m: distance at which that repulsion ends
-    haste: float = 0.15  # share of the group's speed that a member may add to keep its place
-    turn_time: float = 0.7  # s: time in which a group's heading follows its way
-    slow_time: float = 0.9  # s: how early a group slows down before a goal where it stands
-    avoid_person: float = 1.3  # strength of the power law between strangers
-    avoid_group: float = 1.6  # strength of the power law between whole groups
-    avoid_time: float = 2.5  # s: time constant of the power law; collisions beyond four times this are ignored
-    person_radius: float = 0.29  # m: half the distance that strangers keep
-    person_range: float = 3.5  # m: strangers further apart ignore each other
-    group_range: float = 8.0  # m: groups further apart ignore each other
-    avoid_max: float = 2.0  # m/s²: cap of each avoidance force
-    shove: float = 3.0  # m/s²: repulsion between strangers at distance zero
-    wall: float = 4.0  # m/s²: repulsion of a wall or pillar at contact
-    wall_range: float = 0.25  # m: distance over which that repulsion falls to 37 %
-    gather_radius: float = 0.9  # m: a group has gathered when all members are this close to their places
-    pass_radius: float = 0.8  # m: a waypoint counts as passed at this distance
-    max_acceleration: float = 2.2  # m/s²: cap of the sum of all forces
-
-    def array(self) -> Array:
-        """Returns the parameters as the kernels take them, (21,)."""
-        return np.array(astuple(self))
+# parameters
+RELAXATION = 0.5  # s: time in which a person takes up the wanted velocity
+COHESION_TIME = 1.6  # s: time in which a member returns to its place in the formation
+ALIGNMENT = 0.25  # 1/s: rate at which a member takes up the group's mean velocity
+SEPARATION = 2.5  # m/s²: repulsion between two members at distance zero
+SEPARATION_RANGE = 0.6  # m: distance at which that repulsion ends
+HASTE = 0.15  # share of the group's speed that a member may add to keep its place
+TURN_TIME = 0.7  # s: time in which a group's heading follows its way
+SLOW_TIME = 0.9  # s: how early a group slows down before a goal where it stands
+AVOID_PERSON = 1.3  # strength of the power law between strangers
+AVOID_GROUP = 1.6  # strength of the power law between whole groups
+AVOID_TIME = 2.5  # s: time constant of the power law; collisions beyond four times this are ignored
+PERSON_RADIUS = 0.29  # m: half the distance that strangers keep
+PERSON_RANGE = 3.5  # m: strangers further apart ignore each other
+GROUP_RANGE = 8.0  # m: groups further apart ignore each other
+AVOID_MAX = 2.0  # m/s²: cap of each avoidance force
+SHOVE = 3.0  # m/s²: repulsion between strangers at distance zero
+WALL = 4.0  # m/s²: repulsion of a wall or pillar at contact
+WALL_RANGE = 0.25  # m: distance over which that repulsion falls to 37 %
+GATHER_RADIUS = 0.9  # m: a group has gathered when all members are this close to their places
+PASS_RADIUS = 0.8  # m: a waypoint counts as passed at this distance
+MAX_ACCELERATION = 2.2  # m/s²: cap of the sum of all forces
 
 
 class GroupArrays(NamedTuple):
@@ -163,6 +147,4 @@ class Obstacles(NamedTuple):
 
     walls: Array  # (W, 4) x1, y1, x2, y2 of the two ends
     pillars: Array  # (P, 3) x, y of the middle, radius
-    # (S, 7) x, y of the middle of the foot's edge; unit vector from foot to head x, y; length; width; share of the
-    # speed kept on them (0 to 1)
-    stairs: Array
+    stairs: Array  # (S, 10) rows of `sim.scene.terrain.flight_rows`, and the share of the speed kept on them (0 to 1)

@@ -33,12 +33,12 @@ PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the p
 
 
 @njit(cache=True)
-def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[no-untyped-def]
+def _power_law(dx, dy, wx, wy, radius, strength):  # type: ignore[no-untyped-def]
     """Returns the avoidance acceleration (fx, fy), m/s², of one of two discs whose radii add up to `radius`.
 
-    (dx, dy), (wx, wy) = own - other position and velocity. Minus the gradient of strength exp(-tau / horizon) / tau²
-    over the relative position (Karamouzas 2014, eq. 2-3), tau the time to collision, cut to length `cap`. *Ours*: tau ≥
-    0.05 s, and zero for tau > 4 horizon.
+    (dx, dy), (wx, wy) = own - other position and velocity. Minus the gradient of strength exp(-tau / T) / tau²
+    over the relative position (Karamouzas 2014, eq. 2-3), tau the time to collision, T = AVOID_TIME, cut to length
+    AVOID_MAX. *Ours*: tau ≥ 0.05 s, and zero for tau > 4 T.
     """
     a = wx * wx + wy * wy
     c = dx * dx + dy * dy - radius * radius
@@ -51,23 +51,21 @@ def _power_law(dx, dy, wx, wy, radius, strength, horizon, cap):  # type: ignore[
         return 0.0, 0.0
     root = sqrt(root)
     tau = (b - root) / a
-    if tau <= 0.0 or tau > 4.0 * horizon:
+    if tau <= 0.0 or tau > 4.0 * AVOID_TIME:
         return 0.0, 0.0
     tau = max(tau, 0.05)
-    size = strength * exp(-tau / horizon) / (a * tau * tau) * (2.0 / tau + 1.0 / horizon)
+    size = strength * exp(-tau / AVOID_TIME) / (a * tau * tau) * (2.0 / tau + 1.0 / AVOID_TIME)
     fx = -size * (wx - (b * wx + a * dx) / root)
     fy = -size * (wy - (b * wy + a * dy) / root)
     f = sqrt(fx * fx + fy * fy)
-    if f > cap:
-        fx, fy = fx * cap / f, fy * cap / f
+    if f > AVOID_MAX:
+        fx, fy = fx * AVOID_MAX / f, fy * AVOID_MAX / f
     return fx, fy
 
 
 @njit(cache=True)
-def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
+def _avoid_groups(status, push):  # type: ignore[no-untyped-def]
     """Overwrites push (G, 2) with each group's acceleration from avoiding other groups as discs."""
-    strength, horizon, radius = rules[AVOID_GROUP], rules[AVOID_TIME], rules[PERSON_RADIUS]
-    reach, cap = rules[GROUP_RANGE], rules[AVOID_MAX]
     push[:] = 0.0
     live, place = np.empty(len(status), np.int64), np.empty(len(status))
     m = 0
@@ -84,14 +82,14 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
     last = 0
     for s in range(m):
         a = live[s]
-        while last < m and rows[MEAN_X, s] - rows[MEAN_X, last] >= -reach:
+        while last < m and rows[MEAN_X, s] - rows[MEAN_X, last] >= -GROUP_RANGE:
             last += 1
-        for k in range(_near_discs(rows, s, last, reach, radius, found)):
+        for k in range(_near_discs(rows, s, last, found)):
             b = live[found[k]]
             dx, dy = status[a, MEAN_X] - status[b, MEAN_X], status[a, MEAN_Y] - status[b, MEAN_Y]
             wx, wy = status[a, MEAN_VX] - status[b, MEAN_VX], status[a, MEAN_VY] - status[b, MEAN_VY]
-            size = status[a, RADIUS] + status[b, RADIUS] + 2.0 * radius
-            fx, fy = _power_law(dx, dy, wx, wy, size, strength, horizon, cap)
+            size = status[a, RADIUS] + status[b, RADIUS] + 2.0 * PERSON_RADIUS
+            fx, fy = _power_law(dx, dy, wx, wy, size, AVOID_GROUP)
             if fx == 0.0 and fy == 0.0:
                 continue
             # The smaller group yields more.
@@ -103,7 +101,7 @@ def _avoid_groups(status, rules, push):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped-def]
+def _near_discs(rows, s, last, found):  # type: ignore[no-untyped-def]
     """Writes to `found` the groups s + 1 … last - 1 on collision course with group s; returns how many."""
     count, x, y = rows[COUNT], rows[MEAN_X], rows[MEAN_Y]
     vx, vy, disc = rows[MEAN_VX], rows[MEAN_VY], rows[RADIUS]
@@ -112,39 +110,39 @@ def _near_discs(rows, s, last, reach, radius, found):  # type: ignore[no-untyped
         # No branches, so that the compiler can use vector instructions.
         dx, dy = x[s] - x[t], y[s] - y[t]
         wx, wy = vx[s] - vx[t], vy[s] - vy[t]
-        size = disc[s] + disc[t] + 2.0 * radius
+        size = disc[s] + disc[t] + 2.0 * PERSON_RADIUS
         cross = dx * wy - dy * wx
         root = (wx * wx + wy * wy) * size * size - cross * cross
         found[k] = t
-        near = (dx * dx + dy * dy <= reach * reach) & (count[s] + count[t] >= 2.5)
+        near = (dx * dx + dy * dy <= GROUP_RANGE * GROUP_RANGE) & (count[s] + count[t] >= 2.5)
         k += near & (dx * wx + dy * wy < 0.0) & (root > 1e-12)
     return k
 
 
 @njit(cache=True)
-def _pair(state, tag, i, j, dx, dy, d2, rules, out):  # type: ignore[no-untyped-def]
+def _pair(state, tag, i, j, dx, dy, d2, out):  # type: ignore[no-untyped-def]
     """Adds the forces between persons i and j to out (N, 2); (dx, dy) = position i - position j, d2 its square."""
     if tag[i, GROUP] == tag[j, GROUP]:
-        if d2 >= rules[SEPARATION_RANGE] * rules[SEPARATION_RANGE]:
+        if d2 >= SEPARATION_RANGE * SEPARATION_RANGE:
             return
         d = max(sqrt(d2), TINY)
-        f = rules[SEPARATION] * (1.0 - d / rules[SEPARATION_RANGE]) / d
+        f = SEPARATION * (1.0 - d / SEPARATION_RANGE) / d
         fx, fy = f * dx, f * dy
     elif tag[i, QUEUE] >= 0 and tag[i, QUEUE] == tag[j, QUEUE]:
         if d2 >= QUEUE_SEPARATION_RANGE * QUEUE_SEPARATION_RANGE:
             return
         d = max(sqrt(d2), TINY)
-        f = rules[SEPARATION] * (1.0 - d / QUEUE_SEPARATION_RANGE) / d
+        f = SEPARATION * (1.0 - d / QUEUE_SEPARATION_RANGE) / d
         fx, fy = f * dx, f * dy
     else:
-        size = 2.0 * rules[PERSON_RADIUS]
+        size = 2.0 * PERSON_RADIUS
         wx, wy = state[i, VX] - state[j, VX], state[i, VY] - state[j, VY]
         if d2 < size * size:
             d = max(sqrt(d2), TINY)
-            f = rules[SHOVE] * (1.0 - d / size) / d
+            f = SHOVE * (1.0 - d / size) / d
             fx, fy = f * dx, f * dy
         else:
-            fx, fy = _power_law(dx, dy, wx, wy, size, rules[AVOID_PERSON], rules[AVOID_TIME], rules[AVOID_MAX])
+            fx, fy = _power_law(dx, dy, wx, wy, size, AVOID_PERSON)
             if fx == 0.0 and fy == 0.0:
                 return
     out[i, X] += fx
@@ -200,12 +198,12 @@ def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: 
 
 
 @njit(cache=True)
-def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
-    """Adds the forces between people closer than Steering.person_range to out (N, 2), each pair once."""
+def _pairs(state, tag, out):  # type: ignore[no-untyped-def]
+    """Adds the forces between people closer than PERSON_RANGE to out (N, 2), each pair once."""
     n = len(state)
-    order, start, nx = _cells(state, rules[PERSON_RANGE])
-    reach, radius = rules[PERSON_RANGE] * rules[PERSON_RANGE], 2.0 * rules[PERSON_RADIUS]
-    touch = max(rules[SEPARATION_RANGE], QUEUE_SEPARATION_RANGE, radius)
+    order, start, nx = _cells(state, PERSON_RANGE)
+    reach, radius = PERSON_RANGE * PERSON_RANGE, 2.0 * PERSON_RADIUS
+    touch = max(SEPARATION_RANGE, QUEUE_SEPARATION_RANGE, radius)
     touch *= touch
     rows = np.empty((4, n))
     for s in range(n):
@@ -224,13 +222,12 @@ def _pairs(state, tag, rules, out):  # type: ignore[no-untyped-def]
             for k in range(m):
                 j = order[found[k]]
                 dx, dy = state[i, X] - state[j, X], state[i, Y] - state[j, Y]
-                _pair(state, tag, i, j, dx, dy, dx * dx + dy * dy, rules, out)
+                _pair(state, tag, i, j, dx, dy, dx * dx + dy * dy, out)
 
 
 @njit(cache=True)
-def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
+def _walls(state, walls, pillars, out):  # type: ignore[no-untyped-def]
     """Adds the forces of walls within WALL_REACH and pillars within PILLAR_REACH to out (N, 2)."""
-    strength, decay = rules[WALL], rules[WALL_RANGE]
     for i in range(len(state)):
         x, y = state[i, X], state[i, Y]
         for k in range(len(walls)):
@@ -244,7 +241,7 @@ def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
             dx, dy = x - ax - s * ux, y - ay - s * uy
             d = max(sqrt(dx * dx + dy * dy), TINY)
             if d < WALL_REACH:
-                f = strength * exp(-(d - BODY) / decay) / d
+                f = WALL * exp(-(d - BODY) / WALL_RANGE) / d
                 out[i, X] += f * dx
                 out[i, Y] += f * dy
         for k in range(len(pillars)):
@@ -252,33 +249,32 @@ def _walls(state, walls, pillars, rules, out):  # type: ignore[no-untyped-def]
             r = pillars[k, PILLAR_RADIUS]
             d = max(sqrt(dx * dx + dy * dy), TINY)
             if d < r + PILLAR_REACH:
-                f = strength * exp(-(d - BODY - r) / decay) / d
-                wide = r + PILLAR_MARGIN * rules[PERSON_RADIUS]
+                f = WALL * exp(-(d - BODY - r) / WALL_RANGE) / d
+                wide = r + PILLAR_MARGIN * PERSON_RADIUS
                 vx, vy = state[i, VX], state[i, VY]
-                fx, fy = _power_law(dx, dy, vx, vy, wide, rules[AVOID_PERSON], rules[AVOID_TIME], rules[AVOID_MAX])
+                fx, fy = _power_law(dx, dy, vx, vy, wide, AVOID_PERSON)
                 out[i, X] += f * dx + fx
                 out[i, Y] += f * dy + fy
 
 
 @njit(cache=True)
-def avoid(state, tag, status, walls, pillars, rules, push, out):  # type: ignore[no-untyped-def]
-    """Adds all avoidance accelerations to out (N, 2), and cuts each sum to Steering.max_acceleration.
+def avoid(state, tag, status, walls, pillars, push, out):  # type: ignore[no-untyped-def]
+    """Adds all avoidance accelerations to out (N, 2), and cuts each sum to MAX_ACCELERATION.
 
     state (N, 4), tag (N, 4), status (G, 12), walls (W, 4), pillars (P, 3): columns as in `forces`. walls: None if there
-    are neither walls nor pillars, so that nothing of them is compiled. rules (21,): Steering.array(). push (G, 2):
+    are neither walls nor pillars, so that nothing of them is compiled. push (G, 2):
     scratch.
     """
-    _avoid_groups(status, rules, push)
-    _pairs(state, tag, rules, out)
+    _avoid_groups(status, push)
+    _pairs(state, tag, out)
     if walls is not None:
-        _walls(state, walls, pillars, rules, out)
-    cap = rules[MAX_ACCELERATION]
+        _walls(state, walls, pillars, out)
     for i in range(len(state)):
         # People in a queue do not take part in the avoidance of their group as a whole.
         if tag[i, MODE] == IN_GROUP:
             out[i, X] += push[tag[i, GROUP], 0]
             out[i, Y] += push[tag[i, GROUP], 1]
         size = sqrt(out[i, X] * out[i, X] + out[i, Y] * out[i, Y])
-        if size > cap:
-            out[i, X] *= cap / size
-            out[i, Y] *= cap / size
+        if size > MAX_ACCELERATION:
+            out[i, X] *= MAX_ACCELERATION / size
+            out[i, Y] *= MAX_ACCELERATION / size

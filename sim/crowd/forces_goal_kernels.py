@@ -12,15 +12,16 @@ from sim.compiler import njit
 # isort: off
 # fmt: off
 from sim.crowd.forces import (
-    ALIGNMENT, AMPLITUDE, AVOIDED, AXIS_X, AXIS_Y, COHESION_TIME, COS, COUNT, END, FOOT_X, FOOT_Y, GATHER,
-    GATHER_RADIUS, GROUP, HASTE, LENGTH, MAX_OFF_PLACE, MEAN_AHEAD, MEAN_LEFT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y,
+    ALIGNMENT, AMPLITUDE, AVOIDED, COHESION_TIME, COS, COUNT, END, GATHER,
+    GATHER_RADIUS, GROUP, HASTE, MAX_OFF_PLACE, MEAN_AHEAD, MEAN_LEFT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y,
     MODE, NARROW, PASS, PASS_RADIUS, RADIUS, RELAXATION, SIN, SLOW_TIME, SLOWDOWN, STAND, STRAY_AHEAD, STRAY_LEFT,
-    SWAY_X, SWAY_Y, TO_TARGET, TURN_TIME, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, WAYPOINT, WIDTH,
+    SWAY_X, SWAY_Y, TO_TARGET, TURN_TIME, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, WAYPOINT,
     X, Y,
 )
 # fmt: on
 # isort: on
 from sim.elementary_kernels import atan2, cos, sin
+from sim.scene.terrain import AXIS_X, AXIS_Y, FOOT_X, FOOT_Y, HALF_WIDTH, LENGTH
 
 STRIDES = 0.807  # strides per s at 1 m/s: 0.0064 m of step per step/min (Sekiya & Nagasaki 1998)
 SWAYLESS = 2.70  # m/s: on the line through amplitudes of 0.0350 m at 0.7 m/s and 0.0193 m at 1.6 m/s (Orendurff 2004)
@@ -121,10 +122,8 @@ def _pass_doors(tag, kind, length, current, status):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def _lead_groups(route, kind, length, current, speed, heading, finish, arrived, status, dt, rules):  # type: ignore[no-untyped-def]
+def _lead_groups(route, kind, length, current, speed, heading, finish, arrived, status, dt):  # type: ignore[no-untyped-def]
     """Advances each group on its way by dt (s), and sets its wanted velocity."""
-    turn_time, slow_time = rules[TURN_TIME], rules[SLOW_TIME]
-    gather, radius = rules[GATHER_RADIUS], rules[PASS_RADIUS]
     for g in range(len(status)):
         if status[g, COUNT] == 0.0 or length[g] == 0:
             continue
@@ -132,8 +131,8 @@ def _lead_groups(route, kind, length, current, speed, heading, finish, arrived, 
         goal = kind[g, w]
         dx, dy = route[g, w, 0] - status[g, MEAN_X], route[g, w, 1] - status[g, MEAN_Y]
         d = sqrt(dx * dx + dy * dy)
-        if (goal == PASS and d < radius + 0.3 * status[g, RADIUS]) or (
-            goal == GATHER and status[g, MAX_OFF_PLACE] < gather
+        if (goal == PASS and d < PASS_RADIUS + 0.3 * status[g, RADIUS]) or (
+            goal == GATHER and status[g, MAX_OFF_PLACE] < GATHER_RADIUS
         ):
             if w < last:
                 current[g] = w + 1
@@ -147,16 +146,16 @@ def _lead_groups(route, kind, length, current, speed, heading, finish, arrived, 
         if w == last and goal == END:
             if finish[g] == STAND:
                 # A group slows down before an end where it stands.
-                pace = min(pace, d / slow_time)
+                pace = min(pace, d / SLOW_TIME)
                 if d < ARRIVED:
                     arrived[g] = True
-            elif d < radius:
+            elif d < PASS_RADIUS:
                 arrived[g] = True
         if d > TURN_DISTANCE and goal != GATHER and not arrived[g]:
-            _turn(heading, g, dx / d, dy / d, dt / turn_time)
+            _turn(heading, g, dx / d, dy / d, dt / TURN_TIME)
         if arrived[g] and finish[g] == STAND:
             # It drifts back to the end of its way.
-            status[g, WANTED_VX], status[g, WANTED_VY] = dx / slow_time, dy / slow_time
+            status[g, WANTED_VX], status[g, WANTED_VY] = dx / SLOW_TIME, dy / SLOW_TIME
             size = _length(status[g, WANTED_VX], status[g, WANTED_VY])
             if size > STANDING_SPEED:
                 status[g, WANTED_VX] *= STANDING_SPEED / size
@@ -179,10 +178,9 @@ def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _seek(  # type: ignore[no-untyped-def]
     state, place, target, pace, noise, wanted, tag,
-    route, kind, length, current, speed, heading, status, stairs, rules, out,
+    route, kind, length, current, speed, heading, status, stairs, out,
 ):  # fmt: skip
     """Overwrites out (N, 2) with the acceleration of each person towards its goal."""
-    relax, cohesion, alignment, haste = rules[RELAXATION], rules[COHESION_TIME], rules[ALIGNMENT], rules[HASTE]
     for i in range(len(state)):
         g = tag[i, GROUP]
         x, y, vx, vy = state[i, X], state[i, Y], state[i, VX], state[i, VY]
@@ -209,11 +207,11 @@ def _seek(  # type: ignore[no-untyped-def]
                 tx = (route[g, w, 0] + ox - x) / GATHER_TIME
                 ty = (route[g, w, 1] + oy - y) / GATHER_TIME
             else:
-                limit = speed[g] * (1.0 + haste)
-                tx = status[g, WANTED_VX] + (status[g, MEAN_X] + ox - x) / cohesion
-                ty = status[g, WANTED_VY] + (status[g, MEAN_Y] + oy - y) / cohesion
+                limit = speed[g] * (1.0 + HASTE)
+                tx = status[g, WANTED_VX] + (status[g, MEAN_X] + ox - x) / COHESION_TIME
+                ty = status[g, WANTED_VY] + (status[g, MEAN_Y] + oy - y) / COHESION_TIME
                 if status[g, COUNT] > 1.0:
-                    align = alignment
+                    align = ALIGNMENT
         if stairs is not None:
             limit *= _pace_on_stairs(x, y, stairs)
         size = sqrt(tx * tx + ty * ty)
@@ -226,8 +224,8 @@ def _seek(  # type: ignore[no-untyped-def]
         tx += share * (noise[i, WANDER_ALONG] * ex - noise[i, WANDER_LEFT] * ey)
         ty += share * (noise[i, WANDER_ALONG] * ey + noise[i, WANDER_LEFT] * ex)
         wanted[i, 0], wanted[i, 1] = size * ex, size * ey
-        out[i, 0] = (tx - vx) / relax + align * (status[g, MEAN_VX] - vx)
-        out[i, 1] = (ty - vy) / relax + align * (status[g, MEAN_VY] - vy)
+        out[i, 0] = (tx - vx) / RELAXATION + align * (status[g, MEAN_VX] - vx)
+        out[i, 1] = (ty - vy) / RELAXATION + align * (status[g, MEAN_VY] - vy)
 
 
 @njit(cache=True)
@@ -251,7 +249,7 @@ def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
         dx, dy = x - stairs[k, FOOT_X], y - stairs[k, FOOT_Y]
         s = dx * stairs[k, AXIS_X] + dy * stairs[k, AXIS_Y]
         t = dy * stairs[k, AXIS_X] - dx * stairs[k, AXIS_Y]
-        if 0.0 <= s <= stairs[k, LENGTH] and abs(t) <= stairs[k, WIDTH] / 2:
+        if 0.0 <= s <= stairs[k, LENGTH] and abs(t) <= stairs[k, HALF_WIDTH]:
             return stairs[k, SLOWDOWN]
     return 1.0
 
@@ -268,12 +266,12 @@ def _mark_avoided(kind, current, status):  # type: ignore[no-untyped-def]
 def drive(  # type: ignore[no-untyped-def]
     state, place, target, pace, noise, gait, calm, wanted, tag,
     route, kind, length, current, speed, heading, finish, arrived, status,
-    stairs, dt, rules, out,
+    stairs, dt, out,
 ):  # fmt: skip
     """Overwrites out (N, 2) with the accelerations towards goals, and advances the groups' ways by dt (s).
 
-    Returns False, with nothing written, if a state is not below 1e9. state (N, 4), stairs (S, 7), None without stairs:
-    columns as in `forces`. rules (21,): Steering.array(). The others are the fields of PeopleArrays and GroupArrays.
+    Returns False, with nothing written, if a state is not below 1e9. state (N, 4), stairs (S, 10), None without stairs:
+    columns as in `forces`. The others are the fields of PeopleArrays and GroupArrays.
     """
     for i in range(len(state)):
         if not abs(state[i, X]) + abs(state[i, Y]) + abs(state[i, VX]) + abs(state[i, VY]) < 1e9:
@@ -284,10 +282,10 @@ def drive(  # type: ignore[no-untyped-def]
     _average(calm, noise, tag, status)
     _spread(calm, place, tag, route, kind, current, heading, status)
     _pass_doors(tag, kind, length, current, status)
-    _lead_groups(route, kind, length, current, speed, heading, finish, arrived, status, dt, rules)
+    _lead_groups(route, kind, length, current, speed, heading, finish, arrived, status, dt)
     _seek(
         calm, place, target, pace, noise, wanted, tag,
-        route, kind, length, current, speed, heading, status, stairs, rules, out,
+        route, kind, length, current, speed, heading, status, stairs, out,
     )  # fmt: skip
     _mark_avoided(kind, current, status)
     return True

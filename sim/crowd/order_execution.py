@@ -61,23 +61,19 @@ class ServiceQueue:
         group; those of a group still coming are sorted, nearest to the head first. pos (P, 2): m.
         """
         done = self._serve(t, members, pos)
+
+        def far(g: int, tail: int) -> float:
+            return float(np.min(length(pos[members[g]] - self.slot(tail))))
+
         tail = sum(len(members[g]) for g in self.joined)
-        self.coming.sort(key=lambda g: (float(np.min(length(pos[members[g]] - self.slot(tail)))), g))
-        slots: dict[int, Array] = {}
-
-        def give(g: int) -> None:
-            for column in members[g]:
-                slots[column] = self.slot(len(slots))
-
-        for g in self.joined:
-            give(g)
-        while self.coming and np.min(length(pos[members[self.coming[0]]] - self.slot(len(slots)))) < JOIN_RADIUS:
+        self.coming.sort(key=lambda g: (far(g, tail), g))
+        while self.coming and far(self.coming[0], tail) < JOIN_RADIUS:
             self.joined.append(self.coming.pop(0))
-            give(self.joined[-1])
+            tail += len(members[self.joined[-1]])
         for g in self.coming:
             members[g].sort(key=lambda c: (float(length(pos[c] - self.head)), c))
-            give(g)
-        return slots, done
+        line = [column for g in self.joined + self.coming for column in members[g]]
+        return {column: self.slot(k) for k, column in enumerate(line)}, done
 
     def _serve(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
         """Returns the group whose service ends by time t, in a list; begins the service of the next."""
@@ -226,8 +222,14 @@ class OrderExecution:
         changed = bool(self.queues)
         for pending in self.pending:
             if pending.fired is None and pending.is_due(t, state, self.groups, self.come_true):
-                self._fire(pending, tick, state)
-                changed = True
+                pending.fired, changed = tick, True
+                match pending.order:
+                    case MergeOrder():
+                        self._merge(pending, pending.order, state)
+                    case SplitOrder():
+                        self._split(pending, pending.order, state)
+                    case QueueOrder():
+                        self._line_up(pending, pending.order)
             elif pending.fired is not None and pending.true_at is None:
                 pending.watch(t, rule_holds(pending, state, self.groups.targets))
                 if pending.true_at is not None:
@@ -235,16 +237,6 @@ class OrderExecution:
         for queue in self.queues.values():
             self._serve(queue, t, state)
         return self.groups.settle_arrived(state) or changed
-
-    def _fire(self, pending: PendingOrder, tick: int, state: Array) -> None:
-        pending.fired = tick
-        order = pending.order
-        if isinstance(order, MergeOrder):
-            self._merge(pending, order, state)
-        elif isinstance(order, SplitOrder):
-            self._split(pending, order, state)
-        else:
-            self._line_up(pending, order)
 
     def _merge(self, pending: PendingOrder, order: MergeOrder, state: Array) -> None:
         groups, arrays = self.groups, self.groups.arrays

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import pymunk
@@ -24,7 +23,7 @@ from scenarios.errors import WorkError
 from scenarios.schema.scenario import Scenario
 from sim.clock import PHYSICS_RATE, SCRIPT_RATE, STEPS, FrameTimes
 from sim.crowd.errands import Errands
-from sim.crowd.forces import WAYPOINT, GroupArrays, Obstacles, PeopleArrays, Steering
+from sim.crowd.forces import WAYPOINT, GroupArrays, Obstacles, PeopleArrays
 from sim.crowd.group_state import GroupState
 from sim.crowd.heading import facings, headings
 from sim.crowd.navigation import Navigator, blocked, scene_of
@@ -32,6 +31,7 @@ from sim.crowd.order_execution import OrderExecution, groups_made
 from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, fluctuations, script_placement
 from sim.elementary import cos, length, sin
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
+from sim.scene.terrain import flight_rows
 from sim.types import Array, Ints, Motion, Scene, States
 
 STEP_TIME = 1 / PHYSICS_RATE  # s
@@ -42,30 +42,28 @@ READ = pymunk.batch.BodyFields.POSITION | pymunk.batch.BodyFields.VELOCITY
 WRITE = pymunk.batch.BodyFields.FORCE
 
 
-def run(scenario: Scenario, seed: int, repeat: int = 0, steering: Steering | None = None) -> Motion:
+def run(scenario: Scenario, seed: int, repeat: int = 0) -> Motion:
     """Returns the whole motion of a scenario for a seed, without the warm-up."""
-    world = World(scenario, seed, repeat, steering or Steering())
-    return world.run()
+    return World(scenario, seed, repeat).run()
 
 
 def accelerate(
-    state: Array, people: PeopleArrays, groups: GroupArrays, obstacles: Obstacles,
-    dt: float, rules: Array, push: Array, out: Array,
+    state: Array, people: PeopleArrays, groups: GroupArrays, obstacles: Obstacles, dt: float, push: Array, out: Array,
 ) -> bool:  # fmt: skip
     """Overwrites out (N, 2) with the accelerations of all people, and advances ways and strides by dt (s).
 
-    state (N, 4): x, y, vx, vy. rules (21,): Steering.array(). push (G, 2): scratch. Returns False, with nothing
-    written, if a state is not below 1e9.
+    state (N, 4): x, y, vx, vy. push (G, 2): scratch. Returns False, with nothing written, if a state is not below
+    1e9.
     """
     from sim.crowd.forces_avoidance_kernels import avoid
     from sim.crowd.forces_goal_kernels import drive, sway
 
     stairs = obstacles.stairs if len(obstacles.stairs) else None
-    if not drive(state, *people, *groups, stairs, dt, rules, out):
+    if not drive(state, *people, *groups, stairs, dt, out):
         return False
     sway(people.wanted, people.gait, dt, out)
     walls = obstacles.walls if len(obstacles.walls) + len(obstacles.pillars) else None
-    avoid(people.calm, people.tag, groups.status, walls, obstacles.pillars, rules, push, out)
+    avoid(people.calm, people.tag, groups.status, walls, obstacles.pillars, push, out)
     return True
 
 
@@ -79,13 +77,12 @@ class World:
     all frames lie on ticks.
     """
 
-    def __init__(self, scenario: Scenario, seed: int, repeat: int, steering: Steering) -> None:
+    def __init__(self, scenario: Scenario, seed: int, repeat: int) -> None:
         self.scenario, self.seed, self.repeat = scenario, seed, repeat
         self.scene: Scene = scene_of(scenario.world)
         self.entering: list[EnteringGroup] = draw_population(scenario, self.scene, seed, repeat)
         self.waiting = list(self.entering)
         self.members = [m for group in self.entering for m in group.members]
-        self.rules = steering.array()
         slowdown = scenario.crowd.slowdown_per_member
         self.groups = GroupState(self.entering, groups_made(scenario), Navigator(self.scene), slowdown)
         self.orders = OrderExecution(scenario, self.groups, script_placement(scenario, seed, repeat), seed, repeat)
@@ -112,19 +109,14 @@ class World:
         fps, duration = self.scenario.camera.fps, self.scenario.duration
         count = max(1, math.ceil(duration * SCRIPT_RATE - 1e-9))
         frames = FrameTimes.of(max(1, round(duration * fps)), fps)
-        ticks = _Record.empty(count, len(self.members))
-        if self.between is None:
-            for tick, (state, group) in enumerate(self.ticks(count)):
-                ticks.state[tick], ticks.intent[tick] = state, group
-            return self._motion(ticks, ticks, frames)
-        shown = _Record.empty(len(frames.tick), len(self.members))
-        for tick, (state, group) in enumerate(self.ticks(max(count, int(frames.tick[-1]) + 2))):
-            if tick:  # what lies between two ticks is known at the second one
-                shown.state[frames.within(tick - 1)] = frames.states(tick - 1, self.between)
-            shown.intent[frames.within(tick)] = group
-            if tick < count:
-                ticks.state[tick], ticks.intent[tick] = state, group
-        return self._motion(ticks, shown, frames)
+        people, needed = len(self.members), count if self.between is None else max(count, int(frames.tick[-1]) + 2)
+        states, intents = np.empty((needed, people, 4)), np.empty((needed, people), np.int64)
+        shown = states[: len(frames.tick)] if self.between is None else np.empty((len(frames.tick), people, 4))
+        for tick, (state, group) in enumerate(self.ticks(needed)):
+            states[tick], intents[tick] = state, group
+            if tick and self.between is not None:  # what lies between two ticks is known at the second one
+                shown[frames.within(tick - 1)] = frames.states(tick - 1, self.between)
+        return self._motion(states[:count], intents[:count], shown, intents[frames.tick], frames)
 
     def ticks(self, length: int) -> Iterator[tuple[Array, Ints]]:
         """Yields the states (P, 4) and group indices (P,) at `length` ticks after the warm-up; the next overwrites
@@ -157,9 +149,7 @@ class World:
         noise.take(self.columns, axis=0, out=self.people.noise, mode="clip")
         out = self.force[:n]
         for step in range(1, STEPS + 1):
-            if not accelerate(
-                self.state, self.people, self.groups.arrays, self.obstacles, STEP_TIME, self.rules, self.push, out
-            ):
+            if not accelerate(self.state, self.people, self.groups.arrays, self.obstacles, STEP_TIME, self.push, out):
                 raise self._blown_up()
             pymunk.batch.set_space_bodies(self.space, WRITE, self._write_buffer)
             self.space.step(STEP_TIME)
@@ -239,18 +229,17 @@ class World:
         self.groups.fill(self.people, self.columns)
         self.people.gait[:] = self.gait[self.columns]
 
-    def _motion(self, ticks: _Record, shown: _Record, frames: FrameTimes) -> Motion:
+    def _motion(self, ticks: Array, groups: Ints, state: Array, intent: Ints, frames: FrameTimes) -> Motion:
+        """Returns the Motion of states and group indices at the ticks, and in the frames."""
         height = np.array([m.height for m in self.members])
-        pos, vel = ticks.state[..., :2], ticks.state[..., 2:]
+        pos, vel = ticks[..., :2], ticks[..., 2:]
         present = np.isfinite(pos[..., 0])
-        facing = facings(pos, vel, present, ticks.intent, SCRIPT_RATE)
-        measured = States(SCRIPT_RATE, pos, vel, headings(facing), present, ticks.intent)
-        count = len(frames.tick)  # fewer than ticks where the duration is no whole number of them
-        state, intent = shown.state[:count], shown.intent[:count]
+        facing = facings(pos, vel, present, groups, SCRIPT_RATE)
+        measured = States(SCRIPT_RATE, pos, vel, headings(facing), present, groups)
         there = np.isfinite(state[..., 0])
         if self.between is None:
             # All frames lie on ticks.
-            heading = measured.heading[:count]
+            heading = measured.heading[: len(state)]
         else:
             heading = np.where(there, headings(frames.between_ticks(facing, present)), np.nan)
         return Motion(
@@ -262,24 +251,8 @@ class World:
         )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Record:
-    """State (K, P, 4) and group index (K, P) of the people at K times; nan, -1: absent."""
-
-    state: Array
-    intent: Ints
-
-    @classmethod
-    def empty(cls, times: int, people: int) -> _Record:
-        return cls(np.empty((times, people, 4)), np.empty((times, people), np.int64))
-
-
 def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
-    stairs = np.zeros((len(scene.stairs), 7))
-    for row, s, spec in zip(stairs, scene.stairs, scenario.world.stairs, strict=True):
-        along = s.head - s.foot
-        far = float(length(along))
-        row[:] = (*s.foot, *(along / far), far, s.width, spec.slowdown)
+    stairs = np.column_stack([flight_rows(scene), [spec.slowdown for spec in scenario.world.stairs]])
     return Obstacles(np.array(scene.walls).reshape(-1, 4), np.array(scene.pillars), stairs)
 
 

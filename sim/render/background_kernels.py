@@ -18,7 +18,7 @@ from sim.scene.raycast import (
 )
 # fmt: on
 # isort: on
-from sim.scene.raycast_kernels import at_pixel, first_hit
+from sim.scene.raycast_kernels import first_hit, has_solids, look
 
 GREY, GRASS, BRICK, STONE, STEP, SKY = range(6)  # rows of the palette
 CONTRAST, SLAB_WIDTH, PLANT_KEY, PLANT_LEVEL = range(4)  # slots of `style`: the last is inf without plants
@@ -84,7 +84,7 @@ def _sky(d, key, palette, out):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[no-untyped-def]
     """Returns the share of four points across the penumbra from which no solid thing hides the sun."""
-    if len(solids.walls) + len(solids.pillars) + len(solids.flights) == 0:
+    if not has_solids(solids):
         return 1.0
     share = 0.0
     for k in range(4):
@@ -98,18 +98,16 @@ def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[n
 
 
 @njit(cache=True)
-def trace_pixels(origin, direction, solids, depth, kind, place):  # type: ignore[no-untyped-def]
+def trace_pixels(rays, solids, depth, kind, place):  # type: ignore[no-untyped-def]
     """Sets depth (H, W), kind (H, W) and place (H, W, 3) to what the centre of each pixel shows.
 
-    origin, direction (3, 3): of PixelRays. Sky has depth inf and place 1e9.
+    Sky has depth inf and place 1e9.
     """
     height, width = depth.shape
     o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
     for v in range(height):
         for u in range(width):
-            at_pixel(origin, u + 0.5, v + 0.5, o)
-            at_pixel(direction, u + 0.5, v + 0.5, d)
-            t = first_hit(o, d, solids, hit)
+            t = look(rays, u + 0.5, v + 0.5, solids, o, d, hit)
             depth[v, u], kind[v, u] = t, int(hit[HIT_KIND])
             for k in range(3):
                 place[v, u, k] = o[k] + t * d[k] if t < 1e9 else 1e9
@@ -124,9 +122,7 @@ def _point_colour(  # type: ignore[no-untyped-def]
     Returns the share of direct sun in its light, the share covered by plants, and a whole number that is equal for
     points of one surface lit alike. Arguments as of `paint_pixels`; o, d (3,), hit (6,), more (4, 6): scratch.
     """
-    at_pixel(rays[0], x, y, o)
-    at_pixel(rays[1], x, y, d)
-    t = first_hit(o, d, solids, hit)
+    t = look(rays, x, y, solids, o, d, hit)
     kind = int(hit[HIT_KIND])
     if kind == NOTHING:
         _sky(d, key, palette, out)
@@ -164,7 +160,7 @@ def paint_pixels(  # type: ignore[no-untyped-def]
 ):
     """Sets colour (H, W, 3) BGR, and the shares direct (H, W) of sun and plants (H, W), of samples x samples rays.
 
-    rays: origin and direction, each (3, 3), of PixelRays. scale: px per m at a depth of 1 m, or minus px per m for a
+    scale: px per m at a depth of 1 m, or minus px per m for a
     camera from above. sun (3,): unit vector to the sun. shadow: the sun's share of the light. penumbra: m. size (2,) m:
     of the world. style (4,): slots CONTRAST …. palette (6, 3): rows GREY …. key: of the random patterns.
     """

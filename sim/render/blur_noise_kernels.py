@@ -42,14 +42,6 @@ def _with_noise(x, grain, read, slope):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _show_line(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-def]
-    """Sets out to gain times a line of canvas values plus noise, as grey levels."""
-    read, slope = ONE - shot, shot * GREY
-    for i in range(many):
-        out[i] = _with_noise(np.float32(line[i]) * gain, grain[i], read, slope)
-
-
-@njit(cache=True)
-def _show_line_by_gains(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-def]
     """Sets out to a line of canvas values times gain (many,) plus noise, as grey levels."""
     read, slope = ONE - shot, shot * GREY
     for i in range(many):
@@ -135,7 +127,7 @@ def finish_image(canvas, empty, dirty, weights, nodes, step, noise, shot, offset
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     edge, wide, tile = _scratch(len(weights) // 2, width)
-    bright, uniform = np.empty((TILE_H, 3 * width), np.float32), nodes.size == 1
+    bright, uniform = np.full((TILE_H, 3 * width), nodes[0, 0], np.float32), nodes.size == 1
     for top in range(0, height, TILE_H):
         rows, marks = min(TILE_H, height - top), dirty[top // TILE_H]
         for r in range(0 if uniform else rows):
@@ -150,12 +142,8 @@ def finish_image(canvas, empty, dirty, weights, nodes, step, noise, shot, offset
                 _blur_block(canvas, top, left, rows, cols, weights, edge, wide, tile)
             for r in range(rows):
                 grain, to = noise[offsets[top + r] + 3 * left :], out[top + r, 3 * left :]
-                line, gain, clean = tile[r], bright[r, 3 * left :], empty[top + r, 3 * left :]
-                if uniform and drawn:
-                    _show_line(line, nodes[0, 0], grain, shot, 3 * cols, to)
-                elif uniform:
-                    _show_line(clean, nodes[0, 0], grain, shot, 3 * cols, to)
-                elif drawn:
-                    _show_line_by_gains(line, gain, grain, shot, 3 * cols, to)
+                gain = bright[r, 3 * left :]
+                if drawn:
+                    _show_line(tile[r], gain, grain, shot, 3 * cols, to)
                 else:
-                    _show_line_by_gains(clean, gain, grain, shot, 3 * cols, to)
+                    _show_line(empty[top + r, 3 * left :], gain, grain, shot, 3 * cols, to)

@@ -18,6 +18,7 @@ The empty scene as one camera sees it, traced and painted once for all frames of
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from typing import TYPE_CHECKING
@@ -27,7 +28,7 @@ from numpy.typing import NDArray
 
 from scenarios.limits import PICTURE_SIDE
 from sim.render.canvas import MOST, TILE_H, TILE_W, UNIT, FrameCanvas
-from sim.render.weather import Foliage, Illumination, SampledField
+from sim.render.weather import Foliage, Illumination
 from sim.rng import rng
 from sim.scene.raycast import GROUND, NOTHING, PILLAR, WALL, PixelRays, Solids, pixel_rays, signed_scale, solids_of
 from sim.types import Array, Camera, Ints, Motion
@@ -111,13 +112,15 @@ OCCLUDER = -2  # id of walls and pillars in id maps
 class CameraView:
     """The empty scene as one camera sees it; each part is computed when first needed, and kept.
 
-    State: canvases that were given back, for the next frame. plants is None without plants.
+    State: canvases that were given back, for the next frame. side: 0 the left camera, 1 the right one. plants is None
+    without plants.
     """
 
     def __init__(
-        self, camera: Camera, motion: Motion, light: Illumination, picture: Picture, plants: Foliage | None
+        self, camera: Camera, side: int, motion: Motion, light: Illumination, picture: Picture, plants: Foliage | None
     ) -> None:
-        self.camera, self.motion, self.light, self.picture, self.plants = camera, motion, light, picture, plants
+        self.camera, self.side, self.motion = camera, side, motion
+        self.light, self.picture, self.plants = light, picture, plants
         self.width, self.height = camera.image
         self.rays: PixelRays = pixel_rays(camera)
         self.solids: Solids = solids_of(motion.scene)
@@ -147,7 +150,7 @@ class CameraView:
 
         size = self.height, self.width
         depth, kind, place = np.empty(size, np.float32), np.empty(size, np.uint8), np.empty((*size, 3), np.float32)
-        trace_pixels(self.rays.origin, self.rays.direction, self.solids, depth, kind, place)
+        trace_pixels(self.rays, self.solids, depth, kind, place)
         return PixelGeometry(depth, kind, place)
 
     @cached_property
@@ -165,9 +168,9 @@ class CameraView:
         # In the order of the slots CONTRAST, SLAB_WIDTH, PLANT_KEY, PLANT_LEVEL.
         style = np.array([self.picture.texture, slab, *((plants.key, plants.level) if plants else (0.0, np.inf))])
         paint_pixels(
-            (self.rays.origin, self.rays.direction), self.picture.samples, signed_scale(self.camera), light.sun,
-            light.shadow, light.penumbra, self.solids, np.array(self.motion.scene.size, dtype=float), style,
-            np.clip(palette, 20, 240), key, colour, direct, green,
+            self.rays, self.picture.samples, signed_scale(self.camera), light.sun, light.shadow, light.penumbra,
+            self.solids, np.array(self.motion.scene.size, dtype=float), style, np.clip(palette, 20, 240), key,
+            colour, direct, green,
         )  # fmt: skip
         return EmptyScene(colour, direct, green)
 
@@ -192,6 +195,7 @@ class CameraView:
 
     def empty_ids(self) -> NDArray[np.int64]:
         """Returns a new id map (H, W) of the empty scene: OCCLUDER where a wall or pillar shows, else 0."""
+        # Zeros are quicker than a copy of zeros.
         return np.zeros((self.height, self.width), np.int64) if self._occluders is None else self._occluders.copy()
 
     @cached_property
@@ -217,7 +221,7 @@ class CameraView:
         return field.reshape(-(-self.height // NODE_STEP) + 1, -1).astype(np.float32)
 
     @cached_property
-    def _clouds(self) -> SampledField:
+    def _clouds(self) -> Callable[[float], Array]:
         return self.light.clouds.sampled(*self._nodes)
 
     def brightness(self, t: float, key: int) -> NDArray[np.float32]:
@@ -228,20 +232,19 @@ class CameraView:
         gain = self.light.gain(t, key)
         if self.light.clouds.amplitude == 0:
             return np.full((1, 1), gain, np.float32)
-        return self._grid(gain * np.exp(self._clouds.at(t)))
+        return self._grid(gain * np.exp(self._clouds(t)))
 
     @cached_property
-    def _sway(self) -> tuple[SampledField, SampledField]:
+    def _sway(self) -> list[Callable[[float], Array]]:
         assert self.plants is not None
         places, _ = self._nodes
-        across, down = (waves.sampled(places, np.zeros(len(places))) for waves in self.plants.sway)
-        return across, down
+        return [waves.sampled(places, np.zeros(len(places))) for waves in self.plants.sway]
 
     def wind(self, t: float) -> NDArray[np.float32]:
         """Returns the sway of plants at time t (s) at the nodes, (2, J, I): px across, px down."""
         assert self.plants is not None
         strength = self.plants.strength(t)
-        return np.stack([self._grid(strength * field.at(t)) for field in self._sway])
+        return np.stack([self._grid(strength * field(t)) for field in self._sway])
 
     @cached_property
     def plant_runs(self) -> Ints:

@@ -7,7 +7,7 @@ scene afterwards.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,7 @@ FIRST_ROW, END_ROW, FIRST_COLUMN, END_COLUMN = range(4)  # columns of pixel boun
 RUN_ROW, RUN_FIRST, RUN_END = range(3)  # columns of runs of pixels: row, first column, last column + 1
 
 
-@dataclass(frozen=True, eq=False)
-class FrameCanvas:
+class FrameCanvas(NamedTuple):
     """What one frame of one view is drawn on; at first the empty scene. The arrays are changed by drawing."""
 
     colour: NDArray[np.int16]  # (H, W, 3) int16, BGR: grey levels times UNIT (64)

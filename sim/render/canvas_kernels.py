@@ -24,11 +24,9 @@ def ellipse_row(y, a, b, d):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def outline_columns(v, i, e, middle, inverse, width):  # type: ignore[no-untyped-def]
-    """Returns the first column and the last + 1 of row v in the outline of part e of person i; equal if none.
-
-    middle (N, 2, 2) px, inverse (N, 2, 3) 1/px²: centres and packed inverse shapes of the outlines.
-    """
+def outline_columns(v, i, e, outlines, width):  # type: ignore[no-untyped-def]
+    """Returns the first column and the last + 1 of row v in the outline of part e of person i; equal if none."""
+    middle, inverse = outlines.middle, outlines.inverse
     x0, x1 = ellipse_row(v + 0.5 - middle[i, e, 1], inverse[i, e, XX], inverse[i, e, XY], inverse[i, e, YY])
     if x0 > x1:
         return 0, 0
@@ -37,13 +35,14 @@ def outline_columns(v, i, e, middle, inverse, width):  # type: ignore[no-untyped
 
 
 @njit(cache=True)
-def mark_dirty(dirty, v, left, right, margin, height, width):  # type: ignore[no-untyped-def]
+def mark_dirty(canvas, v, left, right, margin):  # type: ignore[no-untyped-def]
     """Marks the tiles of columns left … right - 1 of row v, and of pixels at most `margin` px away."""
+    height, width = canvas.depth.shape
     if right > left:
         first, last = max(left - margin, 0) // TILE_W, (min(right + margin, width) - 1) // TILE_W
         for r in range(max(v - margin, 0) // TILE_H, min(v + margin, height - 1) // TILE_H + 1):
             for c in range(first, last + 1):
-                dirty[r, c] = 1
+                canvas.dirty[r, c] = 1
 
 
 @njit(cache=True)

@@ -13,17 +13,19 @@ solid things such as walls hide the sun from a person's feet, waist and head.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import TypeVar
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.rng import rng
-from sim.scene.body import Ellipsoids, Outlines, bodies_at, half_axes, outlines, packed_inverse
+from sim.scene.body import Ellipsoids, Outlines, RecordedBodies, half_axes, outlines, packed_inverse
 from sim.scene.camera import project
 from sim.scene.raycast import HIT_SLOTS, PixelRays, Solids
 from sim.types import Array, Camera, Ints, Motion
+
+if TYPE_CHECKING:
+    from sim.render.weather import Illumination
 
 # Palettes in BGR, grey levels.
 SKINS = np.array([[120, 150, 195], [105, 135, 180], [80, 110, 150], [55, 75, 105]], float)
@@ -66,25 +68,7 @@ def clothing_atlas(people: int, seed: int, repeat: int = 0) -> NDArray[np.uint8]
     return pages.reshape(people, 2, UP * (ROUND + 1) * 3)
 
 
-T = TypeVar("T")
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnPeople:
-    """N people of one frame, or of several frames one after the other."""
-
-    id: Ints  # (N,) person id = column of the Motion (from 0) + 1
-    pos3: Array  # (N, 3) feet: x, y, z in m
-    height: Array  # (N,) body height, m
-    # Ellipsoids of body and head in the world: centres (N, 2, 3) m and shape matrices (N, 2, 3, 3) m²
-    shapes: Ellipsoids
-    half: Array  # (N, 2, 3) half axes of body and head in m: across, along the heading, up
-    # (N, 3, 3) rotation from the world to a person's own axes: across (to the right), along the heading, up
-    turn: Array
-
-
-@dataclass(frozen=True, eq=False)
-class ImageOutlines:
+class ImageOutlines(NamedTuple):
     """Ellipses of N people in the image, two each; the second axis is body, head."""
 
     middle: Array  # (N, 2, 2) centres, u and v in px; nan if not wholly in front of the camera
@@ -94,51 +78,41 @@ class ImageOutlines:
     bounds: Ints
 
 
-@dataclass(frozen=True, eq=False)
-class ProjectedPeople:
-    """N people as one camera sees them; the second axis is body, head."""
+class PeopleInView(NamedTuple):
+    """N people of one or more frames as one camera sees them; the axis of length 2 is body, head."""
 
+    id: Ints  # (N,) person id = column of the Motion (from 0) + 1
+    centre: Array  # (N, 2, 3) m: of the ellipsoids, in the world
+    half: Array  # (N, 2, 3) half axes in m: across (to the right), along the heading, up; these are the own axes
+    sun: Array  # (N, 3) unit vector to the sun, in own axes
+    # (N, 3) 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing, as a wall, hides it
+    sunlit: Array
     # (N, 2, 3, 3) times (u, v, 1): origin of a pixel's ray in the part's axes, where it is a ball of radius 1
     start: Array
     step: Array  # (N, 2, 3, 3) times (u, v, 1): direction of that ray, depth 1 m per unit
-    outlines: ImageOutlines  # ImageOutlines of body and head
-    nearest_depth: Array  # (N, 2) m along the optical axis: no point of the part is nearer; negative behind the camera
+    nearest: Array  # (N, 2) m along the optical axis: no point of the part is nearer; negative behind the camera
+    outlines: ImageOutlines
 
 
-def people_of_frames(motion: Motion, first: int, last: int) -> tuple[DrawnPeople, Ints]:
-    """Returns the people of frames first … last - 1 (from 1), each sorted by id, and the row where each begins."""
-    present = motion.present[first - 1 : last - 1]
-    t, p = np.nonzero(present)
-    pos3, shapes = bodies_at(motion, t + first - 1, p)
-    heading = motion.heading[t + first - 1, p]
+def people_in_view(
+    motion: Motion, people: RecordedBodies, camera: Camera, rays: PixelRays, solids: Solids, sun: Array
+) -> PeopleInView:
+    """Returns N people as this camera, with its own rays, sees them in the light of the sun (3,)."""
+    t, p, centre = people.frame - 1, people.id - 1, people.shapes.centre
+    heading = motion.heading[t, p]
     c, s = np.cos(heading), np.sin(heading)
-    turn = np.zeros((len(p), 3, 3))
+    turn = np.zeros((len(p), 3, 3))  # from the world to a person's own axes
     turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1], turn[:, 2, 2] = s, -c, c, s, 1.0
     half = half_axes(motion.height[p], motion.width[p], motion.depth[p])
-    people = DrawnPeople(p + 1, pos3, motion.height[p], shapes, half, turn)
-    return people, np.concatenate([[0], np.cumsum(present.sum(axis=1))])
-
-
-def take_rows(value: T, rows: slice) -> T:
-    """Returns a copy of a dataclass with these rows of all its arrays, those of nested dataclasses included."""
-    kept = {
-        f.name: v[rows] if isinstance(v := getattr(value, f.name), np.ndarray) else take_rows(v, rows)
-        for f in fields(value)  # type: ignore[arg-type]
-    }
-    return type(value)(**kept)
-
-
-def project_people(camera: Camera, rays: PixelRays, people: DrawnPeople) -> ProjectedPeople:
-    """Returns N people as this camera, with its own rays, sees them."""
-    to_ball = people.turn[:, None] / people.half[..., None]
+    to_ball = turn[:, None] / half[..., None]
     start = to_ball @ rays.origin
-    start[..., 2] -= np.einsum("npij,npj->npi", to_ball, people.shapes.centre)
+    start[..., 2] -= np.einsum("npij,npj->npi", to_ball, centre)
     forward = camera.rotation[2]
-    depth = (people.shapes.centre - camera.position) @ forward
+    depth = (centre - camera.position) @ forward
     nearest = depth - np.sqrt(np.einsum("i,npij,j->np", forward, people.shapes.shape, forward))
-    return ProjectedPeople(
-        start, to_ball @ rays.direction, image_outlines(camera, outlines(camera, people.shapes)), nearest
-    )
+    lit = sunlit_shares(solids, people.pos3, motion.height[p], sun)
+    seen = image_outlines(camera, outlines(camera, people.shapes))
+    return PeopleInView(people.id, centre, half, turn @ sun, lit, start, to_ball @ rays.direction, nearest, seen)
 
 
 def image_outlines(camera: Camera, ellipses: Outlines) -> ImageOutlines:
@@ -159,8 +133,7 @@ def pixel_bounds(camera: Camera, low: Array, high: Array) -> Ints:
 LIT_HEIGHTS = (0.12, 0.5, 0.95)  # of the height: feet (they stand a step deep in drawn stairs), waist, head
 
 
-@dataclass(frozen=True, eq=False)
-class PeopleShadows:
+class PeopleShadows(NamedTuple):
     """Shadows of N people on the ground at their feet, two each; the second axis is body, head."""
 
     shape: Array  # (N, 2, 3) inverse of each shadow ellipse's 2 x 2 shape matrix, 1/m²: entries 11, 12, 22, in x and y
@@ -169,29 +142,32 @@ class PeopleShadows:
     outlines: ImageOutlines
 
 
-def people_shadows(camera: Camera, people: DrawnPeople, sun: Array, penumbra: float, level: bool) -> PeopleShadows:
+def people_shadows(
+    motion: Motion, people: RecordedBodies, camera: Camera, light: Illumination, level: bool
+) -> PeopleShadows:
     """Returns the shadows of N people as a camera sees them.
 
     An ellipsoid with centre c and shape S casts on the plane at height z an ellipse with centre c - s (c_z - z)/s_z and
-    shape P S Pᵀ. Here s is the unit vector `sun` (3,) to the sun, e_z the upward unit vector, and P = I - s e_zᵀ/s_z.
-    penumbra: m. level: True if shadows can fall on level ground only.
+    shape P S Pᵀ. Here s is the unit vector to the sun, e_z the upward unit vector, and P = I - s e_zᵀ/s_z.
+    level: True if shadows can fall on level ground only.
     """
+    sun = light.sun
     along = np.eye(3) - np.outer(sun / sun[2], [0.0, 0.0, 1.0])
     shape = along @ people.shapes.shape @ along.T
     radius = np.linalg.det(shape[..., :2, :2]) ** 0.25
-    softness = 0.5 * penumbra / radius
+    softness = 0.5 * light.penumbra / radius
     foot = people.pos3[:, None, 2]
     middle = people.shapes.centre - sun / sun[2] * (people.shapes.centre[..., 2] - foot)[..., None]
     flat = shape * ((1 + softness) ** 2)[..., None, None]
     found = image_outlines(camera, outlines(camera, Ellipsoids(middle, flat)))
     if not level:
-        found = ImageOutlines(found.middle, found.inverse, _bounds_up_to_head(camera, people, sun, flat))
+        found = found._replace(bounds=_bounds_up_to_head(camera, people, motion.height[people.id - 1], sun, flat))
     return PeopleShadows(packed_inverse(shape[..., :2, :2]), softness, found)
 
 
-def _bounds_up_to_head(camera: Camera, people: DrawnPeople, sun: Array, flat: Array) -> Ints:
+def _bounds_up_to_head(camera: Camera, people: RecordedBodies, height: Array, sun: Array, flat: Array) -> Ints:
     half = np.sqrt(np.diagonal(flat, axis1=2, axis2=3))[..., :2]
-    low_z, high_z = np.minimum(people.pos3[:, 2], 0.0), people.pos3[:, 2] + people.height
+    low_z, high_z = np.minimum(people.pos3[:, 2], 0.0), people.pos3[:, 2] + height
     corners = []
     for z in (low_z, high_z):
         middle = (
@@ -206,15 +182,15 @@ def _bounds_up_to_head(camera: Camera, people: DrawnPeople, sun: Array, flat: Ar
     return pixel_bounds(camera, np.where(behind, 0.0, uv.min(axis=1)), np.where(behind, camera.image, uv.max(axis=1)))
 
 
-def sunlit_shares(solids: Solids, people: DrawnPeople, sun: Array) -> Array:
+def sunlit_shares(solids: Solids, pos3: Array, height: Array, sun: Array) -> Array:
     """Returns (N, 3): 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing hides it."""
-    lit = np.ones((len(people.id), 3))
+    lit = np.ones((len(pos3), 3))
     if not any(len(part) for part in solids if isinstance(part, np.ndarray)):
         return lit
     from sim.scene.raycast_kernels import first_hit
 
     hit = np.empty(HIT_SLOTS)
-    for row, place, height in zip(lit, people.pos3, people.height, strict=True):
+    for row, place, tall in zip(lit, pos3, height, strict=True):
         for k, up in enumerate(LIT_HEIGHTS):
-            row[k] = float(np.isinf(first_hit(place + np.array([0.0, 0.0, up * height]), sun, solids, hit)))
+            row[k] = float(np.isinf(first_hit(place + np.array([0.0, 0.0, up * tall]), sun, solids, hit)))
     return lit

@@ -93,8 +93,9 @@ FEET, WAIST, HEAD = range(3)  # columns of `sunlit`
 
 
 @njit(cache=True)
-def _row_of_rays(i, e, v, start, step, ray):  # type: ignore[no-untyped-def]
+def _row_of_rays(i, e, v, seen, ray):  # type: ignore[no-untyped-def]
     """Sets ray (3, 4) to the rays of image row v in the own axes of part e of person i, a ball of radius 1."""
+    start, step = seen.start, seen.step
     for k in range(3):
         ray[k, P_AT_0] = start[i, e, k, 1] * (v + 0.5) + start[i, e, k, 2]
         ray[k, P_PER_COLUMN] = start[i, e, k, 0]
@@ -164,34 +165,29 @@ def _texture_and_light(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def draw_people(  # type: ignore[no-untyped-def]
-    order, start, step, half, middle, inverse, bounds, id, sun, shadow, sunlit, pages, atlas,
-    shade, label, depth, ids, colour, dirty, margin, amodal,
-):  # fmt: skip
-    """Draws N people by depth, in this `order` of rows, of which only the speed depends.
+def draw_people(rows, seen, shadow, atlas, shade, label, canvas, ids, margin, amodal):  # type: ignore[no-untyped-def]
+    """Draws the people of these rows by depth; only the speed depends on the order of the rows.
 
-    start, step (N, 2, 3, 3), half (N, 2, 3) m, middle (N, 2, 2) px, inverse (N, 2, 3), bounds (N, 4): see
-    `sim.render.people`. sun (N, 3): in own axes. sunlit (N, 3): columns FEET …. pages (N,): of the atlas. depth (H, W)
-    m, dirty: of the canvas. With `label`, ids (H, W) gets the ids of visible people, and amodal (N,) is raised by the
-    pixels of whole silhouettes. With `shade`, colour (H, W, 3) is drawn.
+    seen: PeopleInView of N people. shadow: the sun's share of the light. With `label`, ids (H, W) gets the ids of
+    visible people, and amodal (N,) is raised by the pixels of whole silhouettes. With `shade`, colours are drawn.
     """
-    height, width = depth.shape
+    width, depth, colour, outlines = canvas.depth.shape[1], canvas.depth, canvas.colour, seen.outlines
     t, ray = np.empty(width), np.empty((3, 4))
     place, one = np.empty(width, np.int32), np.float32(1.0)
     across, up, light = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
-    for i in order:
+    for i in rows:
         for e in range(2):
-            page = atlas[pages[i], e]
-            for v in range(bounds[i, FIRST_ROW], bounds[i, END_ROW]):
-                low, high = outline_columns(v, i, e, middle, inverse, width)
+            page = atlas[seen.id[i] - 1, e]
+            for v in range(outlines.bounds[i, FIRST_ROW], outlines.bounds[i, END_ROW]):
+                low, high = outline_columns(v, i, e, outlines, width)
                 if low == high:
                     continue
                 if label:
                     amodal[i] += high - low
                     if e == HEAD_PART:  # pixels of the body were counted before
-                        other, last = outline_columns(v, i, BODY_PART, middle, inverse, width)
+                        other, last = outline_columns(v, i, BODY_PART, outlines, width)
                         amodal[i] -= max(0, min(last, high) - max(other, low))
-                _row_of_rays(i, e, v, start, step, ray)
+                _row_of_rays(i, e, v, seen, ray)
                 _hit_depths(ray, low, high - low, t)
                 shown = 0
                 for u in range(low, high):
@@ -202,15 +198,15 @@ def draw_people(  # type: ignore[no-untyped-def]
                     shown += 1
                     depth[v, u] = near
                     if label:
-                        ids[v, u] = id[i]
+                        ids[v, u] = seen.id[i]
                 if shown == 0:
                     continue
-                mark_dirty(dirty, v, low, high, margin, height, width)
+                mark_dirty(canvas, v, low, high, margin)
                 if not shade:
                     continue
-                head = e == HEAD_PART
+                half, sun, sunlit, head = seen.half[i, e], seen.sun[i], seen.sunlit[i], e == HEAD_PART
                 _texture_and_light(
-                    ray, low, high - low, t, half[i, e], sun[i], shadow, sunlit[i], head, place, across, up, light
+                    ray, low, high - low, t, half, sun, shadow, sunlit, head, place, across, up, light
                 )  # fmt: skip
                 for u in range(low, high):
                     n = u - low

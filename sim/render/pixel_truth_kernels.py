@@ -15,30 +15,26 @@ from sim.render.canvas import END_COLUMN, END_ROW, FIRST_COLUMN, FIRST_ROW
 from sim.render.canvas_kernels import ellipse_row
 from sim.scene.body import XX, XY, YY
 from sim.scene.raycast import HIT_SLOTS
-from sim.scene.raycast_kernels import at_pixel, first_hit
+from sim.scene.raycast_kernels import has_solids, look
 
 SAME = 1e-3  # m: a point in front by less than this counts as the same point
 
 
 @njit(cache=True)
-def empty_scene_disparities(depth, scale, origin, direction, solids, out):  # type: ignore[no-untyped-def]
+def empty_scene_disparities(depth, scale, rays, solids, out):  # type: ignore[no-untyped-def]
     """Sets out (H, W) to the disparities scale / depth of the empty scene, at the left camera's pixels.
 
-    depth (H, W) m: of the left view. scale: px m. origin, direction (3, 3): PixelRays of the right camera.
+    depth (H, W) m: of the left view. scale: px m. rays: PixelRays of the right camera.
     """
-    height, width = depth.shape
-    any_solid = len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
-    o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
-    for v in range(height):
-        for u in range(width):
+    o, d, hit, solid = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), has_solids(solids)
+    for v in range(depth.shape[0]):
+        for u in range(depth.shape[1]):
             z = depth[v, u]
             x = u + 0.5 - scale / z
-            out[v, u] = scale / z if z < np.inf and x >= 0.0 else np.nan
-            if any_solid and out[v, u] == out[v, u]:
-                at_pixel(origin, x, v + 0.5, o)
-                at_pixel(direction, x, v + 0.5, d)
-                if first_hit(o, d, solids, hit) < z - SAME:
-                    out[v, u] = np.nan
+            seen = z < np.inf and x >= 0.0
+            if seen and solid:
+                seen = look(rays, x, v + 0.5, solids, o, d, hit) >= z - SAME
+            out[v, u] = scale / z if seen else np.nan
 
 
 @njit(cache=True)
@@ -55,45 +51,38 @@ def _part_is_before(x, i, e, start, step, row, z):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True)
-def _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, solids, out):  # type: ignore[no-untyped-def]
+def _set_people(rows, depth, ids, seen, scale, right_depth, rays, solids, out):  # type: ignore[no-untyped-def]
     """Sets out (H, W) to the disparity at the pixels of people; nan where the right camera does not see the point."""
-    width = depth.shape[1]
-    any_solid = len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
-    o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
-    for i in range(len(id)):
+    width, bounds, id = depth.shape[1], seen.outlines.bounds, seen.id
+    o, d, hit, solid = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), has_solids(solids)
+    for i in rows:
         for v in range(bounds[i, FIRST_ROW], bounds[i, END_ROW]):
             for u in range(bounds[i, FIRST_COLUMN], bounds[i, END_COLUMN]):
-                if ids[v, u] != id[i]:
-                    continue
-                z = depth[v, u]
-                x = u + 0.5 - scale / z
-                out[v, u] = scale / z if x >= 0.0 else np.nan
-                if any_solid and x >= 0.0:
-                    j = int(x)
-                    if min(right_depth[v, max(j - 1, 0)], right_depth[v, j], right_depth[v, min(j + 1, width - 1)]) < z:
-                        at_pixel(origin, x, v + 0.5, o)
-                        at_pixel(direction, x, v + 0.5, d)
-                        if first_hit(o, d, solids, hit) < z - SAME:
-                            out[v, u] = np.nan
+                if ids[v, u] == id[i]:
+                    z = depth[v, u]
+                    j = max(int(u + 0.5 - scale / z), 0)
+                    near = min(right_depth[v, max(j - 1, 0)], right_depth[v, j], right_depth[v, min(j + 1, width - 1)])
+                    x = u + 0.5 - scale / z
+                    out[v, u] = scale / z if x >= 0.0 else np.nan
+                    if solid and near < z and x >= 0.0 and look(rays, x, v + 0.5, solids, o, d, hit) < z - SAME:
+                        out[v, u] = np.nan
 
 
 @njit(cache=True)
-def add_people(  # type: ignore[no-untyped-def]
-    depth, ids, bounds, id, scale, start, step, middle, inverse, nearest, right_depth, origin, direction, solids, out
-):
-    """Adds N people to out (H, W), on entry the disparities of the empty scene, at the left camera's pixels.
+def add_people(rows, depth, ids, seen, scale, other, right_depth, rays, solids, out):  # type: ignore[no-untyped-def]
+    """Adds the people of these rows to out (H, W), on entry the disparities of the empty scene.
 
-    depth (H, W) m, ids (H, W), bounds (N, 4), id (N,): of the left image, with people. scale: px m. The rest is the
-    right camera's: start, step (N, 2, 3, 3), middle (N, 2, 2) px, inverse (N, 2, 3), nearest (N, 2) m: of bodies and
-    heads; right_depth (H, W) m: of the empty scene; origin, direction (3, 3): PixelRays.
+    depth (H, W) m, ids (H, W): of the left image, with people. seen, other: PeopleInView of the left and right camera.
+    scale: px m. right_depth (H, W) m, rays: of the empty scene in the right camera.
     """
     height, width = depth.shape
     row = np.empty(6)
-    _set_people(depth, ids, bounds, id, scale, right_depth, origin, direction, solids, out)
-    for i in range(len(id)):
+    _set_people(rows, depth, ids, seen, scale, right_depth, rays, solids, out)
+    middle, inverse, start, step = other.outlines.middle, other.outlines.inverse, other.start, other.step
+    for i in rows:
         # Pixels that a person hides from the right camera become nan.
         for e in range(2):
-            mu, mv, most = middle[i, e, 0], middle[i, e, 1], scale / nearest[i, e]
+            mu, mv, most = middle[i, e, 0], middle[i, e, 1], scale / other.nearest[i, e]
             a, b, c = inverse[i, e, XX], inverse[i, e, XY], inverse[i, e, YY]
             half = np.sqrt(a / (a * c - b * b))
             if not half >= 0.0:

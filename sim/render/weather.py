@@ -14,6 +14,7 @@ correlation over all draws is exp(-r² / 2 length²) at distance r; likewise ove
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -30,21 +31,6 @@ WAVES = 24
 
 
 @dataclass(frozen=True, eq=False)
-class SampledField:
-    """A random field at N fixed places: at time t (s), sine @ cos(omega t) + cosine @ sin(omega t)."""
-
-    # sine, cosine (N, W): sine and cosine of the waves' phases at each place, times their amplitudes, in the field's
-    # unit
-    sine: Array
-    cosine: Array
-    omega: Array  # (W,) angular frequencies, rad/s
-
-    def at(self, t: float) -> Array:
-        """Returns the field's values (N,) at time t (s), in the order of the places."""
-        return np.asarray(self.sine @ np.cos(self.omega * t) + self.cosine @ np.sin(self.omega * t))
-
-
-@dataclass(frozen=True, eq=False)
 class PlaneWaves:
     """A random field over ground and time: the sum of W plane waves amplitude sin(k·x + omega t + phase)."""
 
@@ -57,11 +43,15 @@ class PlaneWaves:
         """Returns the field's value at the world's origin at time t (s)."""
         return float(self.amplitude * np.sin(self.omega * t + self.phase).sum()) if self.amplitude > 0 else 0.0
 
-    def sampled(self, places: Array, spread: Array) -> SampledField:
-        """Returns the field at places (N, 2) m, each smoothed by a Gaussian of standard deviation spread (N,) m."""
+    def sampled(self, places: Array, spread: Array) -> Callable[[float], Array]:
+        """Returns the field at places (N, 2) m as a function of the time in s.
+
+        Each place is smoothed by a Gaussian of standard deviation spread (N,) m.
+        """
         amplitude = self.amplitude * np.exp(-0.5 * (self.k**2).sum(axis=1) * spread[:, None] ** 2)
         at = places @ self.k.T + self.phase
-        return SampledField(amplitude * np.sin(at), amplitude * np.cos(at), self.omega)
+        sine, cosine = amplitude * np.sin(at), amplitude * np.cos(at)
+        return lambda t: np.asarray(sine @ np.cos(self.omega * t) + cosine @ np.sin(self.omega * t))
 
 
 def _with_random_phases(source: np.random.Generator, sd: float, k: Array, omega: Array) -> PlaneWaves:
@@ -177,7 +167,7 @@ def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repea
     pattern, cover = np.empty((2, -(-height // SAMPLE_STEP), -(-width // SAMPLE_STEP)))
     rays, size = pixel_rays(camera), np.array(scene.size, dtype=float)
     scale = picture.samples * signed_scale(camera)  # leaves show farther away
-    sample_plants((rays.origin, rays.direction), scale, SAMPLE_STEP, solids_of(scene), size, key, pattern, cover)
+    sample_plants(rays, scale, SAMPLE_STEP, solids_of(scene), size, key, pattern, cover)
     # The level above which plants cover the wanted share of the image.
     order = np.argsort(-pattern, axis=None, kind="stable")
     covered = np.cumsum(cover.ravel()[order])

@@ -15,7 +15,7 @@ from sim.render.canvas_kernels import mark_dirty, outline_columns
 from sim.render.texture_kernels import plant_cover, plant_pattern
 from sim.scene.body import BODY_PART, HEAD_PART, XX, XY, YY
 from sim.scene.raycast import GROUND, HIT_KIND, HIT_SLOTS
-from sim.scene.raycast_kernels import at_pixel, first_hit
+from sim.scene.raycast_kernels import look
 
 
 @njit(cache=True)
@@ -27,9 +27,7 @@ def sample_plants(rays, scale, step, solids, size, key, pattern, cover):  # type
     o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
     for j in range(pattern.shape[0]):
         for i in range(pattern.shape[1]):
-            at_pixel(rays[0], (i + 0.5) * step, (j + 0.5) * step, o)
-            at_pixel(rays[1], (i + 0.5) * step, (j + 0.5) * step, d)
-            t = first_hit(o, d, solids, hit)
+            t = look(rays, (i + 0.5) * step, (j + 0.5) * step, solids, o, d, hit)
             pattern[j, i], cover[j, i] = -np.inf, 0.0
             if int(hit[HIT_KIND]) == GROUND:
                 slope = abs(d[2]) / np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
@@ -49,11 +47,11 @@ def _interpolate(nodes, x, y, k):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def sway(empty, share, runs, nodes, step, colour, dirty, margin):  # type: ignore[no-untyped-def]
+def sway(empty, share, runs, nodes, step, canvas, margin):  # type: ignore[no-untyped-def]
     """Draws plants where wind has moved them: colour at pixel p becomes `empty` at p - share(p) * wind(p), bilinear.
 
-    colour, empty (H, W, 3): canvases. share (H, W): of plants. runs (S, 3): pixels with plants. nodes (2, J, I): wind,
-    px, at every `step`-th pixel.
+    empty (H, W, 3): as `canvas.colour`. share (H, W): of plants. runs (S, 3): pixels with plants. nodes (2, J, I):
+    wind, px, at every `step`-th pixel.
     """
     height, width = share.shape
     for s in range(len(runs)):
@@ -68,8 +66,8 @@ def sway(empty, share, runs, nodes, step, colour, dirty, margin):  # type: ignor
             for k in range(3):
                 low = empty[j, i, k] + a * np.float32(empty[j, i + 1, k] - empty[j, i, k])
                 high = empty[j + 1, i, k] + a * np.float32(empty[j + 1, i + 1, k] - empty[j + 1, i, k])
-                colour[v, u, k] = np.int16(low + b * (high - low))
-        mark_dirty(dirty, v, left, right, margin, height, width)
+                canvas.colour[v, u, k] = np.int16(low + b * (high - low))
+        mark_dirty(canvas, v, left, right, margin)
 
 
 @njit(cache=True)
@@ -90,31 +88,30 @@ def _shade_line(place, many, centre, shape, sx, sy, softness, shade):  # type: i
 
 
 @njit(cache=True)
-def draw_shadows(  # type: ignore[no-untyped-def]
-    place, direct, bounds, flat, middle, inverse, centre, shape, sun, softness, shaded, colour, dirty, margin
-):
-    """Darkens colour (H, W, 3) where N people stand before the sun; of several shadows, the darkest counts.
+def draw_shadows(rows, place, direct, level, centre, shadows, sun, canvas, margin):  # type: ignore[no-untyped-def]
+    """Darkens the canvas where the people of these rows stand before the sun; of several shadows, the darkest counts.
 
-    place (H, W, 3) m, direct (H, W): of the empty scene. bounds (N, 4), middle (N, 2, 2) px, inverse (N, 2, 3), shape
-    (N, 2, 3), softness (N, 2): of PeopleShadows. flat: True if only level ground is in view. centre (N, 2, 3) m: of the
-    ellipsoids. shaded (H, W): on return 255 times the share of the sun that is gone.
+    place (H, W, 3) m, direct (H, W): of the empty scene. level: True if only level ground is in view. centre (N, 2, 3)
+    m: of the ellipsoids. shadows: PeopleShadows of N people.
     """
-    height, width = direct.shape
+    width, colour, shaded = direct.shape[1], canvas.colour, canvas.shaded
+    outlines, bounds = shadows.outlines, shadows.outlines.bounds
     sx, sy = sun[0] / sun[2], sun[1] / sun[2]
     shade, half = np.empty(width, np.float32), np.float32(0.5)
-    for i in range(len(bounds)):
+    for i in rows:
         for v in range(bounds[i, FIRST_ROW], bounds[i, END_ROW]):
             low, high = bounds[i, FIRST_COLUMN], bounds[i, END_COLUMN]
-            if flat:
-                low, high = outline_columns(v, i, BODY_PART, middle, inverse, width)
-                first, last = outline_columns(v, i, HEAD_PART, middle, inverse, width)
+            if level:
+                low, high = outline_columns(v, i, BODY_PART, outlines, width)
+                first, last = outline_columns(v, i, HEAD_PART, outlines, width)
                 if last > first:
                     low, high = (min(low, first), max(high, last)) if high > low else (first, last)
             if high <= low:
                 continue
             shade[: high - low] = 0.0
             for e in range(2):
-                _shade_line(place[v, low:], high - low, centre[i, e], shape[i, e], sx, sy, softness[i, e], shade)
+                shape, softness = shadows.shape[i, e], shadows.softness[i, e]
+                _shade_line(place[v, low:], high - low, centre[i, e], shape, sx, sy, softness, shade)
             left, right = width, 0
             for u in range(low, high):
                 new, old = int(shade[u - low] + half), int(shaded[v, u])
@@ -125,4 +122,4 @@ def draw_shadows(  # type: ignore[no-untyped-def]
                     factor = (np.float32(1.0) - part * np.float32(new)) / (np.float32(1.0) - part * np.float32(old))
                     for k in range(3):
                         colour[v, u, k] = np.int16(np.int32(np.float32(colour[v, u, k]) * factor))
-            mark_dirty(dirty, v, left, right, margin, height, width)
+            mark_dirty(canvas, v, left, right, margin)

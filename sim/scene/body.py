@@ -99,20 +99,14 @@ def ellipsoids(
     return Ellipsoids(centre, shape)
 
 
-def bodies_at(motion: Motion, t: Ints, p: Ints) -> tuple[Array, Ellipsoids]:
-    """Returns the feet (N, 3) and the shapes of N people of a Motion, on the ground of its scene.
-
-    t (N,): frame - 1. p (N,): id - 1. Absent people are nan.
-    """
+def recorded_bodies(motion: Motion, first: int = 1, end: int | None = None) -> RecordedBodies:
+    """Returns the bodies of all people present in frames first … end - 1 (None: to the last), on the ground."""
+    t, p = np.nonzero(motion.present[first - 1 : None if end is None else end - 1])
+    t += first - 1
     xy = motion.pos[t, p]
     pos3 = np.column_stack([xy, height_at(motion.scene, xy)])
-    return pos3, ellipsoids(pos3, motion.heading[t, p], motion.height[p], motion.width[p], motion.depth[p])
-
-
-def recorded_bodies(motion: Motion) -> RecordedBodies:
-    """Returns the bodies of all people in all frames in which they are present."""
-    t, p = np.nonzero(motion.present)
-    return RecordedBodies(t + 1, p + 1, *bodies_at(motion, t, p))
+    shapes = ellipsoids(pos3, motion.heading[t, p], motion.height[p], motion.width[p], motion.depth[p])
+    return RecordedBodies(t + 1, p + 1, pos3, shapes)
 
 
 def outlines(camera: Camera, people: Ellipsoids) -> Outlines:

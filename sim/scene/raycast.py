@@ -6,7 +6,6 @@ point (u, v) px. `sim.scene.raycast_kernels.first_hit` finds what a ray meets fi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -32,8 +31,7 @@ class Solids(NamedTuple):
     flights: Array
 
 
-@dataclass(frozen=True)
-class PixelRays:
+class PixelRays(NamedTuple):
     """Lines of sight of a camera: image point (u, v) px looks from origin @ (u, v, 1) along direction @ (u, v, 1)."""
 
     origin: Array

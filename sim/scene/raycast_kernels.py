@@ -34,6 +34,12 @@ def at_pixel(field, u, v, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def has_solids(solids):  # type: ignore[no-untyped-def]
+    """Returns True if there are walls, pillars or stairs."""
+    return len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
+
+
+@njit(cache=True)
 def _set_hit(hit, kind, normal_x, normal_y, normal_z, index, place):  # type: ignore[no-untyped-def]
     hit[HIT_KIND], hit[NORMAL_X], hit[NORMAL_Y], hit[NORMAL_Z] = kind, normal_x, normal_y, normal_z
     hit[HIT_INDEX], hit[HIT_PLACE] = index, place
@@ -190,3 +196,11 @@ def first_hit(o, d, solids, hit):  # type: ignore[no-untyped-def]
     for k in range(len(solids.flights)):
         best = _hit_flight(o, d, solids.flights[k], hit, best, k)
     return best
+
+
+@njit(cache=True)
+def look(rays, u, v, solids, o, d, hit):  # type: ignore[no-untyped-def]
+    """Sets o and d (3,) to the ray through image point (u, v) px, and returns `first_hit` of it."""
+    at_pixel(rays.origin, u, v, o)
+    at_pixel(rays.direction, u, v, d)
+    return first_hit(o, d, solids, hit)

@@ -57,20 +57,16 @@ def measure_visibility(
 
     frame (R,): sorted; people of one frame hide each other. pos3 (R, 3): feet. height (R,). Lens distortion is ignored.
     """
-    from sim.scene.visibility_kernels import COLUMNS, ROWS, behind_stairs, sample_visibility
+    from sim.scene.visibility_kernels import sample_visibility
 
     ellipses = outlines(camera, shapes)
-    box = outline_boxes(ellipses)
-    solids = solids_of(scene)
-    centre, inverse, pos = np.ascontiguousarray(ellipses.centre), packed_inverse(ellipses.shape), pos3[:, :2].copy()
-    has_eye, eye, unproject = camera.kind == "pinhole", np.array(camera.position, dtype=float), unprojection(camera)
-    behind = np.zeros((0, ROWS, COLUMNS), bool)
-    if has_eye and len(solids.flights):
-        behind = behind_stairs(box, centre, inverse, pos, eye, unproject, only_flights(solids.flights))
-    hides = has_eye and len(solids.walls) + len(solids.pillars) > 0
+    box, solids, has_eye = outline_boxes(ellipses), solids_of(scene), camera.kind == "pinhole"
+    hides, climbs = has_eye and len(solids.walls) + len(solids.pillars) > 0, has_eye and len(solids.flights) > 0
     visibility, truncation, visible_box = sample_visibility(
-        frame_starts(frame), box, centre, inverse, occlusion_distance(camera, pos3, height), pos,
-        np.array(camera.image, dtype=float), eye, unproject, solids if hides else None, behind,
+        frame_starts(frame), box, np.ascontiguousarray(ellipses.centre), packed_inverse(ellipses.shape),
+        occlusion_distance(camera, pos3, height), pos3[:, :2].copy(), np.array(camera.image, dtype=float),
+        np.array(camera.position, dtype=float), unprojection(camera), solids if hides else None,
+        only_flights(solids.flights) if climbs else None,
     )  # fmt: skip
     return BodyVisibility(box, visibility, truncation, visible_box)
 
@@ -108,14 +104,14 @@ def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
     """
     if truth.box is None or truth.visible_box is not None or not len(truth.box):
         return truth
-    from sim.scene.visibility_kernels import COLUMNS, ROWS, sample_visibility
+    from sim.scene.visibility_kernels import sample_visibility
 
     size = np.array(image_size if image_size is not None else image_size_of_boxes(truth.box), dtype=float)
     ellipses = inscribed_outlines(truth.box)
     seen, truncation, visible_box = sample_visibility(
         frame_starts(truth.frame), np.array(truth.box), np.ascontiguousarray(ellipses.centre),
         packed_inverse(ellipses.shape), -(truth.box[:, 1] + truth.box[:, 3]), np.zeros((len(truth.box), 2)), size,
-        np.zeros(3), np.eye(3), None, np.zeros((0, ROWS, COLUMNS), bool),
+        np.zeros(3), np.eye(3), None, None,
     )  # fmt: skip
     labelled = bool((truth.visibility < 1).any())
     return truth.replace(

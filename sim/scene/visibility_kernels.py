@@ -123,48 +123,23 @@ def _meets_any(d, eye, between, n_walls, before, n_pillars, solids):  # type: ig
 
 
 @njit(cache=True)
-def behind_stairs(box, centre, inverse, pos, eye, unproject, stairs):  # type: ignore[no-untyped-def]
-    """Returns which samples of R people lie behind stairs, (R, ROWS, COLUMNS); False outside the silhouettes.
-
-    Such a ray meets stairs or ground before the upright plane through pos (R, 2) m that faces the eye. The other
-    arguments are those of `sample_visibility`.
-    """
-    found = np.zeros((len(box), ROWS, COLUMNS), np.bool_)
-    d, hit = np.empty(3), np.empty(HIT_SLOTS)
-    for i in range(len(box)):
-        if not (box[i, WIDTH] > 0 and box[i, HEIGHT] > 0):
-            continue
-        dx, dy = pos[i, 0] - eye[0], pos[i, 1] - eye[1]
-        for r in range(ROWS):
-            v = box[i, TOP] + (r + 0.5) * box[i, HEIGHT] / ROWS
-            for c in range(COLUMNS):
-                u = box[i, LEFT] + (c + 0.5) * box[i, WIDTH] / COLUMNS
-                if _inside(centre, inverse, i, u, v):
-                    at_pixel(unproject, u, v, d)
-                    towards = d[0] * dx + d[1] * dy
-                    if towards > 0.0:
-                        found[i, r, c] = first_hit(eye, d, stairs, hit) < (dx * dx + dy * dy) / towards
-    return found
-
-
-@njit(cache=True)
 def sample_visibility(  # type: ignore[no-untyped-def]
-    starts, box, centre, inverse, distance, pos, image_size, eye, unproject, solids, behind
+    starts, box, centre, inverse, distance, pos, image_size, eye, unproject, solids, stairs
 ):
     """Returns visibility (R,), truncation (R,) and visible boxes (R, 4) px of R people.
 
     starts (F + 1,): first row of each frame. box (R, 4) px. centre (R, 2, 2) px, inverse (R, 2, 3): of body and head.
     distance (R,): occlusion order, nearest lowest. pos (R, 2) m: feet. unproject (3, 3): `raycast.unprojection`.
-    solids: None without walls and pillars that can hide somebody. behind: of `behind_stairs`; without rows if there are
-    no stairs.
+    solids: None without walls and pillars that can hide somebody. stairs: Solids without walls and pillars; None
+    without stairs.
     """
-    # numba leaves out the branches of solids if it is None: a third of what there is to compile.
+    # numba leaves out the branches of solids and stairs if they are None: half of what there is to compile.
     rows = len(box)
     seen, cut, part = np.empty(rows), np.empty(rows), np.empty((rows, 4))
     people = np.empty(rows, np.int64)
     if solids is not None:
-        between, before, d = np.empty(len(solids.walls), np.int64), np.empty(len(solids.pillars), np.int64), np.empty(3)
-    has_stairs = len(behind) > 0
+        between, before = np.empty(len(solids.walls), np.int64), np.empty(len(solids.pillars), np.int64)
+    d, hit = np.empty(3), np.empty(HIT_SLOTS)
     for f in range(len(starts) - 1):
         for i in range(starts[f], starts[f + 1]):
             left, top, width, height = box[i, LEFT], box[i, TOP], box[i, WIDTH], box[i, HEIGHT]
@@ -180,7 +155,7 @@ def sample_visibility(  # type: ignore[no-untyped-def]
                 n_pillars = _pillars_before(pos[i, 0], pos[i, 1], eye, solids.pillars, before)
             whole = left >= 0 and top >= 0 and left + width <= image_size[0] and top + height <= image_size[1]
             # Most people are wholly in view with nothing before them.
-            if whole and n + n_walls + n_pillars == 0 and not has_stairs:
+            if whole and n + n_walls + n_pillars == 0 and stairs is None:
                 seen[i], cut[i] = 1.0, 0.0
                 for k in range(4):  # an assignment of the row takes two seconds to compile
                     part[i, k] = box[i, k]
@@ -208,7 +183,13 @@ def sample_visibility(  # type: ignore[no-untyped-def]
                     if solids is not None and not hidden and n_walls + n_pillars > 0:
                         at_pixel(unproject, u, v, d)
                         hidden = _meets_any(d, eye, between, n_walls, before, n_pillars, solids)
-                    hidden = hidden or (has_stairs and behind[i, r, c])
+                    if stairs is not None:
+                        at_pixel(unproject, u, v, d)
+                        dx, dy = pos[i, 0] - eye[0], pos[i, 1] - eye[1]
+                        towards = d[0] * dx + d[1] * dy
+                        # Stairs hide before the upright plane through the person that faces the eye.
+                        if not hidden and towards > 0.0:
+                            hidden = first_hit(eye, d, stairs, hit) < (dx * dx + dy * dy) / towards
                     if not hidden:
                         visible += 1
                         low_c, high_c = min(low_c, c), max(high_c, c)

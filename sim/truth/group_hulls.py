@@ -14,7 +14,7 @@ import numpy as np
 from sim.geometry.polygons import convex_hull, footprint_hulls
 from sim.types import Array, Groups, Ints
 
-__all__ = ["box_groups", "groups_over_time"]
+__all__ = ["box_groups", "groups_over_time", "member_rows"]
 
 
 def groups_over_time(
@@ -25,7 +25,7 @@ def groups_over_time(
     frame, id, group (R,): people in frames, in any order, group -1 = alone. pos, vel (R, D): m, m/s, or px with a
     px_per_m, the scale of the footprints; results are in the same unit. extent is the covariance of x and y.
     """
-    order, starts = _member_rows(frame, id, group)
+    order, starts = member_rows(frame, id, group)
     hulls = footprint_hulls(pos[order, :2] / px_per_m, np.diff(np.append(starts, len(order))))
     rows = frame[order], id[order], group[order], pos[order], vel[order]
     return _assemble(*rows, starts, [h * px_per_m for h in hulls], first, length)
@@ -38,7 +38,7 @@ def box_groups(
 
     As `groups_over_time`; pos, vel (R, 2): px, px/s. box (R, 4): left, top, width, height, px.
     """
-    order, starts = _member_rows(frame, id, group)
+    order, starts = member_rows(frame, id, group)
     low, high = box[:, :2], box[:, :2] + box[:, 2:]
     corners = np.stack([low, np.stack([high[:, 0], low[:, 1]], 1), high, np.stack([low[:, 0], high[:, 1]], 1)], 1)
     ends = np.append(starts, len(order))
@@ -47,7 +47,7 @@ def box_groups(
     return _assemble(*rows, starts, hulls, first, length)
 
 
-def _member_rows(frame: Ints, id: Ints, group: Ints) -> tuple[Ints, Ints]:
+def member_rows(frame: Ints, id: Ints, group: Ints) -> tuple[Ints, Ints]:
     """Returns the rows of people in groups of two or more in one frame, sorted by (frame, group, id), and the starts of
     each group in each frame in them.
     """

@@ -67,9 +67,21 @@ def lineage(
     unchanged = {g for g, people in old.items() if new.get(g) == people and people <= stay}
     found: list[GroupChange] = []
     for g in sorted(old.keys() - unchanged):
-        found += _changes_of_old(g, old[g], stay, is_, now)
+        people = old[g]
+        targets = {is_[p] for p in people & stay}
+        alone = max(targets, default=-1) < 0
+        if len(targets) > 1:
+            kind = "dissolve" if alone else "split"
+            found.append(GroupChange(kind, (g,), _names(targets), tuple(sorted(people & now))))
+        elif not targets or (alone and len(people) > 1):
+            found.append(GroupChange("leave", (g,), _names(targets), tuple(sorted(people))))
     for g in sorted(new.keys() - unchanged):
-        found += _changes_of_new(g, new[g], stay, was)
+        people = new[g]
+        sources = {was[p] for p in people & stay}
+        alone = max(sources, default=-1) < 0
+        if len(sources) > 1 or alone:
+            kind = "enter" if len(sources) < 2 else "form" if alone else "merge"
+            found.append(GroupChange(kind, _names(sources), (g,), tuple(sorted(people))))
     return found
 
 
@@ -81,31 +93,6 @@ def _unit_of(groups: Members, everybody: PersonSet) -> dict[int, int]:
 
 def _names(units: Iterable[int]) -> tuple[int, ...]:
     return tuple(sorted(max(u, ALONE) for u in units))
-
-
-def _changes_of_old(
-    g: int, people: PersonSet, stay: PersonSet, is_: dict[int, int], now: PersonSet
-) -> list[GroupChange]:
-    """Returns the split, dissolve or leave of the old group g as a list of one, or []."""
-    left = people & stay
-    targets = {is_[p] for p in left}
-    if len(targets) > 1:
-        kind = "dissolve" if max(targets) < 0 else "split"
-        return [GroupChange(kind, (g,), _names(targets), tuple(sorted(people & now)))]
-    if not left or (max(targets) < 0 and len(people) > 1):
-        return [GroupChange("leave", (g,), _names(targets), tuple(sorted(people)))]
-    return []
-
-
-def _changes_of_new(g: int, people: PersonSet, stay: PersonSet, was: dict[int, int]) -> list[GroupChange]:
-    """Returns the merge, form or enter of the new group g as a list of one, or []."""
-    sources = {was[p] for p in people & stay}
-    if len(sources) > 1:
-        kind = "form" if max(sources) < 0 else "merge"
-        return [GroupChange(kind, _names(sources), (g,), tuple(sorted(people)))]
-    if not sources or max(sources) < 0:
-        return [GroupChange("enter", _names(sources), (g,), tuple(sorted(people)))]
-    return []
 
 
 @dataclass

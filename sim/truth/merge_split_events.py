@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations, pairwise
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -26,13 +26,11 @@ Rule = Literal["merge", "split"]
 NEVER = np.iinfo(np.int64).max
 
 
-@dataclass(frozen=True, slots=True)
-class MeasuredMotion:
+class MeasuredMotion(NamedTuple):
     """The motion from which groups are found: T frames, P people."""
 
-    # pos, vel (T, P, 2): m, m/s, nan while absent
-    pos: Array
-    vel: Array
+    pos: Array  # (T, P, 2) m, nan while absent
+    vel: Array  # (T, P, 2) m/s, nan while absent
     present: Bools  # (T, P) flags
     intent: Ints  # (T, P) index of the group that the script means a person to belong to, -1 while absent
     hold: int  # number of frames for which the merge or split rule must hold

@@ -12,13 +12,16 @@ the third. All moments are handled at once. Tables of positions (M, n, 2) hold M
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 
 from sim.elementary import atan2, length, unit
+from sim.geometry.polygons import cross
 from sim.truth.merge_split_rules import close_pairs, frames_of, stretches
 from sim.types import Array, Bools, GroupEvent, Ints
 
@@ -30,14 +33,13 @@ MIN_CROWD_SHARE = 2 / 3  # of a crowd that must be in the line: else it is no qu
 MAX_CELLS = 2_000_000  # numbers handled together: bounds memory
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class QueueShapes:
+class QueueShapes(NamedTuple):
     """M lines of people who stand behind one another."""
 
-    # (M, n) row numbers, in the table of positions, of the people in order along the line; only the first count (M,) of
-    # each are valid
+    # (M, n) row numbers, in the table of positions, of the people in order along the line; only the first `number`
+    # (M,) of each are valid
     rows: Ints
-    count: Ints
+    number: Ints
     u: Array  # (M, 2) unit vector along the line from the first person towards the last
     middle: Array  # (M, 2) mean position x, y, m
 
@@ -108,7 +110,7 @@ def _fits(p: Array, count: Ints) -> Bools:
     """Returns which of M ordered sets of positions pass the three tests of a line."""
     u, middle, _ = _axes(p, count)
     arm = p - middle[:, None]
-    off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
+    off = np.abs(cross(u[:, None], arm))
     within = np.arange(p.shape[1]) < count[:, None]
     good = (off <= MAX_OFFSET) | ~within
     good[:, 1:] &= _steps_fit((arm * u[:, None]).sum(axis=2)) | ~within[:, 1:]
@@ -130,13 +132,15 @@ def _turns_fit(p: Array) -> Bools:
 def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
     """Returns crowd, order, length and misfit of lines sought through each two people of crowds (C, n, 2)."""
     i, j = np.triu_indices(p.shape[1], 1)
-    crowd, seed = np.nonzero(_steps_fit(np.stack([np.zeros((len(p), len(i))), _lengths(p, i, j)], axis=1))[:, 0])
+    crowd, seed = np.nonzero(
+        _steps_fit(np.stack([np.zeros((len(p), len(i))), length(p[:, j] - p[:, i])], axis=1))[:, 0]
+    )
     i, j, places = i[seed], j[seed], p[crowd]
     rows = np.arange(len(crowd))
     u = places[rows, j] - places[rows, i]
     u /= length(u)[:, None]
     arm = places - (places[rows, i] + places[rows, j])[:, None] / 2
-    off = np.abs(u[:, None, 0] * arm[..., 1] - u[:, None, 1] * arm[..., 0])
+    off = np.abs(cross(u[:, None], arm))
     along = np.where(off <= MAX_OFFSET, (arm * u[:, None]).sum(axis=2), OFF_LINE)
     order = np.argsort(along, axis=1, kind="stable")
     places = np.take_along_axis(places, order[..., None], axis=1)
@@ -147,10 +151,6 @@ def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]
     places = np.take_along_axis(p[crowd], order[..., None], axis=1)
     good = np.flatnonzero((count >= least) & _fits(places, count))
     return crowd[good], order[good], count[good], _axes(places[good], count[good])[2]
-
-
-def _lengths(p: Array, i: Ints, j: Ints) -> Array:
-    return length(p[:, j] - p[:, i])
 
 
 def _longest(links: Bools) -> tuple[Ints, Ints]:
@@ -171,35 +171,20 @@ MEMBER_TIME = 1.0  # s in line, from which a person counts as a member of the qu
 SIDEWAYS_SPEED = 0.1  # m/s: a line that moves sideways faster than this, and less along itself, is no queue
 MAX_RATE = 10.0  # Hz, at most, at which moments are examined
 
-Vector = tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class DetectedQueue:
-    """A queue found in measured motion. People are columns (person id - 1)."""
-
-    first: int  # first frame with 3 people in line;
-    # last frame in which the line was seen. Frames from 0, both inclusive; only examined frames (about 10 per s) count.
-    last: int
-    # members from one end of the line to the other; either end may be the head. People who joined later are inserted
-    # between those they stood between. Empty if nobody was in line for MEMBER_TIME (1 s).
-    order: tuple[int, ...]
-    middle: Vector  # x, y of the line's middle when it was first followed, m; this may be before frame `first`
-
 
 @dataclass(frozen=True, slots=True)
 class _LineNow:
-    """A line of waiting people in one moment."""
+    """A line of waiting people in one moment; vectors are complex numbers."""
 
     t: int  # frame, from 0
     order: tuple[int, ...]  # columns (person id - 1) from one end to the other
-    u: Vector  # unit vector x, y from the first person towards the last
-    middle: Vector  # x, y of their mean position, m
-    drift: Vector  # their mean velocity along u and to the left of u, m/s
+    u: complex  # unit vector from the first person towards the last
+    middle: complex  # their mean position, m
+    drift: complex  # their mean velocity along u, and to the left of u (imaginary part), m/s
 
     def turned(self) -> _LineNow:
         """Returns the same line with its ends exchanged."""
-        return replace(self, order=self.order[::-1], u=(-self.u[0], -self.u[1]), drift=(-self.drift[0], -self.drift[1]))
+        return replace(self, order=self.order[::-1], u=-self.u, drift=-self.drift)
 
 
 @dataclass
@@ -207,14 +192,11 @@ class _FollowedLine:
     """A line of waiting people that is followed through time; frames from 0, people are columns."""
 
     now: _LineNow  # the line when last seen
-    # since, three: first and last frame with at least 3 people (QUEUE_PEOPLE)
-    since: int
+    since: int  # first and last frame with at least 3 people (QUEUE_PEOPLE)
     three: int
-    middle: Vector  # x, y of the line's middle in the frame in which following began, m
-    seen: dict[int, int] = field(default_factory=dict)  # by person, number of moments (examined frames) in the line
-    ranks: list[int] = field(default_factory=list)  # all people seen, in order along the line
-    # sum over `moments` moments of the line's mean velocity along itself and to its left, m/s
-    drift: Vector = (0.0, 0.0)
+    middle: complex  # of the line in the frame in which following began, m
+    seen: Counter[int]  # by person, number of moments (examined frames) in the line
+    drift: complex = 0.0  # sum over `moments` moments of the line's drift
     moments: int = 0
 
 
@@ -224,43 +206,34 @@ def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> l
     pos, vel (T, P, 2): m, m/s. present (T, P). group (T, P): group ids, -1 = alone. A queue is a line (see
     `queue_shapes`) of people who wait, that has QUEUE_PEOPLE for QUEUE_TIME and may be lost for BRIDGE_TIME. A line
     that moves sideways is none. The event starts in the first frame with 3 people and ends in the last with two in
-    line. Its members are all who were in line for MEMBER_TIME. Its position is the middle of the line when it was first
-    followed.
-    """
-    found = []
-    for q in detect_queues(pos, vel, present, fps):
-        if not q.order:
-            continue
-        columns = np.array(sorted(q.order))
-        before, after = (_groups_of(group[t, columns[present[t, columns]]]) for t in (q.first, q.last))
-        people = tuple((columns + 1).tolist())
-        found.append(GroupEvent("queue", q.first + 1, q.last + 1, None, before, after, people, q.middle))
-    return found
-
-
-def _groups_of(label: Ints) -> tuple[int, ...]:
-    """Returns the ids of the groups among labels (K,), after -1 once for each person alone."""
-    return (-1,) * int((label < 0).sum()) + tuple(np.unique(label[label >= 0]).tolist())
-
-
-def detect_queues(pos: Array, vel: Array, present: Bools, fps: float) -> list[DetectedQueue]:
-    """Returns all queues, sorted, also those without members; about MAX_RATE frames per second are examined.
-
-    pos, vel (T, P, 2): m, m/s. present (T, P).
+    line. About MAX_RATE frames per second are examined. Its members are all who were in line for MEMBER_TIME. Its
+    position is the middle of the line when it was first followed.
     """
     there = present & np.isfinite(pos).all(axis=2)
     stride = max(1, round(fps / MAX_RATE))
     hold, bridge = frames_of(QUEUE_TIME, fps), max(frames_of(BRIDGE_TIME, fps), stride)
     following: list[_FollowedLine] = []
-    found: list[DetectedQueue] = []
+    ended: list[_FollowedLine] = []
     for t, moments in groupby(_lines(pos, vel, waiting_people(vel, there, fps), stride), key=lambda m: m.t):
-        ended = [f for f in following if t - f.now.t > bridge]
+        ended += [f for f in following if t - f.now.t > bridge]
         following = [f for f in following if t - f.now.t <= bridge]
-        found += [queue for f in ended for queue in _finished(f, hold, stride, fps)]
         for moment in moments:
             _follow(following, moment, hold, bridge)
-    found += [queue for f in following for queue in _finished(f, hold, stride, fps)]
-    return sorted(found, key=lambda q: (q.first, q.last, q.order))
+    found = []
+    for f in ended + following:
+        columns = np.array(sorted(p for p, n in f.seen.items() if n * stride >= MEMBER_TIME * fps), np.int64)
+        along, aside = abs(f.drift.real) / f.moments, abs(f.drift.imag) / f.moments
+        sideways = aside > SIDEWAYS_SPEED and aside > along
+        if len(columns) and f.three - f.since + stride >= hold and not sideways:
+            before, after = (_groups_of(group[t, columns[present[t, columns]]]) for t in (f.since, f.now.t))
+            people, place = tuple((columns + 1).tolist()), (f.middle.real, f.middle.imag)
+            found.append(GroupEvent("queue", f.since + 1, f.now.t + 1, None, before, after, people, place))
+    return sorted(found, key=lambda e: (e.start, e.end, e.members))
+
+
+def _groups_of(label: Ints) -> tuple[int, ...]:
+    """Returns the ids of the groups among labels (K,), after -1 once for each person alone."""
+    return (-1,) * int((label < 0).sum()) + tuple(np.unique(label[label >= 0]).tolist())
 
 
 def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
@@ -277,21 +250,17 @@ def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
 
 def _lines(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_LineNow]:
     t, p = np.nonzero(waits[::stride])
-    i, j = close_pairs(t, pos[t * stride, p], MAX_SPACING)
+    t *= stride
+    place, speed = pos[t, p], np.nan_to_num(vel[t, p])
     made: list[_LineNow] = []
-    for c in queue_shapes(pos[t * stride, p], i, j):
-        made += _of_table(c, t * stride, p, vel)
+    for rows, count, u, middle in queue_shapes(place, *close_pairs(t, place, MAX_SPACING)):
+        within = np.arange(rows.shape[1]) < count[:, None]
+        mean = np.where(within[..., None], speed[rows], 0.0).sum(axis=1) / count[:, None]
+        drift = (mean * u).sum(axis=1) + 1j * cross(u, mean)
+        vectors = (x[:, 0] + 1j * x[:, 1] for x in (u, middle))
+        columns = (x.tolist() for x in (t[rows[:, 0]], count, p[rows], *vectors, drift))
+        made += [_LineNow(when, tuple(people[:n]), *rest) for when, n, people, *rest in zip(*columns, strict=True)]
     return sorted(made, key=lambda m: (m.t, min(m.order)))
-
-
-def _of_table(c: QueueShapes, t: Ints, p: Ints, vel: Array) -> Iterator[_LineNow]:
-    within = np.arange(c.rows.shape[1]) < c.count[:, None]
-    mean = np.where(within[..., None], np.nan_to_num(vel[t[c.rows], p[c.rows]]), 0.0).sum(axis=1) / c.count[:, None]
-    along, aside = (mean * c.u).sum(axis=1), mean[:, 1] * c.u[:, 0] - mean[:, 0] * c.u[:, 1]
-    columns = [t[c.rows[:, 0]], c.count, *c.u.T, *c.middle.T, along, aside]
-    table = zip(p[c.rows].tolist(), *(x.tolist() for x in columns), strict=True)
-    for people, when, n, ux, uy, x, y, forward, sideways in table:
-        yield _LineNow(when, tuple(people[:n]), (ux, uy), (x, y), (forward, sideways))
 
 
 def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: int) -> None:
@@ -301,46 +270,26 @@ def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: in
     fits = [f for f in fits if _same_order(f.now, now)]
     if fits:
         f = max(fits, key=lambda f: (len(people.intersection(f.now.order)), -f.since))
-        now = now if _dot(f.now.u, now.u) >= 0 else now.turned()
+        now = now if _same_way(f.now, now) else now.turned()
     elif long:
-        f = _FollowedLine(now, now.t, now.t, now.middle)
+        f = _FollowedLine(now, now.t, now.t, now.middle, Counter())
         following.append(f)
     else:
         return
     if long:
         # A line that was too short for too long before it became a queue starts anew.
         if now.t - f.three > bridge and f.three - f.since < hold:
-            f.since, f.seen, f.ranks, f.drift, f.moments = now.t, {}, [], (0.0, 0.0), 0
+            f.since, f.seen, f.drift, f.moments = now.t, Counter(), 0.0, 0
         f.three = now.t
-    f.now = now
-    f.drift = (f.drift[0] + now.drift[0], f.drift[1] + now.drift[1])
-    f.moments += 1
-    _record_people(f)
+    f.now, f.drift, f.moments = now, f.drift + now.drift, f.moments + 1
+    f.seen.update(now.order)
 
 
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1]
+def _same_way(before: _LineNow, now: _LineNow) -> bool:
+    return (before.u * now.u.conjugate()).real >= 0
 
 
 def _same_order(before: _LineNow, now: _LineNow) -> bool:
     """Returns True if the people who are in both lines stand in the same order."""
-    order = now.order if _dot(before.u, now.u) >= 0 else now.order[::-1]
+    order = now.order if _same_way(before, now) else now.order[::-1]
     return [p for p in order if p in before.order] == [p for p in before.order if p in order]
-
-
-def _record_people(f: _FollowedLine) -> None:
-    for k, p in enumerate(f.now.order):
-        f.seen[p] = f.seen.get(p, 0) + 1
-        # A new person comes behind all who stand before them in line.
-        if p not in f.ranks:
-            ahead = [f.ranks.index(q) for q in f.now.order[:k]]
-            f.ranks.insert(max(ahead) + 1 if ahead else 0, p)
-
-
-def _finished(f: _FollowedLine, hold: int, stride: int, fps: float) -> list[DetectedQueue]:
-    """Returns the queue that a followed line was, as a list of one; [] if it was too short or moved sideways."""
-    along, aside = (abs(v) / f.moments for v in f.drift)
-    if f.three - f.since + stride < hold or (aside > SIDEWAYS_SPEED and aside > along):
-        return []
-    order = tuple(p for p in f.ranks if f.seen[p] * stride >= MEMBER_TIME * fps)
-    return [DetectedQueue(f.since, f.now.t, order, f.middle)]

@@ -9,6 +9,7 @@ from sim.crowd.forces import (
     END,
     GATHER,
     GROUP,
+    MAX_ACCELERATION,
     MODE,
     QUEUE,
     SWAY_X,
@@ -17,7 +18,6 @@ from sim.crowd.forces import (
     GroupArrays,
     Obstacles,
     PeopleArrays,
-    Steering,
 )
 from sim.crowd.forces_avoidance_kernels import _avoid_groups, _pairs, _walls
 from sim.crowd.world import accelerate
@@ -50,7 +50,7 @@ def crowd(n: int, seed: int, side: float = 6.0) -> tuple[np.ndarray, PeopleArray
 def forces(state: np.ndarray, people: PeopleArrays, groups: GroupArrays, obstacles: Obstacles = NOTHING) -> np.ndarray:
     out = np.zeros((len(state), 2))
     push = np.zeros((len(groups.speed), 2))
-    assert accelerate(state, people, groups, obstacles, 0.02, Steering().array(), push, out)
+    assert accelerate(state, people, groups, obstacles, 0.02, push, out)
     return out
 
 
@@ -74,8 +74,8 @@ def test_pairs_equal_the_slow_twin(arranged: str, n: int) -> None:
     state, people, _ = crowd(n, n, side=4 + n / 10)
     state = ARRANGED[arranged](state)
     out = np.zeros((n, 2))
-    _pairs(state, people.tag, Steering().array(), out)
-    np.testing.assert_allclose(out, between_people(state, people.tag, Steering()), atol=1e-9)
+    _pairs(state, people.tag, out)
+    np.testing.assert_allclose(out, between_people(state, people.tag), atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -86,8 +86,8 @@ def test_groups_equal_the_slow_twin(seed: int) -> None:
     now[:, 9] = (count > 0) & (r.random(40) < 0.9)
     now[seed, 3:5] = 0.0
     push = np.ones((40, 2))
-    _avoid_groups(now, Steering().array(), push)
-    np.testing.assert_allclose(push, between_groups(now, Steering()), atol=1e-9)
+    _avoid_groups(now, push)
+    np.testing.assert_allclose(push, between_groups(now), atol=1e-9)
     assert np.abs(push).max() > 0.1
 
 
@@ -97,8 +97,8 @@ def test_walls_and_pillars_equal_the_slow_twin() -> None:
     walls, pillars = r.uniform(0, 6, (5, 4)), r.uniform(0.1, 6, (3, 3)) * [1, 1, 0.1]
     walls[0, 2:] = walls[0, :2]
     out = np.zeros((100, 2))
-    _walls(state, walls, pillars, Steering().array(), out)
-    np.testing.assert_allclose(out, from_things(state, walls, pillars, Steering()), atol=1e-9)
+    _walls(state, walls, pillars, out)
+    np.testing.assert_allclose(out, from_things(state, walls, pillars), atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -132,7 +132,7 @@ def test_the_order_of_people_does_not_matter() -> None:
 
 def test_forces_are_capped_and_states_that_are_not_finite_are_noticed() -> None:
     state, people, groups = crowd(100, 1, side=3.0)
-    assert np.linalg.norm(forces(state, people, groups), axis=1).max() <= Steering().max_acceleration + 1e-12
+    assert np.linalg.norm(forces(state, people, groups), axis=1).max() <= MAX_ACCELERATION + 1e-12
     state[5, 0] = np.nan
     out, push = np.zeros((100, 2)), np.zeros((len(groups.speed), 2))
-    assert not accelerate(state, people, groups, NOTHING, 0.02, Steering().array(), push, out)
+    assert not accelerate(state, people, groups, NOTHING, 0.02, push, out)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
-from sim.crowd.forces import Steering
 from sim.crowd.formation import standing
 from sim.crowd.order_execution import concerned
 from sim.crowd.world import World, run
@@ -72,10 +71,10 @@ def test_a_group_that_merges_leaves_its_queue(tmp_path):
 def test_a_merge_as_a_parent_arrives_keeps_the_places_of_the_new_group(tmp_path):
     """Whatever the tick at which it fires, also the one in which the old group begins to stand in a circle."""
     merge = '{{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", when = {{ time = {} }} }}'
-    first = World(scenario(tmp_path), 0, 0, Steering())
+    first = World(scenario(tmp_path), 0, 0)
     arrival = next(k for k, _ in enumerate(first.ticks(240)) if first.groups.arrays.arrived[0]) / 10
     for t in arrival + np.arange(-2, 3) / 10:
-        world = World(scenario(tmp_path, merge.format(t)), 0, 0, Steering())
+        world = World(scenario(tmp_path, merge.format(t)), 0, 0)
         assert len(list(world.ticks(240))) == 240
         g = world.groups.alive["ab"]
         kept = world.groups.places[world.groups.members[g]]

@@ -10,7 +10,7 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.schema.scenario import Light, LightSwitch, Picture
 from sim.hashing import canonical_hash
-from sim.render.renderer import BACKGROUNDS, make_renderer
+from sim.render.renderer import BACKGROUNDS, Renderer
 from sim.truth.label import bodies
 from sim.types import Motion, Scene, Stairs
 from tests import reference_render as slow
@@ -47,7 +47,7 @@ def slowly_seen(view: str, scene: str) -> slow.Seen:
 @pytest.mark.parametrize("view", VIEWS)
 def test_ids_masks_and_counts_are_those_of_a_slow_renderer(view: str, scene: str) -> None:
     motion, camera = motion_in(SCENES[scene]), VIEWS[view]
-    seen, pixels = slowly_seen(view, scene), make_renderer(motion, camera).pixels(5)
+    seen, pixels = slowly_seen(view, scene), Renderer(motion, camera).pixels(5)
     assert (seen.ids > 0).sum() > 300  # the oracle sees somebody
     assert (pixels.ids != seen.ids).sum() <= 2  # a ray that grazes two things
     ids = np.flatnonzero(motion.present[4]) + 1
@@ -68,7 +68,7 @@ def test_ids_masks_and_counts_are_those_of_a_slow_renderer(view: str, scene: str
 def test_disparities_are_those_of_a_slow_renderer(view: str, scene: str) -> None:
     motion, camera = motion_in(SCENES[scene]), VIEWS[view]
     wanted = slow.disparity(slowly_seen(view, scene), camera, motion, 5)
-    found = make_renderer(motion, camera).pixels(5, disparity=True).disparity
+    found = Renderer(motion, camera).pixels(5, disparity=True).disparity
     assert np.isnan(wanted).sum() > 100
     both = np.isfinite(wanted) & np.isfinite(found)
     assert (np.isfinite(wanted) != np.isfinite(found)).sum() <= 12  # of 19,200: grazing rays, and 1 mm of depth
@@ -81,7 +81,7 @@ def test_blobs_are_connected_regions() -> None:
     import cv2
 
     motion = motion_in(BUILT, 25)
-    pixels = make_renderer(motion, VIEWS["low"]).pixels(5)
+    pixels = Renderer(motion, VIEWS["low"]).pixels(5)
     _, label = cv2.connectedComponents((pixels.ids > 0).astype(np.uint8), connectivity=8)
     ids = np.flatnonzero(motion.present[4]) + 1
     regions = {int(i): set(label[pixels.ids == i].tolist()) for i in ids}
@@ -97,7 +97,7 @@ def test_blobs_are_connected_regions() -> None:
 @pytest.mark.parametrize("view", ["high", "above"])
 def test_shadows_fall_where_somebody_stands_before_the_sun(view: str) -> None:
     motion, camera = motion_in(BARE), VIEWS[view]
-    made = make_renderer(motion, camera, Light(shadow=0.5, penumbra=0.0), SHARP)
+    made = Renderer(motion, camera, Light(shadow=0.5, penumbra=0.0), SHARP)
     seen, sun = slowly_seen(view, "bare"), made.illumination.sun
     shadow = slow.in_shadow(seen.place, motion, 5, sun) & (seen.ids == 0) & np.isfinite(seen.depth)
     ground = (seen.ids == 0) & ~shadow
@@ -112,14 +112,14 @@ def test_frames_are_pure_functions_of_their_index() -> None:
     motion, camera = motion_in(BUILT), VIEWS["high"]
     light = Light(drift=0.1, flicker=0.02, cloud=0.1, switch=(LightSwitch(at=0.5, gain=0.7),))
     picture = Picture(jpeg=80, foliage=0.1)
-    one, two = (make_renderer(motion, camera, light, picture) for _ in range(2))
+    one, two = (Renderer(motion, camera, light, picture) for _ in range(2))
     forwards = [one.draw(i, right=True, pixels=True, disparity=True) for i in range(1, 5)]
     for i in (3, 1, 4, 2):
         other = forwards[i - 1]
         assert np.array_equal(two.frame(i), other.image)
         assert np.array_equal(two.right(i), other.right)
         assert canonical_hash(two.pixels(i, disparity=True)) == canonical_hash(other.pixels)
-        assert np.array_equal(make_renderer(motion, camera, light, picture).frame(i), other.image)
+        assert np.array_equal(Renderer(motion, camera, light, picture).frame(i), other.image)
     assert not np.array_equal(forwards[0].image, forwards[0].right)
     assert np.array_equal(one.background(7), two.background(7))
 
@@ -127,7 +127,7 @@ def test_frames_are_pure_functions_of_their_index() -> None:
 def test_one_person_more_changes_nobody_else() -> None:
     whole = motion_in(BARE, 7)
     without = whole.replace(present=whole.present & (np.arange(7) < 6))
-    few, many = (make_renderer(m, VIEWS["high"], Light(shadow=0), SHARP) for m in (without, whole))
+    few, many = (Renderer(m, VIEWS["high"], Light(shadow=0), SHARP) for m in (without, whole))
     others = many.pixels(3).ids != 7
     assert (~others).sum() > 20
     assert np.array_equal(few.frame(3)[others], many.frame(3)[others])
@@ -135,7 +135,7 @@ def test_one_person_more_changes_nobody_else() -> None:
 
 def test_noise_is_normal_independent_and_the_same_in_empty_frames() -> None:
     motion, camera = motion_in(BARE, 3), small(pinhole(60.0))
-    made = make_renderer(motion, camera, Light(), Picture(noise=4.0, shot=0.0, texture=0.0))
+    made = Renderer(motion, camera, Light(), Picture(noise=4.0, shot=0.0, texture=0.0))
     empty = np.stack([made.background(k) for k in range(BACKGROUNDS)]).astype(float)
     noise = empty - empty.mean(axis=0)
     assert noise.std() == pytest.approx(4.0 * np.sqrt(1 - 1 / BACKGROUNDS), rel=0.02)
@@ -145,17 +145,17 @@ def test_noise_is_normal_independent_and_the_same_in_empty_frames() -> None:
         assert abs((noise * shifted).mean()) < 0.02 * noise.var()
     assert abs((flat[1:] * flat[:-1]).mean()) < 0.03 * noise.var()
     assert np.percentile(np.abs(noise), 99.7) == pytest.approx(3 * 4.0, rel=0.05)
-    right = make_renderer(motion, camera, Light(), Picture(noise=4.0)).right(4).astype(float)
-    left = make_renderer(motion, camera, Light(), Picture(noise=4.0)).frame(4).astype(float)
-    clean = make_renderer(motion, camera, Light(), Picture(noise=0.0))
+    right = Renderer(motion, camera, Light(), Picture(noise=4.0)).right(4).astype(float)
+    left = Renderer(motion, camera, Light(), Picture(noise=4.0)).frame(4).astype(float)
+    clean = Renderer(motion, camera, Light(), Picture(noise=0.0))
     a, b = left - clean.frame(4), right - clean.right(4)
     assert abs((a * b).mean()) < 0.03 * a.std() * b.std()
 
 
 def test_light_changes_as_it_is_told() -> None:
     motion, camera = motion_in(BARE, 3), VIEWS["high"]
-    steady = make_renderer(motion, camera, Light(), SHARP)
-    switched = make_renderer(motion, camera, Light(switch=(LightSwitch(at=0.5, gain=0.6, ramp=0.2),)), SHARP)
+    steady = Renderer(motion, camera, Light(), SHARP)
+    switched = Renderer(motion, camera, Light(switch=(LightSwitch(at=0.5, gain=0.6, ramp=0.2),)), SHARP)
     share = [switched.frame(i).mean() / steady.frame(i).mean() for i in (1, 6, 7, 8, 12)]
     assert share == pytest.approx([1, 1, np.sqrt(0.6), 0.6, 0.6], abs=0.01)
     assert np.array_equal(switched.background(49), steady.background(49))
@@ -163,7 +163,7 @@ def test_light_changes_as_it_is_told() -> None:
 
 def test_both_cameras_see_the_same_surfaces() -> None:
     motion, camera = motion_in(BUILT), VIEWS["high"]
-    made = make_renderer(motion, camera, Light(), SHARP)
+    made = Renderer(motion, camera, Light(), SHARP)
     left, right, d = made.frame(3), made.right(3), made.pixels(3, disparity=True).disparity
     v, u = np.nonzero(np.isfinite(d))
     x = np.clip(u - d[v, u], 0, 158.0)
@@ -179,9 +179,9 @@ def test_a_misaligned_right_camera_turns_and_moves_its_picture_only() -> None:
     import cv2
 
     motion, camera = motion_in(BUILT), VIEWS["high"]
-    plain = make_renderer(motion, camera, Light(), SHARP).draw(3, right=True, pixels=True, disparity=True)
+    plain = Renderer(motion, camera, Light(), SHARP).draw(3, right=True, pixels=True, disparity=True)
     picture = SHARP.model_copy(update={"right_roll_deg": 2.0, "right_down_px": 1.5, "right_gain": 1.1})
-    wrong = make_renderer(motion, camera, Light(), picture).draw(3, right=True, pixels=True, disparity=True)
+    wrong = Renderer(motion, camera, Light(), picture).draw(3, right=True, pixels=True, disparity=True)
     assert np.array_equal(plain.image, wrong.image)
     assert np.array_equal(plain.pixels.disparity, wrong.pixels.disparity, equal_nan=True)
     matrix = cv2.getRotationMatrix2D((camera.centre_px[0] - 0.5, camera.centre_px[1] - 0.5), -2.0, 1.0)
@@ -196,7 +196,7 @@ def test_a_misaligned_right_camera_turns_and_moves_its_picture_only() -> None:
 @pytest.mark.parametrize("scene", SCENES)
 def test_geometric_visibility_is_that_of_the_pixels(scene: str) -> None:
     motion, camera = crowd(5, people=14, frames=3, scene=SCENES[scene]), pinhole(25.0, at=(8.0, -6.0, 4.5))
-    truth, pixels = bodies(motion, camera), make_renderer(motion, camera).pixels(2)
+    truth, pixels = bodies(motion, camera), Renderer(motion, camera).pixels(2)
     here = truth.rows(2)
     assert np.abs(truth.visibility[here] - pixels.visibility).max() < 0.06
     whole = pixels.visibility == 1
@@ -210,40 +210,40 @@ def test_stairs_hide_people_in_geometry_as_in_pixels(rise: float) -> None:
     x, y = np.meshgrid(np.linspace(5.0, 11.5, 9), [3.8, 5.0, 6.0, 7.0, 8.2, 9.0])  # before, on and behind the flight
     motion = walkers(np.column_stack([x.ravel(), y.ravel()]), np.full((x.size, 2), 0.3), frames=2, scene=scene)
     camera = pinhole(15.0, at=(8.0, -5.0, 3.2))
-    truth, pixels = bodies(motion, camera), make_renderer(motion, camera).pixels(1)
+    truth, pixels = bodies(motion, camera), Renderer(motion, camera).pixels(1)
     off = truth.visibility[truth.rows(1)] - pixels.visibility
     assert np.abs(off).max() < 0.06
-    alone = make_renderer(motion.replace(scene=BARE), camera).pixels(1)
+    alone = Renderer(motion.replace(scene=BARE), camera).pixels(1)
     assert (pixels.visible_px < 0.7 * alone.visible_px).sum() >= 3  # they do hide somebody
 
 
 def test_what_cannot_be_drawn_is_refused() -> None:
     motion = motion_in(BARE, 2)
     with pytest.raises(InputError, match="radial"):
-        make_renderer(motion, VIEWS["high"].replace(radial=0.1))
+        Renderer(motion, VIEWS["high"].replace(radial=0.1))
     with pytest.raises(InputError, match="baseline"):
-        make_renderer(motion, VIEWS["high"].replace(baseline=0.0)).right(1)
+        Renderer(motion, VIEWS["high"].replace(baseline=0.0)).right(1)
     with pytest.raises(InputError, match="baseline"):
-        make_renderer(motion, VIEWS["above"].replace(baseline=0.1)).right(1)
+        Renderer(motion, VIEWS["above"].replace(baseline=0.1)).right(1)
     with pytest.raises(ValueError, match="sun_elevation_deg"):
         Light(sun_elevation_deg=-5.0)
     with pytest.raises(ValueError, match="gain"):  # of pydantic
-        make_renderer(motion, VIEWS["high"], Light(switch=(LightSwitch(at=1.0, gain=-1.0),))).frame(1)
+        Renderer(motion, VIEWS["high"], Light(switch=(LightSwitch(at=1.0, gain=-1.0),))).frame(1)
 
 
 def test_nobody_behind_the_camera_and_no_people_at_all() -> None:
     motion = motion_in(BARE, 5)
     behind = small(pinhole(20.0, at=(8.0, 12.0, 3.0)))
-    pixels = make_renderer(motion, behind).pixels(1)
+    pixels = Renderer(motion, behind).pixels(1)
     assert not (pixels.ids > 0).any()
     assert pixels.amodal_px.tolist() == [0.0] * 5
     assert pixels.blob.tolist() == [-1] * 5
     nobody = crowd(0, people=0, frames=2)
-    assert make_renderer(nobody, VIEWS["high"]).draw(1, pixels=True, right=True, disparity=True).pixels is not None
+    assert Renderer(nobody, VIEWS["high"]).draw(1, pixels=True, right=True, disparity=True).pixels is not None
 
 
 def test_sky_is_above_the_horizon_and_has_no_disparity() -> None:
-    made = make_renderer(motion_in(BARE, 2), small(pinhole(5.0, at=(8.0, -6.0, 2.0))))
+    made = Renderer(motion_in(BARE, 2), small(pinhole(5.0, at=(8.0, -6.0, 2.0))))
     pixels = made.pixels(1, disparity=True)
     assert np.isnan(pixels.disparity[0]).all()
     assert made.frame(1)[0].mean() > made.frame(1)[-1].mean()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sim.truth.crossing_events import crossings, net_crossings
-from sim.truth.queue_detection import detect_queues, queues
+from sim.truth.queue_detection import queues
 
 FPS = 10.0
 T = np.arange(120)[:, None] / FPS
@@ -132,9 +132,9 @@ def served(people=5, service=2.0, spacing=0.8):
 
 
 def test_advancing_is_waiting():
-    (line,) = detect_queues(*crowd(served()), FPS)
-    assert line.order in ((0, 1, 2, 3, 4), (4, 3, 2, 1, 0))
-    assert (line.first, line.last) == (0, pytest.approx(79, abs=2))
+    (line,) = queued(served())
+    assert line.members == (1, 2, 3, 4, 5)
+    assert (line.start, line.end) == (1, pytest.approx(80, abs=2))
 
 
 @pytest.mark.parametrize("people", [3, 5, 8])
@@ -171,22 +171,19 @@ def cut(a, b):
 def test_net_crossings_are_those_of_the_segments():
     """Random walks of different lengths, with holes, that cross each other many times and from both sides."""
     r = np.random.default_rng(0)
-    a, b, encounter, expected = [], [], [], []
-    for k in range(300):
+    found, expected = [], []
+    for _ in range(300):
         n = int(r.integers(2, 20))
         paths = r.uniform(-2, 2, (2, 1, 2)) + np.cumsum(r.normal(0, 1, (2, n, 2)), axis=1)
         holes = r.random((2, n)) < 0.1
         holes[:, 0] = False
         expected.append(cut(*(path[~hole] for path, hole in zip(paths, holes, strict=True))))
         paths[holes] = np.nan
-        a.append(paths[0])
-        b.append(paths[1])
-        encounter += [k] * n
-    found = net_crossings(np.concatenate(a), np.concatenate(b), np.array(encounter), 300)
-    assert found.tolist() == expected
+        found.append(net_crossings(*paths))
+    assert found == expected
     assert {-1, 0, 1} <= set(expected)
     assert sum(e == 0 for e in expected) < 270
     round_twice = np.linspace(0.3, 4 * np.pi + 0.3, 40)
     spiral, ray = np.stack([np.cos(round_twice), np.sin(round_twice)], axis=1), np.linspace([0, 0], [3, 0.01], 40)
-    assert net_crossings(ray, spiral, np.zeros(40, np.int64), 1)[0] == cut(ray, spiral) == -2
-    assert net_crossings(ray, 1.1 * spiral[::-1], np.zeros(40, np.int64), 1)[0] == cut(ray, 1.1 * spiral[::-1]) == 2
+    assert net_crossings(ray, spiral) == cut(ray, spiral) == -2
+    assert net_crossings(ray, 1.1 * spiral[::-1]) == cut(ray, 1.1 * spiral[::-1]) == 2

@@ -195,13 +195,13 @@ def picture_scenario(settings: str):
 
 @pytest.mark.parametrize("key", PICTURES)
 def test_a_key_changes_pictures_and_only_those(key):
-    from sim.render.renderer import make_renderer
+    from sim.render.renderer import Renderer
 
     before, after = (picture_scenario(settings) for settings in PICTURES[key])
     assert before.model_dump(exclude={"light", "picture"}) == after.model_dump(exclude={"light", "picture"})
     bare = {} if key in ("picture.noise", "picture.shot") else {"noise": 0.0}
     a, b = (
-        make_renderer(*three_people(), s.light, s.picture.model_copy(update=bare)).draw(3, right=True)
+        Renderer(*three_people(), s.light, s.picture.model_copy(update=bare)).draw(3, right=True)
         for s in (before, after)
     )
     of_right = key.startswith("picture.right_")
