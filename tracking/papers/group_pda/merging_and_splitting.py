@@ -77,7 +77,8 @@ def merge_onset(moments: list[PairMoment], alike: float) -> tuple[int, float]:
     """
     t, gap = np.array([m.t for m in moments]), np.array([m.gap for m in moments])
     before = np.linspace(-2 * WALK_TIME, 0, BEFORE, endpoint=False)
-    way = np.concatenate([moments[0].way + before[:, None] * moments[0].velocity, [m.way for m in moments]])
+    came = moments[0].way + before[:, None] * moments[0].velocity
+    way = np.concatenate([came, np.array([m.way for m in moments])])
     differ = chords(np.concatenate([t[0] + before, t]), way, WALK_TIME)[BEFORE:]
     speaks = np.where(gap > MERGE_DISTANCE, -1.0, np.maximum(1 - np.square(differ / alike), -1.0))
     total = np.concatenate([[0.0], np.cumsum(speaks[1:] * np.diff(t))])

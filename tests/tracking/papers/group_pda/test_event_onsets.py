@@ -17,7 +17,7 @@ def encounter(noise: float, seed: int, sway: float = 0.0) -> list[PairMoment]:
     t = np.arange(50) / FPS
     v = np.stack([2 * np.clip((SLOWS + LASTS - t) / LASTS, 0, 1), sway * np.sin(2 * np.pi * t)], axis=1)
     way = np.cumsum(v, axis=0) / FPS + np.random.default_rng(seed).normal(0, noise, v.shape)
-    return [PairMoment(s, *there, np.zeros(2), 0.5) for s, *there in zip(t.tolist(), way, v, strict=True)]
+    return [PairMoment(s, d, vel, np.zeros(2), 0.5) for s, d, vel in zip(t.tolist(), way, v, strict=True)]
 
 
 @pytest.mark.parametrize(("noise", "sway"), [(0.0, 0.0), (0.05, 0.0), (0.1, 0.0), (0.0, 0.6)])
