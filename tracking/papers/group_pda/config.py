@@ -40,10 +40,10 @@ class GroupPdaConfig(BackgroundSettings):
         "R, misses, rest and gate of extents, parts, velocities of merges and parts (ours)", "categorical")
     appearance: float = param(0.5, (0.0, 5.0), "",
         "from pixels: weight of colours in the log masses (future work of sec. 6; ours)", sees="pixels")
-    merge_velocity: float = param(0.65, (0.05, 3.0), "m/s",
-        "largest difference of velocities at which groups and parts merge (ours, in place of SR_v)")
-    merge_time: float = param(0.75, (0.0, 3.0), "s",
-        "time for which groups must be near, with like velocities on the mean of two steps, before they merge (ours)")
+    merge_velocity: float = param(0.5, (0.05, 3.0), "m/s",
+        "groups and parts whose velocities differ by less may be one (ours, in place of SR_v)")
+    merge_time: float = param(0.5, (0.0, 3.0), "s",
+        "evidence at which groups merge: time for which they are near, with equal velocities (ours)")
     split_time: float = param(0.5, (0.0, 3.0), "s",
         "time without a feasible association, less the measured frames in it, after which a group falls apart")
     confirm_time: float = param(0.3, (0.0, 3.0), "s",

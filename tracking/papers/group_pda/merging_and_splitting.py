@@ -3,10 +3,11 @@
 Merging (sec. 3.1, 3.2): which groups are near with like velocities, for how long, and their union. Input: the bank of
 groups after the update of a frame; output: the bank with merged groups, and the events. The relation R_x holds for two
 groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
-components of groups under R_x; each becomes one group. With `corrections` velocities are alike if their difference, on
-the mean of two steps, is at most `merge_velocity`; R_x also needs people of both at most 1.5 m apart, and must hold for
-`merge_time`. Without, velocities are alike if the regions SR_v overlap. Groups that are not measured, or infeasible, do
-not merge.
+components of groups under R_x; each becomes one group. With `corrections` there is evidence over time
+(ours), as of a Markov chain of two states: a moment speaks for one group the more, the smaller the difference of
+velocities is beside `merge_velocity`, on the mean of two steps, and against it if people of both are more than 1.5 m
+apart. Since the onset, when the sum was least, it must have grown by `merge_time`. Without, velocities are alike if the
+regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
 
 Splitting (sec. 3.3): a group without feasible associations for `split_time` falls apart. An association (a set of
 points that may be a group's) is feasible if its points form one group under the group constraint G_y
@@ -16,10 +17,10 @@ the bank by one row per part. A group that G_y leaves whole stays. With `correct
 tracked by itself; the group is their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates
 become one row again. Sets of parts whose people have been more than 1.5 m from the rest's for `confirm_time` split off.
 
-Onsets (ours): when an event that is known now began. A merge is known `merge_time` after its onset. The onset of a
-split is measured from the group's earlier points, divided among the parts. Distances are metres on the ground (in an
-image depth is stretched to it). The distances and velocities of the truth's rules come from
-sim.truth.merge_split_rules. Lengths are in the unit of the points (m on the ground or px), times in s.
+Onsets (ours): when an event that is known now began. The onset of a split is measured from the group's earlier points,
+divided among the parts. Distances are metres on the ground (in an image depth is stretched to it). The distances and
+velocities of the truth's rules come from sim.truth.merge_split_rules. Lengths are in the unit of the points (m on the
+ground or px), times in s.
 
 Of two groups that follow the same people the one with the smaller share of people of its own becomes lost (ours).
 Groups that share points are each measured by all of them. Without this rule a group that is hidden or has left would
@@ -44,9 +45,10 @@ from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
-# s before and after a moment over which the difference of two groups' velocities is averaged, or a chord for parts that
-# leave: the time of one step, so that the sway of people has no part in it.
+# s before and after a moment for the chord of parts that leave: one step, so that sway has no part in it.
 STEP_TIME = 0.5
+WALK_TIME = 0.8  # s before and after a moment for the difference of two groups' velocities: that of two steps in all.
+BEFORE = 16  # Places by which the way before the first moment is known.
 # Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three.
 REACH = 1.1
 
@@ -54,31 +56,34 @@ REACH = 1.1
 class PairMoment(NamedTuple):
     """Two groups a and b at one time; a has the smaller id.
 
-    t: s. velocity (2,): that of b less that of a, as filtered, m/s on the ground. middle (2,): mean of the centroids,
-    weighted by people, in the unit of the points. gap: distance of their nearest people, m; negative if, from pixels,
-    they overlap.
+    t: s. way, velocity (2,): from a's centroid to b's, m on the ground, and b's velocity less a's, as filtered, m/s.
+    middle (2,): mean of the centroids, weighted by people, in the unit of the points. gap: distance of their nearest
+    people, m; negative if, from pixels, they overlap.
     """
 
     t: float
+    way: Array
     velocity: Array
     middle: Array
     gap: float
 
 
-def merge_onset(moments: list[PairMoment], most: float) -> int:
-    """Returns the index of the moment since which two groups have been near with velocities that differ by at most
-    `most`, m/s, on the mean of two steps; the number of moments if they are not."""
-    before = (_step_speeds(moments) > most) | (np.array([m.gap for m in moments]) > MERGE_DISTANCE)
-    return int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0
+def merge_onset(moments: list[PairMoment], alike: float) -> tuple[int, float]:
+    """Returns the index of the moment since which two groups are most probably one, and the evidence for it, s.
 
-
-def _step_speeds(moments: list[PairMoment]) -> Array:
-    """Returns the lengths (K,) of the difference of velocities, on the mean of two steps, m/s, at each moment."""
-    t, v = np.array([m.t for m in moments]), np.array([m.velocity for m in moments])
-    first, last = windows(t, STEP_TIME)
-    total = np.concatenate([np.zeros((1, 2)), np.cumsum(v, 0)])
-    mean = (total[last + 1] - total[first]) / (last + 1 - first)[:, None]
-    return np.asarray(np.hypot(*mean.T))
+    Each moment speaks for one group, by up to its time, if their people are near and their velocities differ by less
+    than `alike`, m/s, on the mean of two steps; else against it, by at most as much. Before the first moment they came
+    on as the filter has it.
+    """
+    t, gap = np.array([m.t for m in moments]), np.array([m.gap for m in moments])
+    before = np.linspace(-2 * WALK_TIME, 0, BEFORE, endpoint=False)
+    came = moments[0].way + before[:, None] * moments[0].velocity
+    way = np.concatenate([came, np.array([m.way for m in moments])])
+    differ = chords(np.concatenate([t[0] + before, t]), way, WALK_TIME)[BEFORE:]
+    speaks = np.where(gap > MERGE_DISTANCE, -1.0, np.maximum(1 - np.square(differ / alike), -1.0))
+    total = np.concatenate([[0.0], np.cumsum(speaks[1:] * np.diff(t))])
+    k = len(total) - 1 - int(total[::-1].argmin())
+    return k, float(total[-1] - total[k])
 
 
 def windows(t: Array, half: float) -> tuple[Ints, Ints]:
@@ -255,9 +260,8 @@ def _onset(bank: GroupBank, pair: Pair, moments: list[PairMoment], scaled: Scale
         rows = np.array([int(np.flatnonzero(bank.id == id)[0]) for id in pair])
         overlap = regions_overlap(bank.x[rows, 2:], bank.P[rows, 2:, 2:], c.gate)  # SR_v
         return moments[-1] if overlap[0, 1] else None
-    k = merge_onset(moments, c.merge_velocity)
-    due = k < len(moments) and moments[-1].t - moments[k].t >= c.merge_time - 1e-9
-    return moments[k] if due else None
+    k, evidence = merge_onset(moments, c.merge_velocity)
+    return moments[k] if evidence >= c.merge_time - 1e-9 else None
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:
@@ -283,9 +287,9 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
 
 
 def _moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float) -> PairMoment:
-    d, v = ((bank.x[b, k : k + 2] - bank.x[a, k : k + 2]) * scaled.metres_per_unit for k in (0, 2))
+    way, v = ((bank.x[b, k : k + 2] - bank.x[a, k : k + 2]) * scaled.metres_per_unit for k in (0, 2))
     w = bank.size[[a, b]] / bank.size[[a, b]].sum()
-    return PairMoment(t, v, w @ bank.x[[a, b], :2], _gap(bank, a, b, d, scaled))
+    return PairMoment(t, way, v, w @ bank.x[[a, b], :2], _gap(bank, a, b, way, scaled))
 
 
 def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) -> float:

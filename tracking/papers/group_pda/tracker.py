@@ -66,13 +66,13 @@ Departures. Those marked (c) are off with `corrections` off.
   groups the largest. Paper: none. Why: tracks need ids.
 - walking out: a new group within reach of a member is a part of its group and as old, (c) with its velocity; without
   corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
-- like velocities, (c): difference up to `merge_velocity` on the mean of two steps. Paper: SR_v overlap. Why: P does
-  not measure likeness; people sway with each step.
+- like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`. Paper: SR_v
+  overlap. Why: P does not measure likeness; people sway with each step.
 - SR_v, without corrections: of the updated velocity. Paper: of the predicted one. Why: Fig. 1 merges after the update.
 - near groups, (c): people at most 1.5 m apart, too; from pixels by centroids and extents. Paper: regions overlap. Why:
   no merge after a split.
-- merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) after `merge_time`, in
-  which gaps up to 1.5 s count. Paper: at once. Why: crossing groups.
+- merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) once the evidence is
+  `merge_time`; gaps up to 1.5 s count. Paper: at once. Why: crossing groups.
 - enter: so is a merge reported if at most one of the groups was there 1 s before. Paper: none. Why: they came together.
 - duplicates: of two groups or parts on the same people for `coast_time` the one with the smaller share of own people is
   lost. Paper: none. Why: hidden groups follow others.

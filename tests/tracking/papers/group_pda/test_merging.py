@@ -1,4 +1,4 @@
-"""When groups merge: a moment in which one of them cannot merge does not restart the time that they must be near."""
+"""When groups merge: a moment in which one of them cannot merge does not take the evidence away."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FPS = 10.0
 
 
 @pytest.mark.parametrize("why", ["unmeasured", "infeasible"])
-def test_a_moment_without_velocity_does_not_restart_the_time_to_merge(why: str) -> None:
+def test_a_moment_without_velocity_does_not_take_the_evidence_away(why: str) -> None:
     scaled, when = scale_parameters(GroupPdaConfig(merge_time=0.8), FPS, 1.0), []
     for pause in (range(0), range(4, 6)):
         changes, two = GroupChanges(), bank(size=np.ones(2), extent=np.tile(0.1 * np.eye(2), (2, 1, 1)))
