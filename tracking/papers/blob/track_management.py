@@ -5,7 +5,8 @@ Two kinds of `management`:
   innovation: the uncertainty of a track, no unit, 1 in the steady state (tracking.filters.track_uncertainty).
 - existence (ours): by the probability that a track is a person (existence). A measurement is associated where that is
   more likely than that it is false or new. A track is reported if it is a person, and where predicted, with the
-  probability LIKELY. A person whose feet are nearer to the camera hides others.
+  probability LIKELY. A person whose feet are nearer to the camera hides others. A track on the body of another is not
+  hidden, and merged with it.
 
 Also here: the tracks of `blob` from pixels, with a direction and a nominal covariance for each track.
 
@@ -36,8 +37,12 @@ LIKELY = 0.5  # least probability of a confirmed track, and of a reported box
 LEAST_EXISTENCE = 0.01  # a track with a lower existence probability is deleted, or not started
 BODY = 0.35  # m: a box is right if its middle is so near to the person
 IN_FRONT = 0.15  # m in the image: whose feet are lower by more stands in front
+SAME_BODY = 0.15  # m in the image: tracks whose feet are nearer are on one body
+DOUBLE_TIME = 3.0  # s: mean time after which two tracks on one body are one person
 SIZE_SPREAD = 0.3  # m: standard deviation of height and width of false boxes
 LEAST_VIEW = 5.0  # m: least width and height of the field of view
+DOUBLES = 0.05  # boxes per frame that a person has beside the own one, on average
+DOUBLE_SPREAD = 0.3  # m: standard deviation of centre, height and width of such a box
 
 
 class TrackedPeople:
@@ -90,10 +95,17 @@ class TrackedPeople:
         self.death_rho = track_uncertainty.after_misses(dynamics, frames - 1)
 
     def predict(self) -> None:
-        """Predict all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence."""
+        """Predict all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence; a
+        track on the body of another is merged with it, that is, deleted, unless it is likely another person."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
         self.rho[:] = self.compute_rho()
         self.states[:] = self.transition @ self.states
+        if self.by_existence:
+            doubled = self._doubled()
+            self.states[:, doubled] *= np.exp(-self.dynamics.dt / DOUBLE_TIME)
+            merged = doubled & (self.existence() < LIKELY)
+            if merged.any():
+                self.keep_only((~merged).nonzero()[0])
         self.detectable = self.config.detect_prob * self.visible_shares()
 
     def compute_rho(self) -> Array:
@@ -120,6 +132,16 @@ class TrackedPeople:
         in_front = foot - foot[:, None] > IN_FRONT * self.scale[:, None]
         covered = np.where(in_front, box_geometry.covered_share(place, place), 0.0) * self.existence()
         return np.asarray(1 - covered.max(1) * self._well_placed())
+
+    def _doubled(self) -> Bools:
+        """Returns flags (N,): True where a track, missed before, is on the body of a more probable person."""
+        if len(self.id) < 2:
+            return np.zeros(len(self.id), bool)
+        place, r = self.upright_boxes(), self.existence()
+        foot = np.column_stack([place[:, 0], place[:, 1] + place[:, 2] / 2])
+        near = np.square(foot[:, None] - foot).sum(2) < np.square(SAME_BODY * self.scale)
+        order = np.lexsort((self.id, -r)).argsort()
+        return np.asarray((near & (order < order[:, None])).any(1) & ~self.measured)
 
     def _well_placed(self) -> Array:
         from scipy.special import erf
@@ -176,14 +198,24 @@ class TrackedPeople:
         size = np.maximum(place[:, 2], place[:, 3]) / PERSON_HEIGHT
         return np.asarray(np.clip(size, whole / LARGEST_SCALE, whole * LARGEST_SCALE))
 
-    def new_people(self, count: int, ratio: Array | float = 1.0) -> Array:
-        """Returns the probability (M,) that each of M = count boxes, as no track's, is of a person without a track; it
-        may also be false. Also counts the people without a track."""
+    def new_people(self, z: Array, free: Bools, ratio: Array | float = 1.0) -> Array:
+        """Returns the probability (M,) that each box z (M, 4), as no track's, is of a person without a track.
+
+        It may also be false, or a second box of a measured person or of an earlier one of the boxes `free` (M,), which
+        no track has. Also counts the people without a track.
+        """
         c, new = self.config, self._new_people(ratio)
-        if count or len(self.id):
+        person = new / (new + c.clutter_rate) * np.ones(len(z))
+        earlier = np.tri(len(z), k=-1) * np.where(free, person, 0.0)
+        owned = np.concatenate([np.tile(self.existence() * self.measured, (len(z), 1)), earlier], 1)
+        place, scale = np.concatenate([self.bank[kalman.PLACE], z]), np.concatenate([self.scale, self._scale_of(z)])
+        d2 = np.square((z[:, None] - place) / (DOUBLE_SPREAD * scale[:, None])).sum(2)
+        density = np.exp(-0.5 * d2) / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self._false_density(scale)
+        double = c.clutter_rate * DOUBLES * (density * owned).sum(1)
+        if len(z) or len(self.id):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
             self.unseen_time = stay * (1 - c.detect_prob) * self.unseen_time + self.dynamics.dt
-        return np.asarray(new / (new + c.clutter_rate) * np.ones(count))
+        return np.asarray(new / (new + c.clutter_rate + double))
 
     def delete_tracks(self, t: float) -> None:
         """Delete tracks from the table at time t, s (sec. 5, and ours)."""

@@ -41,11 +41,12 @@ switches it off, one holds in the preset `paper`, too.
 - association: one to one, most likely, against false and new boxes. Paper: nearest gated track. Why: a wide gate must
   not win.
 - scores of boxes: likelihood ratios, learned from the existence of the boxes' tracks. Paper: none. Why: any unit.
-- births: by the odds of new people to false boxes, the first existence. Paper: a measurement in no gate. Why: people
-  near others must start tracks.
+- births from boxes: by the odds of new people to false boxes and second boxes of people; from pixels the odds are the
+  first existence. Paper: a measurement in no gate. Why: people near others must start tracks.
 - hidden people: detected as far as no other in front covers them, and not at all for `hidden_time`. Paper: none. Why:
   misses come in rows.
 - rates of height and width, from boxes: return to zero. Paper: constant. Why: a missed person's size settles.
+- tracks on one body: merged. Paper: they compete (frame 357). Why: one body is one person.
 - report: boxes that are right with a probability of at least 0.5, and not leaving while missed. Paper: not stated.
   Why: fewer false positives.
 

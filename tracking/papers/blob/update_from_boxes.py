@@ -56,7 +56,7 @@ class BoxUpdater:
         people.record_measured(rows, near, score[columns], evidence[rows, columns], ratio[columns])
         free = np.ones(len(z), bool) if people.by_existence else ~inside.any(0)
         free[columns] = False
-        person = people.new_people(len(z), ratio)
+        person = people.new_people(z, free, ratio)
         person[columns] = people.existence()[rows]
         self.scores.add(score, person)
         free &= (person >= LEAST_EXISTENCE) | (not people.by_existence)

@@ -159,7 +159,7 @@ class PixelUpdater:
             self._learn_looks(seen.image, made.rows)
         near = away <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
         people.record_measured(made.rows, near, made.support, evidence)
-        person = people.new_people(len(unexplained))
+        person = people.new_people(unexplained[:, :4], np.ones(len(unexplained), bool))
         people.delete_tracks(t)
         people.start_tracks(unexplained, np.ones(len(unexplained)), t, person)
 
