@@ -13,7 +13,6 @@ of this module.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import factorial
 from typing import Any
 
@@ -92,28 +91,35 @@ def log(x: Any) -> Any:
     return (2.0 * s * series + e * LN2_LOW) + e * LN2_HIGH
 
 
-def _sine(quarters: float) -> Callable[[Any], Any]:
-    """Returns the sine of an angle to which this whole number of quarters of a turn is added."""
-
-    def sine_of(x: Any) -> Any:
-        k = np.floor(x * PER_HALF_PI + 0.5)
-        r = ((x - k * HALF_PI_1) - k * HALF_PI_2) - k * HALF_PI_3
-        q = r * r
-        sine, cosine = 0.0 * q, 0.0 * q
-        for c in SIN_SERIES:
-            sine = sine * q + c
-        for c in COS_SERIES:
-            cosine = cosine * q + c
-        k = k + quarters
-        quarter = k - 4.0 * np.floor(k * 0.25)
-        # selects by 0 and 1: np.where is slow for scalars in kernels
-        odd = np.float64((quarter == 1.0) | (quarter == 3.0))
-        return (odd * cosine + (1.0 - odd) * (sine * r)) * (1.0 - 2.0 * np.float64(quarter > 1.5))
-
-    return sine_of
+def sin(x: Any) -> Any:
+    """Returns the sine of x, rad."""
+    k = np.floor(x * PER_HALF_PI + 0.5)
+    r = ((x - k * HALF_PI_1) - k * HALF_PI_2) - k * HALF_PI_3
+    q = r * r
+    sine, cosine = 0.0 * q, 0.0 * q
+    for c in SIN_SERIES:
+        sine = sine * q + c
+    for c in COS_SERIES:
+        cosine = cosine * q + c
+    quarter = k - 4.0 * np.floor(k * 0.25)
+    odd = np.float64((quarter == 1.0) | (quarter == 3.0))  # selects by 0 and 1: np.where is slow for scalars in kernels
+    return (odd * cosine + (1.0 - odd) * (sine * r)) * (1.0 - 2.0 * np.float64(quarter > 1.5))
 
 
-sin, cos = _sine(0.0), _sine(1.0)  # of angles in rad
+def cos(x: Any) -> Any:
+    """Returns the cosine of x, rad."""
+    k = np.floor(x * PER_HALF_PI + 0.5)
+    r = ((x - k * HALF_PI_1) - k * HALF_PI_2) - k * HALF_PI_3
+    q = r * r
+    sine, cosine = 0.0 * q, 0.0 * q
+    for c in SIN_SERIES:
+        sine = sine * q + c
+    for c in COS_SERIES:
+        cosine = cosine * q + c
+    quarter = k - 4.0 * np.floor(k * 0.25)
+    odd = np.float64((quarter == 1.0) | (quarter == 3.0))
+    negative = np.float64((quarter == 1.0) | (quarter == 2.0))
+    return (odd * (sine * r) + (1.0 - odd) * cosine) * (1.0 - 2.0 * negative)
 
 
 def atan2(y: Any, x: Any) -> Any:

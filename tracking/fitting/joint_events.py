@@ -18,8 +18,8 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.rng import rng
 from sim.types import Array, Bools, Ints, Truth
-from tracking.papers.joint.group_events_kernels import FEATURES, partition_features
-from tracking.papers.joint.partition_kernels import canonical
+from tracking.papers.joint.group_proposal_kernels import FEATURES, partition_features
+from tracking.papers.joint.partition_labels_kernels import canonical
 
 STRIDE = 0.2  # Time between two partitions that are looked at, s.
 # Standard deviations of the errors of places, m, and velocities, m/s, per axis.
@@ -35,7 +35,7 @@ CLASSES = ("merge", "split", "none")
 class EventRows:
     """Groups and what happened to them within the lag, one row for each group and time."""
 
-    features: Array  # (R, 6): as group_events_kernels
+    features: Array  # (R, 6): as group_proposal_kernels
     event: Ints  # (R,): MERGE, SPLIT or NONE
     possible: Bools  # (R, 3): one person does not split, a group without another one does not merge
 

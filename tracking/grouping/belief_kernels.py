@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
+from sim.elementary_kernels import find_root
 from sim.types import Array, Ints
 
 
@@ -73,17 +74,19 @@ def linked_groups(
     cut (S + 1,): where the rows of each step begin in a, b, values (R,). label (S, P): filled with the lowest member
     of each person's group; -1, as given, where a person is alone.
     """
-    # Only people whose value is positive with somebody can be in a group: the table of a step has these alone.
+    # Only people whose value is positive with somebody can be in a group: the table of a step has these alone. Nobody is
+    # linked across connected components of these pairs, so that groups part whose pairs have no rows any more.
     steps, people = label.shape
-    place, node = np.empty(people, np.int64), np.empty(people, np.int64)
+    place, node, root = np.empty(people, np.int64), np.empty(people, np.int64), np.empty(people, np.int64)
     for p in range(people):
-        place[p] = -1
+        place[p], root[p] = -1, p
     for s in range(steps):
         before = label[max(s - 1, 0)]
         rows = range(cut[s], cut[s + 1])
         for r in rows:
             if values[r] + _memory(before, a[r], b[r], stay, come) > 0:
                 place[a[r]] = place[b[r]] = 0
+                root[find_root(root, a[r])] = find_root(root, b[r])
         count = 0
         for p in range(people):
             if place[p] == 0:
@@ -92,14 +95,15 @@ def linked_groups(
         x = np.empty((count, count))
         for u in range(count):
             for v in range(count):
-                x[u, v] = unseen + _memory(before, node[u], node[v], stay, come)
+                known = find_root(root, node[u]) == find_root(root, node[v])
+                x[u, v] = unseen + _memory(before, node[u], node[v], stay, come) if known else -np.inf
         for r in rows:
             u, v = place[a[r]], place[b[r]]
-            if u >= 0 and v >= 0:
+            if u >= 0 and v >= 0 and x[u, v] > -np.inf:
                 x[u, v] = x[v, u] = values[r] + _memory(before, a[r], b[r], stay, come)
         group = _average_linkage(x)
         for u in range(count):
-            place[node[u]] = -1
+            place[node[u]], root[node[u]] = -1, node[u]
             for v in range(u):
                 if group[v] == group[u]:
                     label[s, node[u]] = label[s, node[v]] = node[group[u]]

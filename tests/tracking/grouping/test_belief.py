@@ -108,6 +108,12 @@ def test_a_chain_of_strangers_is_no_group_and_a_stretched_group_is_one():
         assert max(map(len, parts(label[0]))) == size
 
 
+def test_two_pairs_that_are_too_far_apart_for_evidence_are_two_groups():
+    step, a, b = [0] * 6 + [1, 1], [0, 0, 0, 1, 1, 2, 0, 2], [1, 2, 3, 2, 3, 3, 1, 3]
+    label = groups_of_steps((2, 4), *map(np.array, (step, a, b)), np.full(8, 5.0), -4.0, 7.0, 1.2)
+    assert label.tolist() == [[0, 0, 0, 0], [0, 0, 2, 2]]
+
+
 def test_the_file_is_read_as_written(tmp_path):
     belief = default_belief()
     (tmp_path / "b.toml").write_text(belief.toml_text("two\nlines"))

@@ -86,11 +86,11 @@ class JointConfig(BackgroundSettings):
         return np.array([self.merge_weights, self.split_weights])
 
     def rules(self, dt: float) -> Array:
-        """Returns the rules (5,) of events in a step of dt s, as group_events_kernels has them."""
+        """Returns the rules (5,) of events in a step of dt s, as group_proposal_kernels has them."""
         every = self.algorithm == "paper"
         return np.array([dt / EVENT_TIME, SHARPNESS, every, SIZE_MEAN, SIZE_STD])
 
 
 # Squared Mahalanobis distance of the gate: the quantile of chi-squared with 2 degrees of freedom.
 LARGEST_DISTANCE = float(-2 * np.log1p(-GATE))
-SCALES = np.array([SCATTER, APART])  # The scales (2,) of the validity, as partition_kernels has them.
+SCALES = np.array([SCATTER, APART])  # The scales (2,) of the validity, as partition_labels_kernels has them.

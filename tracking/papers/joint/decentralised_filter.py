@@ -19,7 +19,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.filters.particles import systematic_resample_rows
-from tracking.papers.joint.partition_kernels import relabel
+from tracking.papers.joint.partition_labels_kernels import relabel
 
 
 class Distributions(Protocol):

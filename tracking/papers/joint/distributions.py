@@ -16,10 +16,10 @@ import numpy as np
 
 from sim.types import Array, Ints
 from tracking.filters.person_streams import NOBODY, Keys, PersonStreams
-from tracking.papers.joint import group_events_kernels, partition_kernels
+from tracking.papers.joint import group_proposal_kernels, partition_labels_kernels
 from tracking.papers.joint.config import ALPHA, SCALES, VALIDITY_RATE, JointConfig
 from tracking.papers.joint.decentralised_filter import log_sum
-from tracking.papers.joint.group_events_kernels import CROSS, PLACE, RATE, group_dynamics, own_dynamics
+from tracking.papers.joint.group_proposal_kernels import CROSS, PLACE, RATE, group_dynamics, own_dynamics
 
 
 def process_noise(place: float, velocity: float, dt: float) -> Array:
@@ -117,7 +117,7 @@ MOTION, CHOICES, PARTITIONS, EVENTS, RESAMPLING, BIRTHS, PLACING = range(7)  # W
 class FrameModel:
     """The distributions of a frame; Distributions of decentralised_filter.
 
-    X is (N_x, K, 4). Z is (N_x, N_z, K), labels as partition_kernels has them.
+    X is (N_x, K, 4). Z is (N_x, N_z, K), labels as partition_labels_kernels has them.
 
     config; dt: s; noise: standard deviation of a measured place, m; z (K, 2): measured places, m, nan for a person who
     was not measured; belief (K, K): log-odds that each pair belongs together; streams: the random numbers; key
@@ -164,12 +164,12 @@ class FrameModel:
         c, shape = self.config, z.shape
         out = z.copy()
         if c.variant in ("VAR2", "VAR3"):
-            partition_kernels.uniform_partitions(
+            partition_labels_kernels.uniform_partitions(
                 stam_cumulated(shape[2]), self._of_partitions(shape, np.append(self.key, NOBODY), 1)[..., 0], out
             )  # fmt: skip
             return out
         uniforms = self._of_partitions(shape, self.key, 3)
-        group_events_kernels.propose(x, new, out, uniforms, c.classifier, c.rules(self.dt), SCALES)
+        group_proposal_kernels.propose(x, new, out, uniforms, c.classifier, c.rules(self.dt), SCALES)
         return out
 
     def _of_partitions(self, shape: tuple[int, ...], key: Keys, columns: int) -> Array:
@@ -184,9 +184,9 @@ class FrameModel:
         if c.variant == "VAR3":
             return out
         if c.belief_rate > 0:
-            partition_kernels.pair_sums(self.belief, z, out)
+            partition_labels_kernels.pair_sums(self.belief, z, out)
             return np.asarray(c.belief_rate * self.dt * out)
-        partition_kernels.validities(new, z, SCALES, out)
+        partition_labels_kernels.validities(new, z, SCALES, out)
         return np.asarray(-VALIDITY_RATE * self.dt * out)
 
 

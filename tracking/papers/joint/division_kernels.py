@@ -9,7 +9,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
-from tracking.papers.joint.partition_kernels import validity_of
+from tracking.papers.joint.partition_labels_kernels import validity_of
 
 MOST_LISTED = 6
 """Largest group of which all divisions into two parts are tried."""

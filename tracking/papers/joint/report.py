@@ -19,7 +19,7 @@ from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, GroupEvent, Groups, Ints
 from tracking.grouping.group_labels import part_sets
 from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, event_of_change
-from tracking.papers.joint import partition_kernels
+from tracking.papers.joint import partition_labels_kernels
 
 
 def moments(state: Array, weights: Array) -> tuple[Array, Array]:
@@ -32,7 +32,7 @@ def moments(state: Array, weights: Array) -> tuple[Array, Array]:
 def histogram_partition(label: Ints, weights: Array) -> list[Ints]:
     """Returns the groups of two or more people by the histogram of Fig. 3: each person has the label of most weight."""
     votes = np.zeros((label.shape[2], label.shape[2]))
-    partition_kernels.head_votes(label, weights, votes)
+    partition_labels_kernels.head_votes(label, weights, votes)
     return groups_of(votes.argmax(axis=1))
 
 

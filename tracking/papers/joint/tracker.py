@@ -6,12 +6,12 @@ particles of X, N_z partitions under each. The steps of a frame, with the number
 
     4  X' ~ pi(X' | X, y)              composite proposal                     before eq. 3   distributions
          alpha of N(A x, Sigma), the rest pi_det
-    5  q = qbar p(X' | X, Z)           groups move individuals                eq. 5          group_events_kernels
+    5  q = qbar p(X' | X, Z)           groups move individuals                eq. 5          group_proposal_kernels
          N(x + B g, Sigma) for each person, g the mean of the group
     6  resample Z by q                                                                       decentralised_filter
-    7  Z' ~ pi(Z' | X', X, Z)          Merge, Split, None of each group       eqs 6, 7       group_events_kernels
+    7  Z' ~ pi(Z' | X', X, Z)          Merge, Split, None of each group       eqs 6, 7       group_proposal_kernels
     1  w = p_Nz(y | X') p_Nz(X' | X) / pi(X' | X, y)                          eq. 4          decentralised_filter
-    3  qbar = p(y | X', Z')            exp(-lambda_cl d_cl), Davies-Bouldin   eq. 4          partition_kernels
+    3  qbar = p(y | X', Z')            exp(-lambda_cl d_cl), Davies-Bouldin   eq. 4          partition_labels_kernels
        estimate                        means, votes on labels                 Fig. 3         report
     2  resample X and Z by w                                                                 decentralised_filter
 

@@ -8,7 +8,7 @@ import pytest
 from sim.truth.identity import Identities
 from tests.reference_joint import all_partitions, label_of, validity
 from tracking.papers.joint import division_kernels
-from tracking.papers.joint import group_events_kernels as events
+from tracking.papers.joint import group_proposal_kernels as events
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.report import ReportedEvents
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.reference_joint import all_partitions, label_of, log_group_dynamics
 from tracking.papers.joint.distributions import Proposal, log_density, moved, precision_of, process_noise
-from tracking.papers.joint.group_events_kernels import group_dynamics, own_dynamics
+from tracking.papers.joint.group_proposal_kernels import group_dynamics, own_dynamics
 
 DT, NOISE = 0.1, 0.1
 SIGMA = process_noise(0.2, 0.8, DT)

@@ -7,7 +7,7 @@ import pytest
 
 from tests.reference_joint import all_partitions, label_of, validity
 from tracking.grouping.belief import default_belief
-from tracking.papers.joint import partition_kernels
+from tracking.papers.joint import partition_labels_kernels
 from tracking.papers.joint.config import SCALES as OWN_SCALES
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.distributions import FrameModel, stam_cumulated
@@ -21,7 +21,7 @@ PAIRS = np.array([[0, 0], [0.7, 0], [10, 0], [10.7, 0]])
 def validities(points, labels, scales=SCALES):
     labels = np.asarray(labels)[None]
     out = np.empty(labels.shape[:2])
-    partition_kernels.validities(np.asarray(points, float)[None], labels, scales, out)
+    partition_labels_kernels.validities(np.asarray(points, float)[None], labels, scales, out)
     return out[0]
 
 
@@ -35,7 +35,7 @@ def test_a_label_does_not_depend_on_how_groups_are_called():
             label[part] = name + 1
         alone = [p[0] for p in parts if len(p) == 1]
         label[alone] = rng.choice([0, -1, 50], len(alone)) if len(set(alone)) < 2 else 0
-        partition_kernels.canonical(label)
+        partition_labels_kernels.canonical(label)
         assert label.tolist() == label_of(parts).tolist()
 
 
@@ -76,7 +76,7 @@ def test_the_true_partition_is_the_best_of_all(points):
 def uniform(people, count):
     label = np.empty((1, count, people), np.int64)
     uniforms = np.random.default_rng(3).random((1, count, people + 1))
-    partition_kernels.uniform_partitions(stam_cumulated(people), uniforms, label)
+    partition_labels_kernels.uniform_partitions(stam_cumulated(people), uniforms, label)
     return label[0]
 
 
@@ -116,7 +116,7 @@ def test_the_energy_is_of_beliefs_or_else_of_the_validity():
     np.testing.assert_allclose(energy(belief_rate=20.0), [20 * 0.2 * 1.5, 0])
     by_validity = energy(belief_rate=0.0)
     out = np.zeros((1, 2))
-    partition_kernels.validities(x, z, OWN_SCALES, out)
+    partition_labels_kernels.validities(x, z, OWN_SCALES, out)
     np.testing.assert_allclose(by_validity, -60 * 0.2 * out[0])
     assert by_validity[0] > by_validity[1]
     assert not energy(variant="VAR3").any()

@@ -17,7 +17,7 @@ from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
 from tracking.papers.joint.division_kernels import divide
-from tracking.papers.joint.partition_kernels import clusters, same_row
+from tracking.papers.joint.partition_labels_kernels import clusters, same_row
 
 X, Y, VX, VY, XX, XY, YY, SPREAD, SIZE = range(9)
 """Columns of moments (G, 9): mean place and velocity, covariance of the places shrunk to PRIOR, mean squared distance
@@ -185,7 +185,7 @@ def propose(
     """Draw Z_{t+1} from the joint group proposal for all particles: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7.
 
     early, late (N_x, K, 4): states at both times; label (N_x, N_z, K): Z_t, changed in place; uniforms (N_x, N_z, K,
-    3): of the heads of groups. weights, rules: as event_probabilities; scales: as partition_kernels.SCATTER and the
+    3): of the heads of groups. weights, rules: as event_probabilities; scales: as partition_labels_kernels.SCATTER and the
     following.
 
     Groups are visited in random order. A group that an event has changed is not visited. A pair of groups that are each
