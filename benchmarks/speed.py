@@ -23,7 +23,7 @@ from benchmarks.support.tables import head, row
 from benchmarks.support.timing import best_times, machine_load
 from scenarios.schema.scenario import Scenario
 from sim.crowd.world import run
-from sim.render import people_kernels, renderer, plants_and_shadows_kernels
+from sim.render import people_kernels, plants_and_shadows_kernels, renderer
 from sim.render.renderer import Renderer
 from sim.scene.camera_placement import place_camera
 

@@ -43,7 +43,7 @@ def simulate(
         seed: 0 or more.
         repeat: Number of the suite entry's copy, 0 without copies.
         streams: Some of "left", "right", "disparity", "ids", "background". "left" and "right" give frames with
-            pictures; any of them gives `background()` and exact pixels (`load_pixels`). () draws nothing.
+            pictures; each of the five gives `background()` and exact pixels (`load_pixels`). () draws nothing.
         stride: Of the camera's frames only 1, 1 + stride, … are in the sequence.
 
     Returns:
@@ -51,6 +51,7 @@ def simulate(
 
     Raises:
         InputError: The scenario is impossible (no room for its people, people out of view) or a stream is.
+        ValueError: The seed is negative.
         WorkError: A position is not finite. When the truth is read: an order of the script was not fulfilled.
     """
     from sim.crowd.world import run

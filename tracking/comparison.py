@@ -123,7 +123,9 @@ def compare(
     group_match: GroupMatch = "hull",
     blocks: int = 0,
 ) -> ComparedRuns:
-    """Scores several runs on the same labelled sequences, all compared alike, beside the oracles of their inputs.
+    """Scores several runs on the same labelled sequences, all by one similarity, and the oracle of each kind of input.
+
+    The oracle has the tracker's detections with the true ids.
 
     Args:
         sequences: Labelled sequences.

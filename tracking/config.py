@@ -105,7 +105,7 @@ def param(
         use: online, tunable, sees, as in `ParamUse`.
 
     Raises:
-        ValueError: A number has not two `values`.
+        ValueError: `values` are not two, though the scale is not "categorical".
     """
     categorical = scale == "categorical"
     if scale == "vector":
@@ -196,7 +196,9 @@ class Config:
         return cls.from_toml(file_of(cls.tracker, source))
 
     def with_set(self, *assignments: str) -> Self:
-        """Returns a copy with assignments "name=value" or "tracker.name=value" applied, checked as a whole at the end.
+        """Returns a copy with assignments "name=value" or "tracker.name=value" applied.
+
+        Each value is checked in turn, their combination at the end.
 
         Raises:
             InputError: An assignment has no "=", or as `from_dict`.

@@ -47,7 +47,6 @@ PARTS: dict[str, Replacement] = {
     "false boxes last 0.15 s": (existence, "CLUTTER_TIME", 0.15),
     "nobody hides anybody": (TrackedPeople, "visible_shares", lambda people: np.ones(len(people.id))),
     "no second boxes": (track_management, "DOUBLES", 0.0),
-    "tracks on one body stay": (track_management, "SAME_BODY", 0.0),
     "sizes change on": (update_from_boxes, "SIZE_RATE_TIME", 1e9),
     "reported while they exist": (track_management, "BODY", 1e9),
 }

@@ -48,7 +48,7 @@ def sensor_settings(path: str | Path) -> tuple[str, ...]:
         A setting "sensor.key=value" for each key given in the file.
 
     Raises:
-        InputError: The file does not exist.
+        InputError: The file cannot be read, has no [sensor] table, or has a wrong key or value.
     """
     return tuple(f"sensor.{key}={toml_files.toml_value(v)}" for key, v in sensor_table(path).items())
 

@@ -206,7 +206,7 @@ def replay(
 ) -> Sequence:  # fmt: skip
     """Returns the labelled people of a recording as a simulated sequence: real motion, seen by our camera and sensor.
 
-    The ground is moved so that the least x and y are 1 m, unless a simulated source has a scene, which is then kept.
+    The ground is moved so that the least x and y of people are 1 m. A simulated source keeps its ground and scene.
 
     Args:
         source: A sequence with truth, or the path of one.

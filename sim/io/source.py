@@ -51,7 +51,7 @@ def open_source(
         camera: Calibration, or the path of its file.
         images: False leaves out the pictures of MOTChallenge folders.
         background: Frames for background models, "first:N" or "spread:N", or the path of a picture of the empty place,
-            which spread:50 is added to; None: spread:50, or the stored empty frames.
+            used together with spread:50; None: spread:50, or the stored empty frames.
         person_class: Classes of people in MOTChallenge texts that have classes, as 1, "1,2" or "person"; None: 1, or
             "person" and "pedestrian" if they are words, with a warning about others.
         box_scale: Factor of the boxes of MOTChallenge texts that are not in pixels of the pictures, "X" or "X,Y".

@@ -70,7 +70,7 @@ def play(
 
     Args:
         tracker: Name, file.py:Class, module:Class, class or TimeLimited.
-        source: What is played.
+        source: The sequence to play on: a scenario's entry with a seed, a path, or a Sequence.
         config: The tracker's parameters; None for the defaults.
         detections: The tracker's input; None chooses one that works.
         tracker_seed: Seed of the tracker's random numbers.

@@ -74,8 +74,8 @@ def linked_groups(
     cut (S + 1,): where the rows of each step begin in a, b, values (R,). label (S, P): filled with the lowest member
     of each person's group; -1, as given, where a person is alone.
     """
-    # Only people whose value is positive with somebody can be in a group: the table of a step has these alone. Nobody is
-    # linked across connected components of these pairs, so that groups part whose pairs have no rows any more.
+    # Only people whose value is positive with somebody can be in a group: the table of a step has these alone.
+    # Connected components of such pairs are never joined, so that groups part whose pairs have no rows any more.
     steps, people = label.shape
     place, node, root = np.empty(people, np.int64), np.empty(people, np.int64), np.empty(people, np.int64)
     for p in range(people):

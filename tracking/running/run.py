@@ -194,7 +194,7 @@ def track(
     Args:
         tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
             (tracking.running.time_limit), which stops a step that hangs.
-        sequence: As `sim.simulate` or `sim.io.source.open_sequence` return it.
+        sequence: As `sim.simulate` returns it, or one of those that `sim.io.source.open_source` returns.
         params: A config, values by name, the name of a preset, or a TOML file; None for the tracker's defaults.
         detections: "image", "file" or "truth"; None for the first of them that can work.
         sensor: Settings as in a scenario's [sensor] that degrade "truth"; None: perfect.

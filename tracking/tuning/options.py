@@ -34,7 +34,8 @@ class TuneOptions:
         "Validation seeds, out of 10000:20000; for 48 episodes if absent.", None, metavar="A:B")
     test: range | None = option("Test seeds, out of 20000:30000; for 100 episodes if absent.", None, metavar="A:B")
     check: str | None = option(
-        "Second suite to test on: friends-meet or crossing if absent, or none.", "", metavar="SUITE")
+        "Second suite to test on; friends-meet or crossing if absent; none (in Python None): no second suite.",
+        "", metavar="SUITE")
     objective: str | Iterable[str] = option(
         "Score to improve, or frames/s; several give a Pareto front.", (), metavar="KEY")
     detections: DetectionMode | None = option("Input of the tracker; file if absent and the tracker can use it.", None)

@@ -126,7 +126,7 @@ class _Rows:
 def run_tables(tracks: Series[Tracks], fps: float, places: Places = NOWHERE) -> TidyTables:
     """Returns the tidy tables of a run: one `Tracks` per frame. Of a tracker of whole groups, people are empty.
 
-    places: lines and zones by name, which `counts` then has columns of.
+    places: lines and zones by name; `counts` gets columns for each.
     """
     from sim.io.store.track_files import flatten
 
@@ -147,7 +147,7 @@ def run_tables(tracks: Series[Tracks], fps: float, places: Places = NOWHERE) -> 
 def truth_tables(truth: Truth, places: Places = NOWHERE) -> TidyTables:
     """Returns the tidy tables of a truth, in m if it has positions on the ground, else of the boxes' centres in px.
 
-    places: lines and zones by name, which `counts` then has columns of.
+    places: lines and zones by name; `counts` gets columns for each.
     """
     pos, vel, unit = truth.pos, truth.vel, "m"
     if pos is None:

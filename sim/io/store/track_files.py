@@ -288,7 +288,7 @@ def write_tracks(
         folder: Where. Files of an earlier run are replaced; others stay.
         tracks: One Tracks per frame, all of one plane and unit.
         fps: Frames per second.
-        camera: People on the ground or in space whose tracker gives no boxes get those of upright people in the texts.
+        camera: Gives boxes of upright people in the texts to people on the ground or in space without boxes.
         scene: Gives the height of the ground under 2-D positions; None: 0.
         info: Content of run.json, to which "format", "boxes", "files" and "sha256" are added.
         pairs: Content of pairs.parquet (`pair_table`); None: no such file.
@@ -340,7 +340,7 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
 
     Args:
         path: A folder that `write_tracks` wrote, a file of it, or a text. Of a text, velocities are differences over
-            0.5 s, covariances nan, and everybody is alone, but for groups.csv and events.json beside a tracks.txt.
+            0.5 s, covariances nan, and everybody is alone. Beside a tracks.txt, groups.csv and events.json are read.
         fps: Frames per second of a text; None: 25.
         length: Frames of a text; None: to the last frame in the file.
 

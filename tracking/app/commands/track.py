@@ -1,4 +1,7 @@
-"""`flockscope track`: runs a tracker over a sequence, or over every sequence of a dataset, and stores the tracks."""
+"""`flockscope track`: runs a tracker over a sequence, or over every sequence of a dataset, and stores the tracks.
+
+Its options and their help stand in tracking.app.command_options.
+"""
 
 from __future__ import annotations
 

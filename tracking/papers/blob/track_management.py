@@ -5,8 +5,7 @@ Two kinds of `management`:
   innovation: the uncertainty of a track, no unit, 1 in the steady state (tracking.filters.track_uncertainty).
 - existence (ours): by the probability that a track is a person (existence). A measurement is associated where that is
   more likely than that it is false or new. A track is reported if it is a person, and where predicted, with the
-  probability LIKELY. A person whose feet are nearer to the camera hides others. A track on the body of another is not
-  hidden, and merged with it.
+  probability LIKELY. A person whose feet are nearer to the camera hides others.
 
 Also here: the tracks of `blob` from pixels, with a direction and a nominal covariance for each track.
 
@@ -37,8 +36,6 @@ LIKELY = 0.5  # least probability of a confirmed track, and of a reported box
 LEAST_EXISTENCE = 0.01  # a track with a lower existence probability is deleted, or not started
 BODY = 0.35  # m: a box is right if its middle is so near to the person
 IN_FRONT = 0.15  # m in the image: whose feet are lower by more stands in front
-SAME_BODY = 0.15  # m in the image: tracks whose feet are nearer are on one body
-DOUBLE_TIME = 3.0  # s: mean time after which two tracks on one body are one person
 SIZE_SPREAD = 0.3  # m: standard deviation of height and width of false boxes
 LEAST_VIEW = 5.0  # m: least width and height of the field of view
 DOUBLES = 0.05  # boxes per frame that a person has beside the own one, on average
@@ -95,17 +92,10 @@ class TrackedPeople:
         self.death_rho = track_uncertainty.after_misses(dynamics, frames - 1)
 
     def predict(self) -> None:
-        """Predict all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence; a
-        track on the body of another is merged with it, that is, deleted, unless it is likely another person."""
+        """Predict all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
         self.rho[:] = self.compute_rho()
         self.states[:] = self.transition @ self.states
-        if self.by_existence:
-            doubled = self._doubled()
-            self.states[:, doubled] *= np.exp(-self.dynamics.dt / DOUBLE_TIME)
-            merged = doubled & (self.existence() < LIKELY)
-            if merged.any():
-                self.keep_only((~merged).nonzero()[0])
         self.detectable = self.config.detect_prob * self.visible_shares()
 
     def compute_rho(self) -> Array:
@@ -132,16 +122,6 @@ class TrackedPeople:
         in_front = foot - foot[:, None] > IN_FRONT * self.scale[:, None]
         covered = np.where(in_front, box_geometry.covered_share(place, place), 0.0) * self.existence()
         return np.asarray(1 - covered.max(1) * self._well_placed())
-
-    def _doubled(self) -> Bools:
-        """Returns flags (N,): True where a track, missed before, is on the body of a more probable person."""
-        if len(self.id) < 2:
-            return np.zeros(len(self.id), bool)
-        place, r = self.upright_boxes(), self.existence()
-        foot = np.column_stack([place[:, 0], place[:, 1] + place[:, 2] / 2])
-        near = np.square(foot[:, None] - foot).sum(2) < np.square(SAME_BODY * self.scale)
-        order = np.lexsort((self.id, -r)).argsort()
-        return np.asarray((near & (order < order[:, None])).any(1) & ~self.measured)
 
     def _well_placed(self) -> Array:
         from scipy.special import erf

@@ -46,7 +46,6 @@ switches it off, one holds in the preset `paper`, too.
 - hidden people: detected as far as no other in front covers them, and not at all for `hidden_time`. Paper: none. Why:
   misses come in rows.
 - rates of height and width, from boxes: return to zero. Paper: constant. Why: a missed person's size settles.
-- tracks on one body: merged. Paper: they compete (frame 357). Why: one body is one person.
 - report: boxes that are right with a probability of at least 0.5, and not leaving while missed. Paper: not stated.
   Why: fewer false positives.
 

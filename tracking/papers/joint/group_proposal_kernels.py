@@ -185,8 +185,8 @@ def propose(
     """Draw Z_{t+1} from the joint group proposal for all particles: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7.
 
     early, late (N_x, K, 4): states at both times; label (N_x, N_z, K): Z_t, changed in place; uniforms (N_x, N_z, K,
-    3): of the heads of groups. weights, rules: as event_probabilities; scales: as partition_labels_kernels.SCATTER and the
-    following.
+    3): of the heads of groups. weights, rules: as event_probabilities; scales: as partition_labels_kernels.SCATTER and
+    the following.
 
     Groups are visited in random order. A group that an event has changed is not visited. A pair of groups that are each
     other's nearest draws its merge once, so that the probability is the pair's (ours).

@@ -118,18 +118,10 @@ def test_a_missed_person_keeps_its_size(growth):
     assert abs(missed - last) < 5
 
 
-def test_a_second_box_of_a_person_and_a_coasting_track_on_a_body_are_nobody():
+def test_a_second_box_of_a_person_is_nobody():
     double = [[104 + 4 * k, 198, 30, 72] for k in range(40)]
     made = run([[*at((100 + 4 * k, 200)), *([double[k]] if k % 4 == 0 else [])] for k in range(40)])
     assert len(ids(made)) == 1
-    tracker, frames = Blob(), [at((100, 200), (340, 200))] * 12 + [at((100, 200))] * 40
-
-    def put_the_second_on_the_first(k):
-        if k == 12:
-            tracker.people.bank[:, 1] = tracker.people.bank[:, 0]
-
-    made = run(frames, tracker=tracker, before=put_the_second_on_the_first)
-    assert tracker.people.id.tolist() == made[-1].id.tolist() == [1]
 
 
 @pytest.mark.parametrize("detected", [0.5, 0.7, 1.0])
