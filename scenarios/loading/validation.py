@@ -17,8 +17,12 @@ from scenarios.loading.toml_files import KeyPath, Table, did_you_mean, place_of
 TAGS = {"number", "distribution", "point", "word"}  # of the discriminators of values, in pydantic's locations
 # our words for those of pydantic's messages
 WORDS = {
-    "^(Input should be |Value error, )": "", "a valid tuple": "a list", "String should match pattern": "a name like",
+    "^(Input should be |Value error, )": "", "a valid tuple": "a list",
+    "^String should match pattern.*": "a name: a letter, then letters, digits, '_', '.' or '-'",
     r"a valid dictionary or instance of \w+": "a table",
+    r"^Tuple should have (at \w+ \d+ items?).*": r"\1",
+    "^Unable to extract tag using .*": "`type`, one of 'merge', 'split', 'queue'",
+    "^Input tag .* does not match any of the expected tags:": "`type`, one of",
 }  # fmt: skip
 
 M = typing.TypeVar("M", bound=BaseModel)

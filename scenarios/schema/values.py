@@ -132,7 +132,7 @@ def _kind(value: Any) -> str | None:
 
 
 # Discriminators, so that pydantic reports the errors of one kind of value alone.
-EXPECTED = "a number, or a distribution such as {{ normal = [1.3, 0.2] }}"
+EXPECTED = "a number, or a distribution such as { normal = [1.3, 0.2] }"
 Value = Annotated[
     Annotated[float, Tag("number")] | Annotated[Distribution, Tag("distribution")],
     Discriminator(_kind, custom_error_type="no_value", custom_error_message=EXPECTED),

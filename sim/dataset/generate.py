@@ -6,6 +6,7 @@ The stored bytes depend on scenario, seed and versions only, not on the workers.
 
 from __future__ import annotations
 
+import socket
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -13,6 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any, TypedDict, Unpack, cast
+from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, shortened
 from scenarios.loading.resolve import Entry, resolve
@@ -22,7 +24,7 @@ from scenarios.schema.scenario import ObservationSpec
 from sim.clock import check_stride
 from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
 from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
-from sim.io.files.atomic import lock_folder, remove_partials, write_file
+from sim.io.files.atomic import PARTIAL, lock_folder, remove_partials, write_file
 from sim.io.files.own_files import is_side_file, output_path, output_paths
 from sim.io.store import sequence_folder
 from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest
@@ -46,6 +48,9 @@ class SequenceJob:
     streams: tuple[str, ...] = ()
     images: str = "jpg"  # their file type, "jpg", "png" or "mp4"
     stride: int = 1  # N stores every N-th frame of the camera
+    # a file that a worker must see before it starts, because it would otherwise write to another file system; None for
+    # local workers
+    marker: Path | None = None
 
     @property
     def name(self) -> str:
@@ -92,7 +97,9 @@ def _differences(job: SequenceJob, stored: Table, wanted: Table) -> str:
     if stored["scenario_hash"] != wanted["scenario_hash"]:
         with suppress(InputError):  # of an unreadable scenario only the hashes are known
             mine, same = parse_toml(dump(job.entry.scenario)), {"scenario_hash": None}
-            stored, wanted = parse(job.folder / "scenario.toml") | stored | same, mine | wanted | same
+            theirs = parse(job.folder / "scenario.toml")
+            if _flat("", theirs) != _flat("", mine):
+                stored, wanted = theirs | stored | same, mine | wanted | same
     before, after = _flat("", stored), _flat("", wanted)
     keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
     words = [f"{key} {_word(before.get(key))} → {_word(after.get(key))}" for key in keys[:MOST]]
@@ -108,8 +115,10 @@ def _flat(place: str, value: Any) -> Table:
 
 
 def _word(value: Any) -> str:
-    text = ",".join(map(str, value)) if isinstance(value, list) else "none" if value is None else str(value)
-    return shortened(text.removesuffix(".0") or "none", LONGEST)
+    if isinstance(value, list):
+        return shortened(",".join(map(_word, value)) or "none", LONGEST)
+    text = str(value).removesuffix(".0") if isinstance(value, float) else "none" if value is None else str(value)
+    return shortened(text or "none", LONGEST)
 
 
 def is_stored(job: SequenceJob) -> bool:
@@ -147,10 +156,15 @@ def simulate_and_store(job: SequenceJob) -> None:
 def run_job(job: SequenceJob) -> JobOutcome:
     """Makes the job's sequence unless it is stored undamaged; errors are in the outcome, not raised."""
     try:
+        if job.marker is not None:
+            _wait_for(job.marker)
         if not is_stored(job):
             simulate_and_store(job)
     except FlockscopeError as error:
-        return JobOutcome(error, isinstance(error.__cause__, OSError))
+        fatal = isinstance(error.__cause__, OSError)
+        if fatal and job.marker is not None:
+            error = error.replaced(place=f"on {socket.gethostname()}")
+        return JobOutcome(error, fatal)
     return JobOutcome()
 
 
@@ -159,17 +173,15 @@ def lost_job(job: SequenceJob, error: WorkError) -> JobOutcome:
     return JobOutcome(error.replaced(file=job.name))
 
 
-def _missing(job: SequenceJob) -> JobOutcome | None:
-    """Returns the outcome of a sequence that a worker has made, but on another file system than this one."""
+def _wait_for(marker: Path) -> None:
     for _ in range(20):
-        if (job.folder / MANIFEST).is_file():
-            return None
+        if marker.exists():
+            return
         time.sleep(SHARED_DELAY / 20)
-    error = WorkError(
-        file=job.folder, got="nothing, though a worker has made it", expected="a folder that all machines share",
+    raise InputError(
+        file=marker.parent, got="another folder, or none", expected="the one that the command writes to",
         remedy="choose an --out that all machines share under the same path",
-    )  # fmt: skip
-    return JobOutcome(error, fatal=True)
+    ) from FileNotFoundError(marker)  # fmt: skip
 
 
 LEFT_OUT = 0.05  # greatest share of sequences that may be left out because an order of their script did not come true
@@ -181,7 +193,9 @@ Progress = Callable[[int, int, str], None]  # called as progress(sequences done,
 class Folders(list[Path]):
     """The folders of the sequences made; `left_out` has the error of each whose script did not come true, by name."""
 
-    left_out: dict[str, OrderError]
+    def __init__(self, folders: Iterable[Path] = (), left_out: dict[str, OrderError] | None = None) -> None:
+        super().__init__(folders)
+        self.left_out = left_out or {}
 
 
 class Stored(TypedDict, total=False):
@@ -240,9 +254,7 @@ def generate(
     if len(errors) > len(unfulfilled) or len(unfulfilled) > LEFT_OUT * len(jobs):
         many = len(unfulfilled) > LEFT_OUT * len(jobs)
         raise _summary({name: e for name, e in errors.items() if many or name not in unfulfilled}, len(jobs))
-    folders = Folders(job.folder for job in jobs if job.name not in unfulfilled)
-    folders.left_out = unfulfilled
-    return folders
+    return Folders((job.folder for job in jobs if job.name not in unfulfilled), unfulfilled)
 
 
 @contextmanager
@@ -259,10 +271,12 @@ def _dataset(root: Path, folder: Path) -> Iterator[None]:
 def _run_jobs(jobs: list[SequenceJob], workers: WorkerOptions, progress: Progress | None) -> dict[str, FlockscopeError]:
     errors: dict[str, FlockscopeError] = {}
     with start_workers(min(workers.count, max(1, len(jobs))), workers.cluster) as run:
+        if jobs and workers.cluster is not None:
+            marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
+            write_file(marker, b"")
+            jobs = [replace(job, marker=marker) for job in jobs]
         done = run(run_job, jobs, ahead=QUEUED_JOBS, on_loss=lost_job)
         for count, (job, outcome) in enumerate(done, 1):
-            if outcome.error is None and workers.cluster is not None:
-                outcome = _missing(job) or outcome
             if outcome.error is not None:
                 errors[job.name] = outcome.error
             if outcome.fatal:

@@ -107,14 +107,15 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
 
 def _distinct(sequences: list[Sequence]) -> list[Sequence]:
     # MOTChallenge folders may share a name in seqinfo.ini; their folders do not.
-    count = Counter(s.name for s in sequences)
-    for k, each in enumerate(sequences):
+    count, named = Counter(s.name for s in sequences), list[Sequence]()
+    for each in sequences:
         if count[each.name] > 1 and each.source["kind"] == "mot":
             folder = Path(each.source["path"])
             words = f"is the name of {count[each.name]} sequences; it is called {folder.name}, as its folder"
             warnings.warn(f"{folder / 'seqinfo.ini'}: name: {each.name} {words}", stacklevel=3)
-            sequences[k] = replace(each, name=folder.name)
-    return sequences
+            each = replace(each, name=folder.name)
+        named.append(each)
+    return named
 
 
 def holds_sequences(folder: Path) -> bool:

@@ -93,7 +93,9 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
         size, files = _size(sequence), _picture_files(sequence)
         shape = {"width": size[0], "height": size[1]}
         videos.append(json_text({**about, **shape}))
-        for index in files or range(1, (sequence.length or 0) + 1):
+        for index in range(1, (sequence.length or 0) + 1):
+            if files and index not in files:
+                continue
             name = {"file_name": Path(os.path.relpath(files[index], root)).as_posix()} if files else {}
             images.append(json_text({"id": len(images) + 1, **name, **shape, "video_id": k, "frame": index}))
             shared = {"image_id": len(images), "video_id": k, "category_id": 1}

@@ -34,41 +34,53 @@ def lock_folder(root: Path, held: bool = False) -> Iterator[None]:
     if held and root.resolve() in _held.get():
         yield
         return
-    with _folders(root, root):
-        descriptor = os.open(root, os.O_RDONLY)
+    made = _absent(root)
+    try:
+        descriptor = _locked(root)
+        token = _held.set(_held.get() | {root.resolve()})
         try:
-            with suppress(OSError):  # NFS cannot lock folders
-                try:
-                    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
-                    got, remedy = "another run that writes here", "wait, or choose another --out"
-                    raise InputError(file=root, got=got, expected="one at a time", remedy=remedy) from None
-            token = _held.set(_held.get() | {root.resolve()})
-            try:
-                yield
-            finally:
-                _held.reset(token)
+            yield
         finally:
+            _held.reset(token)
+            _remove_empty(made)  # only who holds the lock may remove what others would lock
+            os.close(descriptor)
+    except OSError as error:
+        raise write_error(root, error) from error
+
+
+def _locked(root: Path) -> int:
+    while True:
+        root.mkdir(parents=True, exist_ok=True)
+        with suppress(FileNotFoundError):  # removed by who held its lock
+            descriptor = os.open(root, os.O_RDONLY)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                os.close(descriptor)
+                got, remedy = "another run that writes here", "wait, or choose another --out"
+                raise InputError(file=root, got=got, expected="one at a time", remedy=remedy) from None
+            except OSError:  # NFS cannot lock folders
+                return descriptor
+            # Another folder may stand at the path now, or none.
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(descriptor), os.stat(root)):
+                    return descriptor
             os.close(descriptor)
 
 
-@contextmanager
-def _folders(root: Path, file: Path) -> Iterator[None]:
-    """Makes a folder and those above it for the block, and removes those that stayed empty; OSErrors are of `file`."""
-    made = [p for p in (root, *root.parents) if not p.exists()]
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-        yield
-    except OSError as error:
-        raise write_error(file, error) from error
-    finally:
-        with suppress(OSError):
-            for folder in made:
-                folder.rmdir()
+def _absent(folder: Path) -> list[Path]:
+    return [p for p in (folder, *folder.parents) if not p.exists()]
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    with suppress(OSError):
+        for folder in folders:
+            folder.rmdir()
 
 
 PARTIAL = ".partial-"  # beginning of temporary names
-OURS = re.compile(re.escape(PARTIAL) + r"(.*)-[0-9a-f]{12}", re.DOTALL)  # all of a temporary name, with its target's
+# all of a temporary name: with the name of the target, or the marker of a cluster's run
+OURS = re.compile(re.escape(PARTIAL) + r"(?:(.*)-[0-9a-f]{12}|[0-9a-f]{32})", re.DOTALL)
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -88,11 +100,15 @@ def staged_path(target: Path) -> Iterator[Path]:
     """Yields a random temporary path beside the target, for the block to rename; what is left there is deleted."""
     # Two machines that share a disk may have the same process id, so the name is random.
     partial = target.parent / f"{PARTIAL}{target.name}-{uuid4().hex[:12]}"
-    with _folders(target.parent, target):
-        try:
-            yield partial
-        finally:
-            _remove(partial)
+    made = _absent(target.parent)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        yield partial
+    except OSError as error:
+        raise write_error(target, error) from error
+    finally:
+        _remove(partial)
+        _remove_empty(made)
 
 
 def write_file(target: Path, content: bytes) -> None:

@@ -9,7 +9,6 @@ import io
 import re
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -102,7 +101,10 @@ class TextRows:
 
     def words(self, column: int, first: int = 0) -> list[str]:
         """Returns the cells of a column (from 0) of the rows from `first` on, without quotes."""
-        return [row[column].strip().strip('"') for row in islice(self.cells(), first, None) if len(row) > column]
+        return [row[column].strip().strip('"') for row in self._below(first).cells() if len(row) > column]
+
+    def _below(self, first: int) -> TextRows:
+        return TextRows(self.file, self.text[first:], self.line[first:])
 
     def numbers(
         self, columns: tuple[int, int], also: int | None = None, *, first: int = 0, layout: str = "",
@@ -113,7 +115,7 @@ class TextRows:
         columns: (least, greatest) number of columns, and `also` another one. use: the columns to read, from 0, of which
         only these must hold numbers; None: all.
         """
-        rows, (low, high) = TextRows(self.file, self.text[first:], self.line[first:]), columns
+        rows, (low, high) = self._below(first), columns
         if not rows.text:
             return NumericTable(self.file, np.zeros((0, low)), rows.line, layout)
         width = len(rows.text[0].split(rows.separator))

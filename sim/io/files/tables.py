@@ -44,6 +44,7 @@ def validated(path: Path, value: Any, kind: type[M], remedy: str, place: str = "
     steps = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in first["loc"])
     got = "nothing" if first["type"] == "missing" else repr(first["input"])
     expected = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
+    expected = "a value" if first["type"] == "missing" else expected
     raise InputError(file=path, place=(place + steps).removeprefix("."), got=got, expected=expected, remedy=remedy)
 
 

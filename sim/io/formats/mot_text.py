@@ -388,10 +388,10 @@ def truth_of_table(
         z=None if place is None else place[:, 2],
         labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip
-    path = group_file(table.rows.file)
     if table.group is not None:
         table.rows.reject(table.group < -1, "groups from 0, or -1 for alone", "correct the group")
-        return _labelled(truth, table.group[order], path)
+        return _labelled(truth, table.group[order], table.rows.file)
+    path = group_file(table.rows.file)
     return _labelled(truth, labels_of(path, id), path) if is_present(path) else truth
 
 

@@ -290,4 +290,6 @@ def _picture_files(folder: Path) -> list[Path]:
     if not os.path.isdir(folder):
         return []
     found = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES and not is_hidden(p))
-    return [path for path in found if is_present(path)]
+    for path in found:
+        is_present(path)  # refuses a FIFO; a dead link keeps its place, as a lost frame
+    return found

@@ -175,18 +175,15 @@ class StoredPictures:
 
     def body(self, name: str) -> bytes:
         """Returns the bytes of a file; raises InputError if they are not those that the manifest names."""
-        path = self.folder / name
-        body = path.read_bytes() if path.is_file() else b""
-        self.check(name, body)
-        return body
+        return self.check(name, whole=True)
 
-    def check(self, name: str, body: bytes | None = None) -> None:
-        """Raises InputError if a file is not the one that the manifest names. body: its content, if it was read."""
+    def check(self, name: str, whole: bool = False) -> bytes:
+        """Raises InputError if a file is not the one that the manifest names. whole: True returns its bytes."""
         path, files = self.folder / name, self.manifest["files"]
         if name not in files:
             got, expected = "a manifest that does not name it", "a file that manifest.json names"
             raise InputError(file=path, got=got, expected=expected, remedy=REDO)
-        check_file(path, files[name], body=body)
+        return check_file(path, files[name], whole=whole)
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
         """Returns picture `index` (from 1) of a stream of picture files: BGR, or codes of ids and disparity."""

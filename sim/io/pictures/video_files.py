@@ -114,7 +114,8 @@ def index_packets(path: Path) -> PacketIndex:
                 if p.size and not p.is_discard:
                     found.append((p.pts, bool(p.is_keyframe)))
                 if len(found) > FRAMES:
-                    raise InputError(file=path, got="more frames", expected=f"at most {FRAMES}", remedy="cut the video")
+                    got, expected = f"more than {FRAMES} frames", f"at most {FRAMES}"
+                    raise InputError(file=path, got=got, expected=expected, remedy="cut the video")
         except av.FFmpegError as error:
             broken = _reason(error)
         context = stream.codec_context

@@ -23,7 +23,7 @@ from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, INTEGER
 from sim.io.files import tables
-from sim.io.files.numeric_text import read_number, read_rows, read_text, whole_or_number
+from sim.io.files.numeric_text import is_number_text, read_number, read_rows, read_text, whole_or_number
 from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, Pair, StoredTable, columns_of, validated
 from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
 
@@ -172,9 +172,10 @@ def wkt(hull: Array, digits: int) -> str:
 def parse_wkt(text: str) -> list[list[float]]:
     """Returns the vertices [x, y] of a WKT POLYGON of one ring; raises ValueError for other texts."""
     body = re.fullmatch(r"\s*POLYGON\s*(?:EMPTY|\(\(([^()]*)\)\))\s*", text)
-    if body is None:
-        raise ValueError("POLYGON ((x y, …))")
-    ring = [[read_number(v) for v in point.split()] for point in (body[1] or "").split(",") if point.strip()]
+    points = [point.split() for point in body[1].split(",")] if body and body[1] is not None else []
+    if body is None or not all(len(xy) == 2 and all(map(is_number_text, xy)) for xy in points):
+        raise ValueError("POLYGON ((x y, …)), pairs of numbers")
+    ring = [[read_number(v) for v in xy] for xy in points]
     return ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
 
 
@@ -209,6 +210,10 @@ def _value(text: str) -> int | float | str | None:
     return None if value in ("", "nan") or value != value else value
 
 
+def _size(text: str) -> int | float | str | None:
+    return whole_or_number(text) if text else None
+
+
 def _ids(text: str | None) -> list[Any]:
     return [whole_or_number(word) for word in (text or "").split()]
 
@@ -223,10 +228,10 @@ class _GroupRow(BaseModel):
     frame: Annotated[FrameNumber, BeforeValidator(_value)]
     group: Annotated[Id, BeforeValidator(_value)]
     members: Annotated[list[Id], BeforeValidator(_ids)]
-    x: Annotated[Number | None, BeforeValidator(_value)]
-    y: Annotated[Number | None, BeforeValidator(_value)]
-    hull: Annotated[tuple[Pair, ...], BeforeValidator(_hull)]
-    size: Annotated[Annotated[Number, Field(ge=0)] | None, BeforeValidator(_value)] = None
+    x: Annotated[Number | None, BeforeValidator(_value)] = None
+    y: Annotated[Number | None, BeforeValidator(_value)] = None
+    hull: Annotated[tuple[Pair, ...], BeforeValidator(_hull)] = ()
+    size: Annotated[Annotated[Number, Field(ge=0)] | None, BeforeValidator(_size)] = None
 
 
 def read_groups_csv(path: Path, length: int) -> list[Groups]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Container, Iterable, Iterator, Mapping
-from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 
@@ -148,16 +147,19 @@ def damaged_files(
 
 def check_file(
     path: Path, facts: Mapping[str, Any], seal: str = MANIFEST, remedy: str = REDO, size_only: bool = False,
-    body: bytes | None = None,
-) -> None:  # fmt: skip
-    """Raises InputError if a file is not as a seal states. body: its content; None: it is read in parts."""
-    size = None
-    with suppress(OSError):
+    whole: bool = False,
+) -> bytes:  # fmt: skip
+    """Raises InputError if a file is not as a seal states. whole: True returns its bytes, False reads it in parts."""
+    size, body = None, b""
+    try:
         if path.is_file():  # a FIFO would block its reader
             size = path.stat().st_size
-            same = size == facts["bytes"]
-            if same and (size_only or hashing.file_hash(path if body is None else body) == facts["sha256"]):
-                return
+            if size == facts["bytes"]:
+                body = path.read_bytes() if whole else b""
+                if size_only or hashing.file_hash(body if whole else path) == facts["sha256"]:
+                    return body
+    except OSError:
+        size = None
     kind = "truncated" if size is not None and size < facts["bytes"] else "altered"
     got = "missing" if size is None else f"{kind}: {size} bytes"
     expected = f"the file of {facts['bytes']} bytes that {seal} names"

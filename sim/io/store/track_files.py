@@ -269,13 +269,13 @@ def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
 
     A person in two groups gets the one with the higher id. Members without a track stay in the groups.
     """
-    every = group_files.read_groups_csv(path, len(found))
-    for k, (tracks, groups) in enumerate(zip(found, every, strict=True)):
+    made = list[Tracks]()
+    for tracks, groups in zip(found, group_files.read_groups_csv(path, len(found)), strict=True):
         group = tracks.group.copy()
         for name, members in zip(groups.id, groups.members, strict=True):
             group[np.isin(tracks.id, members)] = name
-        found[k] = tracks.replace(group=group, groups=groups)
-    return found
+        made.append(tracks.replace(group=group, groups=groups))
+    return made
 
 
 def write_tracks(

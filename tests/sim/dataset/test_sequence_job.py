@@ -80,6 +80,7 @@ DIFFERENCES = [
     ({"duration": 3.0, "camera": {"fps": 5}}, {"streams": ("left",)}, "duration 20 → 3, camera.fps 10 → 5, "
      "streams none → left,background, images none → jpg)"),
     ({"group": [{"id": "b", "start": [1, 1], "goal": [2, 2]}]}, {}, "group.0.id a → b)"),
+    ({"about": "1.2.0"}, {}, "about none → 1.2.0)"),
     ({}, {"stride": 4}, "stride 1 → 4)"),
 ]  # fmt: skip
 

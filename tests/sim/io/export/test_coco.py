@@ -89,6 +89,14 @@ def test_names_of_pictures_of_recordings_resolve(tmp_path):
         assert found["images"][0]["width"] == 64
 
 
+@pytest.mark.filterwarnings("ignore:.*1 pictures? beyond frame 2")
+def test_pictures_after_the_last_frame_are_no_images(tmp_path):
+    pictures = [f"img1/{k:06d}.png" for k in (1, 2, 3)]
+    labelled_folder(tmp_path / "s", ["1,1,5,5,9,9,1,1,1"], pictures=pictures, ini="seqLength=2\n")
+    (path,) = coco(tmp_path / "s", tmp_path / "c.json")
+    assert [i["frame"] for i in json.loads(path.read_text())["images"]] == [1, 2]
+
+
 def test_people_outside_the_picture_are_left_out(tmp_path):
     rows = [
         "1,1,-20,5,20,9,1,1,1", "1,2,64,5,9,9,1,1,1", "1,3,5,48,9,9,1,1,1", "1,4,5,-30,9,29,1,1,1",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+from contextlib import ExitStack
 from pathlib import Path
 
 import cv2
@@ -13,7 +15,7 @@ from hypothesis import strategies as st
 
 from scenarios.errors import InputError
 from sim.io.files import own_files
-from sim.io.files.atomic import PARTIAL
+from sim.io.files.atomic import PARTIAL, lock_folder
 from sim.io.files.tables import Column, table_bytes
 from sim.io.pictures.video_files import write_video
 
@@ -104,3 +106,25 @@ def test_videos(tmp_path, comment):
     with write_video(tmp_path / "x.mp4", (32, 32), 10.0, comment=comment) as video:
         video.add(np.zeros((32, 32, 3), np.uint8))
     assert own_files.is_ours(tmp_path / "x.mp4") is (comment == own_files.GENERATOR)
+
+
+@pytest.mark.parametrize("step", ["mkdir", "flock"])
+def test_nobody_removes_or_replaces_a_folder_that_another_locks(tmp_path, monkeypatch, step):
+    """The other comes between two steps of the first: before its mkdir, or between its open and its flock."""
+    root, stack, place = tmp_path / "a/out", ExitStack(), {"mkdir": Path, "flock": fcntl}[step]
+    original = getattr(place, step)
+
+    def late(*given, **more):
+        monkeypatch.undo()
+        if step == "flock":
+            root.rmdir()
+        stack.enter_context(lock_folder(root))
+        return original(*given, **more)
+
+    monkeypatch.setattr(place, step, late)
+    with stack:
+        for _ in range(2):
+            with pytest.raises(InputError, match="another run"), lock_folder(root):
+                pass
+        assert root.is_dir()
+    assert not root.exists()

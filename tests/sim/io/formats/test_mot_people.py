@@ -46,6 +46,7 @@ WORDS = {
     "class": ("class", ["Person", "bicycle", "pedestrian"]),
     "quoted": ("category", ['"person"', '"traffic light"', '"person"']),
     "label": ("label", ["person", "car", "person"]),
+    "header apart by blanks": ("class", ["person", "car", "person"]),
     "name beside a number": ("class,name", ["0,person", "7,car", "0,person"]),
 }
 
@@ -53,7 +54,8 @@ WORDS = {
 def words(tmp_path, kind):
     names, cells = WORDS[kind]
     lines = [f"{f},{k},{10 * k + f},10,20,50,{cell}" for f in (1, 2) for k, cell in enumerate(cells, 1)]
-    (tmp_path / "people.csv").write_text("\n".join([f"frame,id,left,top,width,height,{names}", *lines]))
+    header = f"frame,id,left,top,width,height,{names}".replace(",", " " if "blanks" in kind else ",")
+    (tmp_path / "people.csv").write_text("\n".join([header, *lines]))
     return tmp_path / "people.csv"
 
 

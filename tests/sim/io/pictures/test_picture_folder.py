@@ -194,6 +194,13 @@ def test_a_lost_picture_is_told_once(tmp_path, capfd, suffix):
     assert capfd.readouterr().err == ""
 
 
+def test_a_dead_link_is_a_lost_frame(tmp_path):
+    path = folder(tmp_path / "a", ["a.png", "b.png", "c.png"])
+    (path / "img1/b.png").unlink()
+    (path / "img1/b.png").symlink_to(tmp_path / "nowhere")
+    assert shown(path) == [0, None, 2]
+
+
 def test_pictures_cost_nothing_where_nobody_asks(tmp_path, monkeypatch):
     path = folder(tmp_path / "a", ["000001.jpg", "000002.jpg"])
     monkeypatch.setattr(pictures, "read_picture", None)
