@@ -91,8 +91,8 @@ def _point(action: ArrayLike, size: int) -> Array:
 
 def _to_unit(p: Param, value: Value) -> float:
     choices = _choices(p)
-    if p.scale == "int":
-        value = min(max(int(value), choices[0]), choices[-1])
+    if p.scale == "int" and isinstance(value, int | float):
+        value = min(max(int(value), math.ceil(p.low)), math.floor(p.high))
     if choices:
         return (2 * choices.index(value) + 1) / len(choices) - 1
     assert isinstance(value, int | float)
