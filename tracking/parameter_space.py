@@ -80,17 +80,19 @@ def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config
 
 def _point(action: ArrayLike, size: int) -> Array:
     try:
-        point = np.asarray(action, float)
-    except (TypeError, ValueError):
-        point = np.zeros(0)
-    if point.shape != (size,) or not np.isfinite(point).all():
-        remedy = "give one number in [-1, 1] for each parameter of the space"
-        raise InputError(place="action", got=repr(action)[:80], expected=f"({size},) finite numbers", remedy=remedy)
-    return np.asarray(np.clip(point, -1.0, 1.0))
+        point = np.asarray(action)
+    except ValueError:  # rows of different lengths
+        point = np.asarray(None)
+    if point.dtype.kind not in "biuf" or point.shape != (size,) or not np.isfinite(point).all():
+        got, remedy = f"shape {point.shape}: {action!r}", "give one number in [-1, 1] for each parameter of the space"
+        raise InputError(place="action", got=got[:80], expected=f"({size},) finite numbers", remedy=remedy)
+    return np.asarray(np.clip(point.astype(float), -1.0, 1.0))
 
 
 def _to_unit(p: Param, value: Value) -> float:
     choices = _choices(p)
+    if p.scale == "int" and isinstance(value, int | float):
+        value = min(max(int(value), math.ceil(p.low)), math.floor(p.high))
     if choices:
         return (2 * choices.index(value) + 1) / len(choices) - 1
     assert isinstance(value, int | float)

@@ -43,10 +43,6 @@ def cluster_workers(address: str, workers: int = 1) -> Iterator[RunItems]:
     As many items are under way as the cluster has threads, at least `workers`, and the `ahead` of the call.
     """
     client = _connect(address)
-    try:
-        client.wait_for_workers(1, timeout=NO_WORKERS_WARNING)
-    except TimeoutError:
-        warnings.warn(f"{address} has no workers: waiting for some to come", stacklevel=2)
 
     def run(
         function: Callable[[T], R], items: Iterable[T], *, ahead: int = 0, on_loss: OnLoss[T, R] = None
@@ -55,16 +51,25 @@ def cluster_workers(address: str, workers: int = 1) -> Iterator[RunItems]:
 
         finished = as_completed(loop=client.loop, with_results=True, raise_errors=False)
         waiting, under_way, threads, counted = iter(items), dict[Any, T](), 0, float("-inf")
+        empty_since = time.monotonic()
         while True:
-            if time.monotonic() - counted >= COUNT_INTERVAL:
-                threads, counted = _count_threads(client, address), time.monotonic()
+            now = time.monotonic()
+            if now - counted >= COUNT_INTERVAL:
+                threads, counted = _count_threads(client, address), now
+                if threads:
+                    empty_since = now
+                elif now - empty_since >= NO_WORKERS_WARNING:
+                    empty_since = float("inf")  # one warning
+                    warnings.warn(f"{address} has no workers: waiting for some to come", stacklevel=2)
             for item in islice(waiting, max(0, max(workers, threads) + ahead - len(under_way))):
                 future = _submit(client, function, item)
                 under_way[future] = item
                 finished.add(future)
             if not under_way:
                 return
-            for future, answer in finished.next_batch():
+            with finished.thread_condition:
+                finished.thread_condition.wait_for(finished.has_ready, COUNT_INTERVAL)
+            for future, answer in finished.next_batch(block=False):
                 item = under_way.pop(future)
                 yield item, _result(answer, item, address, on_loss)
 
@@ -98,7 +103,7 @@ def _connect(address: str) -> Any:
 
 def _count_threads(client: Any, address: str) -> int:
     """Returns the number of the cluster's threads, each of which runs one item at a time."""
-    if client.status != "running":
+    if client.status not in ("running", "connecting"):
         raise lost_connection(address)
     with suppress(OSError):  # a scheduler that is lost just now shows in its futures
         return sum(client.nthreads().values())

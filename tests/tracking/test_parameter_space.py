@@ -40,6 +40,8 @@ def test_known_points():
     config = decode(SPACE, [1.0, 0.5, 1.0, 1.0, 1.0], Mixed(fixed=0.25))
     assert config.rate == pytest.approx(10.0)
     assert (config.gate, config.count, config.kind, config.on, config.fixed) == (5.0, 6, "c", False, 0.25)
+    narrow = [dataclasses.replace(SPACE[2], low=4)]
+    assert encode(narrow, Mixed(count=2)) == pytest.approx(encode(narrow, Mixed(count=4)))
     low = decode(SPACE, [-1.0] * 5, Mixed())
     assert (low.gate, low.rate, low.count, low.kind, low.on) == (1.0, 0.01, 2, "a", True)
     assert type(low.count) is int
@@ -76,7 +78,7 @@ def refuse_all(config):
     raise InputError(place="x", got="y", expected="z", remedy="w")
 
 
-@pytest.mark.parametrize("action", [[0.0] * 4, [[0.0] * 5], [0, 0, 0, 0, np.nan], [0, 0, 0, 0, np.inf]])
+@pytest.mark.parametrize("action", [[0.0] * 4, [[0.0] * 5], [0, 0, 0, 0, np.nan], [0, 0, 0, 0, np.inf], ["0.5"] * 5])
 def test_wrong_actions_are_named(action):
     with pytest.raises(InputError, match="action"):
         decode(SPACE, action, Mixed())

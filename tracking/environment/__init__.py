@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib.abc import MetaPathFinder
-from importlib.machinery import ModuleSpec, PathFinder
+from importlib.machinery import ModuleSpec
 from types import ModuleType
 
 ID = "flockscope/Tuning-v0"
@@ -35,7 +35,7 @@ def _register() -> None:
 class _RegisteringFinder(MetaPathFinder):
     """Import hook: makes the loader of Gymnasium register the environment after loading, then removes itself.
 
-    Other modules are left to the other finders.
+    It finds no modules itself: the other finders are asked.
     """
 
     def find_spec(
@@ -43,7 +43,8 @@ class _RegisteringFinder(MetaPathFinder):
     ) -> ModuleSpec | None:
         if fullname != LIBRARY:
             return None
-        spec = PathFinder.find_spec(fullname, path, target)
+        specs = (finder.find_spec(fullname, path, target) for finder in sys.meta_path if finder is not self)
+        spec = next((found for found in specs if found is not None), None)
         if spec is None or spec.loader is None:
             return spec
         load = spec.loader.exec_module

@@ -216,5 +216,6 @@ class SourceCache:
                 dropped, _ = self._opened.popitem(last=False)
                 held -= self._bytes.pop(dropped)
             self._opened[key] = OpenedSource(source, streams)
+        self._bytes.pop(key, None)  # it may come to hold more
         self._opened.move_to_end(key)
         return self._opened[key]

@@ -99,12 +99,12 @@ class RemoteTracker:
         self._host, self._number = host, number
 
     def create(self) -> None:
-        """Makes the tracker in the process."""
+        """Makes the tracker in the process, unless it is there."""
         values = None if self.config is None else self.config.as_dict()
         self._host.call(self._number, "create", self._host.tracker, values)
 
     def reset(self, context: Context, seed: int) -> None:
-        """Resets the tracker, which is made again, as its process may have ended."""
+        """Resets the tracker; one whose process has ended is made again."""
         self.create()
         _, self.px_per_m = self._host.call(self._number, "reset", context, seed)
 
@@ -120,10 +120,12 @@ _made: dict[int, Tracker] = {}  # In the process: the tracker by its number; at 
 def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
     number, method, given, limit = request
     if method == "create":
-        spec, values = given
-        found: Any = tracker_registry.find(spec)
-        _made.clear()
-        _made[number] = found() if values is None else found(found.config_class.from_dict(values))
+        if number not in _made:
+            spec, values = given
+            found: Any = tracker_registry.find(spec)
+            made = found() if values is None else found(found.config_class.from_dict(values))
+            _made.clear()
+            _made[number] = made
         return None
     if number not in _made:
         raise RuntimeError("the process of this tracker was started again since its reset")

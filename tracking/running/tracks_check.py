@@ -96,7 +96,7 @@ def _faults(tracks: Any, index: int, history: ReportHistory) -> Iterator[Any]:
         yield own and event.kind not in own and (f"an event of kind {event.kind!r}", f"one of own_events, {own}")
 
 
-NUMBERS = {"i": "int64", "f": "numbers", "b": "bool"}  # By kind of dtype.
+NUMBERS = {"i": "whole numbers", "f": "floats", "b": "bool"}  # By kind of dtype.
 
 
 def _array_faults(
@@ -139,7 +139,7 @@ def _group_faults(groups: Any, d: int, people: Iterable[int]) -> Iterator[Any]:
     for ids in groups.members:
         yield (ids.ndim != 1 or (len(ids) and ids.dtype.kind != "i")) and (
             "groups.members that are no ids",
-            "(k,) int64",
+            "(k,) whole numbers",
         )
         yield _member_fault(ids.tolist(), people, "groups.members")
     for hull in groups.hull:

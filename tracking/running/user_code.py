@@ -6,7 +6,8 @@ code 0 and without output, and a KeyboardInterrupt of its own would look like Ct
 SIGINT is recorded before KeyboardInterrupt is raised, as Python drops an exception that is raised inside a destructor
 or a callback of a C library, KeyboardInterrupt included. A command records SIGINT here, and its loops ask
 `raise_if_interrupted` between two items. The record also tells a KeyboardInterrupt of the user from one that a
-tracker's own code raises (`is_interruption`).
+tracker's own code raises (`is_interruption`). A tracker that calls `_thread.interrupt_main` or sends itself SIGINT
+interrupts the command as Ctrl-C does.
 """
 
 from __future__ import annotations

@@ -155,11 +155,14 @@ class SearchStudy:
                     self.optuna.sampler = tpe_sampler(self.plan, t.number)
                     trial = optuna.Trial(self.optuna, t._trial_id)
                     for name, choices in self._space.items():  # the process may have ended before it had chosen all
+                        # What was drawn alone is drawn again, so that the generator continues from there.
+                        if name in t.params and name not in trial.relative_params:
+                            self.optuna.sampler.sample_independent(self.optuna, t, name, choices)
                         trial._suggest(name, choices)
                     return trial
             if len(begun) >= self.plan.options.trials:
                 return None
-            if len(trials) == len(begun):  # none is enqueued
+            if not any(t.state == TrialState.WAITING for t in trials):
                 propose(self.plan, self.optuna, len(trials))
             trial = self.optuna.ask(self._space)
             self._lock_trial(trial.number)
@@ -271,7 +274,7 @@ def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> No
         if trial is not None:
             with suppress(UpdateFinishedTrialError):  # another process plays it, too, and was faster
                 _play_trial(study, trial, play)
-        elif len(study.finished()) >= planned:
+        elif len(study.finished()) >= planned and study.trials()[0].state.is_finished():
             return
         elif study.locks is not None:
             time.sleep(PAUSE)
@@ -311,8 +314,10 @@ def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -
                 continue
             if k not in reported:
                 trial.report(goal.of(result), k)
+            if trial.number == 0 or plan.options.prune == 0 or len(played) == len(order):
+                continue
             estimate = _estimate_if_losing(study, played)
-            if estimate is not None and len(played) < len(order) and trial.number > 0:
+            if estimate is not None:
                 trial.set_user_attr(PRUNED, len(played))
                 return [estimate]
     if trial.number == 0:

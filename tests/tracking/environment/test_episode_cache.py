@@ -21,3 +21,13 @@ def test_it_is_bounded_and_drops_what_was_used_longest_ago():
         play("blob", source, cache=cache)
         assert cache.bytes <= cache.limit * 2
     assert before <= len(cache) < 4
+
+
+def test_what_a_source_comes_to_hold_later_counts():
+    cache = SourceCache()
+    for source in SOURCES[:2]:
+        cache.open(source)
+    assert cache.bytes < 1000
+    assert cache.open(SOURCES[0]).truth is not None
+    last = cache.open(SOURCES[1])
+    assert cache.bytes > last.bytes + 1000

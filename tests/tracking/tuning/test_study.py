@@ -9,6 +9,7 @@ import sys
 
 import pytest
 from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
+from optuna.trial import TrialState
 
 from scenarios.errors import InputError
 from sim.hashing import runtime
@@ -68,6 +69,30 @@ def test_a_trial_moves_few_parameters_of_the_best(tmp_path):
     assert min(near) >= 1
     assert 2 <= sum(near) / len(near) <= 7
     assert min(far) > len(first) / 2
+
+
+def test_a_trial_that_failed_does_not_end_the_climb(tmp_path):
+    with open_study(toy_plan(tmp_path, tracker="blob", trials=6), None, "x") as study:
+        study.tell(study.ask(), [0.5])
+        study.optuna.tell(study.ask().number, state=TrialState.FAIL)
+        first, second = study.trials()[0], study.ask()
+        assert sum(first.params[name] != value for name, value in second.params.items()) < len(first.params) / 2
+
+
+@pytest.mark.parametrize("goals", ["HOTA", ("HOTA", "GOSPA")])
+def test_killed_between_two_parameters(tmp_path, goals):
+    made = toy_plan(tmp_path, trials=12, objective=goals)
+
+    def trials(path):
+        with open_study(made, path, "x") as study:
+            while (asked := study.ask()) is not None:
+                study.tell(asked, [asked.params["reach"], asked.params["skip"]][: len(made.goals)])
+            return study.records()
+
+    whole = trials(tmp_path / "whole")
+    lines = (tmp_path / "whole").read_bytes().splitlines(keepends=True)
+    (tmp_path / "cut").write_bytes(b"".join(lines[:-3]))
+    assert trials(tmp_path / "cut") == whole
 
 
 def test_killed_between_two_lines(tmp_path):

@@ -10,7 +10,7 @@ from scenarios.errors import InputError, WorkError
 from tests.tuning_toys import TOY, toy_plan, write_scenes
 from tracking.environment.episodes import Episode, sources
 from tracking.tuning.parallel_episodes import EpisodeTask, play_task
-from tracking.tuning.study import open_study, run_trials
+from tracking.tuning.study import SearchStudy, open_study, run_trials
 from tracking.tuning.tuned_tracker import tuned_tracker
 
 
@@ -64,6 +64,19 @@ def test_parameters_that_cannot_be_played_are_a_trial_without_value(tmp_path):
     assert refused
     assert all(t.values == () and "expected another" in t.error and not t.pruned for t in refused)
     assert len(trials) == 12
+
+
+def test_a_search_waits_for_its_defaults(tmp_path):
+    """Another process may play them still, while others have played as many trials as wanted here."""
+    wanted = {"seeds": range(12), "only": ["skip"]}
+    with open_study(toy_plan(tmp_path, trials=4, **wanted), None, "x") as study:
+        study.ask()
+        for value in (0.1, 0.2, 0.3):
+            study.tell(study.ask(), [value])
+        own = SearchStudy(toy_plan(tmp_path, trials=3, **wanted), study.optuna, None)
+        run_trials(own, Game(), lambda *now: None)
+        assert own.left_out() == [""] * 12
+        assert own.records()[0].params == own.plan.defaults
 
 
 UNPLAYABLE = [
