@@ -25,8 +25,9 @@ from benchmarks.support.tables import head, row
 from benchmarks.support.timing import best_in_turn
 from sim.io.formats.mot_table import read_table
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
-from tracking.scoring.evaluation import people_scores
+from tracking.scoring.evaluation import weighted_people
 from tracking.scoring.rows import FrameRows
+from tracking.scoring.weighted_sums import unweighted
 
 REACH = 2.0  # m
 TOLERANCE = 1e-6
@@ -89,6 +90,11 @@ def trackeval_metrics() -> tuple:
         from trackeval import metrics
     quiet = {"THRESHOLD": 0.5, "PRINT_CONFIG": False}
     return metrics.HOTA(), metrics.CLEAR(quiet), metrics.Identity(quiet)
+
+
+def people_scores(pairs: Pairs) -> dict[str, float]:
+    """Returns the scores of HOTA, CLEAR and Identity by key."""
+    return unweighted(weighted_people(pairs, pairs.size), pairs.size)
 
 
 def greatest_difference(pairs: Pairs) -> float:

@@ -40,7 +40,7 @@ from sim.sequence import observe
 from sim.types import Sequence as Recording
 from tracking.oracle import oracle
 from tracking.running.run import track
-from tracking.scoring.evaluation import Scorer, people_scores
+from tracking.scoring.evaluation import Scorer
 from tracking.scoring.people_comparison import Similarity
 
 RECORDINGS = "recordings"
@@ -58,9 +58,7 @@ def oracle_hota(sequence: Recording, similarity: Similarity) -> float:
     """Returns HOTA of the oracle with the sequence's own detections."""
     truth = sequence.truth
     assert truth is not None
-    (compared,) = Scorer(truth).compare([oracle(sequence, {}, similarity).tracks], similarity, None)
-    assert compared.people is not None
-    return people_scores(compared.people)["HOTA"]
+    return Scorer(truth).evaluate(oracle(sequence, {}, similarity).tracks, similarity=similarity)["HOTA"]
 
 
 def figures(entry: Entry, seed: int) -> np.ndarray:

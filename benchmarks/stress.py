@@ -44,7 +44,7 @@ from sim.types import Array, Sequence, Tracks, Truth
 from tracking.environment.episode_cache import Source
 from tracking.oracle import oracle
 from tracking.running.tracker_registry import find
-from tracking.scoring.evaluation import Scorer, people_scores
+from tracking.scoring.evaluation import Scorer
 from tracking.stats import mean_interval
 from tracking.stress import failures, minimize
 from tracking.stress.axes import AXES, Axis, breaking_point, crossing
@@ -143,9 +143,7 @@ def spoilt(weakness: Weakness, source: Source) -> float:
     assert sequence.truth is not None
     truth = sequence.truth.replace(groups=None, labelled=None, events=None)  # which are not scored
     tracks = weakness.spoil(oracle(sequence, {"detections": "file", "input": "points"}), truth, source.seed)
-    (compared,) = Scorer(truth).compare([tracks], None, None)
-    assert compared.people is not None
-    return people_scores(compared.people)[weakness.by]
+    return Scorer(truth).evaluate(tracks)[weakness.by]
 
 
 def sweep_of(weakness: Weakness, seeds: SequenceOf[int], episodes: int, folder: Path) -> Sweep:

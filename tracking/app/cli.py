@@ -39,9 +39,12 @@ def _declare() -> None:
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
+        from importlib.metadata import PackageNotFoundError, version
 
-        print(version("flockscope"))
+        try:
+            print(version("flockscope"))
+        except PackageNotFoundError:
+            print("unknown: not installed")
         raise typer.Exit
 
 

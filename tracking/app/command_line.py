@@ -155,6 +155,8 @@ def _usage(error: Any) -> InputError:
     where = "flockscope" if error.ctx is None else error.ctx.command_path
     message = error.format_message().rstrip(".").removeprefix("Got ")
     got, expected, remedy = message[:1].lower() + message[1:], "a command line as in the help", f"see {where} --help"
+    if type(error).__name__ == "MissingParameter" and error.param.help:
+        expected = f"{error.param.metavar or error.param.name.upper()}: {error.param.help.rstrip('.')}"
     return InputError(place=where, got=got, expected=expected, remedy=remedy)
 
 

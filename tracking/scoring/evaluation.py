@@ -53,7 +53,6 @@ from tracking.scoring.weighted_group_scores import weighted_groups_and_events
 from tracking.scoring.weighted_sums import WeightedScores, mean_of_known, unweighted
 
 PORTION = 100  # Draws that are computed together: bounds memory.
-OF_PEOPLE = (weighted_hota, weighted_clear, weighted_identity)
 
 
 def without_distractors(truth: Truth, unscored: Unscored, tracked: PersonRows) -> PersonRows:
@@ -144,9 +143,7 @@ class MatchedSides:
     def _weighted(self, group_match: GroupMatch) -> WeightedScores:
         sides, parts = self.sides, list[WeightedScores]()
         if self.people is not None:
-            self.people.require_unique_ids()
-            parts += [scores(self.people, len(sides.inside)) for scores in OF_PEOPLE]
-            parts.append(weighted_positions(sides))
+            parts += [weighted_people(self.people, len(sides.inside)), weighted_positions(sides)]
         if self.groups is not None:
             parts += weighted_groups_and_events(sides, self.groups, group_match)
 
@@ -238,7 +235,7 @@ class Scorer:
         return ComparedSides(self.truth, tracks, frames, self.labelled & frames, true, est, nobody, plane)
 
     def evaluate(
-        self, tracks: Iterable[Tracks], similarity: Similarity | None = None, frames: int | range | None = None
+        self, tracks: Iterable[Tracks], *, similarity: Similarity | None = None, frames: int | range | None = None
     ) -> Scores:
         """Returns the scores of one tracker against this truth, as the function `evaluate` does."""
         (compared,) = self.compare([tracks], similarity, frames)
@@ -296,11 +293,14 @@ def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
     return [by_frame[index] for index in sorted(by_frame)]
 
 
-def people_scores(pairs: Pairs) -> dict[str, float]:
-    """Returns the scores of HOTA, CLEAR and Identity by key. Raises ValueError if an id is twice in a frame."""
+def weighted_people(pairs: Pairs, size: int) -> WeightedScores:
+    """Returns the weighted scores of HOTA, CLEAR and Identity; size: number of frame numbers, from 0.
+
+    Raises ValueError if an id is twice in a frame.
+    """
     pairs.require_unique_ids()
-    found = (unweighted(scores(pairs, pairs.size), pairs.size) for scores in OF_PEOPLE)
-    return {key: value for part in found for key, value in part.items()}
+    parts = [scores(pairs, size) for scores in (weighted_hota, weighted_clear, weighted_identity)]
+    return lambda weights: {key: value for part in parts for key, value in part(weights).items()}
 
 
 def objective_of(found: Mapping[str, float]) -> float:

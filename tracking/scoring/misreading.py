@@ -26,6 +26,7 @@ NONE = 0.02  # Share of matching boxes below which there is a warning, whatever 
 CLEARLY = 0.3  # Share by which another reading must match more boxes.
 ABOUT = 0.85  # A simpler reading is preferred if it matches at least this part of what another one does.
 PAIRS = 20_000  # Most pairs of boxes that are looked at, unless one frame has more.
+NEAR = 0.05  # A unit or a rounded scale is tried if it differs from the fitted one by at most this share of it.
 STEPS = 6  # Refinements of an estimated scale.
 SHIFTS = (1, -1, 2, -2, 5, -5, 10, -10)
 RATES = (2, 3, 4, 5, 6, 10, 12, 15, 25, 30)
@@ -162,7 +163,7 @@ def _share(true: Side, est: Side) -> float:
 
 def _other_columns(true: Side, est: Side, size: tuple[int, int] | None) -> Iterator[Reading]:
     points = true.values.shape[1] == 2
-    known = [(s, s) for s in (UNITS if points else SCALES)]
+    known = [] if points else [(s, s) for s in SCALES]
     known += [] if size is None or points else [(size[0] / side, size[1] / side) for side in SQUARES]
     for name in [name for name in ORDERS if (name in ("x,y", "y,x")) == points]:
         other, plain = int(name not in USUAL.values()), est.read(name)
@@ -171,7 +172,8 @@ def _other_columns(true: Side, est: Side, size: tuple[int, int] | None) -> Itera
             yield Reading(name, labels=True, effort=2, share=_share(true.read(name), est))
         fitted = _fitted_scale(true, plain)
         one = float(Fraction(float(np.sqrt(fitted[0] * fitted[1]))).limit_denominator(4))
-        for effort, scale in [*((2, s) for s in [*known, (one, one)]), (4, fitted)]:
+        near = [(s, s) for s in [*(UNITS if points else ()), one] if np.allclose(s, fitted, rtol=NEAR, atol=0.0)]
+        for effort, scale in [*((2, s) for s in [*known, *near]), (4, fitted)]:
             yield Reading(name, scale, effort=other + effort, share=_share(true, est.read(name, scale)))
 
 
@@ -210,7 +212,8 @@ def _other_frames(true: Side, est: Side, usual: Reading) -> Iterator[Reading]:
 def _simplest(found: list[Reading], share: float) -> Reading | None:
     most = max((r.share for r in found), default=0.0)
     good = [r for r in found if r.share >= ABOUT * most and most >= share + CLEARLY]
-    return min(good, key=lambda r: (r.effort, 0.0 if r.frames else -r.share), default=None)
+    first = next((r for r in good if r.frames), None)
+    return min([r for r in good if r is first or not r.frames], key=lambda r: (r.effort, -r.share), default=None)
 
 
 def _factor(scale: Scale) -> str:

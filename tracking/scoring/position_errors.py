@@ -28,7 +28,7 @@ from tracking.scoring.weighted_sums import FrameScores, WeightedScores
 
 REACH = 2.0  # m: distance from which the similarity of two positions is 0; also the cut-off of GOSPA
 POWER = 2.0
-PARTS = ("localisation", "missed", "false")  # Parts of GOSPA.
+PARTS = ("GOSPA_localisation", "GOSPA_missed", "GOSPA_false")
 
 
 def weighted_positions(sides: ComparedSides) -> WeightedScores:
@@ -56,9 +56,9 @@ def weighted_positions(sides: ComparedSides) -> WeightedScores:
 
 
 def gospa_of(means: Mapping[str, Array], power: float = POWER) -> dict[str, Array]:
-    """Returns GOSPA and its parts by key, roots of means over frames of d^p and of `PARTS`, (D,) each by name."""
-    powers = {f"GOSPA_{name}": means[name] for name in PARTS}
-    powers |= {"GOSPA": means["localisation"] + means["missed"] + means["false"]}
+    """Returns GOSPA and its parts by key, roots of means (D,) over frames of d^p and of `PARTS`, by name."""
+    localisation, missed, false = parts = [means[name] for name in PARTS]
+    powers = {**dict(zip(PARTS, parts, strict=True)), "GOSPA": localisation + missed + false}
     # float by float: numpy takes another root of arrays, which differs in the last bit
     return {key: np.array([v ** (1 / power) for v in values.tolist()]) for key, values in powers.items()}
 

@@ -80,6 +80,8 @@ class FrameScores:
 
     def __call__(self, weights: Array) -> dict[str, Array]:
         """Returns the scores (D,) by key; weights (D, size)."""
+        if not self._columns:
+            return {}
         columns = np.column_stack(list(self._columns.values()))
         sums = dict(zip(self._columns, (weights @ columns).T, strict=True))
         exact = [place for place, key in enumerate(self._columns) if key in self._totals]

@@ -70,6 +70,7 @@ NOT_COMPARED = [
     (lambda p: stored(p, np.append(BASE, 0.5), truth="a"), "incomplete: got s6, not in"),
     (lambda p: stored(p, BASE, similarity="image", truth="a"), "s0: similarity: got 'image'"),
     (lambda p: stored(p, BASE, truth="b"), "s0: truth"),
+    (lambda p: stored(p, BASE, truth=None), "s0: truth: got None"),
     (lambda p: (p.write_text("{}"), str(p))[1], "got no scores of sequences"),
     (lambda p: (p.write_text('{"sequences": [{"name": "a"}, {"name": "a"}]}'), str(p))[1], "a sequence twice"),
 ]

@@ -91,6 +91,15 @@ def test_a_method_without_members_has_the_people_in_its_hulls():
     assert found(0.31)["objective"] == found(0.31)["group_F1"]
 
 
+@pytest.mark.parametrize("events", [None, [event("merge", 1, (1, 2))]])
+def test_wholes_in_the_image_of_unknown_scale_have_scores_of_events_alone(events):
+    true = truth([Scene(APART, {1: ((1, 2), None)})], events, px_per_m=float("nan"))
+    found = evaluate(true, tracks([Scene({}, {1: ((), (0, 0, 2, 1))})], unit="group", plane="image"))
+    known = {key for key, value in found.items() if not np.isnan(value)}
+    assert ("merge_FN" in known) == bool(known) == (events is not None)
+    assert not any(key.startswith(("group", "pairwise")) for key in known)
+
+
 @pytest.mark.parametrize(("late", "core"), [(10, 1), (11, 1), (12, 18 / 19)])
 def test_the_core_forgives_one_second(late, core):
     # 10 fps, 50 frames, a group that is there from frame 21 on (an event). Told n frames late it is missed in n of its

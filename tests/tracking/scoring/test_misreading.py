@@ -132,6 +132,14 @@ def test_positions(wrong, words):
     assert words in text.replace("Give", "give")
 
 
+def test_no_unit_is_named_for_positions_that_it_merely_shrinks_to_the_origin():
+    rows, rng = walk(), np.random.default_rng(0)
+    near, away = rng.uniform(-0.5, 0.5, (len(rows), 2)), rng.normal((80, 90), 2, (len(rows), 2))
+    text = likely_misreading(truth_of(rows, near), tracks_of(rows[:, 0], rows[:, 1], None, away))
+    assert "x_m" not in text
+    assert "by 0," not in text
+
+
 def score(capsys, *words):
     import json
 

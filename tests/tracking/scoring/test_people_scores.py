@@ -7,7 +7,8 @@ import pytest
 
 from tests.matrix_pairs import matrix_pairs
 from tests.reference_trackeval import trackeval_scores
-from tracking.scoring.evaluation import people_scores
+from tracking.scoring.evaluation import weighted_people
+from tracking.scoring.weighted_sums import unweighted
 
 SEEDS = range(15)
 
@@ -26,8 +27,9 @@ def random_case(seed: int, values=None, crowd: int = 9):
 
 
 def assert_equal_to_trackeval(true, est, similarity, pairs=None) -> None:
-    expected = trackeval_scores(true, est, similarity)
-    assert people_scores(pairs or matrix_pairs(true, est, similarity)) == pytest.approx(expected, abs=1e-9)
+    pairs = pairs or matrix_pairs(true, est, similarity)
+    found = unweighted(weighted_people(pairs, pairs.size), pairs.size)
+    assert found == pytest.approx(trackeval_scores(true, est, similarity), abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -72,7 +72,7 @@ def _require_same(options: CompareOptions, before: Stored, now: Stored) -> None:
     elif len(before) < FEWEST:
         place, got, expected, remedy = "too few", "1 sequence", f"at least {FEWEST}", "generate more seeds"
     else:
-        known = [(n, k) for n, k in product(before, HOW) if None not in (before[n].get(k), now[n].get(k))]
+        known = [(n, k) for n, k in product(before, HOW) if k in before[n] and k in now[n]]
         name, key = next(((n, k) for n, k in known if before[n][k] != now[n][k]), ("", ""))
         if name:
             place, got = f"{name}: {key}", repr(now[name][key])

@@ -24,8 +24,8 @@ from tracking.app import option_parsing
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score import summary
-from tracking.app.commands.score_ranking import rank_words, shown_columns, usual_key, verdict
-from tracking.app.commands.score_tables import SHOWN, SIMILARITY, arrow, number
+from tracking.app.commands.score_ranking import COLUMNS, rank_words, shown_columns, usual_key, verdict
+from tracking.app.commands.score_tables import SHOWN, SIMILARITY, arrow, number, table
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.app.replay_page.video import PageVideo
@@ -107,9 +107,12 @@ def demo(options: DemoOptions) -> CommandResult:
             ]
     pixels = _shown_pixels(scene, from_pixels, out / "pages" / "pictures")
     write_file(page, _page(out, tables, sections, scene, pixels).encode())
-    lines = [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]
-    lines += [f"{time.monotonic() - start:.0f} s; open this page:", str(page.resolve())]
     means = {title: summary([row.scores for row in rows]) for title, rows in sections.items()}
+    shown = means | {f"{row.name}, from pixels": summary([row.scores]) for row in pixels}
+    cells = [[title, *(number(key, each[key]["mean"]) for key in COLUMNS)] for title, each in shown.items()]
+    lines = [table("", ["tracker"], COLUMNS, cells)]
+    lines += [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]
+    lines += [f"{time.monotonic() - start:.0f} s; open this page:", str(page.resolve())]
     return CommandResult({"sequences": len(sequences), "scores": means, "page": page}, "\n".join(lines))
 
 

@@ -131,6 +131,9 @@ def _tracked(source: Path, path: Path) -> Subject:
     from tracking.app.stored_tracks import find_tracks, match_tracks
     from tracking.grouping.grouping_choice import default_grouping
 
+    if not source.is_dir():
+        got, remedy = f"a run beside {source}", "give the sequence that was tracked"
+        raise InputError(place="SOURCE", got=got, expected="a generated sequence", remedy=remedy)
     ((sequence, stored),) = match_tracks(open_source(source), find_tracks(path))
     stored.read(sequence)
     info, rule, got = stored.info, stored.info.get("grouping"), ""

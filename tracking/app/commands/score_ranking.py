@@ -38,8 +38,11 @@ FACTS = {
     "px_per_m": "scale, px per m", "plane": "plane", "boxes": "boxes",
     "truth_hash": "truth hash of what was tracked",
 }  # fmt: skip
+# Keys of run.json that hold settings by name; each setting is compared by itself.
+SETTINGS = {"config": "parameter", "grouping": "grouping"}
 
 COLUMNS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")  # Scores beside the one that ranks.
+MOST_VALUES = 3  # Most values of a run that are shown of a fact in which the runs differ.
 LONGEST_NAME = 40  # Characters of an input or run that a table shows at most.
 
 
@@ -81,21 +84,24 @@ def run_differences(infos: Mapping[str, SequenceOf[Mapping[str, Any]]]) -> list[
     """Returns in what runs differ: for each fact "what" and "runs", by run the values on the sequences, each once."""
     told = {name: rows for name, rows in infos.items() if all(rows)}
     trackers = {info.get("tracker") for rows in told.values() for info in rows}
-    facts = {name: [_facts(info, len(trackers) == 1) for info in rows] for name, rows in told.items()}
+    tables = ["config"] if len(trackers) == 1 else []
+    tables += ["grouping"] if all(info.get("grouping") for rows in told.values() for info in rows) else []
+    facts = {name: [_facts(info, tables) for info in rows] for name, rows in told.items()}
     found = []
     for what in dict.fromkeys(key for rows in facts.values() for each in rows for key in each):
-        values = {name: [each[what] for each in rows] for name, rows in facts.items() if all(what in e for e in rows)}
-        if any(row != next(iter(values.values())) for row in values.values()):
+        values = {name: [each.get(what) for each in rows] for name, rows in facts.items()}
+        if what == FACTS["truth_hash"]:  # a tracker class has none
+            values = {name: row for name, row in values.items() if None not in row}
+        if any(row != next(iter(values.values()), None) for row in values.values()):
             once = {name: [v for k, v in enumerate(row) if v not in row[:k]] for name, row in values.items()}
             found.append({"what": what, "runs": once})
     return found
 
 
-def _facts(info: Mapping[str, Any], one_tracker: bool) -> dict[str, Any]:
-    found = {words: info.get(key) for key, words in FACTS.items() if key != "truth_hash" or info.get(key)}
-    tables = (("parameter", info.get("config") if one_tracker else None), ("grouping", info.get("grouping")))
-    for word, settings in tables:
-        found |= {f"{word} {name}": value for name, value in (settings or {}).items()}
+def _facts(info: Mapping[str, Any], tables: SequenceOf[str]) -> dict[str, Any]:
+    found = {words: info.get(key) for key, words in FACTS.items()}
+    for key in tables:
+        found |= {f"{SETTINGS[key]} {name}": value for name, value in (info.get(key) or {}).items()}
     return found
 
 
@@ -170,13 +176,22 @@ def _last_lines(every: RankedRuns) -> Iterable[str]:
     if every.settings:
         yield "the runs differ in"
     for d in every.settings:
-        values = ", ".join(f"{name} {' or '.join(map(str, row))}" for name, row in d["runs"].items())
+        values = ", ".join(f"{name} {_words(row)}" for name, row in d["runs"].items())
         yield printable(f"  {d['what']}: {values}")
     yield from verdict(c, every.key)
     yield from every.notes
     match = next(iter(c.scores.values()))[0].group_match
     yield f"people compared by {SIMILARITY[c.similarity]}, groups by {GROUP_MATCH[match]}"
     yield "oracle: true ids on the same input, without false alarms"
+
+
+def _words(values: SequenceOf[Any]) -> str:
+    words = {None: "none", True: "yes", False: "no"}
+    shown = [
+        f"{v:.6g}" if isinstance(v, float) else words[v] if v is None or isinstance(v, bool) else str(v)
+        for v in values[:MOST_VALUES]
+    ]
+    return " or ".join([*shown, *(["others"] if len(values) > MOST_VALUES else [])])
 
 
 def _ranking_table(every: RankedRuns) -> str:

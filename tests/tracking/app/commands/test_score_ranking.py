@@ -48,6 +48,12 @@ def test_the_ranking_is_that_of_compare(made: Path, capsys) -> None:
     assert len(found["differences"]) == 3
 
 
+def test_a_parameter_that_one_run_lacks_is_a_difference() -> None:
+    new = {"tracker": "a", "config": {"gate": 0.5}}
+    (found,) = run_differences({"old": [{"tracker": "a", "config": {}}], "new": [new]})
+    assert found == {"what": "parameter gate", "runs": {"old": [None], "new": [0.5]}}
+
+
 def test_a_class_without_a_truth_hash_is_no_difference() -> None:
     stored, played = {"tracker": "a", "truth_hash": "x"}, {"tracker": "a"}
     assert run_differences({"a": [stored], "b": [played]}) == []
