@@ -11,8 +11,9 @@ split a group.
 
 A group remembers the places of its points (`MemberPlaces`), not whose points they are. From points, a place without any
 point near it in this frame is a missed member. It is added as a point that only its group may have, for `carry_time`
-after its last measurement. From pixels nobody is added; only the group's convex hull is kept, which is reported while
-the group coasts.
+after its last measurement. Then, until `coast_time`, its place stays the group's but is no point: whoever is hidden for
+longer still belongs to the group, but would displace it. From pixels nobody is added; only the group's convex hull is
+kept, which is reported while the group coasts.
 """
 
 from __future__ import annotations
@@ -184,10 +185,19 @@ def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: Sca
         offset = mine - bank.x[row, :2]
         if not scaled.from_pixels:
             known = any_within(offset, bank.members[row].offset, scaled.scale * scaled.config.carry_reach)
-            bank.members[row] = MemberPlaces(offset, last_seen, known)
+            parts = zip((offset, last_seen, known), _hidden_members(bank, row, claims.points, scaled, t), strict=True)
+            bank.members[row] = MemberPlaces(*map(np.concatenate, parts))
             continue
         (offset,) = convex_hulls([offset])
         bank.members[row] = MemberPlaces(offset, np.full(len(offset), t), np.ones(len(offset), bool))
+
+
+def _hidden_members(bank: GroupBank, row: int, points: Array, scaled: ScaledParameters, t: float) -> MemberPlaces:
+    c, past = scaled.config, bank.members[row]
+    age = t - past.last_seen
+    hidden = past.known & (age > c.carry_time + 1e-9) & (age <= c.coast_time + 1e-9) & (c.carry_time > 0)
+    hidden &= ~any_within(bank.positions(row), points, scaled.scale * c.carry_reach)
+    return MemberPlaces(past.offset[hidden], past.last_seen[hidden], past.known[hidden])
 
 
 def thinned(points: Array) -> Array:

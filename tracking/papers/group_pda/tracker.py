@@ -42,8 +42,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - m_d: S with the R of each association's m. Paper: one P_yc. Why: fewer people measure a centroid worse.
 - m_N: σ_n grows with N, (c) by 15 %, else 1 %; heavy tails. Paper: normal, σ_n. Why: several join at once.
 - α_s and α_N: equal, from `extent_time`. Paper: two constants. Why: one parameter less.
-- missed detections: (c) a miss hypothesis; missed members stand in for `carry_time`, from points. Paper: not
-  considered. Why: detectors miss people.
+- missed detections: (c) a miss hypothesis; from points, missed members stand in for `carry_time`, and their places
+  stay the group's for `coast_time`. Paper: not considered. Why: detectors miss people.
 - size: N over the probability that a member is seen (`detect_prob`), from points. Paper: N. Why: detectors miss
   people.
 - Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated.

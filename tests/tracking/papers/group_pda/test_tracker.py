@@ -171,6 +171,13 @@ def holds(hull: Array, point: Array) -> bool:
     return bool((edge[:, 0] * d[:, 1] - edge[:, 1] * d[:, 0] >= 0).all())
 
 
+def test_a_hidden_member_is_inside_the_hull_until_a_group_would_be_lost() -> None:
+    r, hidden = np.random.default_rng(0), int(1.5 * FPS)
+    frames = [noisy([block(2, 2)], r)[: 4 if k < 40 else 3] for k in range(40 + 2 * hidden)]
+    inside = [holds(t.groups.hull[0], block(2, 2)[3]) for t in track(frames)[40:]]
+    assert inside == [k < hidden for k in range(2 * hidden)]
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.8, 1.6])
 @pytest.mark.parametrize(("ranks", "gap"), [(2, 0.45), (2, 1.0), (3, 1.0)])
 def test_a_false_alarm_beside_a_group_is_no_member(angle: float, ranks: int, gap: float) -> None:
