@@ -38,9 +38,6 @@ PARTS: Mapping[str, Replacement] = {
     "depth counts in full": DEPTH,
     "by 100 boxes": (ground_of_boxes, "BOXES", 100),
     "by all boxes": (ground_of_boxes, "BOXES", 10**9),
-    "low cameras, too": (ground_of_boxes, "LOWEST", 0.0),
-    "steep cameras, too": (ground_of_boxes, "STEEPEST", np.pi),
-    "equal boxes, too": (ground_of_boxes, "DIFFER", 0.0),
     "boxes that agree less, too": (ground_of_boxes, "SURE", 1.0),
     "lone deviations not bounded": (ground_of_boxes, "FARTHEST", 100.0),
 }

@@ -8,9 +8,8 @@ height H who stands there has a box of height h. With r = 1 - h / (focal s), the
 
 so that each tilt gives one value for each box. The tilt is the one on which the boxes agree best: with the least mean
 absolute deviation of ln (H / C) from its median. Lone deviations are bounded, as boxes are cut and people sit. Where
-the boxes do not agree much better than on one height in px (straight from above, all people at one row, stairs, a
-moving camera), the ground is unknown. It is not used either if the camera is about as high as people's heads: their
-feet then tell too little of the depth, or if it looks steeply down: heights of boxes then are no heights of people.
+the boxes do not agree much better than on one height in px (equal boxes, all people at one row, stairs, a moving
+camera), the ground is unknown.
 
 The first boxes decide, so that later frames change nothing. The focal length hardly matters for who is together: scores
 of groups are the same from 0.8 to 1.1 of the width of the picture, and a little lower at 1.5.
@@ -30,10 +29,7 @@ BOXES, LEAST = 300, 100  # boxes that the first frames hold together, and least 
 TILTS = np.radians(np.arange(-10.0, 71.0))
 FOCAL = 1.1  # focal length over the width of the picture: between wide lenses (0.8) and surveillance (1.5)
 FARTHEST = 0.5  # largest deviation of ln (H / C) that counts, and that of boxes that cannot stand on the ground
-LOWEST = 2.5  # m: least height of a camera from which feet tell the depth
-STEEPEST = np.radians(60.0)
-DIFFER = 0.02  # least mean deviation of ln h: of equal boxes each tilt is right
-SURE = 2 / 3  # largest mean deviation, over that of ln h
+SURE = 2 / 3  # the mean deviation must be below that of ln h times this
 
 
 @dataclass(frozen=True)
@@ -64,7 +60,7 @@ def ground_of_boxes(tracks: Sequence[Tracks], px_per_m: float) -> Ground:
     width, height = (box[:, :2] + box[:, 2:]).max(axis=0).tolist()  # of the picture, whose size need not be known
     size, focal = box[:, 3], FOCAL * width
     differ = _spread(np.log(size / np.median(size)))
-    if width <= 0 or differ < DIFFER:
+    if width <= 0:
         return Ground(None, last)
     log_ratio = _log_ratios((box[:, 1] + size - height / 2) / focal, size / focal)
     seen = np.isfinite(log_ratio).any(axis=1)
@@ -73,7 +69,7 @@ def ground_of_boxes(tracks: Sequence[Tracks], px_per_m: float) -> Ground:
     spread = _spread(log_ratio - middle[:, None])
     best = int(spread.argmin())
     position = np.array([0.0, 0.0, np.median(size) / px_per_m / np.exp(middle[best])])
-    if spread[best] > SURE * differ or position[2] < LOWEST or TILTS[best] > STEEPEST:
+    if spread[best] >= SURE * differ:
         return Ground(None, last)
     picture, rotation = (int(np.ceil(width)), int(np.ceil(height))), camera_rotation(TILTS[best], 0.0)
     return Ground(Camera("pinhole", picture, (focal, focal), (width / 2, height / 2), position, rotation), last)

@@ -12,7 +12,9 @@ from tracking.grouping.foot_points import as_measured, ground_below
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 
 
-@pytest.mark.parametrize(("tilt", "height", "known"), [(15, 6, True), (40, 8, True), (85, 20, False), (3, 1.8, False)])
+@pytest.mark.parametrize(
+    ("tilt", "height", "known"), [(15, 6, True), (40, 8, True), (65, 8, True), (90, 20, False), (3, 2.2, True)]
+)
 def test_ground_is_that_of_the_camera_or_unknown(tilt: float, height: float, known: bool) -> None:
     view, r = camera_rotation(np.radians(tilt), 0.0), np.random.default_rng(30_000)
     camera = Camera("pinhole", (640, 480), (700.0, 700.0), (320.0, 240.0), np.array([0.0, 0.0, height]), view)
