@@ -51,7 +51,7 @@ class View:
     def height(self) -> int:
         """Returns the height in px in a panel."""
         ratio = (self.high - self.low)[1] / (self.high - self.low)[0]
-        return round(WIDTH * float(np.clip(ratio, 0.4, 1.2) if self.plan else ratio))
+        return round(WIDTH * float(ratio if self.pictures else np.clip(ratio, 0.4, 1.2)))
 
     def draw(self, area: Image, index: int, fps: float) -> None:
         """Fills `area` in place with frame `index` (from 1)."""
@@ -75,7 +75,7 @@ def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8, tracks: Se
     tracks: are shown in place of the truth.
     """
     layers = _layers(sequence, tracks)
-    if not any(layer.frames for layer in layers) and not sequence.has_images:
+    if not sequence.has_images and not any(len(m.id) for layer in layers for m in layer.frames.values()):
         raise InputError(
             file=sequence.name, got="no labelled people and no pictures", expected="a sequence with gt/ or pictures",
             remedy="name another",
@@ -123,8 +123,9 @@ def _image_area(sequence: Sequence, layer: Layer) -> tuple[Array, Array]:
         return np.zeros(2), np.array(sequence.image_size, float)
     boxes = np.concatenate([np.zeros((0, 4)), *(marks.box for marks in layer.frames.values())])
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
-    corners = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
-    return (corners.min(axis=0), corners.max(axis=0) + 1e-3) if len(corners) else (np.zeros(2), np.ones(2))
+    points = np.concatenate([np.zeros((0, 2)), *(marks.at for marks in layer.frames.values())])
+    corners = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:], points[np.isfinite(points).all(axis=1)]])
+    return (corners.min(axis=0) - 1, corners.max(axis=0) + 1) if len(corners) else (np.zeros(2), np.ones(2))
 
 
 def _pictures(sequence: Sequence, chosen: set[int]) -> dict[int, Image | None]:

@@ -68,7 +68,8 @@ def heat_map(title: str, played: Iterable[tuple[str, str, Played]]) -> HeatMap:
 
 
 def _cell(found: SequenceOf[Played]) -> HeatCell:
-    score, best = (mean_of_finite(np.array(part)) for part in ([p.score for p in found], [p.best for p in found]))
+    known = [one for one in found if math.isfinite(one.score)]
+    score, best = (mean_of_finite(np.array(part)) for part in ([p.score for p in known], [p.best for p in known]))
     why = " or ".join(sorted({one.why for one in found}))
     return HeatCell(score, best, "" if math.isfinite(score) else why)
 

@@ -39,12 +39,14 @@ def report_of_sweep(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Report:
     easy = scenes if searched or not plan.axes else [s for s in scenes if s.values == sweep.values[0]]
     entries = {entry.name: entry for name in plan.scenarios for entry in rows(name)}
     played = {one: scene for scene in scenes for one in _played(sweep, scene, entries)}
+    chosen = {id(scene) for scene in easy}
+    easiest = [(p.scenario, p.name, p) for p, s in played.items() if id(s) in chosen]
     errors: list[tuple[str, RunErrors]] = []
     shown = moments([*played], lambda one, rival: _replay(sweep, (one.name, rival), played[one], errors))
     return Report(
         title=f"Stress of {', '.join(sweep.trackers)}", about=_about(sweep, data), by=plan.by,
         ranking=[] if searched else list(_ranking(sweep, easy)), ranking_words=_ranking_words(sweep, easy),
-        heat=heat_map(f"{plan.by} by scenario", ((p.scenario, p.name, p) for p, s in played.items() if s in easy)),
+        heat=heat_map(f"{plan.by} by scenario", easiest),
         curves=_curves(sweep, data, words), matrices=list(_matrices(sweep, played)) if data["matrix"] else [],
         causes=cause_rows(errors), causes_about=CAUSES, moments=shown, failures=data["failures"],
     )  # fmt: skip
