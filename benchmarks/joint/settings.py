@@ -49,16 +49,14 @@ def ablation(given: argparse.Namespace) -> None:
     base: list[Row] = []
     deltas = {"GDSR": "group_GDSR", "MOTA": "group_MOTA", "HOTA": "HOTA", "group F1": "group_F1_hull",
               "event F1": "event_F1", "false events": "false"}  # fmt: skip
-    shown = "event F1", "of the least person"
-    tables.head(["setting", *(f"{name}, %" for name in SHARES), *shown, *(f"Δ {name}" for name in deltas)])
+    tables.head(["setting", *(f"{name}, %" for name in SHARES), "event F1", *(f"Δ {name}" for name in deltas)])
     for setting in ("", *(given.only.split(",") if given.only else (*DEPARTURES, *RULES))):
         words = [*given.set, *([] if setting in RULES else setting.split())]
         with replaced_code([RULES[setting]] if setting in RULES else []):
             rows = [with_false_events(mean_row(measured(s, Variant(""), given.filter_seeds, words))) for s in made]
         base = base or rows
         differences = [difference(rows, base, key) for key in deltas.values()]
-        own = dict(zip(OTHERS, others(rows), strict=True))
-        tables.row([setting or "defaults", *pooled(rows, "_core")[:4], *(own[name] for name in shown), *differences])
+        tables.row([setting or "defaults", *pooled(rows, "_core")[:4], others(rows)[0], *differences])
 
 
 def particles(given: argparse.Namespace) -> None:
