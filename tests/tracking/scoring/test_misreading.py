@@ -25,7 +25,7 @@ def walk(seed=0):
 def truth_of(rows, pos=None):
     frame, id = rows[:, 0].astype(int), rows[:, 1].astype(int)
     return Truth(
-        "x", 25.0, int(frame.max()), 100.0, frame, id, np.full(len(rows), -1), pos, None,
+        "x", 25.0, int(frame.max()), 40.0, frame, id, np.full(len(rows), -1), pos, None,
         None if pos is not None else rows[:, 2:6], np.ones(len(rows)),
     )  # fmt: skip
 
@@ -119,7 +119,7 @@ def test_no_warning_for_weak_trackers(share):
 
 WRONG_POSITIONS = [
     (lambda p: p * 100, "frame,id,x_cm,y_cm,"), (lambda p: p * 1000, "frame,id,x_mm,y_mm,"),
-    (lambda p: p[:, ::-1], "read as y,x"), (lambda p: p * 40, "give the positions of the tracks in m"),
+    (lambda p: p[:, ::-1], "read as y,x"), (lambda p: p * 40, "give positions in m"),
 ]  # fmt: skip
 
 
@@ -159,9 +159,7 @@ def test_the_warning_of_score_and_its_remedy(tmp_path, capsys):
     low, told = score(capsys, folder, text)
     assert low < 0.05
     assert told.count("warning:") == 1
-    assert (
-        "name all columns in a first line of the tracks: frame,id,x1,y1,x2,y2,… and add --box-scale 2" in told.lower()
-    )
+    assert "name all columns in a first line of the text: frame,id,x1,y1,x2,y2,… and add --box-scale 2" in told.lower()
     text.write_text("frame,id,x1,y1,x2,y2,score\n" + text.read_text())
     high, told = score(capsys, folder, text, "--box-scale", "2")
     assert (high, told) == (pytest.approx(1, abs=1e-3), "")

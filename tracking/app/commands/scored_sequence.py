@@ -109,7 +109,7 @@ def score_runs(sequence: Sequence, runs: list[TrackingRun], job: ScoringJob) -> 
     """Returns the scores of the runs of a job."""
     for run in runs:
         if sequence.truth is not None:
-            text = likely_misreading(sequence.truth, run, size=sequence.image_size, given="run" if run.info else "text")
+            text = likely_misreading(sequence.truth, run, sequence.image_size)
             if text:
                 warnings.warn(f"{sequence.name}: {text}", stacklevel=2)
     compared = compare_one(sequence, runs, job.similarity, job.group_match, job.blocks, job.oracles)
