@@ -15,8 +15,7 @@ from tracking.fitting.detection_matching import MatchedRecording, box_iou, match
 from tracking.fitting.error_correlation import pairs_by_lag
 from tracking.fitting.false_alarms import alarm_tracks
 
-VISIBILITIES = (0.0, 0.25, 0.5, 0.75, 0.95)  # lower limits of the intervals for the share of misses
-LAGS = (0.2, 1.0)  # s: lags of the error correlation
+LAG = 0.2  # s: of the error correlation
 
 
 def simulated_detections(m: MatchedRecording, sensor: Sensor, seed: int) -> MatchedRecording:
@@ -26,36 +25,24 @@ def simulated_detections(m: MatchedRecording, sensor: Sensor, seed: int) -> Matc
 
 
 def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]:
-    """Returns 26 statistics of a detector's errors by name, all recordings pooled; nan where nothing was observed."""
-    hit = np.concatenate([m.hit for m in recordings])
-    visibility = np.concatenate([m.truth.visibility for m in recordings])
-    found: dict[str, float] = {"missed": _known(np.mean, ~hit)}
-    for low, high in zip(VISIBILITIES, (*VISIBILITIES[1:], 1.01), strict=True):
-        here = (visibility >= low) & (visibility < high)
-        found[f"missed, visibility {low:g}-{min(high, 1):g}"] = _known(np.mean, ~hit[here])
+    """Returns nine statistics of a detector's errors by name, all recordings pooled; nan where nothing was observed."""
     runs = np.concatenate([miss_runs(m) / m.truth.fps for m in recordings])
-    found["misses: mean run, s"] = _known(np.mean, runs)
-    found["misses in runs over 1 s"] = float(runs[runs > 1.0].sum() / runs.sum()) if len(runs) else float("nan")
     frames = sum(m.truth.length for m in recordings)
     alarms = [track for m in recordings for track in alarm_tracks(m)]
     seen = np.array([len(a.rows) for a in alarms], dtype=float)
     stay = np.array([(np.ptp(a.frame) + 1) / a.recording.truth.fps for a in alarms])
-    found["false alarms per frame"] = float(seen.sum()) / frames if frames else float("nan")
-    found["false alarms: at people"] = _known(np.average, np.array([a.person >= 0 for a in alarms]), None, seen)
-    found["false alarms: mean stay, s"] = _known(np.mean, stay)
     true = np.concatenate([np.zeros((0, 4)), *(m.truth.box[m.hit] for m in recordings if m.truth.box is not None)])
     box = np.concatenate([m.box[m.match[m.hit]] for m in recordings])
-    e, overlap = box_errors(box, true), box_iou(true, box)
-    for q in (0.1, 0.5, 0.9):
-        found[f"overlap, {q:.0%} quantile"] = _known(np.quantile, overlap, q)
-    for k, name in enumerate(("across", "foot", "top", "log width")):
-        found[f"error {name}: mean"], found[f"error {name}: sd"] = _known(np.mean, e[:, k]), _known(np.std, e[:, k])
-    for lag in LAGS:
-        found[f"error correlation after {lag:g} s"] = _correlation(recordings, e, lag)
-    scores = {"true": [m.score[m.match[m.hit]] for m in recordings], "false": [m.score[m.false] for m in recordings]}
-    for name, parts in scores.items():
-        found[f"score of {name}, median"] = _known(np.quantile, np.concatenate(parts), 0.5)
-    return found
+    overlap = box_iou(true, box)
+    return {
+        "missed": _known(np.mean, np.concatenate([~m.hit for m in recordings])),
+        "misses: mean run, s": _known(np.mean, runs),
+        "false alarms per frame": float(seen.sum()) / frames if frames else float("nan"),
+        "false alarms: at people": _known(np.average, np.array([a.person >= 0 for a in alarms]), None, seen),
+        "false alarms: mean stay, s": _known(np.mean, stay),
+        **{f"overlap, {q:.0%} quantile": _known(np.quantile, overlap, q) for q in (0.1, 0.5, 0.9)},
+        f"error correlation after {LAG:g} s": _correlation(recordings, box_errors(box, true)),
+    }
 
 
 def miss_runs(m: MatchedRecording) -> Ints:
@@ -70,20 +57,18 @@ def miss_runs(m: MatchedRecording) -> Ints:
     return np.concatenate([np.zeros(0, np.int64), *lengths])
 
 
-def _correlation(recordings: Sequence[MatchedRecording], e: Array, lag: float) -> float:
-    """Returns the correlation of one person's errors about `lag` s apart, nan without any; e (H, 4)."""
+def _correlation(recordings: Sequence[MatchedRecording], e: Array) -> float:
+    """Returns the correlation of one person's errors about `LAG` apart, nan without any; e (H, 4)."""
     if not len(e):
         return float("nan")
-    total, count, first = 0.0, 0, 0
+    products, first = [np.zeros((0, 4))], 0
     mean, sd = e.mean(axis=0), np.maximum(e.std(axis=0), 1e-9)
     for m in recordings:
         z = np.full((len(m.truth.id), 4), np.nan)
         z[m.hit] = (e[first : first + int(m.hit.sum())] - mean) / sd
         first += int(m.hit.sum())
-        near = [(i, j) for there, i, j in pairs_by_lag(m.truth, m.hit) if abs(there - lag) <= 0.5 * lag]
-        total += sum(float((z[i] * z[j]).sum()) for i, j in near)
-        count += sum(4 * len(i) for i, _ in near)
-    return total / count if count else float("nan")
+        products += [z[i] * z[j] for lag, i, j in pairs_by_lag(m.truth, m.hit) if abs(lag - LAG) <= 0.5 * LAG]
+    return _known(np.mean, np.concatenate(products))
 
 
 def _known(statistic: Callable[..., Any], a: Array, *more: Any) -> float:

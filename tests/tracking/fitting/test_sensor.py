@@ -141,7 +141,7 @@ def test_synthetic_errors_look_like_those_they_were_fitted_to() -> None:
     real = [error_statistics([simulated_detections(m, KNOWN, 100 * k) for m in first]) for k in range(1, 4)]
     made = [error_statistics([simulated_detections(m, fitted(), 100 * k) for m in first]) for k in range(1, 4)]
     for name in ("missed", "misses: mean run, s", "overlap, 50% quantile", "overlap, 10% quantile",
-                 "false alarms per frame", "false alarms: at people", "error foot: sd"):  # fmt: skip
+                 "false alarms per frame", "false alarms: at people"):  # fmt: skip
         a, b = np.array([r[name] for r in real]), np.array([m[name] for m in made])
         assert abs(a.mean() - b.mean()) < 3.5 * max(a.std(), b.std(), 0.02 * abs(a.mean())), name
 

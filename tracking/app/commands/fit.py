@@ -17,12 +17,6 @@ from tracking.app.command_result import CommandResult
 # Seeds of the simulated detections whose statistics are shown beside the measured ones.
 CHECK_SEEDS = range(30_000, 30_008)
 
-# The statistics that the text shows; --json has all of them.
-SHOWN = (
-    "missed", "misses: mean run, s", "false alarms per frame", "false alarms: at people", "false alarms: mean stay, s",
-    "overlap, 10% quantile", "overlap, 50% quantile", "overlap, 90% quantile", "error correlation after 0.2 s",
-)  # fmt: skip
-
 
 def fit_sensor(options: FitSensorOptions) -> CommandResult:
     """Writes the profile of the detector behind the recordings, pooled over all of them, as a TOML file."""
@@ -46,9 +40,9 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     names = ", ".join(printable(recording.name) for recording in recordings)
     write_file(out, dump_sensor(profile, f"A detector's profile, of {people} labelled people in {names}").encode())
     lines = [f"{people} labelled people, {sum(len(m.box) for m in matched)} detections in {names}", ""]
-    width = max(map(len, SHOWN))
+    width = max(map(len, measured))
     lines += [f"{'':<{width}}  measured  simulated"]
-    lines += [f"{name:<{width}}  {measured[name]:8.3f}  {simulated[name]:9.3f}" for name in SHOWN]
+    lines += [f"{name:<{width}}  {measured[name]:8.3f}  {simulated[name]:9.3f}" for name in measured]
     lines += ["", f"→ {out}: use it as --sensor {out}"]
     data = {"file": out, "sensor": profile.model_dump(exclude_none=True), "measured": measured, "drawn": simulated}
     return CommandResult(data, "\n".join(lines))
