@@ -40,42 +40,34 @@ def encode(space: Space, config: Config) -> Array:
     return np.array([_to_unit(p, getattr(config, p.name)) for p in space])
 
 
-def decode(
-    space: Space, action: ArrayLike, base: Config, allowed: Callable[[Config], object] = lambda config: None
-) -> Config:
+def decode(space: Space, action: ArrayLike, base: Config) -> Config:
     """Returns the config at the vector `action` (P,), which is clipped to [-1, 1]."""
+    return decode_and_build(space, action, base, lambda config: config)
+
+
+def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Callable[[Config], T]) -> T:
+    """Returns the result of `build` for the config at the vector `action` (P,), which is clipped to [-1, 1].
+
+    If the values contradict each other or `build` refuses them, it is the nearest allowed config towards `base`.
+    """
     point = _point(action, len(space))
-    found = _attempt(space, point, base, allowed)
-    if found is not None:
-        return found
-    # The nearest allowed config on the line from `base` to a refused point, by bisection.
-    origin, near, far, best = encode(space, base), 0.0, 1.0, base
+
+    def attempt(point: Array) -> T | None:
+        values = {p.name: _from_unit(p, float(a)) for p, a in zip(space, point, strict=True)}
+        try:
+            return build(dataclasses.replace(base, **values))
+        except InputError:
+            return None
+
+    best = attempt(point)
+    if best is not None:
+        return best
+    origin, near, far = encode(space, base), 0.0, 1.0
     for _ in range(HALVINGS):
         share = (near + far) / 2
-        found = _attempt(space, origin + share * (point - origin), base, allowed)
+        found = attempt(origin + share * (point - origin))
         near, far, best = (near, share, best) if found is None else (share, far, found)
-    return best
-
-
-def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Callable[[Config], T]) -> tuple[Config, T]:
-    """Returns the config at the vector `action` (P,), clipped to [-1, 1], and the result of `build` for it."""
-    made: dict[Config, T] = {}
-
-    def attempt(config: Config) -> None:
-        made[config] = build(config)
-
-    config = decode(space, action, base, attempt)
-    return config, made[config] if config in made else build(config)
-
-
-def _attempt(space: Space, point: Array, base: Config, allowed: Callable[[Config], object]) -> Config | None:
-    values = {p.name: _from_unit(p, float(a)) for p, a in zip(space, point, strict=True)}
-    try:
-        config = dataclasses.replace(base, **values)
-        allowed(config)
-    except InputError:
-        return None
-    return config
+    return build(base) if best is None else best
 
 
 def _point(action: ArrayLike, size: int) -> Array:

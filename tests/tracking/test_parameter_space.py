@@ -71,11 +71,6 @@ def test_what_cannot_be_is_drawn_back_along_a_line_as_little_as_may_be():
     share = (point - origin)[:2] / (action - origin)[:2]
     assert share[0] == pytest.approx(share[1])
     assert 40 < config.gate + config.rate <= 50
-    assert decode(SPACE, action, base, allowed=refuse_all) is base
-
-
-def refuse_all(config):
-    raise InputError(place="x", got="y", expected="z", remedy="w")
 
 
 @pytest.mark.parametrize("action", [[0.0] * 4, [[0.0] * 5], [0, 0, 0, 0, np.nan], [0, 0, 0, 0, np.inf], ["0.5"] * 5])

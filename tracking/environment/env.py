@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, cast, get_args
 
 import gymnasium
@@ -161,9 +160,8 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         if self._observer is None:
             raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
         if self.decision_every is None:
-            build = partial(self._rollout, source=self.source)
-            self.config, rollout = decode_and_build(self.space, action, self.base, build)
-            self.rollout = rollout
+            rollout = decode_and_build(self.space, action, self.base, self._rollout)
+            self.rollout, self.config = rollout, cast(Config, rollout.config)
             terminated = self._advance(rollout, None)
         else:
             assert self.rollout is not None
@@ -173,10 +171,10 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         before, self.score = self.score, self.scores.get("objective", 0.0)
         return self._observe(), self.score - before, terminated, False, self._info()
 
-    def _rollout(self, config: Config, source: Source) -> Rollout:
+    def _rollout(self, config: Config, source: Source | None = None) -> Rollout:
         seed, similarity = self.options.tracker_seed, self.options.similarity
         return Rollout(
-            self.tracker, source, config, detections=self.mode, tracker_seed=seed, cache=self.cache,
+            self.tracker, source or self.source, config, detections=self.mode, tracker_seed=seed, cache=self.cache,
             similarity=similarity,
         )  # fmt: skip
 

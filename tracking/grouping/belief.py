@@ -74,18 +74,14 @@ class Belief:
     def from_toml(cls, path: str | Path) -> Belief:
         """Returns the belief of a file that `toml_text` wrote. Raises InputError if it is none or values are wrong."""
         content = parse(Path(path))
-        kind, rows = content.pop("grouping", None), content.pop("table", None)
-        if kind != KIND or not isinstance(rows, list) or not rows:
-            _refuse(path, "grouping", kind, f'grouping = "{KIND}" and at least one [[table]]')
-        if unknown := sorted(content.keys() - {"bias", *NUMBERS}):
-            _refuse(path, unknown[0], "an unknown key", "one of " + ", ".join(("bias", *NUMBERS)))
-        bias = content.pop("bias", None)
-        if not isinstance(bias, list) or len(bias) != 2 or not all(is_number(x, -math.inf, math.inf) for x in bias):
-            _refuse(path, "bias", bias, "two numbers")
-        for name in NUMBERS:
-            if not is_number(content.get(name), 0.0, math.inf):
-                _refuse(path, name, content.get(name, "nothing"), "a number of 0 or above")
-        return cls(tuple(_table(path, k, row) for k, row in enumerate(rows, 1)), np.array(bias, float), **content)
+        rows, keys = content.pop("table", None), {"bias", *NUMBERS}
+        if content.pop("grouping", None) != KIND or not isinstance(rows, list) or not rows:
+            _refuse(path, "grouping", "another file", f'grouping = "{KIND}" and at least one [[table]]')
+        if content.keys() != keys:
+            _refuse(path, min(content.keys() - keys, default="its keys"), sorted(content), ", ".join(sorted(keys)))
+        bias = _numbers(path, "bias", content.pop("bias"), 2)
+        numbers = {name: float(_numbers(path, name, [value], 1, low=0.0)[0]) for name, value in content.items()}
+        return cls(tuple(_table(path, f"table {k}", row) for k, row in enumerate(rows, 1)), bias, **numbers)
 
     def toml_text(self, comment: str = "") -> str:
         """Returns the file's text. comment: lines at its beginning."""
@@ -142,23 +138,22 @@ def default_belief() -> Belief:
     return Belief.from_toml(FROZEN)
 
 
-def _table(path: str | Path, number: int, row: Any) -> Table:
-    place = f"table {number}"
+def _table(path: str | Path, place: str, row: Any) -> Table:
     keys = ("name", "at", *DECISIONS)
     if not isinstance(row, dict) or set(row) != set(keys):
-        _refuse(path, place, sorted(row) if isinstance(row, dict) else row, ", ".join(keys))
+        _refuse(path, place, row, ", ".join(keys))
     if row["name"] not in NAMES:
         _refuse(path, f"{place}: name", row["name"], "one of " + "; ".join(NAMES))
-    columns = []
-    for key in keys[1:]:
-        values = row[key]
-        if not isinstance(values, list) or not all(is_number(v, -math.inf, math.inf) for v in values):
-            _refuse(path, f"{place}: {key}", values, "a list of numbers")
-        columns.append(np.array(values, float))
-    at = columns[0]
-    if len(at) < 2 or any(len(c) != len(at) for c in columns) or (np.diff(at) <= 0).any():
-        _refuse(path, f"{place}: at", row["at"], "ascending numbers, two or more, as many as log-odds in each column")
-    return Table(row["name"], at, np.array(columns[1:]))
+    columns = np.array([_numbers(path, f"{place}: {key}", row[key], np.size(row["at"])) for key in keys[1:]])
+    if len(columns[0]) < 2 or (np.diff(columns[0]) <= 0).any():
+        _refuse(path, f"{place}: at", row["at"], "two ascending numbers or more")
+    return Table(row["name"], columns[0], columns[1:])
+
+
+def _numbers(path: str | Path, place: str, values: Any, count: int, low: float = -math.inf) -> Array:
+    if not isinstance(values, list) or len(values) != count or not all(is_number(v, low, math.inf) for v in values):
+        _refuse(path, place, values, f"numbers ({count})" + (f" of {low:g} or above" if low == 0 else ""))
+    return np.array(values, float)
 
 
 def _refuse(path: str | Path, place: str, got: object, expected: str) -> None:
