@@ -13,7 +13,7 @@ import os.path
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack, cast
+from typing import Any, ClassVar, Literal, Self, cast
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
@@ -82,17 +82,10 @@ class Param:
             return self.check(text)
 
 
-class ParamUse(TypedDict, total=False):
-    """Optional keywords of `param`."""
-
-    online: bool  # True (default) if it may change between two frames
-    tunable: bool  # True (default) if searches may change it
-    sees: Literal["", "pixels", "points"]  # with what alone it has an effect; searches over others leave it out
-
-
 def param(
-    default: Value, values: tuple[Any, ...], unit: str, meaning: str, scale: Scale = "linear", **use: Unpack[ParamUse]
-) -> Any:
+    default: Value, values: tuple[Any, ...], unit: str, meaning: str, scale: Scale = "linear", *,
+    online: bool = True, tunable: bool = True, sees: Literal["", "pixels", "points"] = "",
+) -> Any:  # fmt: skip
     """Declares a parameter as a field of a config.
 
     Args:
@@ -102,16 +95,17 @@ def param(
         meaning: For the docs; the word "ours" marks a departure from the paper.
         scale: How a search moves: "linear" or "log" for numbers, "int" for whole numbers, "categorical" for choices;
             "vector" for a tuple of numbers, which no search moves.
-        use: online, tunable, sees, as in `ParamUse`.
+        online: Whether it may change between two frames.
+        tunable: Whether searches may change it.
+        sees: With what alone it has an effect; searches over others leave it out.
 
     Raises:
         ValueError: `values` are not two, though the scale is not "categorical".
     """
     categorical = scale == "categorical"
-    if scale == "vector":
-        use["tunable"] = False
     low, high = (float("-inf"), float("inf")) if categorical else values
-    declared = Param("", default, unit, meaning, scale, low, high, values if categorical else (), **use)
+    choices, tunable = values if categorical else (), tunable and scale != "vector"
+    declared = Param("", default, unit, meaning, scale, low, high, choices, online, tunable, sees)
     return dataclasses.field(default=default, metadata={"param": declared})
 
 

@@ -27,7 +27,7 @@ from tracking.scoring.evaluation import Scorer, objective_of
 from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
 from tracking.scoring.group_scores import f1, groups_found, shared_members
 from tracking.scoring.matching import mapped_people
-from tracking.scoring.people_and_groups import GroupRows, bare_groups
+from tracking.scoring.people_and_groups import GroupRows
 from tracking.scoring.people_comparison import Similarity, in_one_plane, people_pairs
 from tracking.scoring.rows import FrameRows, find_rows
 from tracking.scoring.track_scores import weighted_hota
@@ -106,6 +106,6 @@ def _derived_groups(sides: ComparedSides, tracks: Sequence[Tracks], px_per_m: fl
     order, new = order[several], new[several]
     of, first = np.cumsum(new) - 1, np.flatnonzero(new)
     rows = FrameRows(table.frame[order][first] + 1, of[first])
-    groups = bare_groups(rows, np.full((len(rows), 2), np.nan), (np.zeros((0, 2)),) * len(rows))
     member = find_rows(sides.est.rows, FrameRows(table.frame[order] + 1, table.id[order]))
-    return replace(groups, of=of, member=member), np.where(member >= 0, np.append(sides.mapping, -1)[member], -1)
+    groups = GroupRows(rows, np.full((len(rows), 2), np.nan), (np.zeros((0, 2)),) * len(rows), of, member)
+    return groups, np.where(member >= 0, np.append(sides.mapping, -1)[member], -1)

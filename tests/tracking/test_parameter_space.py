@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from scenarios.errors import InputError
 from tracking.config import Config, param
-from tracking.parameter_space import decode, encode
+from tracking.parameter_space import decode, decode_and_build, encode
 from tracking.running.tracker_registry import find, names
 
 CONFIGS = [find(name).config_class for name in names()]
@@ -71,6 +71,13 @@ def test_what_cannot_be_is_drawn_back_along_a_line_as_little_as_may_be():
     share = (point - origin)[:2] / (action - origin)[:2]
     assert share[0] == pytest.approx(share[1])
     assert 40 < config.gate + config.rate <= 50
+    assert 1.9 < decode_and_build(SPACE, [0.0] * 5, Mixed(gate=1.0), at_most_two) <= 2
+
+
+def at_most_two(config):
+    if config.gate > 2:
+        raise InputError(place="x", got="y", expected="z", remedy="w")
+    return config.gate
 
 
 @pytest.mark.parametrize("action", [[0.0] * 4, [[0.0] * 5], [0, 0, 0, 0, np.nan], [0, 0, 0, 0, np.inf], ["0.5"] * 5])

@@ -28,13 +28,8 @@ class Statistic:
 STATISTICS = (
     Statistic("time", 20.0, "s", "time since the first frame"),
     Statistic("tracks", 10.0, "", "number of tracks, mean over frames"),
-    Statistic("births", 1.0, "1/s", "tracks that appear"),
-    Statistic("deaths", 1.0, "1/s", "tracks that disappear"),
     Statistic("speed", 1.3, "m/s", "speed of the tracks, median"),
     Statistic("grouped", None, "share", "tracks in a group; of trackers of groups, groups of two people or more"),
-    Statistic("group_size", 2.0, "people", "people in a group, mean"),
-    Statistic("merges", 6.0, "1/min", "reported events merge and form"),
-    Statistic("splits", 6.0, "1/min", "reported events split and dissolve"),
     Statistic("detections", 10.0, "", "number of detections, mean over frames"),
     Statistic("score", None, "share", "score of the detections, mean"),
 )
@@ -44,13 +39,11 @@ NAMES = tuple(s.name for s in STATISTICS)
 class Observer:
     """Collects frames and tracks between two decisions, for the statistics of the observation.
 
-    State: tracks of the frames since the last decision, ids of the frame before these, numbers and scores of the
-    detections."""
+    State: tracks of the frames since the last decision, numbers and scores of the detections."""
 
     def __init__(self, fps: float) -> None:
         self.fps = fps
         self._tracks: list[Tracks] = []
-        self._before: set[int] = set()
         self._scores: list[Array] = []
 
     def add(self, frame: Frame, tracks: Tracks) -> None:
@@ -70,15 +63,9 @@ class Observer:
         return np.array([squashed(s, values.get(s.name, 0.0)) for s in STATISTICS], np.float32)
 
     def _values(self, px_per_m: float) -> dict[str, float]:
-        tracks, seconds = self._tracks, len(self._tracks) / self.fps
-        born = ended = 0
-        for t in tracks:
-            now = set(t.id.tolist())
-            born, ended, self._before = born + len(now - self._before), ended + len(self._before - now), now
-        values = {
-            "time": tracks[-1].index / self.fps, "births": born / seconds, "deaths": ended / seconds,
-            "tracks": sum(len(t.id) for t in tracks) / len(tracks), **_group_values(tracks, 60 / seconds),
-        }  # fmt: skip
+        tracks = self._tracks
+        count = sum(len(t.id) for t in tracks) / len(tracks)
+        values = {"time": tracks[-1].index / self.fps, "tracks": count, "grouped": _share_in_groups(tracks)}
         if self._scores:
             score = np.concatenate(self._scores)
             values |= {"detections": len(score) / len(self._scores), "score": float(score.mean()) if len(score) else 0}
@@ -88,22 +75,13 @@ class Observer:
         return {**values, "speed": float(np.median(speed[known])) / scale} if scale > 0 and known.any() else values
 
 
-def _group_values(tracks: list[Tracks], per_minute: float) -> dict[str, float]:
-    kinds = [e.kind for t in tracks for e in t.events]
-    values = {
-        name: per_minute * sum(kinds.count(kind) for kind in pair)
-        for name, pair in (("merges", ("merge", "form")), ("splits", ("split", "dissolve")))
-    }
+def _share_in_groups(tracks: list[Tracks]) -> float:
     if tracks[-1].unit == "group":
         size = np.concatenate([np.zeros(0), *(t.groups.size for t in tracks if t.groups is not None)])
-        size = size[np.isfinite(size)]
-        if not len(size):
-            return values
-        return {**values, "grouped": float((size >= TWO_PEOPLE).mean()), "group_size": float(size.mean())}
-    labels = [t.group[t.group >= 0] for t in tracks]
-    people, groups = sum(map(len, labels)), sum(len(set(g.tolist())) for g in labels)
-    count = sum(len(t.id) for t in tracks)
-    return {**values, "grouped": people / max(count, 1), "group_size": people / max(groups, 1)}
+        grouped = size[np.isfinite(size)] >= TWO_PEOPLE
+    else:
+        grouped = np.concatenate([t.group for t in tracks]) >= 0
+    return float(grouped.mean()) if len(grouped) else 0.0
 
 
 def squashed(statistic: Statistic, value: float) -> float:

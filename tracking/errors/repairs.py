@@ -9,7 +9,7 @@ swapped tracks is repaired alone. A wrong lineage has no repair and no cost: non
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from tracking.errors.groups import UNSEEN, GroupError, Memberships, group_f1
 from tracking.errors.people import NOBODY, MatchedPeople, PersonError
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.group_scores import shared_members
-from tracking.scoring.people_and_groups import GroupRows, bare_groups
+from tracking.scoring.people_and_groups import GroupRows
 from tracking.scoring.rows import FrameRows
 from tracking.scoring.track_scores import weighted_hota, weighted_identity
 from tracking.scoring.weighted_sums import unweighted
@@ -159,7 +159,7 @@ def _repaired_f1(of: Memberships, errors: Collection[GroupError], added: Ints, g
 def _groups_of(home: Ints, member: Ints, count: int) -> GroupRows:
     """Returns groups with these memberships, for counting: without frames, ids and places."""
     none = np.zeros(count, np.int64)
-    return replace(bare_groups(FrameRows(none, none), np.zeros((count, 2)), (NO_HULL,) * count), of=home, member=member)
+    return GroupRows(FrameRows(none, none), np.zeros((count, 2)), (NO_HULL,) * count, home, member)
 
 
 def _join_added(of: Memberships, added: Ints, loose: Bools, together: dict[int, list[int]]) -> list[tuple[int, int]]:

@@ -155,24 +155,12 @@ def _log_probabilities(design: Array, weights: Array, possible: Bools) -> Array:
 
 
 def event_scores(rows: EventRows, weights: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Returns scores of a classifier on rows: numbers, log losses, and probabilities of merges and splits."""
-    log_p = log_probabilities(rows, weights)
-    p, counts = np.exp(log_p), np.bincount(rows.event, minlength=3)
-    share = np.maximum(counts / max(len(rows.event), 1), 1e-12)
-    prior = np.where(rows.possible, share, 0.0)
+    """Returns numbers of rows, merges and splits, and log losses of a classifier and of the shares of the events."""
+    counts, each = np.bincount(rows.event, minlength=3), np.arange(len(rows.event))
+    prior = np.where(rows.possible, np.maximum(counts / max(len(rows.event), 1), 1e-12), 0.0)
     prior /= prior.sum(axis=1, keepdims=True)
-    each = np.arange(len(rows.event))
-    scores = {
-        "rows": float(len(rows.event)),
-        "log_loss": -float(log_p[each, rows.event].mean()),
+    return {
+        "rows": float(len(rows.event)), "merges": float(counts[MERGE]), "splits": float(counts[SPLIT]),
+        "log_loss": -float(log_probabilities(rows, weights)[each, rows.event].mean()),
         "prior_log_loss": -float(np.log(prior[each, rows.event]).mean()),
-    }
-    for event in (MERGE, SPLIT):
-        name, there = CLASSES[event], rows.event == event
-        scores |= {
-            f"{name}s": float(counts[event]),
-            f"{name}_probability": float(p[there, event].mean()) if there.any() else float("nan"),
-            f"{name}_false_probability": float(p[~there, event].mean()),
-            f"{name}_expected_over_true": float(p[:, event].sum() / max(counts[event], 1)),
-        }
-    return scores
+    }  # fmt: skip

@@ -109,7 +109,7 @@ def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> Gro
     return GroupRows(
         rows,
         np.concatenate([np.zeros((0, 2)), *(g.pos[:, :2] for g in groups)]),
-        tuple(h for g in groups for h in hulls_of(g)),
+        tuple(h for g in groups for h in (g.hull or (np.zeros((0, 2)),) * len(g.id))),
         of,
         member,
     )
@@ -144,17 +144,6 @@ def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surfa
     if wanted is None:
         found = replace(found, pos=np.full_like(found.pos, np.nan))
     return TrueGroups(found, wanted is not None)
-
-
-def hulls_of(groups: Groups) -> tuple[Array, ...]:
-    """Returns one polygon (V, 2) per group, (0, 2) if there are no hulls."""
-    return groups.hull if len(groups.hull) else (np.zeros((0, 2)),) * len(groups.id)
-
-
-def bare_groups(rows: FrameRows, pos: Array, hull: tuple[Array, ...]) -> GroupRows:
-    """Returns groups with centre and hull only: no members."""
-    nobody = np.zeros(0, np.int64)
-    return GroupRows(rows, pos, hull, nobody, nobody)
 
 
 def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> GroupRows:

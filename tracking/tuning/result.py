@@ -51,23 +51,17 @@ def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
         axes.plot(beyond, [edge] * len(beyond), "|", color=BLUE, label="far worse" if beyond else None)
         axes.set_ylim(**{"bottom" if goal.higher else "top": edge})
     axes.set(xlabel="trial", ylabel=f"{goal.key}, training scenes (optimised: no result)")
-    return _svg(figure, axes)
+    axes.legend(fontsize=8)
+    return _svg(figure)
 
 
-def importance_plot(plan: SearchPlan, importance: Mapping[str, float], config: Config) -> str:
+def importance_plot(plan: SearchPlan, importance: Mapping[str, float]) -> str:
     """Returns as SVG a bar for the importance of each parameter."""
     ranked = sorted(importance, key=lambda name: importance[name])
     title = f"{_title(plan)}: importance for {plan.goals[0].key} in training (PED-ANOVA)"
     figure, axes = _figure(title, 1 + len(ranked) / 3)
-    units = {p.name: p.unit for p in plan.space}
-    for changed, ink, words in ((True, ORANGE, "changed by the winner"), (False, BLUE, "left at its default")):
-        names = [name for name in ranked if (getattr(plan.base, name) != getattr(config, name)) == changed]
-        bars = axes.barh([ranked.index(name) for name in names], [importance[n] for n in names], color=ink, label=words)
-        ends = [dict.fromkeys(short(getattr(one, name)) for one in (plan.base, config)) for name in names]
-        axes.bar_label(bars, [f"{' → '.join(e)} {units[n]}" for e, n in zip(ends, names, strict=True)], padding=4)
-    axes.set_yticks(range(len(ranked)), ranked)
-    axes.set_xlim(right=1.4 * max(importance.values()))
-    return _svg(figure, axes)
+    axes.barh(ranked, [importance[name] for name in ranked], color=BLUE)
+    return _svg(figure)
 
 
 def _figure(title: str, height: float = 4.0) -> tuple[Any, Any]:
@@ -79,10 +73,9 @@ def _figure(title: str, height: float = 4.0) -> tuple[Any, Any]:
     return figure, axes
 
 
-def _svg(figure: Any, axes: Any) -> str:
+def _svg(figure: Any) -> str:
     from matplotlib import rc_context
 
-    axes.legend(fontsize=8)
     text = io.StringIO()
     with rc_context({"svg.hashsalt": "flockscope", "svg.fonttype": "none"}):  # the same search, the same bytes
         figure.savefig(text, format="svg", metadata={"Date": None})
@@ -222,7 +215,7 @@ class TuningResult:
             },
             "comparisons": [{**asdict(c), "verdict": c.verdict} for c in self.comparisons],
             "candidates": [_candidate(c) for c in self.candidates],
-            "front": [_candidate(c) for c in self.front] if len(plan.goals) > 1 else [],
+            "front": [_candidate(c) for c in self.front],
             "importance": dict(self.importance),
             "notes": list(self.notes),
             "left_out": list(self.left_out),
@@ -233,8 +226,7 @@ class TuningResult:
         """Writes the parameters to `path` (TOML), and beside it all figures (.json) and the plots (.svg)."""
         target = Path(path)
         files = {".json": json.dumps(_without_nan(self.as_dict()), indent=1, allow_nan=False) + "\n", **self.plots()}
-        if len(self.plan.goals) > 1:
-            files |= {f".front-{k}.toml": self.to_toml(c) for k, c in enumerate(self.front, 1)}
+        files |= {f".front-{k}.toml": self.to_toml(c) for k, c in enumerate(self.front, 1)}
         for suffix, content in files.items():
             write_file(target.with_suffix(suffix), content.encode())
         write_file(target, self.to_toml().encode())
@@ -244,7 +236,7 @@ class TuningResult:
         """Returns the plots as SVG text by file suffix: ".history.svg", ".importance.svg"."""
         plots = {".history.svg": history_plot(self.plan, self.trials)}
         if any(self.importance.values()):
-            plots[".importance.svg"] = importance_plot(self.plan, self.importance, self.config)
+            plots[".importance.svg"] = importance_plot(self.plan, self.importance)
         return plots
 
 
