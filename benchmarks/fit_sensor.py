@@ -47,7 +47,7 @@ def part(recording: Recording, first: int, last: int, size: tuple[int, int]) -> 
     names = ("frame", "id", "group", "pos", "vel", "box", "visibility", "z")
     cut = {name: getattr(truth, name)[rows] for name in names if getattr(truth, name) is not None}
     cut["frame"] = cut["frame"] - (first - 1)
-    short: Truth = truth.replace(length=last - first + 1, labelled=None, **cut)
+    short: Truth = truth.replace(length=last - first + 1, labelled=None, unscored=None, **cut)
     found: list[Detections] = []
     for frame in recording.without_pictures():
         if first <= frame.index <= last and frame.detections is not None:

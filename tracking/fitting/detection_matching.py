@@ -10,18 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.schema.sensor import BoxNoise
 from sim.detector.box_noise import box_errors, perturb_boxes
-from sim.io.formats.mot_table import read_table
-from sim.io.formats.mot_text import DISTRACTORS
 from sim.io.store.truth_files import scores_or_ones
 from sim.scene.visibility import image_size_of_boxes, with_visibility
-from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth
+from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth, Unscored
 from tracking.filters.assignment import optimal
 from tracking.scoring.annotated_frames import annotated_frames
 
@@ -79,37 +76,31 @@ def match_sequence(sequence: Sequence) -> MatchedRecording:
         if wrong:
             raise InputError(file=file, got=got, expected=expected, remedy=remedy)
     assert truth is not None
-    truth, found, left_out = _annotated(truth, found, _left_out(sequence))
-    return match_detections(truth, found, sequence.image_size, sequence.camera, left_out)
+    return match_detections(*_annotated(truth, found), sequence.image_size, sequence.camera)
 
 
-def _annotated(
-    truth: Truth, found: list[Detections], left_out: tuple[Ints, Array] | None
-) -> tuple[Truth, list[Detections], tuple[Ints, Array] | None]:
+def _annotated(truth: Truth, found: list[Detections]) -> tuple[Truth, list[Detections]]:
     annotated = annotated_frames(truth)
     if annotated.step == 1:
-        return truth, found, left_out
+        return truth, found
     known = np.flatnonzero(annotated.frames)
     turn = np.searchsorted(known, np.arange(truth.length + 1)) + 1
+    beside = truth.unscored
+    if beside is not None:
+        kept = annotated.frames[beside.frame]
+        beside = Unscored(turn[beside.frame[kept]], beside.box[kept], beside.distractor[kept])
+        truth = truth.replace(unscored=beside)
     truth = truth.replace(frame=turn[truth.frame], fps=truth.fps / float(np.diff(known).mean()), length=len(known))
-    found = [d.replace(index=int(turn[d.index])) for d in found if annotated.frames[d.index]]
-    if left_out is not None:
-        kept = annotated.frames[left_out[0]]
-        left_out = turn[left_out[0][kept]], left_out[1][kept]
-    return truth, found, left_out
+    return truth, [d.replace(index=int(turn[d.index])) for d in found if annotated.frames[d.index]]
 
 
 def match_detections(
-    truth: Truth,
-    found: SequenceOf[Detections],
-    size: tuple[int, int] | None,
-    camera: Camera | None = None,
-    left_out: tuple[Ints, Array] | None = None,
+    truth: Truth, found: SequenceOf[Detections], size: tuple[int, int] | None, camera: Camera | None = None
 ) -> MatchedRecording:
     """Returns labels and detections, one per frame, matched one to one; both must have boxes.
 
-    size: of the picture, px; None: the extent of all boxes. left_out: frames (L,) and boxes (L, 4) of labelled rows
-    that are not scored; a detection that covers one is dropped unless it matches a person.
+    size: of the picture, px; None: the extent of all boxes. A detection that covers a labelled row that is not scored
+    is dropped unless it matches a person.
     """
     assert truth.box is not None
     box = np.concatenate([np.zeros((0, 4)), *(d.box for d in found if d.box is not None)])
@@ -126,7 +117,7 @@ def match_detections(
         pairs = _pairs(truth, frame, box, usual)
     owner, partner = np.full(len(box), -1, np.int64), np.full(len(truth.id), -1, np.int64)
     owner[pairs[1]], partner[pairs[0]] = pairs
-    keep = np.ones(len(box), bool) if left_out is None else (owner >= 0) | ~_covered(frame, box, *left_out)
+    keep, truth = (owner >= 0) | ~_covered(frame, box, truth.unscored), truth.replace(unscored=None)
     number = np.cumsum(keep) - 1
     partner = np.where(partner >= 0, number[np.maximum(partner, 0)], -1) if len(box) else partner
     pos = None if pos is None else pos[keep]
@@ -167,25 +158,11 @@ def box_intersections(a: Array, b: Array) -> Array:
     return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=-1))
 
 
-def _covered(frame: Ints, box: Array, out_frame: Ints, out_box: Array) -> Bools:
+def _covered(frame: Ints, box: Array, unscored: Unscored | None) -> Bools:
     """Returns which detections overlap an unscored box of their frame by an IoU of 0.5 or more, (M,)."""
     covered = np.zeros(len(box), bool)
-    for index in np.unique(out_frame):
-        here, there = np.flatnonzero(frame == index), out_frame == index
-        if len(here):
-            covered[here] = (box_iou(box[here, None], out_box[there]) >= IGNORED).any(axis=1)
+    if unscored is not None:
+        for index in np.unique(unscored.frame):
+            here, there = np.flatnonzero(frame == index), unscored.frame == index
+            covered[here] = (box_iou(box[here, None], unscored.box[there]) >= IGNORED).any(axis=1)
     return covered
-
-
-def _left_out(sequence: Sequence) -> tuple[Ints, Array] | None:
-    """Returns frames (L,) and boxes (L, 4) of the rows of gt/gt.txt that MOTChallenge does not score; None without."""
-    path = Path(str(sequence.source.get("path", ""))) / "gt" / "gt.txt"
-    if sequence.source.get("kind") != "mot" or not path.is_file():
-        return None
-    table = read_table(path)
-    if not table.rest.shape[1]:
-        return None
-    out = (table.id >= 0) & (table.rest[:, 0] == 0)
-    if table.rest.shape[1] in (2, 3):
-        out |= np.isin(table.rest[:, 1], DISTRACTORS)
-    return table.frame[out], table.box[out]

@@ -229,7 +229,7 @@ class Scorer:
         kept = frames[self.people.rows.frame]
         true = self.people if kept.all() else self.people.keep(kept)
         est, plane = tracked_people(tracks), plane_of(self.truth, tracks)
-        if self.truth.unscored is not None:
+        if self.truth.unscored is not None and self.truth.unscored.distractor.any():
             est = without_distractors(self.truth, self.truth.unscored, est)
         nobody = np.full(len(est.rows), -1, np.int64)
         return ComparedSides(self.truth, tracks, frames, self.labelled & frames, true, est, nobody, plane)

@@ -151,15 +151,15 @@ CLASSES = range(1, 14)  # classes of MOTChallenge. A text with another class has
 
 
 def unscored_rows(table: MotTable, people: Bools, name: str, person_class: Classes | None) -> Unscored | None:
-    """Returns the labelled rows beside `people` (N,), sorted by frame; None if no distractor is among them."""
+    """Returns the labelled rows beside `people` (N,), sorted by frame; None without any."""
     found = classes_of(table, person_class is not None)
     usual = not table.rows.classes and table.rest.shape[1] <= LABEL_COLUMNS and person_class in (None, PEDESTRIANS)
-    if found is None or not usual or not np.isin(found, CLASSES).all():
-        return None
-    mot20 = any(each.startswith(MOT20) for each in (name, table.rows.file.resolve().parent.parent.name))
-    distractor = np.isin(found, MOT20_DISTRACTORS if mot20 else DISTRACTORS)
+    distractor = np.zeros_like(people)
+    if found is not None and usual and np.isin(found, CLASSES).all():
+        mot20 = any(each.startswith(MOT20) for each in (name, table.rows.file.resolve().parent.parent.name))
+        distractor = np.isin(found, MOT20_DISTRACTORS if mot20 else DISTRACTORS)
     rows = np.flatnonzero(~people & (table.id >= 0) & ~table.without_box())
-    if not distractor[rows].any():
+    if not len(rows):
         return None
     rows = rows[np.argsort(table.frame[rows], kind="stable")]
     return Unscored(table.frame[rows], table.box[rows], distractor[rows])
