@@ -301,9 +301,3 @@ def weighted_people(pairs: Pairs, size: int) -> WeightedScores:
     pairs.require_unique_ids()
     parts = [scores(pairs, size) for scores in (weighted_hota, weighted_clear, weighted_identity)]
     return lambda weights: {key: value for part in parts for key, value in part(weights).items()}
-
-
-def objective_of(found: Mapping[str, float]) -> float:
-    """Returns the mean of found["HOTA"] and found["group_F1"], or the one that is known, or nan."""
-    known = [v for v in (found["HOTA"], found["group_F1"]) if v == v]
-    return sum(known) / len(known) if known else float("nan")

@@ -55,9 +55,12 @@ def _parts_of(people: PersonRows) -> Callable[[GroupEvent, int, int, int], tuple
 
     def parts_of(event: GroupEvent, reported: int, back: int, ahead: int) -> tuple[list[list[int]], list[list[int]]]:
         def until(frame: int) -> list[list[int]]:
-            return _by_group(event.members, lambda m: group[lookup.last(m, frame, back)])
+            return _by_group(event.members, lambda m: group[lookup.nearest(m, frame, back, 0)])
 
-        before, after = until(reported - 1), _by_group(event.members, lambda m: group[lookup.next(m, reported, ahead)])
+        before, after = (
+            until(reported - 1),
+            _by_group(event.members, lambda m: group[lookup.nearest(m, reported, 0, ahead)]),
+        )
         if sorted(before) == sorted(after):
             before = until(event.start - 1)
         if sorted(before) != sorted(after):
@@ -79,7 +82,7 @@ def _by_group(members: Sequence[int], group: Callable[[int], int]) -> list[list[
 
 
 def _mean_position(event: GroupEvent, lookup: RowLookup, positions: Array) -> tuple[float, float]:
-    rows = [row for m in event.members if (row := lookup.nearest(m, event.start, 0)) >= 0]
+    rows = [row for m in event.members if (row := lookup.nearest(m, event.start, 0, 0)) >= 0]
     if not rows:
         return float("nan"), float("nan")
     x, y = positions[rows].mean(axis=0)
@@ -100,7 +103,7 @@ def tracked_events(
 
     def comparable(event: GroupEvent, reported: int) -> ComparableEvent:
         before, after = parts_of(event, reported, reach, reach)
-        rows = {m: mapped.nearest(m, event.start, reach) for m in event.members}
+        rows = {m: mapped.nearest(m, event.start, reach, reach) for m in event.members}
         known = {m: person[row] for m, row in rows.items() if row >= 0}
         parents, children = (tuple(_true_members(p, known) for p in parts) for parts in (before, after))
         members = _true_members(event.members, known)

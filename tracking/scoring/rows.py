@@ -3,7 +3,7 @@ and id."""
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -66,7 +66,7 @@ def find_rows(rows: FrameRows, wanted: FrameRows) -> Ints:
 
 
 class RowLookup:
-    """Finds the row of one id that is last up to a frame, first from a frame on, or nearest to it.
+    """Finds the row of one id that is nearest to a frame.
 
     State: row, the row indices sorted by id and frame; frame, their frame numbers; span, by id the range in both lists.
     """
@@ -81,22 +81,9 @@ class RowLookup:
         cuts = np.searchsorted(place[order], np.arange(len(ids) + 1)).tolist()
         self.span = dict(zip(ids.tolist(), pairwise(cuts), strict=True))
 
-    def last(self, id: int, frame: int, reach: int) -> int:
-        """Returns the id's row with the latest frame in [frame - reach, frame], -1 if there is none."""
-        low, high = self.span.get(id, NO_ROWS)
-        at = bisect_right(self.frame, frame, low, high) - 1
-        return self.row[at] if at >= low and frame - self.frame[at] <= reach else -1
-
-    def next(self, id: int, frame: int, reach: int) -> int:
-        """Returns the id's row with the earliest frame in [frame, frame + reach], -1 if there is none."""
+    def nearest(self, id: int, frame: int, back: int, ahead: int) -> int:
+        """Returns the id's row nearest to `frame` in [frame - back, frame + ahead], of two the earlier; -1 if none."""
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_left(self.frame, frame, low, high)
-        return self.row[at] if at < high and self.frame[at] - frame <= reach else -1
-
-    def nearest(self, id: int, frame: int, reach: int) -> int:
-        """Returns the id's row nearest to `frame`, at most `reach` away, of two the earlier; -1 if there is none."""
-        low, high = self.span.get(id, NO_ROWS)
-        at = bisect_left(self.frame, frame, low, high)
-        if at > low and (at == high or frame - self.frame[at - 1] <= self.frame[at] - frame):
-            at -= 1
-        return self.row[at] if at < high and abs(self.frame[at] - frame) <= reach else -1
+        near = [k for k in (at - 1, at) if low <= k < high and -back <= self.frame[k] - frame <= ahead]
+        return self.row[min(near, key=lambda k: abs(self.frame[k] - frame))] if near else -1

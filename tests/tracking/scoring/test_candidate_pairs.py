@@ -79,15 +79,15 @@ def test_lookup_is_the_slow_way(seed, reach):
     for lookup, some in ((RowLookup(rows), every), (RowLookup(rows, only), only)):
         for who in (-7, 0, 14, 28, 3, 99):
             for at in (-3, 0, 11, 12, 13, 29, 40):
-                assert lookup.last(who, at, reach) == best(rows, some, who, at - frame, reach)
-                assert lookup.next(who, at, reach) == best(rows, some, who, frame - at, reach)
-                assert lookup.nearest(who, at, reach) == best(rows, some, who, np.abs(frame - at), reach)
+                assert lookup.nearest(who, at, reach, 0) == best(rows, some, who, at - frame, reach)
+                assert lookup.nearest(who, at, 0, reach) == best(rows, some, who, frame - at, reach)
+                assert lookup.nearest(who, at, reach, reach) == best(rows, some, who, np.abs(frame - at), reach)
 
 
 def test_of_two_as_near_the_earlier():
-    assert RowLookup(FrameRows(np.array([3, 7]), np.array([1, 1]))).nearest(1, 5, 2) == 0
+    assert RowLookup(FrameRows(np.array([3, 7]), np.array([1, 1]))).nearest(1, 5, 2, 2) == 0
 
 
 def test_nobody_has_no_rows():
     lookup = RowLookup(FrameRows(np.zeros(0, int), np.zeros(0, int)))
-    assert (lookup.last(1, 5, 9), lookup.next(1, 5, 9), lookup.nearest(1, 5, 9)) == (-1, -1, -1)
+    assert lookup.nearest(1, 5, 9, 9) == -1
