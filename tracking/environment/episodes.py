@@ -38,7 +38,6 @@ class Episode:
         scores: By key of the catalogue, without those that are nan.
         frames: Number of frames played.
         seconds_tracking: Time in the tracker with the checks of what it returns, s; without reading frames.
-        seconds_scoring: Time for groups and scores, s.
         left_out: Why the scene could not be played, as its script did not come true; "" if it was.
     """
 
@@ -48,7 +47,6 @@ class Episode:
     scores: dict[str, float]
     frames: int
     seconds_tracking: float
-    seconds_scoring: float
     left_out: str = ""
 
 
@@ -95,7 +93,7 @@ def play(
 class Rollout:
     """An episode that is played frame by frame; the arguments are those of `play`.
 
-    State: the prepared tracker; tracks, one `Tracks` per frame so far; seconds spent on tracking and scoring.
+    State: the prepared tracker; tracks, one `Tracks` per frame so far; seconds spent on tracking.
     """
 
     tracker: AnyTracker
@@ -116,10 +114,9 @@ class Rollout:
             self.tracker, self.sequence, params=self.config, detections=self.detections, seed=self.tracker_seed
         )
         self.tracks: list[Tracks] = []
-        self.seconds_tracking = self.seconds_scoring = 0.0
         start = time.perf_counter()
         self.prepared.reset(self.tracker_seed)
-        self.seconds_tracking += time.perf_counter() - start
+        self.seconds_tracking = time.perf_counter() - start
         self._frames: Iterator[Frame] | None = None
         self._next: Frame | None = None
 
@@ -160,14 +157,13 @@ class Rollout:
     def episode(self, every_score: bool = False) -> Episode:
         """Returns the result of the frames so far; objective is nan if there is nothing to score."""
         scores = self.scores(every_score)
-        objective, seconds = scores.get("objective", float("nan")), (self.seconds_tracking, self.seconds_scoring)
-        return Episode(self.source.name, self.source.seed, objective, scores, len(self.tracks), *seconds)
+        objective, source = scores.get("objective", float("nan")), self.source
+        return Episode(source.name, source.seed, objective, scores, len(self.tracks), self.seconds_tracking)
 
     def scores(self, every: bool = False) -> dict[str, float]:
         """Returns the scores of the frames so far by key, without nan: objective, HOTA and group_F1, or all."""
         from tracking.scoring.people_comparison import IncomparableError
 
-        start = time.perf_counter()
         px_per_m, pixels = self.prepared.px_per_m(self.tracks), self.prepared.mode == "image"
         try:
             if every:
@@ -179,7 +175,6 @@ class Rollout:
             raise InputError(
                 file=self.source.name, place="similarity", got=str(error), expected=expected, remedy=remedy
             ) from None
-        self.seconds_scoring += time.perf_counter() - start
         return {key: value for key, value in found.items() if value == value}
 
     def _every_score(self, px_per_m: float) -> Mapping[str, float]:

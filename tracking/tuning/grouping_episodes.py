@@ -48,13 +48,10 @@ def play_rule(source: Source, rule: LinkRule, source_cache: SourceCache) -> Epis
         people = with_label_errors(truth, errors, source.seed, repeat)
         px_per_m *= errors.scale ** rng(source.seed, "label", repeat=repeat).uniform(-1, 1)
     tracks = derive(people_as_tracks(people), truth.fps, px_per_m, rule)
-    grouped = time.perf_counter()
+    seconds = time.perf_counter() - start
     found = evaluate(truth, tracks, similarity="image" if tracks and tracks[0].plane == "image" else None)
-    scored = time.perf_counter()
     scores = {key: value for key, value in found.items() if value == value}
-    return Episode(
-        source.name, source.seed, found["objective"], scores, truth.length, grouped - start, scored - grouped
-    )
+    return Episode(source.name, source.seed, found["objective"], scores, truth.length, seconds)
 
 
 def with_label_errors(truth: Truth, errors: LabelErrors, seed: int, repeat: int = 0) -> Truth:

@@ -83,7 +83,13 @@ def playing_workers(workers: int = 1, cluster: str | None = None) -> Iterator[Ru
 
 def play_task(task: EpisodeTask) -> EpisodeOrError:
     """Plays an episode in a worker, which keeps the tracker and its opened sources for later tasks."""
-    return _attempt(task, _tracker(task.tracker, task.code, task.step_timeout), opened_sources())
+    tracker, given = _tracker(task.tracker, task.code, task.step_timeout), (task.source, task.values, task.detections)
+    try:
+        return tracker.play(*given, opened_sources(), task.every_score, task.similarity)
+    except OrderError as error:  # the scene's fault, whatever the parameters
+        return Episode(task.source.name, task.source.seed, float("nan"), {}, 0, 0.0, error.line())
+    except FlockscopeError as error:
+        return error
 
 
 # In a worker: the trackers of its tasks. One with a limit of time has a process.
@@ -105,13 +111,3 @@ def _tracker(name: str | type[Tracker], code: str, step_timeout: float | None) -
 def opened_sources() -> SourceCache:
     """Returns the sequences that this process keeps for later episodes."""
     return SourceCache(CACHE_BYTES)
-
-
-def _attempt(task: EpisodeTask, tracker: TunedTracker, source_cache: SourceCache) -> EpisodeOrError:
-    try:
-        given = (task.source, task.values, task.detections, source_cache, task.every_score, task.similarity)
-        return tracker.play(*given)
-    except OrderError as error:  # the scene's fault, whatever the parameters
-        return Episode(task.source.name, task.source.seed, float("nan"), {}, 0, 0.0, 0.0, error.line())
-    except FlockscopeError as error:
-        return error

@@ -139,19 +139,13 @@ class TuningResult:
         return {name: (old[name], new[name]) for name in new if old[name] != new[name]}
 
     @property
-    def pruned(self) -> int:
-        """Number of trials that were stopped before their last training scene."""
-        return sum(trial.pruned for trial in self.trials)
-
-    @property
-    def episodes(self) -> int:
-        """Number of training episodes that were played, without those of impossible trials."""
-        return sum(trial.episodes for trial in self.trials)
-
-    @property
-    def impossible(self) -> int:
-        """Number of trials with impossible parameters: the tracker refused them or failed with them."""
-        return sum(bool(trial.error) for trial in self.trials)
+    def counts(self) -> dict[str, int]:
+        """Numbers of trials, of training episodes that were played in them, of trials that were stopped early
+        ("pruned"), and of "impossible" ones, whose parameters the tracker refused or failed with."""
+        return {
+            "trials": len(self.trials), "episodes": sum(t.episodes for t in self.trials),
+            "pruned": sum(t.pruned for t in self.trials), "impossible": sum(bool(t.error) for t in self.trials),
+        }  # fmt: skip
 
     def __str__(self) -> str:
         """Returns the lines of `lines()` (settings, counts, values, comparisons, notes) as one text."""
@@ -163,11 +157,11 @@ class TuningResult:
         names = ", ".join(goal.key for goal in plan.goals)
         chosen_similarity = plan.options.similarity
         compared = "" if chosen_similarity is None else f", people compared by {chosen_similarity}"
-        every = len(self.trials) * len(plan.training)
-        counts = f"{self.pruned} given up early, {self.impossible} impossible"
+        counts, every = self.counts, len(self.trials) * len(plan.training)
         lines = [
             f"{plan.tracker_name} tuned on {plan.suite_name}, detections {plan.detections}, for {names}{compared}",
-            f"{counted(len(self.trials), 'trial')}, {self.episodes} of {every} episodes played, {counts}; "
+            f"{counted(counts['trials'], 'trial')}, {counts['episodes']} of {every} episodes played, "
+            f"{counts['pruned']} given up early, {counts['impossible']} impossible; "
             f"training seeds {seeds['train']}, validation {seeds['val']}, test {seeds['test']}",
         ]
         if plan.scene_settings:
@@ -202,10 +196,7 @@ class TuningResult:
         }  # fmt: skip
         return {
             "settings": plan.identity() | settings,
-            "counts": {
-                "trials": len(self.trials), "episodes": self.episodes, "pruned": self.pruned,
-                "impossible": self.impossible,
-            },
+            "counts": self.counts,
             "params": self.config.as_dict(),
             "changed": {name: {"default": a, "tuned": b} for name, (a, b) in self.changed.items()},
             "taken_back": list(self.taken_back),

@@ -18,7 +18,7 @@ from tracking.tuning.search_plan import SearchPlan
 
 
 def episodes(values, key: str = "HOTA") -> list[Episode]:
-    return [Episode("x", k, math.nan, {key: v} if v == v else {}, 10, 1.0, 0.0) for k, v in enumerate(values)]
+    return [Episode("x", k, math.nan, {key: v} if v == v else {}, 10, 1.0) for k, v in enumerate(values)]
 
 
 def test_differences_are_paired():
@@ -55,7 +55,7 @@ class Game:
                 yield WorkError(got="it", expected="another", remedy="no")
                 return
             value = sum(self.worth.get((name, v), 0.0) for name, v in values.items())
-            yield Episode(source.name, source.seed, value, {"HOTA": value + 0.01 * (source.seed % 3)}, 10, 1.0, 0.0)
+            yield Episode(source.name, source.seed, value, {"HOTA": value + 0.01 * (source.seed % 3)}, 10, 1.0)
 
 
 @pytest.fixture
@@ -98,6 +98,6 @@ def test_the_same_command_again_plays_nothing(tmp_path, monkeypatch):
     def never(*_):
         raise AssertionError("an episode was played")
 
-    monkeypatch.setattr("tracking.tuning.parallel_episodes._attempt", never)
+    monkeypatch.setattr("tracking.tuning.parallel_episodes.play_task", never)
     assert str(tune(**given, out=tmp_path / "toy.toml")) == str(first)
     assert (tmp_path / "toy.json").read_bytes() == content

@@ -25,14 +25,14 @@ from pathlib import Path
 import tracking.tuning.parallel_episodes as work
 from tests.tuning_toys import toy_plan, tune_arguments
 from tracking.tuning.search import tune
-played, attempt = 0, work._attempt
+played, attempt = 0, work.play_task
 def counted(*given):
     global played
     played += 1
     if played == int(sys.argv[2]):
         os.kill(os.getpid(), signal.SIGKILL)
     return attempt(*given)
-work._attempt = counted
+work.play_task = counted
 folder = Path(sys.argv[1])
 tune(**tune_arguments(folder), out=folder / sys.argv[3], storage=folder / "study.journal", study="toy")
 """
@@ -155,7 +155,7 @@ def test_several_goals_give_a_front(tmp_path):
     given = tune_arguments(tmp_path, objective=("DetRe", "DetPr"), trials=8)
     found = tune(**given, out=tmp_path / "toy.toml")
     assert found.front
-    assert found.pruned == 0
+    assert found.counts["pruned"] == 0
     assert found.config == found.front[0].config
     assert ToyConfig.from_toml(tmp_path / "toy.front-1.toml").as_dict() == found.config.as_dict()
     for k, one in enumerate(found.front, 1):

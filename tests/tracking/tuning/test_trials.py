@@ -29,7 +29,7 @@ class Game:
                 raise WorkError(got="a worker that died", expected="workers that finish", remedy="run again")
             self.played += 1
             value = 0.5 + 0.04 * (source.seed % 10) - 0.02 * values["skip"]
-            yield Episode(source.name, source.seed, value, {"HOTA": value, "GOSPA": 1 - value}, 10, 1.0, 0.0)
+            yield Episode(source.name, source.seed, value, {"HOTA": value, "GOSPA": 1 - value}, 10, 1.0)
 
 
 def played(tmp_path, game=None, **more):
