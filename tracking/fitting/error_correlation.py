@@ -97,6 +97,8 @@ def _tetrachoric(a: Array, b: Array, both: float) -> float:
 
 def fit_memory(found: Sequence[Array]) -> tuple[Memory, ...]:
     """Returns at most two parts whose sum of share · exp(-lag / time) is nearest to the correlations; () if none is."""
+    from scipy.optimize import nnls
+
     lag, rho, pairs = np.concatenate([np.zeros((0, 3)), *found]).T
     if not len(lag):
         return ()
@@ -105,25 +107,11 @@ def fit_memory(found: Sequence[Array]) -> tuple[Memory, ...]:
     tried = [float(t) for t in TIMES if t <= 2 * lag.max()]
     for times in [(t,) for t in tried] + list(combinations(tried, 2)):
         curves = np.exp(-lag[:, None] / np.array(times))
-        share = _shares(curves * weight[:, None], rho * weight)
+        share = nnls(curves * weight[:, None], rho * weight)[0]
+        share /= max(1.0, share.sum())
         error = float(((curves @ share - rho) ** 2 * pairs).sum())
         if error < best[0] * (1.0 - 1e-9):
             best = error, share, times
     parts = [(round(float(s), 3), t) for s, t in zip(best[1], best[2], strict=True) if s >= LEAST]
     scale = max(1.0, sum(s for s, _ in parts))
     return tuple(Memory(share=s / scale, time=float(f"{t:.3g}")) for s, t in parts)
-
-
-def _shares(curves: Array, target: Array) -> Array:
-    """Returns the least-squares shares of one or two curves (K, 1 or 2), at least 0 and at most 1 in total."""
-    from scipy.optimize import nnls
-
-    share = nnls(curves, target)[0]
-    if share.sum() <= 1.0:
-        return np.asarray(share)
-    if len(share) == 1:
-        return np.ones(1)
-    # the best shares exceed 1: the best of those on the line of sum 1
-    difference = curves[:, 0] - curves[:, 1]
-    first = float(np.clip(difference @ (target - curves[:, 1]) / (difference @ difference), 0.0, 1.0))
-    return np.array([first, 1.0 - first])
