@@ -8,6 +8,7 @@ An alarm that mostly lies on people belongs to one person; all others stand or d
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,7 +25,6 @@ AGAIN = 1.5  # s: longest lag used for the mean life
 LEAST_AGAIN = 0.05  # with smaller shares of alarms detected again, every alarm lasts one frame
 LONGEST = 60.0  # s: greatest mean life
 ON = 0.5  # an alarm belongs to a person if people cover this share of its box, in the median over its detections
-NEARLY = 0.6  # share of the greatest covered area: people with less are no candidates for the alarm's person
 FEW = 5  # with fewer alarm tracks of a kind, nothing is fitted for this kind
 PLACES = 32  # greatest number of foot points in `at`
 
@@ -88,22 +88,13 @@ def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
 def _person_of_alarm(m: MatchedRecording, rows: list[int]) -> int:
     """Returns the id of the labelled person that an alarm belongs to, -1 none."""
     assert m.truth.box is not None
-    share: dict[int, float] = {}
-    offset: dict[int, list[Array]] = {}
-    covered = []
+    share, covered = Counter[int](), []
     for row in rows:
         r = m.truth.rows(int(m.frame[row]))
-        box, people = m.box[row], m.truth.box[r]
-        on = box_intersections(box, people) / (box[2] * box[3])
+        on = box_intersections(m.box[row], m.truth.box[r]) / (m.box[row, 2] * m.box[row, 3])
         covered.append(float(on.sum()))
-        away = (box[:2] + box[2:] * [0.5, 1.0] - people[:, :2] - people[:, 2:] * [0.5, 1.0]) / people[:, 3:]
-        for id, part, distance in zip(m.truth.id[r][on > 0].tolist(), on[on > 0].tolist(), away[on > 0], strict=True):
-            share[id] = share.get(id, 0.0) + part
-            offset.setdefault(id, []).append(distance)
-    if not share or np.median(covered) < ON:
-        return -1
-    candidates = [id for id, s in share.items() if s >= NEARLY * max(share.values())]
-    return min(candidates, key=lambda id: (float(np.std(offset[id], axis=0).sum()), -share[id]))
+        share.update(dict(zip(m.truth.id[r].tolist(), on.tolist(), strict=True)))
+    return share.most_common(1)[0][0] if np.median(covered) >= ON else -1
 
 
 def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
