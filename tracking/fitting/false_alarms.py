@@ -114,11 +114,7 @@ def _life_and_seen(recordings: Sequence[MatchedRecording], tracks: Sequence[Alar
         return round(float(-lag[0] / np.log(min(share[0], 0.98))), 3), 1.0
     # share = seen · exp(-lag / life)
     slope, level = np.polyfit(lag, np.log(share), 1, w=np.sqrt(weight))
-    if slope > -1.0 / LONGEST:
-        slope, level = -1.0 / LONGEST, float(np.average(np.log(share), weights=weight))
-    if level > 0.0:  # seen would exceed 1: fit a line through the origin
-        slope, level = float(weight * lag @ np.log(share) / (weight * lag @ lag)), 0.0
-    return round(-1.0 / min(float(slope), -1.0 / LONGEST), 3), round(float(np.exp(max(level, np.log(0.2)))), 4)
+    return round(-1.0 / min(float(slope), -1.0 / LONGEST), 3), round(float(np.clip(np.exp(level), 0.2, 1.0)), 4)
 
 
 def _robust_spread(values: Sequence[float], tracks: Sequence[AlarmTrack]) -> tuple[float, float]:
