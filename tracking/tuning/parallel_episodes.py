@@ -15,9 +15,10 @@ from typing import Any
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
 from sim.types import DetectionMode, Tracker
 from sim.workers.pool import RunItems
-from tracking.environment.episodes import Episode, Source, SourceCache
+from tracking.environment.episodes import Episode, Source, SourceCache, play
+from tracking.grouping.link_rule import LinkRule
 from tracking.scoring.people_comparison import Similarity
-from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
+from tracking.tuning.tuned_tracker import RULE, TunedTracker, tuned_tracker
 
 CACHE_BYTES = 512 * 2**20  # Bytes of sequences that each process keeps for later episodes.
 
@@ -57,13 +58,13 @@ def episode_player(
         raise InputError(place="--workers", got="a class", expected="a name that workers can look up", remedy=remedy)
     with playing_workers(workers, cluster) as run:
 
-        def play(
+        def play_all(
             sources: Sequence[Source], values: dict[str, Any], every_score: bool
         ) -> Generator[EpisodeOrError, None, None]:
             given = (values, detections, every_score, tracker.code, tracker.step_timeout, similarity)
             yield from results_in_order(run, play_task, [EpisodeTask(tracker.tracker, s, *given) for s in sources])
 
-        yield play
+        yield play_all
 
 
 @contextmanager
@@ -82,12 +83,22 @@ def playing_workers(workers: int = 1, cluster: str | None = None) -> Iterator[Ru
 
 
 def play_task(task: EpisodeTask) -> EpisodeOrError:
-    """Plays an episode in a worker, which keeps the tracker and its opened sources for later tasks."""
-    tracker, given = _tracker(task.tracker, task.code, task.step_timeout), (task.source, task.values, task.detections)
+    """Plays an episode in a worker, which keeps the tracker and its opened sources for later tasks.
+
+    The seed of the tracker is that of the source.
+    """
+    tracker, source, cache = _tracker(task.tracker, task.code, task.step_timeout), task.source, opened_sources()
     try:
-        return tracker.play(*given, opened_sources(), task.every_score, task.similarity)
+        if tracker.name == RULE:
+            from tracking.tuning.grouping_episodes import play_rule
+
+            return play_rule(source, LinkRule.from_dict(task.values), cache)
+        return play(
+            tracker.limited or tracker.tracker, source, task.values or None, detections=task.detections,
+            tracker_seed=source.seed, cache=cache, every_score=task.every_score, similarity=task.similarity,
+        )  # fmt: skip
     except OrderError as error:  # the scene's fault, whatever the parameters
-        return Episode(task.source.name, task.source.seed, float("nan"), {}, 0, 0.0, error.line())
+        return Episode(source.name, source.seed, float("nan"), {}, 0, 0.0, error.line())
     except FlockscopeError as error:
         return error
 

@@ -8,7 +8,7 @@ from typing import Any, cast, get_args
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
 from tracking.config import Config
-from tracking.environment.episodes import Episode, Source, SourceCache, play, streams_for
+from tracking.environment.episodes import Source, streams_for
 from tracking.grouping.link_rule import LinkRule
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracker_registry import checked, code_hash, config_class, find, located
@@ -61,25 +61,6 @@ class TunedTracker:
             raise InputError(place="--similarity", got=similarity, expected=expected, remedy="correct or remove it")
         if not rule:
             choose_mode(self.needs, source.open(streams_for(self.tracker, detections)), detections)
-
-    def play(
-        self,
-        source: Source,
-        values: dict[str, Any],
-        detections: DetectionMode,
-        cache: SourceCache,
-        every_score: bool,
-        similarity: Similarity | None = None,
-    ) -> Episode:
-        """Returns one whole episode with these parameters; the tracker's seed is that of the source."""
-        if self.name == RULE:
-            from tracking.tuning.grouping_episodes import play_rule
-
-            return play_rule(source, LinkRule.from_dict(values), cache)
-        return play(
-            self.limited or self.tracker, source, values or None, detections=detections, tracker_seed=source.seed,
-            cache=cache, every_score=every_score, similarity=similarity,
-        )  # fmt: skip
 
 
 def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = None) -> TunedTracker:
