@@ -107,10 +107,8 @@ class TuningResult:
         trials: All finished ones in the order of the search, pruned and impossible ones included.
         importance: Share (0 to 1) of each parameter, by name, in the first goal's training values.
         comparisons: Of winner and defaults on the test scenes; () if the defaults won.
-        taken_back: Names of parameters that the best trial changed and the winner does not.
         validation: Two tuples, of the defaults and of the winner: one value for each goal on the validation scenes.
         notes: Remarks for the reader.
-        study: Name of the study.
         left_out: A line for each scene whose script did not come true.
     """
 
@@ -121,10 +119,8 @@ class TuningResult:
     trials: tuple[TrialRecord, ...] = field(repr=False)
     importance: Mapping[str, float] = field(repr=False)
     comparisons: tuple[Comparison, ...] = ()
-    taken_back: tuple[str, ...] = ()
     validation: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     notes: tuple[str, ...] = ()
-    study: str = ""
     left_out: tuple[str, ...] = ()
 
     @property
@@ -199,7 +195,6 @@ class TuningResult:
             "counts": self.counts,
             "params": self.config.as_dict(),
             "changed": {name: {"default": a, "tuned": b} for name, (a, b) in self.changed.items()},
-            "taken_back": list(self.taken_back),
             "validation": {
                 goal.key: {"default": a, "tuned": b}
                 for goal, a, b in zip(plan.goals, *self.validation, strict=True)

@@ -153,7 +153,7 @@ class HeldOutEvaluator:
 JOURNAL = ".journal"  # Suffix of the journal beside `--out`.
 
 # What every .json file of a search has.
-RESULT_MARKS: Marks = {"settings": dict, "counts": dict, "taken_back": list}
+RESULT_MARKS: Marks = {"settings": dict, "counts": dict, "left_out": list}
 
 
 @documented(TuneOptions, positional=3)
@@ -231,12 +231,9 @@ def _evaluated(plan: SearchPlan, study: SearchStudy, evaluator: HeldOutEvaluator
         config, value = evaluator.simplified(config, values[0], sorted(importance, key=lambda name: importance[name]))
         values = (value,)
     comparisons, notes = evaluator.compared(config) if config != plan.base else ([], _why_defaults(candidates, goal))
-    tried, new = best.config.as_dict(), config.as_dict()
-    taken_back = [name for name, value in plan.base.as_dict().items() if tried[name] != value == new[name]]
     return TuningResult(
         plan, config, front, tuple(candidates), tuple(study.records()), importance, tuple(comparisons),
-        tuple(taken_back), (default.validation, values), tuple(notes), study.optuna.study_name,
-        tuple(evaluator.left_out.values()),
+        (default.validation, values), tuple(notes), tuple(evaluator.left_out.values()),
     )  # fmt: skip
 
 

@@ -177,7 +177,7 @@ def test_vectorised():
     envs = gymnasium.make_vec(ID, 2, vectorization_mode="async", **made)
     try:
         seen, _ = envs.reset(seed=[1, 2])
-        assert seen.shape == (2, 11)
+        assert seen.shape == (2, len(NAMES))
         zero = np.zeros(envs.action_space.shape, np.float32)
         rewards = np.array([envs.step(zero)[1] for _ in range(2)])
     finally:
