@@ -50,11 +50,6 @@ class MatchedRecording:
         """Which detections are false alarms, belonging to no labelled row, (M,) bool."""
         return np.asarray(self.owner < 0)
 
-    def rows(self, index: int) -> slice:
-        """Returns the slice of the detections of frame number `index` (from 1); empty if the frame has none."""
-        low, high = np.searchsorted(self.frame, (index, index + 1))
-        return slice(int(low), int(high))
-
 
 def match_sequence(sequence: Sequence) -> MatchedRecording:
     """Returns the labels and detections of a recording, matched one to one in each frame.

@@ -117,21 +117,20 @@ def _table(columns: Mapping[str, ArrayLike], side: str) -> Table:
 
 def _column(given: ArrayLike, name: str, side: str) -> Any:
     values, (shape, low, high) = np.asarray(given), COLUMNS[name]
-    values = values if values.size else values.reshape(0, *shape).astype(float)
-    whole = "" if shape else "whole "
+    values = values if values.size else np.zeros((0, *shape))
+    expected = f"{'' if shape else 'whole '}numbers from {low:g} to {high:,}"
+    expected += ", boxes with width and height above 0" if name == "box" else ""
     if values.ndim == 0 or values.shape[1:] != shape:
         got, expected = f"{name} of shape {values.shape}", str(("rows", *shape)).replace("'", "")
     elif values.dtype.kind not in "iuf":
-        got, remedy = f"{values.ravel().tolist()[0]!r} in {name}", "" if shape else ": number them, as by np.unique"
-        expected = f"{whole}numbers{remedy}"
+        got = f"{values.ravel().tolist()[0]!r} in {name}"
     else:
         good = (values >= low) & (values <= high) & (shape != () or values == np.floor(values))
         if name == "box":
             good[:, 2:] &= values[:, 2:] > 0
         if good.all():
             return values.astype(float if shape else np.int64)
-        area = ", boxes with width and height above 0" if name == "box" else ""
-        got, expected = f"{values[~good][0]} in {name}", f"{whole}numbers from {low:g} to {high:,}{area}"
+        got = f"{values[~good][0]} in {name}"
     raise ValueError(f"{side}: got {got}, expected {expected}")
 
 
