@@ -94,11 +94,6 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.source, self.base = self.sources[0], self.defaults
         self._clear_episode()
 
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """The name of the parameter that each of the P numbers of an action sets, in order."""
-        return tuple(p.name for p in self.space)
-
     def _clear_episode(self) -> None:
         self.rollout: Rollout | None = None
         self._observer: Observer | None = None
@@ -239,7 +234,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
             "frame": 0 if self.rollout is None else len(self.rollout.tracks),
             "objective": self.score,
             "scores": dict(self.scores),
-            "names": self.parameter_names,
+            "names": tuple(p.name for p in self.space),  # of the parameters that the numbers of an action set
             "params": self.config.as_dict(),
             "refused": self.refused,
         }
