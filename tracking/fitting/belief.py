@@ -151,16 +151,26 @@ BINS = 15  # Of equal width, between the probabilities 0 and 1.
 
 def belief_scores(sample: PairSample, log_odds: Array) -> dict[str, float]:
     """Returns pairs, log loss, calibration error and F1 of beliefs (R,) of a sample's rows, by name."""
-    true, weight, told = sample.together, sample.weight, log_odds > 0
-    probability = 1 / (1 + np.exp(-log_odds))
-    bin = np.minimum((probability * BINS).astype(np.int64), BINS - 1)
-    count = int(true.sum() + told.sum())
+    true, weight = sample.together, sample.weight
+    loss = np.logaddexp(0.0, log_odds) - log_odds * true
+    bins = reliability(log_odds, true, weight)
+    hits, count = int((true & (log_odds > 0)).sum()), int(true.sum() + (log_odds > 0).sum())
     return {
         "pairs": float(sample.pairs),
-        "log loss": float(weight @ (np.logaddexp(0.0, log_odds) - log_odds * true)),
-        "calibration error": float(np.abs(np.bincount(bin, weight * (probability - true))).sum() / weight.sum()),
-        "F1": 2 * int((true & told).sum()) / count if count else float("nan"),
+        "log loss": float(weight @ loss),
+        "calibration error": float(np.abs(bins[:, 0] * (bins[:, 1] - bins[:, 2]))[bins[:, 0] > 0].sum()),
+        "F1": 2 * hits / count if count else float("nan"),
     }
+
+
+def reliability(log_odds: Array, true: Bools, weight: Array) -> Array:
+    """Returns share of the weight, mean probability and share of mates of each bin, (15, 3); nan in an empty one."""
+    probability = 1 / (1 + np.exp(-log_odds))
+    place = np.minimum((probability * BINS).astype(np.int64), BINS - 1)
+    total = np.bincount(place, weight, BINS)
+    means = [np.bincount(place, weight * x, BINS) for x in (probability, true)]
+    with np.errstate(invalid="ignore"):
+        return np.column_stack([total / weight.sum(), *(m / total for m in means)])
 
 
 @njit(cache=True)
