@@ -22,7 +22,7 @@ from sim.io.files.atomic import lock_folder, new_file, remove_partials, write_fi
 from sim.io.files.own_files import Marks, refuse_foreign_file
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
-from sim.io.store.seal import MANIFEST, read_whole_manifest
+from sim.io.store.seal import MANIFEST, read_manifest
 
 BLOCK = 512  # bytes: a tar holds whole blocks
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
@@ -83,7 +83,7 @@ def _shards(source: Path, size: int) -> list[list[Packed]]:
     shards: list[list[Packed]] = []
     full = size
     for folder in folders:
-        manifest = read_whole_manifest(folder)  # not kept: those of a large dataset would fill the memory
+        manifest = read_manifest(folder)  # not kept: those of a large dataset would fill the memory
         bytes_of = {name: facts["bytes"] for name, facts in manifest["files"].items()}
         bytes_of[MANIFEST] = (folder / MANIFEST).stat().st_size
         more = 0
@@ -149,7 +149,7 @@ def _write_shard(root: Path, facts: dict[str, Any], some: list[Packed]) -> dict[
 
 def _members(folder: Path) -> Iterator[tuple[str, bytes]]:
     """Yields name and content of each file of a sequence as it stands in the tar, the manifest first."""
-    stored = StoredPictures(folder, read_whole_manifest(folder))
+    stored = StoredPictures(folder, read_manifest(folder))
     yield f"{_key(folder)}.{MANIFEST}", (folder / MANIFEST).read_bytes()
     for name in stored.manifest["files"]:
         yield f"{_key(folder)}.{name.replace('/', '.')}", stored.body(name)

@@ -170,10 +170,10 @@ def wkt(hull: Array, digits: int) -> str:
 
 
 def parse_wkt(text: str) -> list[list[float]]:
-    """Returns the vertices [x, y] of a WKT POLYGON of one ring; raises ValueError for other texts."""
-    body = re.fullmatch(r"\s*POLYGON\s*(?:EMPTY|\(\(([^()]*)\)\))\s*", text)
-    points = [point.split() for point in body[1].split(",")] if body and body[1] is not None else []
-    if body is None or not all(len(xy) == 2 and all(map(is_number_text, xy)) for xy in points):
+    """Returns the vertices [x, y] of a WKT POLYGON of one ring, perhaps empty; raises ValueError for other texts."""
+    body = re.fullmatch(r"\s*POLYGON\s*(?:EMPTY|\(\s*\(([^()]*)\)\s*\))\s*", text)
+    points = [point.split() for point in (body[1] or "").split(",") if point.strip()] if body else [[]]
+    if not all(len(xy) == 2 and all(map(is_number_text, xy)) for xy in points):
         raise ValueError("POLYGON ((x y, …)), pairs of numbers")
     ring = [[read_number(v) for v in xy] for xy in points]
     return ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
