@@ -1,4 +1,4 @@
-"""Writes a dataset or recording as COCO JSON: one file per split, with all sequences that have labelled boxes.
+"""Writes a dataset or recording as COCO JSON: one file with all sequences that have labelled boxes.
 
 Each frame is an image and each sequence a video. Each person in the picture is an annotation: box (left, top, width,
 height in px, unclipped), person id, group id, visibility, and a segmentation. That is the mask of the visible pixels
@@ -19,7 +19,7 @@ from scenarios.errors import InputError
 from sim import hashing
 from sim.dataset.splits import split_of
 from sim.io.files.atomic import write_file
-from sim.io.files.own_files import GENERATOR, output_paths, refuse_foreign_file
+from sim.io.files.own_files import GENERATOR, output_paths
 from sim.io.files.tables import json_text
 from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
@@ -28,29 +28,26 @@ from sim.streams import file_name
 from sim.types import Array, Ints, Sequence
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
-# names of folders that divide recordings into splits
-SPLITS = ("train", "training", "val", "valid", "validation", "test", "testing", "fit", "demo")
 
 
-def coco(source: str | Path, out: str | Path, *, person_class: int | str | None = None) -> list[Path]:
-    """Writes the sequences of a source that have labelled boxes as COCO files.
+def coco(source: str | Path, out: str | Path, *, person_class: int | str | None = None) -> Path:
+    """Writes the sequences of a source that have labelled boxes as a COCO file.
 
     Each frame is an image, each sequence a video, both numbered from 1. Annotations have bbox [left, top, width,
     height] px (amodal, unclipped), segmentation, area, track_id (the person's id), group_id (-1 for alone) and
     visibility.
 
     Args:
-        source: A dataset or recording.
-        out: The JSON file, replaced if it exists. If there are several splits (by seed, or by the recordings' folders),
-            each has a file of its own: `coco-train.json`, `coco-val.json` for `coco.json`.
+        source: A dataset of one split, or recordings.
+        out: The JSON file, replaced if it exists.
         person_class: Classes of people, as `open_source` takes them.
 
     Returns:
-        The paths of the files. The same dataset gives the same bytes.
+        The path of the file. The same dataset gives the same bytes.
 
     Raises:
-        InputError: No sequence has labelled boxes, two have one name, an argument is wrong, or a split's file is of
-            another program.
+        InputError: No sequence has labelled boxes, two have one name, there are several splits, or an argument is
+            wrong.
     """
     source, out = Path(source), Path(out)
     every = open_source(source, person_class=person_class)
@@ -58,26 +55,14 @@ def coco(source: str | Path, out: str | Path, *, person_class: int | str | None 
     if not sequences:
         expected, remedy = "a dataset with boxes", "give a generated dataset"
         raise InputError(file=source, got="no labelled boxes", expected=expected, remedy=remedy)
-    root = source if source.is_dir() else source.parent
-    splits: dict[str, list[Sequence]] = {}
-    for sequence in sequences:
-        splits.setdefault(_split(sequence, root), []).append(sequence)
-    paths = [out if len(splits) == 1 else out.with_name(f"{out.stem}-{split}{out.suffix}") for split in splits]
-    for path, some in zip(paths, splits.values(), strict=True):
-        output_paths("", [s.name for s in some], source=source)
-        if path != out:
-            refuse_foreign_file(path)
-    for path, some in zip(paths, splits.values(), strict=True):
-        write_file(path, _document(some, root, path).encode())
-    return paths
-
-
-def _split(sequence: Sequence, root: Path) -> str:
-    if sequence.source.get("kind") == "generated":
-        seed = sequence.source["seed"]
-        return split_of(range(seed, seed + 1))
-    inside = Path(os.path.relpath(sequence.source.get("path", root), root)).parts
-    return next((part.lower() for part in reversed(inside) if part.lower() in SPLITS), "other")
+    seeds = [s.source["seed"] for s in sequences if s.source.get("kind") == "generated"]
+    splits = sorted({split_of(range(seed, seed + 1)) for seed in seeds})
+    if len(splits) > 1:
+        got, remedy = f"the splits {', '.join(splits)}", f"export each by itself, as {source / 'flockscope-train'}"
+        raise InputError(file=source, got=got, expected="one split in a file", remedy=remedy)
+    output_paths("", [s.name for s in sequences], source=source)
+    write_file(out, _document(sequences, source if source.is_dir() else source.parent, out).encode())
+    return out
 
 
 def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
