@@ -191,9 +191,6 @@ def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
             got, expected = f"0 in all {len(keep)} rows, which leaves nobody", "another flag than 0 for people"
             remedy = "write 1 in column 7 of rows that count"
             raise InputError(file=file, place="column 7", got=got, expected=expected, remedy=remedy)
-    elif (flag == 0).all() and len(keep):
-        text = f"{file}: column 7 is 0 in all {len(keep)} rows; it is taken as a confidence, and all rows count"
-        warnings.warn(text, stacklevel=2)
     require_classes(table, person_class)
     return of_class(table, keep, person_class)
 

@@ -67,7 +67,7 @@ def read_near(path: Path) -> Near:
     header = "".join(text.text[:1])
     if header != NEAR_COLUMNS:
         raise _bad(path, 1, repr(header), NEAR_COLUMNS)
-    rows = text.numbers((4, 4), first=1, layout=NEAR_COLUMNS)
+    rows = text.numbers((4,), first=1, layout=NEAR_COLUMNS)
     start, end, a, b = (rows.integers(k, name) for k, name in enumerate(NEAR_COLUMNS.split(",")))
     wrong = (start < 1) | (end < start) | (end > FRAMES) | (np.minimum(a, b) < 0)
     expected = f"frames from 1 to {FRAMES}, start not after end, and two ids from 0 on"
@@ -147,7 +147,7 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
     """Returns the groups of each frame stored in a groups.parquet; None where they are unknown."""
     facts = table.facts_as(_GroupFacts)
     first, count = facts.first, facts.frames
-    axes = AXES if table.has("z") else AXES[:2]
+    axes = AXES if "z" in table.columns else AXES[:2]
     id, size = table.ints("group"), table.floats("size")
     pos, vel = table.floats(*axes), table.floats(*(f"v{a}" for a in axes))
     extent = table.floats(*EXTENT).reshape(-1, 2, 2)

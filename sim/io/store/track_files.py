@@ -163,7 +163,7 @@ def read_track_table(folder: Path) -> list[Tracks]:
     rows = RunRows(
         f.plane, f.unit, frame, table.ints("id"), table.ints("group"), values[:, :d], values[:, d:], cov,
         table.floats(*BOX), np.isin(frame, list(f.boxless)), table.floats("score"),
-        table.floats("seen") > 0 if table.has("seen") else np.ones(len(frame), bool),
+        table.floats("seen") > 0 if "seen" in table.columns else np.ones(len(frame), bool),
     )  # fmt: skip
     rows.reject_faults(table.file, tables.REDO)
     groups, found = _groups(folder / "groups.parquet", f.first, f.frames), []
