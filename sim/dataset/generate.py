@@ -81,7 +81,9 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
         raise error.replaced(remedy="delete that folder, or choose another --out") from None
     scenario = dump(job.entry.scenario)
     wanted = {**identity(scenario, job.seed, job.entry.repeat, job.streams, job.images), "stride": job.stride}
-    other = [key for key in wanted if manifest.get(key, 1 if key == "stride" else None) != wanted[key]]
+    other = [
+        key.removesuffix("_hash") for key in wanted if manifest.get(key, 1 if key == "stride" else None) != wanted[key]
+    ]
     if other:
         got = f"a sequence of another {' and '.join(other)}"
         expected = "the same scenario, version, streams and images, or an empty place"

@@ -80,9 +80,8 @@ def size_of(text: str) -> int:
     found = re.fullmatch(r"([0-9]{1,12}(?:\.[0-9]{1,6})?)\s*(?:([kMG])?B)?", text.strip())
     size = 0 if found is None else round(float(found[1]) * UNITS[found[2] or ""])
     if size < 1:
-        raise InputError(
-            place="--shard-size", got=repr(text), expected="bytes, kB, MB or GB above 0", remedy="write 500MB"
-        )
+        expected = "bytes, kB, MB or GB above 0"
+        raise InputError(place="--shard-size", got=repr(text), expected=expected, remedy="write 500MB")
     return size
 
 

@@ -75,9 +75,8 @@ def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
     try:
         text = read_regular(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(
-            file=path, place=f"byte {error.start}", got="no UTF-8 text", expected="a text file", remedy="check the path"
-        ) from None
+        place, remedy = f"byte {error.start}", "check the path"
+        raise InputError(file=path, place=place, got="no UTF-8 text", expected="a text file", remedy=remedy) from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 

@@ -166,9 +166,5 @@ def scaled_to_image(
         got, expected = "a calibration for {}×{} px".format(*camera.image), "one for {}×{} px, or of that shape"
         raise _wrong(path, "--camera", got, expected.format(*image), "give this recording's calibration")
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
-    return camera.replace(
-        image=image,
-        focal_px=(fx * x, fy * y),
-        centre_px=(cx * x, cy * y),
-        px_per_m=float(camera.px_per_m * np.sqrt(x * y)),
-    )
+    scale = float(camera.px_per_m * np.sqrt(x * y))
+    return camera.replace(image=image, focal_px=(fx * x, fy * y), centre_px=(cx * x, cy * y), px_per_m=scale)

@@ -201,8 +201,7 @@ def _in_order(column: dict[str, Column], units: dict[str, str]) -> list[Column] 
         "id": np.full_like(frame, -1.0),
         "class": np.full_like(frame, -1.0),
         "score": np.ones_like(frame),
-        **column,
-    }
+    } | column
     ground = [column[axis] * UNITS.get(unit, 1.0) for axis, unit in units.items()]
     if have >= {"id", "x", "y"} and not have & {"width", "height", "left", "cx"}:
         return [frame, column["id"], *ground]

@@ -169,12 +169,11 @@ def read_track_table(folder: Path) -> list[Tracks]:
     groups, found = _groups(folder / "groups.parquet", f.first, f.frames), []
     for index, (a, b) in enumerate(pairwise(table.cuts(f.first, f.frames).tolist()), f.first):
         r, box = slice(a, b), None if index in f.boxless else rows.box[a:b]
-        found.append(
-            Tracks(
-                index, (index - 1) / f.fps, f.plane, f.unit, rows.id[r], rows.group[r], rows.pos[r], rows.vel[r],
-                rows.cov[r], box, rows.score[r], groups[index - f.first], derived=f.derived, seen=rows.seen[r],
-            )
+        made = Tracks(
+            index, (index - 1) / f.fps, f.plane, f.unit, rows.id[r], rows.group[r], rows.pos[r], rows.vel[r],
+            rows.cov[r], box, rows.score[r], groups[index - f.first], derived=f.derived, seen=rows.seen[r],
         )  # fmt: skip
+        found.append(made)
     return found
 
 
