@@ -51,8 +51,8 @@ class NumericTable:
     def integers(self, column: int, name: str) -> Ints:
         """Returns column number `column` (from 0) as integers (N,)."""
         v = self.values[:, column]
-        self.reject(v != np.round(v), f"a whole number as {name}", f"correct the {name}")
-        self.reject(np.abs(v) > LARGEST, f"a whole number within {LARGEST} as {name}", f"correct the {name}")
+        wrong = (v != np.round(v)) | (np.abs(v) > LARGEST)
+        self.reject(wrong, f"a whole number within {LARGEST} as {name}", f"correct the {name}")
         return v.astype(np.int64)
 
     def require_bounds(self, frame: Ints, length: int | None = None) -> None:

@@ -138,7 +138,8 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         return pictures.read(wanted, seen if images else pictures.first_size())
 
     def truth() -> Truth:
-        return mot_text.read_truth(gt, info.name, rate, length, options.scale, of_boxes.person_class)
+        table = read_table(gt, length=length, boxless=True)
+        return mot_text.truth_of_table(table, info.name, rate, length, options.scale, of_boxes.person_class)
 
     more: dict[str, Any] = {} if choice is None else {"background": str(choice)}
     more |= {} if pictures.numbering is None else {"numbering": astuple(pictures.numbering)}
