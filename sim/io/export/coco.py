@@ -25,7 +25,7 @@ from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
 from sim.io.store.seal import read_manifest
 from sim.streams import file_name
-from sim.types import Array, Ints, Sequence
+from sim.types import Array, Ints, Sequence, Truth
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
 
@@ -75,7 +75,10 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
     videos, images, annotations = [], list[str](), list[str]()
     for k, sequence in enumerate(sequences, 1):
         about = {"id": k, "name": sequence.name, "fps": sequence.fps, "length": sequence.length}
-        size, files = _size(sequence), _picture_files(sequence)
+        truth, files = sequence.truth, _picture_files(sequence)
+        assert truth is not None
+        assert truth.box is not None
+        size = sequence.image_size or _extent(truth.box)
         shape = {"width": size[0], "height": size[1]}
         videos.append(json_text({**about, **shape}))
         for index in range(1, (sequence.length or 0) + 1):
@@ -84,7 +87,7 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
             name = {"file_name": Path(os.path.relpath(files[index], root)).as_posix()} if files else {}
             images.append(json_text({"id": len(images) + 1, **name, **shape, "video_id": k, "frame": index}))
             shared = {"image_id": len(images), "video_id": k, "category_id": 1}
-            for found in _annotations(sequence, size, index):
+            for found in _annotations(sequence, truth, truth.box, size, index):
                 annotations.append(json_text({"id": len(annotations) + 1, **shared, **found}))
     lists = {"videos": videos, "images": images, "annotations": annotations}
     blocks = [f'"{name}": [\n' + ",\n".join(rows) + "\n]" for name, rows in lists.items()]
@@ -92,20 +95,10 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
     return "{" + ",\n".join([*head, *blocks]) + "}\n"
 
 
-def _size(sequence: Sequence) -> tuple[int, int]:
-    if sequence.image_size is not None:
-        return sequence.image_size
-    # Without pictures, the extent of the boxes is the size.
-    box = _boxes(sequence)
+def _extent(box: Array) -> tuple[int, int]:
     edges = box[:, :2] + box[:, 2:]
     right, bottom = np.ceil(edges[np.isfinite(edges).all(axis=1)].max(axis=0, initial=1)).astype(int).tolist()
     return right, bottom
-
-
-def _boxes(sequence: Sequence) -> Array:
-    assert sequence.truth is not None
-    assert sequence.truth.box is not None
-    return sequence.truth.box
 
 
 def _picture_files(sequence: Sequence) -> dict[int, Path]:
@@ -120,9 +113,9 @@ def _picture_files(sequence: Sequence) -> dict[int, Path]:
     return {index: folder / file_name("left", images, index) for index in range(1, (sequence.length or 0) + 1)}
 
 
-def _annotations(sequence: Sequence, size: tuple[int, int], index: int) -> Iterator[dict[str, Any]]:
-    truth, boxes = sequence.truth, _boxes(sequence)
-    assert truth is not None
+def _annotations(
+    sequence: Sequence, truth: Truth, boxes: Array, size: tuple[int, int], index: int
+) -> Iterator[dict[str, Any]]:
     counts: dict[int, list[int]] | None = None
     for row in range(*truth.rows(index).indices(len(boxes))):
         box = [round(v, 2) for v in boxes[row].tolist()]
