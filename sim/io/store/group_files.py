@@ -210,10 +210,6 @@ def _value(text: str) -> int | float | str | None:
     return None if value in ("", "nan") or value != value else value
 
 
-def _size(text: str) -> int | float | str | None:
-    return whole_or_number(text) if text else None
-
-
 def _ids(text: str | None) -> list[Any]:
     return [whole_or_number(word) for word in (text or "").split()]
 
@@ -231,7 +227,7 @@ class _GroupRow(BaseModel):
     x: Annotated[Number | None, BeforeValidator(_value)] = None
     y: Annotated[Number | None, BeforeValidator(_value)] = None
     hull: Annotated[tuple[Pair, ...], BeforeValidator(_hull)] = ()
-    size: Annotated[Annotated[Number, Field(ge=0)] | None, BeforeValidator(_size)] = None
+    size: Annotated[Annotated[Number, Field(ge=0)] | None, BeforeValidator(_value)] = None
 
 
 def read_groups_csv(path: Path, length: int) -> list[Groups]:
