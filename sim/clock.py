@@ -60,9 +60,8 @@ class FrameTimes:
         k = np.minimum(self.tick, len(values) - 1)
         after = np.minimum(k + 1, len(values) - 1)
         share = ((self.step + self.share) / STEPS)[:, None, None]
-        return np.asarray(
-            np.where(present[after][..., None], values[k] + share * (values[after] - values[k]), values[k])
-        )
+        between = values[k] + share * (values[after] - values[k])
+        return np.asarray(np.where(present[after][..., None], between, values[k]))
 
 
 @dataclass(frozen=True)
@@ -99,10 +98,8 @@ def check_stride(stride: object, fps: float) -> None:
     """Raises InputError if `stride` is no whole number from 1, or leaves less than 0.01 frames/s."""
     most = int(fps / FRAME_RATES[0])
     if not isinstance(stride, int) or not 1 <= stride <= most:
-        raise InputError(
-            place="--stride", got=stride, expected=f"a whole number from 1 to {most} at {fps:g} frames/s",
-            remedy="correct it",
-        )  # fmt: skip
+        expected = f"a whole number from 1 to {most} at {fps:g} frames/s"
+        raise InputError(place="--stride", got=stride, expected=expected, remedy="correct it")
 
 
 def every_nth(motion: Motion, n: int) -> Motion:

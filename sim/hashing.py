@@ -170,7 +170,7 @@ def _array(h: Any, a: NDArray[Any]) -> None:
 
 LIBRARIES = ("numpy", "scipy", "numba", "pymunk", "pyarrow", "pydantic")
 PICTURE_LIBRARIES = ("opencv-python-headless", "av")
-DISTRIBUTION = "flockscope"
+DISTRIBUTION, PACKAGES = "flockscope", ("scenarios", "sim", "tracking")
 
 
 @lru_cache(maxsize=2)
@@ -198,20 +198,10 @@ def runtime() -> dict[str, str]:
     return {**versions(drawn=True), "sources": source_hash(root)}
 
 
-def packages() -> tuple[str, ...]:
-    """Returns the top-level packages of the installed flockscope, else those that simulating needs."""
-    try:
-        listed = metadata.distribution(DISTRIBUTION).read_text("top_level.txt")
-    except metadata.PackageNotFoundError:
-        listed = None
-    # An installation may leave `tracking` out.
-    return tuple(sorted(listed.split())) if listed else ("scenarios", "sim")
-
-
 def source_hash(root: Path) -> str:
     """Returns 12 hex digits of the SHA-256 over the source files of our packages in the folder `root`."""
     h = hashlib.sha256()
-    for package in packages():
+    for package in PACKAGES:
         for path in sorted((root / package).rglob("*")):
             if path.suffix in (".py", ".toml"):
                 h.update(f"{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes() + b"\0")

@@ -144,6 +144,11 @@ class Stairs(Frozen):
     steps: int
     landing: float = 0.0
 
+    @classmethod
+    def of(cls, s: Any) -> Stairs:
+        """Returns the stairs of a table with these fields."""
+        return cls(np.array(s.foot, float), np.array(s.head, float), s.width, s.rise, int(s.steps), s.landing)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene(Frozen):
@@ -167,11 +172,7 @@ class Scene(Frozen):
             np.array(world.size, float), np.array(walls, float).reshape(-1, 2, 2),
             np.array(world.pillars, float).reshape(-1, 3), np.array(doors, float).reshape(-1, 2, 2),
             np.array(world.service, float).reshape(-1, 2),
-            tuple(
-                Stairs(np.array(s.foot, float), np.array(s.head, float), s.width, s.rise, int(s.steps), s.landing)
-                for s in world.stairs
-            ),
-            world.wall_height, world.pillar_height,
+            tuple(map(Stairs.of, world.stairs)), world.wall_height, world.pillar_height,
         )  # fmt: skip
 
 

@@ -9,17 +9,16 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any, TypedDict, Unpack, cast
 from uuid import uuid4
 
-from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, shortened
+from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
 from scenarios.loading.resolve import Entry, resolve
-from scenarios.loading.toml_files import Table, dump, parse
-from scenarios.reading import parse_toml
+from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import ObservationSpec
 from sim.clock import check_stride
 from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
@@ -32,8 +31,6 @@ from sim.streams import check_streams
 from sim.types import Camera, Sequence
 from sim.workers.pool import WorkerOptions, start_workers
 
-MOST = 4  # differences that are named; the others are counted
-LONGEST = 40  # characters of a value
 SHARED_DELAY = 5.0  # s that a shared file system may take to show one machine the file of another
 
 
@@ -84,41 +81,14 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
         raise error.replaced(remedy="delete that folder, or choose another --out") from None
     scenario = dump(job.entry.scenario)
     wanted = {**identity(scenario, job.seed, job.entry.repeat, job.streams, job.images), "stride": job.stride}
-    stored = {key: manifest.get(key, 1 if key == "stride" else None) for key in wanted}
-    if stored != wanted:
-        got = f"another sequence (stored → asked for: {_differences(job, stored, wanted)})"
+    other = [
+        key.removesuffix("_hash") for key in wanted if manifest.get(key, 1 if key == "stride" else None) != wanted[key]
+    ]
+    if other:
+        got = f"a sequence of another {' and '.join(other)}"
         expected = "the same scenario, version, streams and images, or an empty place"
         raise InputError(file=folder, got=got, expected=expected, remedy="choose another --out, or delete that folder")
     return manifest
-
-
-def _differences(job: SequenceJob, stored: Table, wanted: Table) -> str:
-    """Returns what differs, as "camera.fps 10 → 5, duration 20 → 30"; the scenario's keys come first."""
-    if stored["scenario_hash"] != wanted["scenario_hash"]:
-        with suppress(InputError):  # of an unreadable scenario only the hashes are known
-            mine, same = parse_toml(dump(job.entry.scenario)), {"scenario_hash": None}
-            theirs = parse(job.folder / "scenario.toml")
-            if _flat("", theirs) != _flat("", mine):
-                stored, wanted = theirs | stored | same, mine | wanted | same
-    before, after = _flat("", stored), _flat("", wanted)
-    keys = [key for key in {**before, **after} if before.get(key) != after.get(key)]
-    words = [f"{key} {_word(before.get(key))} → {_word(after.get(key))}" for key in keys[:MOST]]
-    return ", ".join(words + [f"{len(keys) - MOST} more"] * (len(keys) > MOST))
-
-
-def _flat(place: str, value: Any) -> Table:
-    if isinstance(value, list) and any(isinstance(inner, dict) for inner in value):
-        value = dict(enumerate(value))
-    if not isinstance(value, dict):
-        return {place: value}
-    return {key: v for step, inner in value.items() for key, v in _flat(f"{place}.{step}".strip("."), inner).items()}
-
-
-def _word(value: Any) -> str:
-    if isinstance(value, list):
-        return shortened(",".join(map(_word, value)) or "none", LONGEST)
-    text = str(value).removesuffix(".0") if isinstance(value, float) else "none" if value is None else str(value)
-    return shortened(text or "none", LONGEST)
 
 
 def is_stored(job: SequenceJob) -> bool:

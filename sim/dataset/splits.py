@@ -21,9 +21,8 @@ SIMULATED = ("simulated", "generated", "replayed")  # values of `Sequence.source
 def split_of(seeds: range) -> str:
     """Returns the name of the split that holds all seeds; raises InputError if they are in two splits, or none."""
     if len(seeds) == 0 or min(seeds) < 0:
-        raise InputError(
-            place="seeds", got=f"{seeds.start}:{seeds.stop}", expected="a:b with 0 <= a < b", remedy="correct --seeds"
-        )
+        got, expected = f"{seeds.start}:{seeds.stop}", "a:b with 0 <= a < b"
+        raise InputError(place="seeds", got=got, expected=expected, remedy="correct --seeds")
     for name, low, high in (*SPLITS, DEMO):
         if low <= min(seeds) < high:
             if max(seeds) < high:

@@ -18,7 +18,7 @@ import signal
 import threading
 import traceback
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -280,7 +280,14 @@ def start_workers(workers: int = 1, cluster: str | None = None) -> AbstractConte
         from sim.workers.cluster import cluster_workers
 
         return cluster_workers(cluster, workers)
-    return process_pool(workers) if workers > 1 else this_process()
+    return process_pool(workers) if workers > 1 else nullcontext(_run_here)
+
+
+def _run_here(
+    function: Callable[[T], R], items: Iterable[T], *, ahead: int = 0, on_loss: OnLoss[T, R] = None
+) -> Iterator[tuple[T, R]]:
+    for item in items:
+        yield item, function(item)
 
 
 def results_in_order(run: RunItems, function: Callable[[T], R], items: Sequence[T]) -> Generator[R, None, None]:
@@ -298,16 +305,3 @@ def results_in_order(run: RunItems, function: Callable[[T], R], items: Sequence[
         # Items under way are waited for; no further one is started.
         for _ in arriving:
             pass
-
-
-@contextmanager
-def this_process() -> Iterator[RunItems]:
-    """Yields a RunItems that calls the function in this process, one item after another."""
-
-    def run(
-        function: Callable[[T], R], items: Iterable[T], *, ahead: int = 0, on_loss: Any = None
-    ) -> Iterator[tuple[T, R]]:
-        for item in items:
-            yield item, function(item)
-
-    yield run

@@ -331,10 +331,10 @@ class ValidateOptions(Options, words="validate", run="datasets:validate"):
 
 
 class CocoOptions(Options, words="export coco", run="datasets:export_coco"):
-    """Write COCO files, one per split, with track and group ids and masks."""
+    """Write a COCO file with track and group ids and masks."""
 
-    folder: Path = ARGUMENT("A sequence or dataset with labelled boxes.", metavar="DIR")
-    out: Path = FILE("File to write; for several splits FILE-train.json, FILE-val.json, …", metavar="FILE.json")
+    folder: Path = ARGUMENT("A sequence, or dataset of one split, with labelled boxes.", metavar="DIR")
+    out: Path = FILE("File to write.", metavar="FILE.json")
     person_class: str | None = PERSON_CLASS()
 
 

@@ -38,13 +38,11 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
         "images": sequence.has_images, "a right image": sequence.has_right, "detections": sequence.has_detections,
         "truth": sequence.load_truth is not None,
     }  # fmt: skip
-    contents = ", ".join(name for name, known in there.items() if known) or "nothing"
-    raise InputError(
-        place=f"--detections {requested or ''}".rstrip(),
-        got=f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {contents}",
-        expected="what both have",
-        remedy=f"try --detections {able[0]}" if able else "take another, or give a detector's boxes with --boxes FILE",
-    )
+    contents, place = ", ".join(name for name, known in there.items() if known) or "nothing", "--detections"
+    got = f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {contents}"
+    remedy = f"try --detections {able[0]}" if able else "take another, or give a detector's boxes with --boxes FILE"
+    place += "" if requested is None else f" {requested}"
+    raise InputError(place=place, got=got, expected="what both have", remedy=remedy)
 
 
 def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
@@ -92,13 +90,7 @@ def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
         raise InputError(place=place, got="points", expected="boxes", remedy="take a tracker that takes points")
 
 
-PERFECT_SENSOR = {
-    "detect_prob": 1.0,
-    "clutter_rate": 0.0,
-    "box_noise": {"scale": 0.0},
-    "noise_m": 0.0,
-    "box": "amodal",
-}
+PERFECT_SENSOR = {"detect_prob": 1.0, "clutter_rate": 0.0, "box_noise": {"scale": 0.0}, "noise_m": 0.0, "box": "amodal"}
 # Settings by which hidden and small people are detected as well as others.
 SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
 

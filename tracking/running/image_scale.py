@@ -31,12 +31,9 @@ def required(px_per_m: float) -> float:
     """Returns px_per_m (image scale, px per m) unchanged. Raises InputError if it is nan, zero or negative."""
     if px_per_m > 0:
         return px_per_m
-    raise InputError(
-        place="context.px_per_m",
-        got=f"{px_per_m:g}",
-        expected="px per m at people, above 0, to track in the image",
-        remedy="give --px-per-m: the height in px of a person in the picture / 1.7 m",
-    )
+    expected = "px per m at people, above 0, to track in the image"
+    remedy = "give --px-per-m: the height in px of a person in the picture / 1.7 m"
+    raise InputError(place="context.px_per_m", got=f"{px_per_m:g}", expected=expected, remedy=remedy)
 
 
 def from_boxes(frames: Iterable[Detections | Tracks | None]) -> ImageScale:

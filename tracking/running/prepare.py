@@ -106,19 +106,12 @@ def prepare(
     mode = choose_mode(instance.needs, sequence, detections)
     if sensor and mode != "truth":
         remedy = "add --detections truth, or leave out the sensor settings"
-        raise InputError(
-            place="--sensor, --set sensor", got=f"--detections {mode}", expected="--detections truth", remedy=remedy
-        )
+        place, got = "--sensor, --set sensor", f"--detections {mode}"
+        raise InputError(place=place, got=got, expected="--detections truth", remedy=remedy)
     frames = frames_with_detections(instance.needs, mode, sequence, sensor or {}, seed)
     scale = image_scale.of_sequence(sequence, mode, frames)
-    context = Context(
-        fps=sequence.fps,
-        px_per_m=scale.px_per_m,
-        camera=sequence.camera,
-        scene=sequence.scene,
-        image_size=sequence.image_size,
-        background=sequence.background() if mode == "image" else None,
-    )
+    background = sequence.background() if mode == "image" else None
+    context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
     return PreparedTracker(name, instance, config, context, mode, sequence, frames, scale.frames)
 
 

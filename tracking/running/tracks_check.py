@@ -137,10 +137,8 @@ def _group_faults(groups: Any, d: int, people: Iterable[int]) -> Iterator[Any]:
         got = len(items) if isinstance(items, tuple) else type(items).__name__
         yield not good and (f"{got} groups.{name}", f"a tuple of {n} arrays, or an empty one")
     for ids in groups.members:
-        yield (ids.ndim != 1 or (len(ids) and ids.dtype.kind != "i")) and (
-            "groups.members that are no ids",
-            "(k,) whole numbers",
-        )
+        good = ids.ndim == 1 and (not len(ids) or ids.dtype.kind == "i")
+        yield not good and ("groups.members that are no ids", "(k,) whole numbers")
         yield _member_fault(ids.tolist(), people, "groups.members")
     for hull in groups.hull:
         good = hull.ndim == 2 and hull.shape[1] == 2 and hull.dtype.kind in "if" and finite(hull)

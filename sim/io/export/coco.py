@@ -1,4 +1,4 @@
-"""Writes a dataset or recording as COCO JSON: one file per split, with all sequences that have labelled boxes.
+"""Writes a dataset or recording as COCO JSON: one file with all sequences that have labelled boxes.
 
 Each frame is an image and each sequence a video. Each person in the picture is an annotation: box (left, top, width,
 height in px, unclipped), person id, group id, visibility, and a segmentation. That is the mask of the visible pixels
@@ -19,38 +19,35 @@ from scenarios.errors import InputError
 from sim import hashing
 from sim.dataset.splits import split_of
 from sim.io.files.atomic import write_file
-from sim.io.files.own_files import GENERATOR, output_paths, refuse_foreign_file
+from sim.io.files.own_files import GENERATOR, output_paths
 from sim.io.files.tables import json_text
 from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
-from sim.io.store.seal import read_whole_manifest
+from sim.io.store.seal import read_manifest
 from sim.streams import file_name
-from sim.types import Array, Ints, Sequence
+from sim.types import Array, Ints, Sequence, Truth
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
-# names of folders that divide recordings into splits
-SPLITS = ("train", "training", "val", "valid", "validation", "test", "testing", "fit", "demo")
 
 
-def coco(source: str | Path, out: str | Path, *, person_class: int | str | None = None) -> list[Path]:
-    """Writes the sequences of a source that have labelled boxes as COCO files.
+def coco(source: str | Path, out: str | Path, *, person_class: int | str | None = None) -> Path:
+    """Writes the sequences of a source that have labelled boxes as a COCO file.
 
     Each frame is an image, each sequence a video, both numbered from 1. Annotations have bbox [left, top, width,
     height] px (amodal, unclipped), segmentation, area, track_id (the person's id), group_id (-1 for alone) and
     visibility.
 
     Args:
-        source: A dataset or recording.
-        out: The JSON file, replaced if it exists. If there are several splits (by seed, or by the recordings' folders),
-            each has a file of its own: `coco-train.json`, `coco-val.json` for `coco.json`.
+        source: A dataset of one split, or recordings.
+        out: The JSON file, replaced if it exists.
         person_class: Classes of people, as `open_source` takes them.
 
     Returns:
-        The paths of the files. The same dataset gives the same bytes.
+        The path of the file. The same dataset gives the same bytes.
 
     Raises:
-        InputError: No sequence has labelled boxes, two have one name, an argument is wrong, or a split's file is of
-            another program.
+        InputError: No sequence has labelled boxes, two have one name, there are several splits, or an argument is
+            wrong.
     """
     source, out = Path(source), Path(out)
     every = open_source(source, person_class=person_class)
@@ -58,39 +55,30 @@ def coco(source: str | Path, out: str | Path, *, person_class: int | str | None 
     if not sequences:
         expected, remedy = "a dataset with boxes", "give a generated dataset"
         raise InputError(file=source, got="no labelled boxes", expected=expected, remedy=remedy)
-    root = source if source.is_dir() else source.parent
-    splits: dict[str, list[Sequence]] = {}
-    for sequence in sequences:
-        splits.setdefault(_split(sequence, root), []).append(sequence)
-    paths = [out if len(splits) == 1 else out.with_name(f"{out.stem}-{split}{out.suffix}") for split in splits]
-    for path, some in zip(paths, splits.values(), strict=True):
-        output_paths("", [s.name for s in some], source=source)
-        if path != out:
-            refuse_foreign_file(path)
-    for path, some in zip(paths, splits.values(), strict=True):
-        write_file(path, _document(some, root, path).encode())
-    return paths
-
-
-def _split(sequence: Sequence, root: Path) -> str:
-    if sequence.source.get("kind") == "generated":
-        seed = sequence.source["seed"]
-        return split_of(range(seed, seed + 1))
-    inside = Path(os.path.relpath(sequence.source.get("path", root), root)).parts
-    return next((part.lower() for part in reversed(inside) if part.lower() in SPLITS), "other")
+    seeds = [s.source["seed"] for s in sequences if s.source.get("kind") == "generated"]
+    splits = sorted({split_of(range(seed, seed + 1)) for seed in seeds})
+    if len(splits) > 1:
+        got, remedy = f"the splits {', '.join(splits)}", f"export each by itself, as {source / 'flockscope-train'}"
+        raise InputError(file=source, got=got, expected="one split in a file", remedy=remedy)
+    output_paths("", [s.name for s in sequences], source=source)
+    write_file(out, _document(sequences, source if source.is_dir() else source.parent, out).encode())
+    return out
 
 
 def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
     info: dict[str, Any] = {"description": GENERATOR, "version": "1"}
     if all(s.source.get("kind") == "generated" for s in sequences):
         folders = [Path(s.source["path"]) for s in sequences]
-        hashes = {split_and_name(folder): read_whole_manifest(folder)["content_hash"] for folder in folders}
+        hashes = {split_and_name(folder): read_manifest(folder)["content_hash"] for folder in folders}
         info["content_hash"] = hashing.dataset_hash(hashes)
     info["root"] = Path(os.path.relpath(root, path.parent)).as_posix()
     videos, images, annotations = [], list[str](), list[str]()
     for k, sequence in enumerate(sequences, 1):
         about = {"id": k, "name": sequence.name, "fps": sequence.fps, "length": sequence.length}
-        size, files = _size(sequence), _picture_files(sequence)
+        truth, files = sequence.truth, _picture_files(sequence)
+        assert truth is not None
+        assert truth.box is not None
+        size = sequence.image_size or _extent(truth.box)
         shape = {"width": size[0], "height": size[1]}
         videos.append(json_text({**about, **shape}))
         for index in range(1, (sequence.length or 0) + 1):
@@ -99,7 +87,7 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
             name = {"file_name": Path(os.path.relpath(files[index], root)).as_posix()} if files else {}
             images.append(json_text({"id": len(images) + 1, **name, **shape, "video_id": k, "frame": index}))
             shared = {"image_id": len(images), "video_id": k, "category_id": 1}
-            for found in _annotations(sequence, size, index):
+            for found in _annotations(sequence, truth, truth.box, size, index):
                 annotations.append(json_text({"id": len(annotations) + 1, **shared, **found}))
     lists = {"videos": videos, "images": images, "annotations": annotations}
     blocks = [f'"{name}": [\n' + ",\n".join(rows) + "\n]" for name, rows in lists.items()]
@@ -107,20 +95,10 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
     return "{" + ",\n".join([*head, *blocks]) + "}\n"
 
 
-def _size(sequence: Sequence) -> tuple[int, int]:
-    if sequence.image_size is not None:
-        return sequence.image_size
-    # Without pictures, the extent of the boxes is the size.
-    box = _boxes(sequence)
+def _extent(box: Array) -> tuple[int, int]:
     edges = box[:, :2] + box[:, 2:]
     right, bottom = np.ceil(edges[np.isfinite(edges).all(axis=1)].max(axis=0, initial=1)).astype(int).tolist()
     return right, bottom
-
-
-def _boxes(sequence: Sequence) -> Array:
-    assert sequence.truth is not None
-    assert sequence.truth.box is not None
-    return sequence.truth.box
 
 
 def _picture_files(sequence: Sequence) -> dict[int, Path]:
@@ -135,9 +113,9 @@ def _picture_files(sequence: Sequence) -> dict[int, Path]:
     return {index: folder / file_name("left", images, index) for index in range(1, (sequence.length or 0) + 1)}
 
 
-def _annotations(sequence: Sequence, size: tuple[int, int], index: int) -> Iterator[dict[str, Any]]:
-    truth, boxes = sequence.truth, _boxes(sequence)
-    assert truth is not None
+def _annotations(
+    sequence: Sequence, truth: Truth, boxes: Array, size: tuple[int, int], index: int
+) -> Iterator[dict[str, Any]]:
     counts: dict[int, list[int]] | None = None
     for row in range(*truth.rows(index).indices(len(boxes))):
         box = [round(v, 2) for v in boxes[row].tolist()]

@@ -205,11 +205,8 @@ def _people_text(tables: TidyTables, folder: Path, form: Form, fps: float) -> st
         raise InputError(file=folder, got=got, expected=expected, remedy="track with --camera, or from points")
     rows = list(zip(*(columns[name].tolist() for name in ("frame", "id", "x_m", "y_m")), strict=True))
     if form == "pedpy":
-        lines = [
-            f"# framerate: {fps:g}",
-            "# id\tframe\tx/m\ty/m",
-            *(f"{p}\t{f}\t{x:.4f}\t{y:.4f}" for f, p, x, y in rows),
-        ]
+        lines = [f"# framerate: {fps:g}", "# id\tframe\tx/m\ty/m"]
+        lines += [f"{p}\t{f}\t{x:.4f}\t{y:.4f}" for f, p, x, y in rows]
     else:
         spans = zip(*(np.asarray(stays[name]).tolist() for name in ("id", "start_frame", "end_frame")), strict=True)
         scenes = ({"scene": {"id": k, "p": p, "s": s, "e": e, "fps": fps}} for k, (p, s, e) in enumerate(spans))
@@ -274,13 +271,18 @@ def _span(rows: _Rows, first: Ints, last: Ints) -> dict[str, Any]:
     return {"start_frame": first, "end_frame": last, **times}
 
 
+def _spans(rows: _Rows, frame: Ints, id: Ints) -> tuple[Ints, Ints, Ints, dict[str, Any]]:
+    """Returns the order of rows by (id, frame), the number of each one's id in it, the ids, and their columns."""
+    order = np.lexsort((frame, id))
+    ids, first, count = np.unique(id[order], return_index=True, return_counts=True)
+    spans = _span(rows, frame[order][first], frame[order][first + count - 1])
+    return order, np.repeat(np.arange(len(ids)), count), ids, {**spans, "frames": count}
+
+
 def _summary(rows: _Rows, speed: Array, members: tuple[Ints, Ints, Ints]) -> dict[str, Any]:
-    order = np.lexsort((rows.frame, rows.id))
-    id, frame, pos = rows.id[order], rows.frame[order], rows.pos[order, :2]
-    people, first, count = np.unique(id, return_index=True, return_counts=True)
-    last, who = first + count - 1, np.repeat(np.arange(len(people)), count)
-    step = np.zeros(len(id))
-    step[1:] = np.where(np.diff(who) == 0, np.hypot(*np.diff(pos, axis=0).T), 0.0)
+    order, who, people, spans = _spans(rows, rows.frame, rows.id)
+    step = np.zeros(len(order))
+    step[1:] = np.where(np.diff(who) == 0, np.hypot(*np.diff(rows.pos[order, :2], axis=0).T), 0.0)
     known = np.isfinite(speed[order])
     total = np.bincount(who, np.where(known, speed[order], 0.0), len(people))
     number = np.bincount(who, known, len(people))
@@ -288,7 +290,7 @@ def _summary(rows: _Rows, speed: Array, members: tuple[Ints, Ints, Ints]) -> dic
     for name, person in np.unique(np.stack(members[1:], axis=1), axis=0).tolist():
         belongs.setdefault(person, set()).add(name)
     return {
-        "id": people, **_span(rows, frame[first], frame[last]), "frames": count,
+        "id": people, **spans,
         f"path_{rows.unit}": np.bincount(who, np.nan_to_num(step), len(people)),
         f"speed_mean_{rows.unit}_s": np.where(number > 0, total / np.maximum(number, 1), np.nan),
         "groups": [sorted(belongs.get(person, ())) for person in people.tolist()],
@@ -296,13 +298,11 @@ def _summary(rows: _Rows, speed: Array, members: tuple[Ints, Ints, Ints]) -> dic
 
 
 def _groups(rows: _Rows, frame: Ints, group: Ints, size: Array) -> dict[str, Any]:
-    order = np.lexsort((frame, group))
-    names, first, count = np.unique(group[order], return_index=True, return_counts=True)
-    who = np.repeat(np.arange(len(names)), count)
+    order, who, names, spans = _spans(rows, frame, group)
+    first = np.flatnonzero(np.diff(who, prepend=-1))
     most = np.maximum.reduceat(size[order], first) if len(first) else np.zeros(0)
-    mean = np.bincount(who, size[order], len(names)) / np.maximum(count, 1)
-    span = _span(rows, frame[order][first], frame[order][first + count - 1])
-    return {"id": names, **span, "frames": count, "size_mean": mean, "size_max": most}
+    mean = np.bincount(who, size[order], len(names)) / spans["frames"]
+    return {"id": names, **spans, "size_mean": mean, "size_max": most}
 
 
 def _intervals(rows: _Rows, frame: Ints, group: Ints, id: Ints) -> dict[str, Any]:

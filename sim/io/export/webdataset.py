@@ -1,8 +1,8 @@
 """WebDataset export: packs stored sequences into tar shards that the library webdataset streams.
 
 A sample is a whole sequence: all its files, hence its content hash. They share a key and stand next to each other. The
-same dataset gives the same bytes: members are sorted by sequence and have no times or owners. A shard appears complete
-or not at all, with a .json beside it that describes it. index.json, written last, lists all shards.
+same dataset gives the same bytes: members are sorted by sequence and have no times or owners. index.json lists all
+shards. The folder appears complete or not at all.
 """
 
 from __future__ import annotations
@@ -18,20 +18,17 @@ from typing import Any
 from scenarios.errors import InputError
 from sim import hashing
 from sim.io.files import tables
-from sim.io.files.atomic import lock_folder, new_file, remove_partials, write_file
-from sim.io.files.own_files import Marks, refuse_foreign_file
+from sim.io.files.atomic import lock_folder, new_folder, remove_partials, write_file
+from sim.io.files.own_files import is_side_file
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
-from sim.io.store.seal import MANIFEST, read_whole_manifest
+from sim.io.store.seal import MANIFEST, read_manifest
 
 BLOCK = 512  # bytes: a tar holds whole blocks
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
 INDEX = "index.json"
-INDEX_MARKS: Marks = {"content_hash": str, "shards": list}
-SHARD_MARKS: Marks = {"manifests": str, "sequences": dict}  # what every index.json, and every .json of a shard, has
 
 Progress = Callable[[int, int, str], None]
-Packed = tuple[Path, str, str]  # the folder of a sequence, the hash of its manifest, and that of its content
 
 
 def webdataset(
@@ -41,26 +38,41 @@ def webdataset(
 
     Args:
         source: A generated sequence or dataset.
-        out: The folder. Complete shards of an earlier run are kept.
+        out: The folder, which holds nothing, or the same export.
         shard_size: Bytes that a shard may have. A sequence is never divided, so a shard of one sequence may be larger.
         progress: Called as progress(shards done, shards in all, name of the last one) after each shard.
 
     Returns:
-        The index: format, content_hash, and shards, the content of the .json beside each shard.
+        The index: format, content_hash, and of each shard name, sequences (content hashes by name), bytes and sha256.
     """
     root, shards, done = Path(out), _shards(Path(source), shard_size), list[dict[str, Any]]()
-    plan = [_facts(number, some) for number, some in enumerate(shards)]
+    hashes = {split_and_name(p): content for some in shards for p, content in some.items()}
+    content = hashing.dataset_hash(hashes)
     with lock_folder(root):
-        remove_partials(root)
-        _reject_other_shards(root, plan)
-        for facts, some in zip(plan, shards, strict=True):
-            done.append(_complete_shard(root, facts) or _write_shard(root, facts, some))
-            if progress is not None:
-                progress(len(done), len(plan), facts["name"])
-        hashes = {name: value for facts in plan for name, value in facts["sequences"].items()}
-        index = {"format": tables.FORMAT, "content_hash": hashing.dataset_hash(hashes), "shards": done}
-        write_file(root / INDEX, tables.json_document(index))
+        remove_partials(root.parent, of=root.name)
+        _reject_others(root, content, len(shards))
+        with new_folder(root, lambda: _reject_others(root, content, len(shards))) as partial:
+            for number, some in enumerate(shards):
+                done.append(_write_shard(partial / _name(number), some))
+                if progress is not None:
+                    progress(len(done), len(shards), done[-1]["name"])
+            index = {"format": tables.FORMAT, "content_hash": content, "shards": done}
+            write_file(partial / INDEX, tables.json_document(index))
     return index
+
+
+def _name(number: int) -> str:
+    return f"shard-{number:06d}.tar"
+
+
+def _reject_others(root: Path, content: str, count: int) -> bool:
+    """Raises InputError if the folder holds anything but the same export."""
+    found = {path.name for path in root.iterdir() if not is_side_file(path.name)}
+    stored = tables.read_json(root / INDEX).get("content_hash") if INDEX in found else None
+    if found and not (stored == content and found == {INDEX, *map(_name, range(count))}):
+        got, remedy = "other files, or another export", "choose another --out, or delete that folder"
+        raise InputError(file=root, got=got, expected="this dataset in shards of this size, or nothing", remedy=remedy)
+    return False
 
 
 def size_of(text: str) -> int:
@@ -68,33 +80,30 @@ def size_of(text: str) -> int:
     found = re.fullmatch(r"([0-9]{1,12}(?:\.[0-9]{1,6})?)\s*(?:([kMG])?B)?", text.strip())
     size = 0 if found is None else round(float(found[1]) * UNITS[found[2] or ""])
     if size < 1:
-        raise InputError(
-            place="--shard-size", got=repr(text), expected="bytes, kB, MB or GB above 0", remedy="write 500MB"
-        )
+        expected = "bytes, kB, MB or GB above 0"
+        raise InputError(place="--shard-size", got=repr(text), expected=expected, remedy="write 500MB")
     return size
 
 
-def _shards(source: Path, size: int) -> list[list[Packed]]:
-    """Returns the consecutive sequences of each shard, as many as fit into a tar of `size` bytes, at least one."""
+def _shards(source: Path, size: int) -> list[dict[Path, str]]:
+    """Returns the content hash of each sequence folder of each shard, as many as fit into a tar of `size` bytes."""
     folders = sorted(sequence_folders(source, "generated"), key=split_and_name)
     twice = next((a for a, b in pairwise(map(split_and_name, folders)) if a == b), None)
     if twice is not None:
         raise InputError(file=source, got=f"two sequences {twice}", expected="unique names", remedy="export them apart")
-    shards: list[list[Packed]] = []
+    shards: list[dict[Path, str]] = []
     full = size
     for folder in folders:
-        manifest = read_whole_manifest(folder)  # not kept: those of a large dataset would fill the memory
-        bytes_of = {name: facts["bytes"] for name, facts in manifest["files"].items()}
-        bytes_of[MANIFEST] = (folder / MANIFEST).stat().st_size
-        more = 0
-        for name, count in bytes_of.items():
-            # A header before each file, and two more blocks with its name if that is long.
-            long = len(f"{_key(folder)}.{name}".encode()) > tarfile.LENGTH_NAME
-            more += BLOCK * ((3 if long else 1) + -(-count // BLOCK))
+        manifest = read_manifest(folder)  # not kept: those of a large dataset would fill the memory
+        sizes = {MANIFEST: (folder / MANIFEST).stat().st_size}
+        sizes |= {name: facts["bytes"] for name, facts in manifest["files"].items()}
+        # A header before each file, and two more blocks with its name if that is long.
+        long = sum(len(f"{_key(folder)}.{name}".encode()) > tarfile.LENGTH_NAME for name in sizes)
+        more = BLOCK * (len(sizes) + 2 * long + sum(-(-count // BLOCK) for count in sizes.values()))
         if full + more > size:
-            shards.append([])
+            shards.append({})
             full = 2 * BLOCK + tarfile.RECORDSIZE  # the end of a tar, at most
-        shards[-1].append((folder, manifest["sha256"], manifest["content_hash"]))
+        shards[-1][folder] = manifest["content_hash"]
         full += more
     return shards
 
@@ -103,53 +112,20 @@ def _key(folder: Path) -> str:
     return split_and_name(folder).replace(".", "%2E")  # webdataset ends a key at its first dot
 
 
-def _facts(number: int, some: list[Packed]) -> dict[str, Any]:
-    manifests = hashing.canonical_hash([sha256 for _, sha256, _ in some])
-    hashes = {split_and_name(folder): content for folder, _, content in some}
-    return {"name": f"shard-{number:06d}.tar", "manifests": manifests, "sequences": hashes}
-
-
-def _reject_other_shards(root: Path, plan: list[dict[str, Any]]) -> None:
-    wanted = {facts["name"]: facts for facts in plan}
-    refuse_foreign_file(root / INDEX, INDEX_MARKS)
-    for name in wanted:
-        refuse_foreign_file((root / name).with_suffix(".json"), SHARD_MARKS)
-    for path in sorted(root.glob("shard-*.tar")):
-        # A tar without .json is what an interrupted run leaves.
-        beside = path.with_suffix(".json")
-        facts = wanted.get(path.name)
-        if facts is None or (beside.is_file() and not facts.items() <= tables.read_json(beside).items()):
-            got, remedy = "a shard of another export", "choose another --out, or delete that folder"
-            raise InputError(file=path, got=got, expected="one of this dataset, size and kind, or none", remedy=remedy)
-
-
-def _complete_shard(root: Path, facts: dict[str, Any]) -> dict[str, Any] | None:
-    path = root / facts["name"]
-    if not path.is_file() or not path.with_suffix(".json").is_file():
-        return None
-    there = tables.read_json(path.with_suffix(".json"))
-    return there if hashing.file_hash(path) == there.get("sha256") else None
-
-
-def _write_shard(root: Path, facts: dict[str, Any], some: list[Packed]) -> dict[str, Any]:
-    path = root / facts["name"]
-    # The .json stands for a whole tar.
-    path.with_suffix(".json").unlink(missing_ok=True)
-    with new_file(path) as beside:
-        with tarfile.open(beside, "w", format=tarfile.GNU_FORMAT) as tar:
-            for name, body in (member for folder, *_ in some for member in _members(folder)):
-                info = tarfile.TarInfo(name)
-                info.size = len(body)
-                tar.addfile(info, io.BytesIO(body))
-        digest = hashing.file_hash(beside)
-    done = {**facts, "bytes": path.stat().st_size, "sha256": digest}
-    write_file(path.with_suffix(".json"), tables.json_document(done))
-    return done
+def _write_shard(path: Path, some: dict[Path, str]) -> dict[str, Any]:
+    with tarfile.open(path, "w", format=tarfile.GNU_FORMAT) as tar:
+        for name, body in (member for folder in some for member in _members(folder)):
+            info = tarfile.TarInfo(name)
+            info.size = len(body)
+            tar.addfile(info, io.BytesIO(body))
+    sequences = {split_and_name(folder): content for folder, content in some.items()}
+    facts = {"name": path.name, "sequences": sequences, "bytes": path.stat().st_size}
+    return {**facts, "sha256": hashing.file_hash(path)}
 
 
 def _members(folder: Path) -> Iterator[tuple[str, bytes]]:
     """Yields name and content of each file of a sequence as it stands in the tar, the manifest first."""
-    stored = StoredPictures(folder, read_whole_manifest(folder))
+    stored = StoredPictures(folder, read_manifest(folder))
     yield f"{_key(folder)}.{MANIFEST}", (folder / MANIFEST).read_bytes()
     for name in stored.manifest["files"]:
         yield f"{_key(folder)}.{name.replace('/', '.')}", stored.body(name)

@@ -89,9 +89,8 @@ def write_error(path: Path, error: OSError) -> FlockscopeError:
     """Returns the user's error for an OSError while writing `path`."""
     reason = error.strerror or type(error).__name__
     if error.errno in DISK_FULL:
-        return WorkError(
-            file=path, got=reason, expected="room on the disk", remedy="free some; what was complete is kept"
-        )
+        remedy = "free some; what was complete is kept"
+        return WorkError(file=path, got=reason, expected="room on the disk", remedy=remedy)
     return InputError(file=path, got=reason, expected="a folder that can be written", remedy="choose another --out")
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Container, Iterator
+from collections.abc import Collection, Container, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -51,8 +51,8 @@ class NumericTable:
     def integers(self, column: int, name: str) -> Ints:
         """Returns column number `column` (from 0) as integers (N,)."""
         v = self.values[:, column]
-        self.reject(v != np.round(v), f"a whole number as {name}", f"correct the {name}")
-        self.reject(np.abs(v) > LARGEST, f"a whole number within {LARGEST} as {name}", f"correct the {name}")
+        wrong = (v != np.round(v)) | (np.abs(v) > LARGEST)
+        self.reject(wrong, f"a whole number within {LARGEST} as {name}", f"correct the {name}")
         return v.astype(np.int64)
 
     def require_bounds(self, frame: Ints, length: int | None = None) -> None:
@@ -75,9 +75,8 @@ def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
     try:
         text = read_regular(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(
-            file=path, place=f"byte {error.start}", got="no UTF-8 text", expected="a text file", remedy="check the path"
-        ) from None
+        place, remedy = f"byte {error.start}", "check the path"
+        raise InputError(file=path, place=place, got="no UTF-8 text", expected="a text file", remedy=remedy) from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -107,33 +106,31 @@ class TextRows:
         return TextRows(self.file, self.text[first:], self.line[first:])
 
     def numbers(
-        self, columns: tuple[int, int], also: int | None = None, *, first: int = 0, layout: str = "",
-        use: list[int] | None = None,
-    ) -> NumericTable:  # fmt: skip
+        self, columns: Collection[int], *, first: int = 0, layout: str = "", use: list[int] | None = None
+    ) -> NumericTable:
         """Returns the numbers of the rows from `first` on.
 
-        columns: (least, greatest) number of columns, and `also` another one. use: the columns to read, from 0, of which
-        only these must hold numbers; None: all.
+        columns: the allowed numbers of columns. use: the columns to read, from 0, of which only these must hold
+        numbers; None: all.
         """
-        rows, (low, high) = self._below(first), columns
+        rows = self._below(first)
         if not rows.text:
-            return NumericTable(self.file, np.zeros((0, low)), rows.line, layout)
-        width = len(rows.text[0].split(rows.separator))
-        if not low <= width <= high:
+            return NumericTable(self.file, np.zeros((0, max(columns))), rows.line, layout)
+        width = len(next(rows.cells()))
+        if width not in columns:
             use = None  # the columns are others than those named: an error below
-        fits = range(low, high + 1) if use is not None else (width,)
+        fits = columns if use is not None else (width,)
         try:
             text = io.StringIO("\n".join(rows.text))
             values = np.loadtxt(text, delimiter=rows.separator, comments=None, ndmin=2, dtype=np.float64, usecols=use)
-            if use is not None and not {len(cells) for cells in rows.cells()} <= {*fits}:
+            if use is not None and not {len(cells) for cells in rows.cells()} <= {*columns}:
                 raise ValueError("lines of different lengths")
         except ValueError:
             raise rows._first_bad(fits, use) from None
         table = NumericTable(self.file, values, rows.line, layout)
-        if use is None and not low <= width <= high and width != also:
-            span = (str(low) if low == high else f"{low} to {high}") + ("" if also is None else f" or {also}")
+        if width not in columns:
             remedy = layout and f"the columns are {layout}"
-            table.reject(np.ones(len(values), bool), f"{span} columns", remedy, remedy)
+            table.reject(np.ones(len(values), bool), f"{', '.join(map(str, columns))} columns", remedy, remedy)
         table.reject(~np.isfinite(values).all(axis=1), "finite numbers", CORRECT)
         return table
 
@@ -182,6 +179,18 @@ def whole_or_number(text: str) -> int | float | str:
 def number_or_nan(text: str | None) -> float:
     """Returns the number of a text, nan for another text and for None."""
     return read_number(text) if text is not None and is_number_text(text) else float("nan")
+
+
+def bounded_number(
+    path: Path, place: str, text: str | None, low: float, high: float, whole: bool = False, remedy: str = "correct it"
+) -> float:
+    """Returns the number of a text; raises InputError if it is none from `low` to `high`."""
+    value = number_or_nan(text)
+    if not low <= value <= high or (whole and value % 1):
+        got = "nothing" if text is None else repr(text)
+        expected = f"a {'whole ' if whole else ''}number from {low:.12g} to {high:.12g}"
+        raise InputError(file=path, place=place, got=got, expected=expected, remedy=remedy)
+    return value
 
 
 def person_ids(path: Path, place: str, text: str) -> set[int]:

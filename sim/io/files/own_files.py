@@ -39,11 +39,8 @@ def is_hidden(path: PurePath) -> bool:
 
 GENERATOR = "flockscope"  # the name in the element <meta name="generator"> of a page, and in the comment of a video
 
-HEAD = 1 << 16  # bytes of a file in which our name stands, so:
-HEADS = {
-    ".html": f'<meta name="generator" content="{GENERATOR}">',
-    ".json": f'"description": "{GENERATOR}"',  # of COCO
-}
+HEAD = 1 << 16  # bytes of a page or picture in which our name stands
+PAGE = f'<meta name="generator" content="{GENERATOR}">'.encode()
 
 IHDR_END = 33  # bytes of a PNG file up to the end of its first chunk
 
@@ -67,7 +64,7 @@ Marks = Mapping[str, type]
 def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
     """Returns True if flockscope wrote the file, False if not, None if it is missing or cannot be parsed.
 
-    marks: of a .json file; without them it must be a COCO file.
+    marks: of a .json file; without them none is ours.
     """
     if not path.is_file():
         return None
@@ -75,10 +72,10 @@ def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
         if path.suffix == ".json" and marks:
             found = tables.read_json(path)
             return all(isinstance(found.get(key), kind) for key, kind in marks.items())
-        if path.suffix in HEADS:
+        if path.suffix in (".html", ".png"):
             with path.open("rb") as file:
-                return HEADS[path.suffix].encode() in file.read(HEAD)
-        kinds = {".parquet": tables.is_own_table, ".png": _picture, ".mp4": _video}
+                return (PAGE if path.suffix == ".html" else SOFTWARE) in file.read(HEAD)
+        kinds = {".parquet": tables.is_own_table, ".mp4": _video}
         return path.suffix in kinds and kinds[path.suffix](path)
     except (InputError, OSError, ValueError):
         return None
@@ -89,11 +86,6 @@ def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
     if path.exists() and not is_ours(path, marks):
         got, expected = "a file that flockscope did not write", "its own file, or none"
         raise InputError(file=path, got=got, expected=expected, remedy="move it away, or choose another --out")
-
-
-def _picture(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(IHDR_END + len(SOFTWARE))[IHDR_END:] == SOFTWARE
 
 
 def _video(path: Path) -> bool:

@@ -76,10 +76,6 @@ class StoredTable:
     columns: dict[str, NDArray[Any]]  # by name an array (R,), of a column of lists an array of R arrays
     facts: dict[str, Any]  # the metadata that was stored with the table, by name, and "format"
 
-    def has(self, name: str) -> bool:
-        """Returns True if the table has this column."""
-        return name in self.columns
-
     def floats(self, *names: str) -> Array:
         """Returns the columns `names` as float64: one as (R,), n > 1 as (R, n)."""
         found = [np.asarray(self._numbers(name, "iufb", "numbers"), np.float64) for name in names]

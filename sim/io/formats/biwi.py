@@ -88,7 +88,7 @@ def labels_of(path: Path, id: Ints) -> Ints:
 def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     """Returns (rows of obsmat.txt, our frames (R,), person ids (R,)), sorted by (frame, id)."""
     path = folder / "obsmat.txt"
-    rows = read_rows(path).numbers((8, 8), layout="frame id x z y vx vz vy")
+    rows = read_rows(path).numbers((8,), layout="frame id x z y vx vz vy")
     if not len(rows.line):
         raise InputError(file=path, got="no line", expected="people: frame id x z y vx vz vy", remedy="restore it")
     raw, id = rows.integers(0, "frame"), rows.integers(1, "id")

@@ -23,7 +23,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, YAML_BYTES
 from scenarios.reading import require_regular
-from sim.io.files.numeric_text import number_or_nan, read_text, xml_root
+from sim.io.files.numeric_text import bounded_number, read_text, xml_root
 from sim.io.store.camera_files import read_camera
 from sim.scene.camera import require_camera
 from sim.types import Array, Camera
@@ -56,11 +56,8 @@ def _values(path: Path) -> dict[str, float]:
     found = {}
     for part, name in ((part, name) for part, names in PARTS.items() for name in names):
         element = root.find(part)
-        text = None if element is None else element.get(name)
-        found[name] = number_or_nan(text)
-        if not (SMALLEST if name in POSITIVE else -LARGEST) <= found[name] <= LARGEST:
-            expected = f"a number {'above 0, ' if name in POSITIVE else ''}within {LARGEST:g}"
-            raise _wrong(path, f"{part} {name}", "nothing" if text is None else repr(text), expected)
+        text, low = None if element is None else element.get(name), SMALLEST if name in POSITIVE else -LARGEST
+        found[name] = bounded_number(path, f"{part} {name}", text, low, LARGEST)
     return found
 
 
@@ -142,9 +139,6 @@ def read_calibration(path: Path) -> Camera:
     expected = "a camera.json, or Tsai's calibration as .xml"
     require_regular(path, f"check --camera: {expected}")
     kind = path.suffix.lower()
-    if kind == ".toml":
-        remedy = "give the recording's calibration; a TOML file describes a view for `flockscope replay --camera`"
-        raise _wrong(path, "--camera", "a TOML file", expected, remedy)
     readers = {".yml": read_opencv_yaml, ".yaml": read_opencv_yaml, ".xml": read_tsai}
     camera = readers.get(kind, read_camera)(path)
     height = float(camera.position[2])
@@ -172,9 +166,5 @@ def scaled_to_image(
         got, expected = "a calibration for {}×{} px".format(*camera.image), "one for {}×{} px, or of that shape"
         raise _wrong(path, "--camera", got, expected.format(*image), "give this recording's calibration")
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
-    return camera.replace(
-        image=image,
-        focal_px=(fx * x, fy * y),
-        centre_px=(cx * x, cy * y),
-        px_per_m=float(camera.px_per_m * np.sqrt(x * y)),
-    )
+    scale = float(camera.px_per_m * np.sqrt(x * y))
+    return camera.replace(image=image, focal_px=(fx * x, fy * y), centre_px=(cx * x, cy * y), px_per_m=scale)

@@ -19,7 +19,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import NumericTable, number_or_nan, person_ids, xml_root
+from sim.io.files.numeric_text import NumericTable, bounded_number, person_ids, xml_root
 from sim.io.formats.labels import CHORD, differentiate, labelled_sequence, labelled_truth_fields, require_size
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.scene.visibility import scale_of_all_boxes, scale_of_first_boxes
@@ -80,12 +80,7 @@ def _number(
     path: Path, place: str, element: ET.Element, key: str, low: float = -COORDINATE, high: float = COORDINATE,
     whole: bool = False,
 ) -> float:  # fmt: skip
-    value = number_or_nan(element.get(key))
-    if not low <= value <= high or (whole and value % 1):
-        expected = f"a {'whole ' if whole else ''}number from {low:g} to {high:.0f}"
-        got, remedy = repr(element.get(key)), "correct it"
-        raise InputError(file=path, place=f"{place}: {element.tag} {key}", got=got, expected=expected, remedy=remedy)
-    return value
+    return bounded_number(path, f"{place}: {element.tag} {key}", element.get(key), low, high, whole)
 
 
 def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:

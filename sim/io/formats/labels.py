@@ -106,25 +106,17 @@ def _names(measured: Ints, label: Ints) -> dict[int, int]:
 
 def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: float) -> GroupEvent:
     """Returns the event with the recording's person ids, group labels and unit."""
-    return replace(
-        event,
-        before=tuple(sorted(names.get(g, g) for g in event.before)),
-        after=tuple(sorted(names.get(g, g) for g in event.after)),
-        members=tuple(int(people[m - 1]) for m in event.members),
-        pos=(event.pos[0] * px_per_m, event.pos[1] * px_per_m),
-    )
+    before, after = (tuple(sorted(names.get(g, g) for g in ids)) for ids in (event.before, event.after))
+    members, (x, y) = tuple(int(people[m - 1]) for m in event.members), event.pos
+    return replace(event, before=before, after=after, members=members, pos=(x * px_per_m, y * px_per_m))
 
 
 def scale_groups(groups: Groups, factor: float) -> Groups:
     """Returns groups with all lengths multiplied by `factor`: positions, velocities and hulls."""
     if factor == 1.0:
         return groups
-    return groups.replace(
-        pos=groups.pos * factor,
-        vel=groups.vel * factor,
-        extent=groups.extent * factor**2,
-        hull=tuple(h * factor for h in groups.hull),
-    )
+    hull, extent = tuple(h * factor for h in groups.hull), groups.extent * factor**2
+    return groups.replace(pos=groups.pos * factor, vel=groups.vel * factor, extent=extent, hull=hull)
 
 
 WINDOW = 0.5  # s, length of the time window

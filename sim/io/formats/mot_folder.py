@@ -16,7 +16,7 @@ from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
-from sim.io.files.numeric_text import number_or_nan, read_text
+from sim.io.files.numeric_text import bounded_number, read_text
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.labels import labelled_sequence
@@ -54,12 +54,10 @@ def read_seqinfo(path: Path) -> SeqInfo:
     section = dict(parser["Sequence"]) if parser.sections() else {}
 
     def number(key: str, low: float, high: float, whole: bool = True) -> Any:
-        text = section.get(key.lower())
-        value = number_or_nan(text)
-        if text is not None and not (low <= value <= high and (not whole or value == round(value))):
-            expected = f"a {'whole ' if whole else ''}number from {low:g} to {high:g}"
-            raise InputError(file=path, place=key, got=repr(text), expected=expected, remedy="correct it")
-        return None if text is None else int(value) if whole else value
+        if key.lower() not in section:
+            return None
+        value = bounded_number(path, key, section[key.lower()], low, high, whole)
+        return int(value) if whole else value
 
     length, w, h = (number(k, 1, high) for k, high in (("seqLength", FRAMES), ("imWidth", SIDE), ("imHeight", SIDE)))
     size = None if w is None or h is None else (w, h)
@@ -140,7 +138,8 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         return pictures.read(wanted, seen if images else pictures.first_size())
 
     def truth() -> Truth:
-        return mot_text.read_truth(gt, info.name, rate, length, options.scale, of_boxes.person_class)
+        table = read_table(gt, length=length, boxless=True)
+        return mot_text.truth_of_table(table, info.name, rate, length, options.scale, of_boxes.person_class)
 
     more: dict[str, Any] = {} if choice is None else {"background": str(choice)}
     more |= {} if pictures.numbering is None else {"numbering": astuple(pictures.numbering)}

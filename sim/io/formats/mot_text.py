@@ -27,7 +27,7 @@ from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.biwi import labels_of
 from sim.io.formats.labels import CHORD, centres, differentiate, labelled_truth_fields, require_size
-from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, read_table, require_pixels
+from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, require_pixels
 from sim.io.formats.options import BoxOptions, Classes
 from sim.scene.visibility import scale_of_all_boxes
 from sim.truth.group_hulls import box_groups
@@ -191,9 +191,6 @@ def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
             got, expected = f"0 in all {len(keep)} rows, which leaves nobody", "another flag than 0 for people"
             remedy = "write 1 in column 7 of rows that count"
             raise InputError(file=file, place="column 7", got=got, expected=expected, remedy=remedy)
-    elif (flag == 0).all() and len(keep):
-        text = f"{file}: column 7 is 0 in all {len(keep)} rows; it is taken as a confidence, and all rows count"
-        warnings.warn(text, stacklevel=2)
     require_classes(table, person_class)
     return of_class(table, keep, person_class)
 
@@ -306,9 +303,7 @@ class DetectionTable:
 
 def detections_of_table(table: MotTable, options: BoxOptions) -> DetectionTable:
     """Returns a text's table as detections: points on the ground (m) if every row has one, else the boxes' centres."""
-    _check_boxes(table)
-    ground = ground_positions(table)
-    boxless = _reject_placeless(table, ground)
+    ground, boxless = _places(table)
     path, rows = table.rows.file, np.argsort(table.frame, kind="stable")
     rows = rows[of_class(table, np.ones(len(rows), bool), options.person_class)[rows]]
     raw = table.scores()[rows]
@@ -326,43 +321,31 @@ def detections_of_table(table: MotTable, options: BoxOptions) -> DetectionTable:
     return DetectionTable(table.frame[rows], table.id[rows], plane, pos[rows], box, score)
 
 
-def _check_boxes(table: MotTable) -> None:
+def _places(table: MotTable) -> tuple[Array | None, Bools]:
+    """Returns the ground positions as `ground_positions` does, and which rows have no box: (N,)."""
     require_pixels(table.rows, table.boxes())
     doubt = corner_doubt(table.boxes())
     if doubt:
         warnings.warn(f"{table.rows.file}: {doubt}", stacklevel=3)
-
-
-def _reject_placeless(table: MotTable, ground: Array | None) -> Bools:
-    boxless = table.without_box()
+    ground, boxless = ground_positions(table), table.without_box()
     if ground is None or np.isnan(ground).any():
         table.rows.reject(boxless, "a box, or x, y, z in every line", "give each line a box or a ground position")
-    return boxless
-
-
-def read_truth(
-    path: Path, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan"),
-    person_class: Classes | None = None,
-) -> Truth:  # fmt: skip
-    """Reads a gt.txt as truth of people without group labels, as MOTChallenge's own scoring counts them.
-
-    length: None: up to the last frame kept. px_per_m: nan: the boxes' median height / 1.7 m. Boxes are None if a row
-    has none, positions (nan in rows without) and velocities if no row has one. Groups are those of a column `group`, or
-    of the file that `group_file` names.
-    """
-    table = read_table(path, length=length, boxless=True)
-    return truth_of_table(table, name, fps, length, px_per_m, person_class)
+    return ground, boxless
 
 
 def truth_of_table(
     table: MotTable, name: str, fps: float, length: int | None = None, px_per_m: float = float("nan"),
     person_class: Classes | None = None,
 ) -> Truth:  # fmt: skip
-    """Returns a text's table as truth. See `read_truth`."""
-    _check_boxes(table)
+    """Returns the table of a gt.txt as truth of people, as MOTChallenge's own scoring counts them.
+
+    length: None: up to the last frame kept. px_per_m: nan: the boxes' median height / 1.7 m. Boxes are None if a row
+    has none, positions (nan in rows without) and velocities if no row has one. Groups are those of a column `group`, or
+    of the file that `group_file` names.
+    """
     require_metres(table, fps)
-    ground = ground_positions(table)
-    boxed = not _reject_placeless(table, ground).any()
+    ground, boxless = _places(table)
+    boxed = not boxless.any()
     # Rows that do not count must be valid all the same.
     keep = labelled_people(table, person_class)
     reject_duplicate_ids(table, keep)

@@ -225,21 +225,18 @@ def write_video(
         got, remedy = "pictures of {}×{} px".format(*size), "take --images jpg or png, or another camera.image"
         raise InputError(place="--images mp4", got=got, expected="an even width and height", remedy=remedy)
     path.write_bytes(b"")  # libav makes no file without pictures
-    made = VideoWriter(path, size, fps, quality, comment)
-    try:
+    with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
+        if comment:
+            container.metadata["comment"] = comment
+        made = VideoWriter(path, container, size, fps, quality)
         yield made
-        made.end()
-    finally:
-        made.close()
+        container.mux(made.stream.encode(None))
     written = 0
     with suppress(av.FFmpegError, IndexError), av.open(str(path)) as container:
         written = sum(packet.size > 0 and not packet.is_corrupt for packet in container.demux(video=0))
     if made.count and written != made.count:
-        got, remedy = (
-            f"{written} of {made.count} pictures in the finished video",
-            "free room on the disk, then run again",
-        )
-        raise WorkError(file=path, got=got, expected="all of them", remedy=remedy)
+        got = f"{written} of {made.count} pictures in the finished video"
+        raise WorkError(file=path, got=got, expected="all of them", remedy="free room on the disk, then run again")
 
 
 class VideoWriter:
@@ -248,21 +245,16 @@ class VideoWriter:
     State: libav's open container and stream, and `count`, the number of pictures added.
     """
 
-    def __init__(self, path: Path, size: tuple[int, int], fps: float, quality: int, comment: str):
-        import av
-
-        self._path, self.count = path, 0
-        self._container: Any = av.open(str(path), "w", format="mp4", options={"movflags": "faststart"})
-        if comment:
-            self._container.metadata["comment"] = comment
+    def __init__(self, path: Path, container: Any, size: tuple[int, int], fps: float, quality: int):
+        self.count, self._path, self._container = 0, path, container
         group = str(max(1, round(fps)))
         # x264's macroblock tree reads memory that it never wrote where pictures are not a multiple of 128 px wide, and
         # the same pictures give other bytes now and then.
         options = {"crf": str(quality), "preset": "veryfast", "g": group, "bf": "2", "threads": "1", "mbtree": "0"}
-        self._stream: Any = self._container.add_stream("libx264", rate=rate_of(fps), options=options)
-        self._stream.width, self._stream.height = size
-        self._stream.pix_fmt = "yuv420p"
-        context = self._stream.codec_context
+        self.stream = container.add_stream("libx264", rate=rate_of(fps), options=options)
+        self.stream.width, self.stream.height = size
+        self.stream.pix_fmt = "yuv420p"
+        context = self.stream.codec_context
         # The same pictures give the same bytes.
         context.thread_count = 1
         context.color_range = WRITTEN_RANGE
@@ -273,18 +265,10 @@ class VideoWriter:
         import av
         import cv2
 
-        width, height = self._stream.width, self._stream.height
-        require_size(picture, (width, height), self._path, f"picture {self.count + 1}")
+        size = self.stream.width, self.stream.height
+        require_size(picture, size, self._path, f"picture {self.count + 1}")
         planes = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2YUV_I420), np.uint8)
         frame = av.VideoFrame.from_ndarray(planes, format="yuv420p")
         frame.color_range, frame.colorspace = WRITTEN_RANGE, WRITTEN_COLOURS
-        self._container.mux(self._stream.encode(frame))
+        self._container.mux(self.stream.encode(frame))
         self.count += 1
-
-    def end(self) -> None:
-        """Writes the frames that the encoder still holds."""
-        self._container.mux(self._stream.encode(None))
-
-    def close(self) -> None:
-        """Writes the index of the file and closes the container."""
-        self._container.close()

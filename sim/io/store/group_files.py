@@ -67,7 +67,7 @@ def read_near(path: Path) -> Near:
     header = "".join(text.text[:1])
     if header != NEAR_COLUMNS:
         raise _bad(path, 1, repr(header), NEAR_COLUMNS)
-    rows = text.numbers((4, 4), first=1, layout=NEAR_COLUMNS)
+    rows = text.numbers((4,), first=1, layout=NEAR_COLUMNS)
     start, end, a, b = (rows.integers(k, name) for k, name in enumerate(NEAR_COLUMNS.split(",")))
     wrong = (start < 1) | (end < start) | (end > FRAMES) | (np.minimum(a, b) < 0)
     expected = f"frames from 1 to {FRAMES}, start not after end, and two ids from 0 on"
@@ -147,7 +147,7 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
     """Returns the groups of each frame stored in a groups.parquet; None where they are unknown."""
     facts = table.facts_as(_GroupFacts)
     first, count = facts.first, facts.frames
-    axes = AXES if table.has("z") else AXES[:2]
+    axes = AXES if "z" in table.columns else AXES[:2]
     id, size = table.ints("group"), table.floats("size")
     pos, vel = table.floats(*axes), table.floats(*(f"v{a}" for a in axes))
     extent = table.floats(*EXTENT).reshape(-1, 2, 2)
@@ -170,10 +170,10 @@ def wkt(hull: Array, digits: int) -> str:
 
 
 def parse_wkt(text: str) -> list[list[float]]:
-    """Returns the vertices [x, y] of a WKT POLYGON of one ring; raises ValueError for other texts."""
-    body = re.fullmatch(r"\s*POLYGON\s*(?:EMPTY|\(\(([^()]*)\)\))\s*", text)
-    points = [point.split() for point in body[1].split(",")] if body and body[1] is not None else []
-    if body is None or not all(len(xy) == 2 and all(map(is_number_text, xy)) for xy in points):
+    """Returns the vertices [x, y] of a WKT POLYGON of one ring, perhaps empty; raises ValueError for other texts."""
+    body = re.fullmatch(r"\s*POLYGON\s*(?:EMPTY|\(\s*\(([^()]*)\)\s*\))\s*", text)
+    points = [point.split() for point in (body[1] or "").split(",") if point.strip()] if body else [[]]
+    if not all(len(xy) == 2 and all(map(is_number_text, xy)) for xy in points):
         raise ValueError("POLYGON ((x y, …)), pairs of numbers")
     ring = [[read_number(v) for v in xy] for xy in points]
     return ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
@@ -210,10 +210,6 @@ def _value(text: str) -> int | float | str | None:
     return None if value in ("", "nan") or value != value else value
 
 
-def _size(text: str) -> int | float | str | None:
-    return whole_or_number(text) if text else None
-
-
 def _ids(text: str | None) -> list[Any]:
     return [whole_or_number(word) for word in (text or "").split()]
 
@@ -231,7 +227,7 @@ class _GroupRow(BaseModel):
     x: Annotated[Number | None, BeforeValidator(_value)] = None
     y: Annotated[Number | None, BeforeValidator(_value)] = None
     hull: Annotated[tuple[Pair, ...], BeforeValidator(_hull)] = ()
-    size: Annotated[Annotated[Number, Field(ge=0)] | None, BeforeValidator(_size)] = None
+    size: Annotated[Annotated[Number, Field(ge=0)] | None, BeforeValidator(_value)] = None
 
 
 def read_groups_csv(path: Path, length: int) -> list[Groups]:

@@ -163,18 +163,17 @@ def read_track_table(folder: Path) -> list[Tracks]:
     rows = RunRows(
         f.plane, f.unit, frame, table.ints("id"), table.ints("group"), values[:, :d], values[:, d:], cov,
         table.floats(*BOX), np.isin(frame, list(f.boxless)), table.floats("score"),
-        table.floats("seen") > 0 if table.has("seen") else np.ones(len(frame), bool),
+        table.floats("seen") > 0 if "seen" in table.columns else np.ones(len(frame), bool),
     )  # fmt: skip
     rows.reject_faults(table.file, tables.REDO)
     groups, found = _groups(folder / "groups.parquet", f.first, f.frames), []
     for index, (a, b) in enumerate(pairwise(table.cuts(f.first, f.frames).tolist()), f.first):
         r, box = slice(a, b), None if index in f.boxless else rows.box[a:b]
-        found.append(
-            Tracks(
-                index, (index - 1) / f.fps, f.plane, f.unit, rows.id[r], rows.group[r], rows.pos[r], rows.vel[r],
-                rows.cov[r], box, rows.score[r], groups[index - f.first], derived=f.derived, seen=rows.seen[r],
-            )
+        made = Tracks(
+            index, (index - 1) / f.fps, f.plane, f.unit, rows.id[r], rows.group[r], rows.pos[r], rows.vel[r],
+            rows.cov[r], box, rows.score[r], groups[index - f.first], derived=f.derived, seen=rows.seen[r],
         )  # fmt: skip
+        found.append(made)
     return found
 
 

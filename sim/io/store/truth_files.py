@@ -126,7 +126,7 @@ def read_truth(folder: Path) -> Truth:
     length = facts.length
 
     def several(*names: str) -> Array | None:
-        return table.floats(*names) if table.has(names[0]) else None
+        return table.floats(*names) if names[0] in table.columns else None
 
     frame, id = table.ints("frame"), table.ints("id")
     _check_rows(table, length)
@@ -208,10 +208,10 @@ class _DetectionFacts(BaseModel):
 def read_detections(path: Path) -> list[Detections]:
     """Reads a det.parquet: one Detections per frame, from frame 1."""
     table = read_table(path)
-    axes = ("x", "y", "z") if table.has("z") else ("x", "y")
+    axes = ("x", "y", "z") if "z" in table.columns else ("x", "y")
     pos, score, facts = table.floats(*axes), table.floats("score"), table.facts_as(_DetectionFacts)
-    vel = table.floats(*(f"v{a}" for a in axes)) if table.has("vx") else None
-    box = table.floats(*BOX) if table.has(BOX[0]) else None
+    vel = table.floats(*(f"v{a}" for a in axes)) if "vx" in table.columns else None
+    box = table.floats(*BOX) if BOX[0] in table.columns else None
     found = []
     for k, (a, b) in enumerate(pairwise(table.cuts(1, facts.frames).tolist())):
         cut = (pos[a:b], None if vel is None else vel[a:b], None if box is None else box[a:b], score[a:b])

@@ -83,10 +83,8 @@ def _seqmaps(root: Path) -> Iterator[InputError]:
         listed = set(path.read_text(encoding="utf-8").splitlines()[1:])
         folders = {p.name for p in split.iterdir() if p.is_dir()}
         there = {name for name in folders if not (name.startswith(PARTIAL) or is_side_file(name))}
-        for name in sorted(listed - there):
-            yield _problem(split / name, "missing", f"a sequence, as {path.name} says")
-        for name in sorted(there - listed):
-            yield _problem(path, f"no line {name}", "every sequence of the split")
+        for name in sorted(listed ^ there):
+            yield _problem(path, f"{'a' if name in listed else 'no'} line {name}", "those of the split's folders")
 
 
 def _sequence(folder: Path) -> list[FlockscopeError]:

@@ -76,13 +76,10 @@ def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: F
 
 
 DIFFERENCES = [
-    ({"camera": {"fps": 5}}, {}, "camera.fps 10 → 5)"),
-    ({"duration": 3.0, "camera": {"fps": 5}}, {"streams": ("left",)}, "duration 20 → 3, camera.fps 10 → 5, "
-     "streams none → left,background, images none → jpg)"),
-    ({"group": [{"id": "b", "start": [1, 1], "goal": [2, 2]}]}, {}, "group.0.id a → b)"),
-    ({"about": "1.2.0"}, {}, "about none → 1.2.0)"),
-    ({}, {"stride": 4}, "stride 1 → 4)"),
-]  # fmt: skip
+    ({"camera": {"fps": 5}}, {"streams": ("left",)}, "scenario and streams and images"),
+    ({"about": "1.2.0"}, {}, "scenario"),
+    ({}, {"stride": 4}, "stride"),
+]
 
 
 @pytest.mark.parametrize(("more", "change", "words"), DIFFERENCES)
@@ -93,15 +90,4 @@ def test_what_differs_is_named(
     other = SequenceJob(job.folder, Entry("x", scenario(**more)), 1, **change)
     with pytest.raises(InputError) as refused:
         stored_manifest(other)
-    assert f"another sequence (stored → asked for: {words}" in refused.value.got
-
-
-def test_what_differs_is_said_without_a_readable_scenario(job: SequenceJob, made: FakeSimulator) -> None:
-    run_job(job)
-    other = SequenceJob(job.folder, Entry("x", scenario(duration=3.0)), 1)
-    for unreadable in ("a = " + "[" * 5000 + "]" * 5000, "a = " + "9" * 5000, None):
-        (job.folder / "scenario.toml").unlink()
-        if unreadable is not None:
-            (job.folder / "scenario.toml").write_text(unreadable)
-        with pytest.raises(InputError, match="scenario_hash"):
-            stored_manifest(other)
+    assert refused.value.got == f"a sequence of another {words}"

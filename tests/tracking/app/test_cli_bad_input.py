@@ -99,7 +99,7 @@ OPTIONS = {
     f"{GOOD} --streams none --images png": "--images",
     f"{TRACK} --fps 5": "--fps",  # options for recordings, of a generated sequence
     "track blob {biwi} --out {tmp}/out --px-per-m 30": "--px-per-m",  # metres already
-    "track blob {caviar} --out {tmp}/out --camera {made}/scene.toml": "--camera",  # no ground
+    "track blob {caviar} --out {tmp}/out --camera {made}/scene.toml": "give a camera.json",
     "scenarios merge --out {tmp}/plan.pdf": "ends in .svg; write {tmp}/",
     "fit sensor {tmp}/none --out {tmp}/x.toml": "nothing there",
     f"{GOOD} --sensor {{tmp}}/none.toml": "No such file",
@@ -115,7 +115,7 @@ OPTIONS = {
     "track blob {walk} --detections image --out {tmp}/x":
         "with truth; expected what both have; try --detections truth",
     "track blob {made}/data --camera {made}/scene.toml --out {tmp}/x":
-        "{made}/scene.toml: --camera: got a TOML file; expected a camera.json … describes a view",
+        "{made}/scene.toml: line 1: got … give a camera.json",
     "generate crossing --seeds 0": "flockscope generate: got missing option '--out'; … generate --help",
     "score {made}/data {made}/run {made}/run": "TRACKS: got … twice; expected each run once",
     "score {made}/data {made}/run {made}/run/scene-s40000 --by HOTAA": "--by: got HOTAA … such as HOTA",

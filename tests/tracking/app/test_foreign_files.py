@@ -22,8 +22,6 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
         rows, ini = "1,1,10,10,20,40,1,1,1\n2,1,12,10,20,40,1,1,1\n", f"name={name}\nframeRate=5\nseqLength=2\n"
         shown = {f"img1/{k:06d}.png": np.full((64, 96, 3), 9 * k, np.uint8) for k in (1, 2)}
         mot_folder(folder / "two" / name, rows, ini=ini, pictures=shown)
-    for split in ("train", "val"):
-        mot_folder(folder / "splits" / split / split, rows, ini=f"name={split}\nframeRate=5\n")
     return folder
 
 
@@ -36,7 +34,6 @@ COMMANDS = {
     "export parquet": ("export parquet {0}/data --out {1}", "scene-s20000/people.parquet"),
     "export trajnet": ("export trajnet {0}/data --out {1}", "scene-s20000/people.ndjson"),
     "export pedpy": ("export pedpy {0}/data --out {1}", "scene-s20000/people.txt"),
-    "export coco": ("export coco {0}/splits --out {1}/x.json", "x-train.json"),
     "tune": ("tune {2} --suite {0}/scene.toml --check none --trials 1 --out {1}/toy.toml",
              "toy.json"),
     "view": ("view {0}/two --out {1}", "other.html"),

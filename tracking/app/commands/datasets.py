@@ -55,14 +55,13 @@ def validate(options: ValidateOptions) -> CommandResult:
 
 
 def export_coco(options: CocoOptions) -> CommandResult:
-    """Writes COCO files, one per split, of all sequences with labelled boxes at the path of the options."""
+    """Writes a COCO file of all sequences with labelled boxes at the path of the options."""
     from sim.io.export.coco import coco
 
     out = option_parsing.output_file(options.out, ".json")
-    paths = coco(options.folder, out, person_class=options.person_class)
+    path = coco(options.folder, out, person_class=options.person_class)
     root = options.folder if options.folder.is_dir() else options.folder.parent
-    text = "\n".join([*map(str, paths), f"file names are relative to {root}"])
-    return CommandResult({"file": paths[0] if len(paths) == 1 else None, "files": paths, "root": root}, text)
+    return CommandResult({"file": path, "root": root}, f"{path}\nfile names are relative to {root}")
 
 
 def export_kitti(options: KittiOptions) -> CommandResult:

@@ -4,6 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from scenarios.errors import InputError
 from sim.io.export.coco import coco
 from sim.io.store import sequence_folder
 from sim.io.store.validate import content_hash
@@ -49,26 +50,13 @@ def labelled_folder(path, rows, *, pictures=(), ini=""):
     mot_folder(path, "\n".join(rows), ini=f"name={path.name}\nframeRate=5\n{ini}", pictures=shown)
 
 
-def test_each_split_has_its_own_file(tmp_path):
+def test_several_splits_are_refused(tmp_path):
     """By the seeds of generated sequences, wherever they lie."""
-    for seed in (1, 2, 10_001, 20_001):
+    for seed in (1, 2, 20_001):
         stored(tmp_path / f"data/mixed/s{seed}", replace(make_sequence(seed), name=f"s{seed}"), seed)
-    paths = coco(tmp_path / "data", tmp_path / "all.json")
-    assert [p.name for p in paths] == ["all-train.json", "all-val.json", "all-test.json"]
-    names = [[v["name"] for v in json.loads(p.read_text())["videos"]] for p in paths]
-    assert names == [["s1", "s2"], ["s10001"], ["s20001"]]
-    for p in paths:
-        found = json.loads(p.read_text())
-        assert [i["id"] for i in found["images"]] == list(range(1, len(found["images"]) + 1))
+    with pytest.raises(InputError, match="the splits test, train"):
+        coco(tmp_path / "data", tmp_path / "all.json")
     assert not (tmp_path / "all.json").exists()
-
-
-def test_recordings_are_split_by_their_folders(tmp_path):
-    for name in ("train/a", "val/b", "val/c"):
-        labelled_folder(tmp_path / "set" / name, ["1,1,5,5,9,9,1,1,1"])
-    paths = coco(tmp_path / "set", tmp_path / "x.json")
-    assert [p.name for p in paths] == ["x-train.json", "x-val.json"]
-    assert coco(tmp_path / "set/val", tmp_path / "y.json") == [tmp_path / "y.json"]
 
 
 def test_names_of_pictures_of_recordings_resolve(tmp_path):
@@ -78,7 +66,7 @@ def test_names_of_pictures_of_recordings_resolve(tmp_path):
     labelled_folder(tmp_path / "set/s", rows, pictures=pictures, ini="imDir=frames\nimExt=.png\nseqLength=4\n")
     for source in (tmp_path / "set", tmp_path / "set/s"):
         with pytest.warns(UserWarning, match="pictures 0 to 3 are taken as frames 1 to 4"):
-            (path,) = coco(source, tmp_path / "out/c.json")
+            path = coco(source, tmp_path / "out/c.json")
         found = json.loads(path.read_text())
         root = path.parent / found["info"]["root"]
         assert root.resolve() == source
@@ -93,7 +81,7 @@ def test_names_of_pictures_of_recordings_resolve(tmp_path):
 def test_pictures_after_the_last_frame_are_no_images(tmp_path):
     pictures = [f"img1/{k:06d}.png" for k in (1, 2, 3)]
     labelled_folder(tmp_path / "s", ["1,1,5,5,9,9,1,1,1"], pictures=pictures, ini="seqLength=2\n")
-    (path,) = coco(tmp_path / "s", tmp_path / "c.json")
+    path = coco(tmp_path / "s", tmp_path / "c.json")
     assert [i["frame"] for i in json.loads(path.read_text())["images"]] == [1, 2]
 
 
@@ -103,7 +91,7 @@ def test_people_outside_the_picture_are_left_out(tmp_path):
         "1,5,-4,40,10,20,1,1,0.3", "1,6,10,10,5,5,1,1,0.1",
     ]  # fmt: skip
     labelled_folder(tmp_path / "s", rows, ini="imWidth=64\nimHeight=48\n")
-    (path,) = coco(tmp_path / "s", tmp_path / "c.json")
+    path = coco(tmp_path / "s", tmp_path / "c.json")
     found = json.loads(path.read_text())["annotations"]
     assert [a["track_id"] for a in found] == [5, 6]
     assert found[0]["bbox"] == [-4, 40, 10, 20], "amodal and unclipped, as in gt.txt"
@@ -122,7 +110,7 @@ def decoded(segmentation):
 def test_masks_are_the_visible_pixels(tmp_path):
     live = make_pictured(1, ("left", "ids"))
     stored(tmp_path / live.name, live, streams=("left", "ids"))
-    (path,) = coco(tmp_path / live.name, tmp_path / "c.json")
+    path = coco(tmp_path / live.name, tmp_path / "c.json")
     found = json.loads(path.read_text())
     frames = {i["id"]: i["frame"] for i in found["images"]}
     assert any(a["area"] > 0 for a in found["annotations"])

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 import tarfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +12,8 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.export.webdataset import size_of, webdataset
-from sim.io.files import atomic, tables
-from sim.io.source import sequence_folders
+from sim.io.files import atomic
 from sim.io.store import sequence_folder
-from sim.io.store.seal import read_manifest, with_hash
 from sim.io.store.validate import content_hash, validate
 from tests.fake_simulator import content
 from tests.made_up import make_pictured
@@ -97,21 +93,21 @@ def test_shards_hold_whole_sequences_up_to_their_size(data: Path, tmp_path: Path
     assert samples(*paths) == samples(*[tmp_path / "whole" / shard["name"] for shard in whole])
 
 
-def test_what_is_whole_is_kept_and_the_rest_made_anew(data: Path, tmp_path: Path) -> None:
+def test_the_same_export_again(data: Path, tmp_path: Path) -> None:
+    """What an interrupted one left is removed; a damaged shard is replaced."""
     out = tmp_path / "out"
     webdataset(data, out, shard_size=1)
     before = content(out)
-    (out / "index.json").unlink()
-    (out / "shard-000001.json").unlink()
-    shard = out / "shard-000002.tar"
-    shard.write_bytes(shard.read_bytes()[:-1])
-    (out / f"{atomic.PARTIAL}x-0123456789ab").write_text("")
-    kept = (out / "shard-000000.tar").stat().st_ino
+    (out / "shard-000002.tar").write_bytes(b"")
+    (tmp_path / f"{atomic.PARTIAL}out-0123456789ab").mkdir()
     seen = []
     webdataset(data, out, shard_size=1, progress=lambda *a: seen.append(a))
     assert content(out) == before
-    assert (out / "shard-000000.tar").stat().st_ino == kept
     assert seen == [(k, 3, f"shard-{k - 1:06d}.tar") for k in (1, 2, 3)]
+    assert not list(tmp_path.glob(f"{atomic.PARTIAL}*"))
+    (out / "mine").write_text("mine")
+    with pytest.raises(InputError, match="other files"):
+        webdataset(data, out, shard_size=1)
 
 
 @pytest.mark.parametrize("name", ["gt/truth.parquet", "img1/000003.png", "manifest.json"])
@@ -120,8 +116,7 @@ def test_an_altered_file_is_named_and_its_shard_not_written(data: Path, tmp_path
     path.write_bytes(path.read_bytes().replace(b"1", b"2", 1) + b" ")
     with pytest.raises(InputError, match=re.escape(str(path))):
         webdataset(data, tmp_path / "out", shard_size=1)
-    assert not (tmp_path / "out" / "shard-000001.tar").exists()
-    assert not (tmp_path / "out" / "index.json").exists()
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "data"]
 
 
 def test_what_is_not_ours_is_refused(tmp_path: Path) -> None:
@@ -139,35 +134,6 @@ def test_sizes(text: str, size: int) -> None:
     assert size_of(text) == size
 
 
-def copied(data: Path, tmp_path: Path, change: Callable[[dict[str, Any], Path], None]) -> Path:
-    """A copy of the first sequence whose manifest is changed and sealed again."""
-    folder = Path(shutil.copytree(sequence_folders(data, "generated")[0], tmp_path / "flockscope-train/a"))
-    manifest = read_manifest(folder)
-    change(manifest, folder)
-    (folder / "manifest.json").write_bytes(tables.json_document(with_hash(manifest)))
-    return folder
-
-
-def link_out_of_the_sequence(manifest: dict[str, Any], folder: Path) -> None:
-    secret = folder.parent / "secret"
-    (folder / "scenario.toml").rename(secret)
-    (folder / "scenario.toml").symlink_to(secret)
-
-
-CHANGED_MANIFESTS = [
-    (lambda manifest, _: manifest.update(files={}), r"files: got no scenario.toml and \d+ more"),
-    (link_out_of_the_sequence, r"scenario.toml: got a link that leads out of the sequence"),
-]
-
-
-@pytest.mark.parametrize(("change", "words"), CHANGED_MANIFESTS)
-def test_what_a_changed_manifest_vouches_for_is_not_exported(data, tmp_path: Path, change, words) -> None:
-    folder = copied(data, tmp_path, change)
-    with pytest.raises(InputError, match=words):
-        webdataset(folder, tmp_path / "out")
-    assert not list((tmp_path / "out").glob("*"))
-
-
 @pytest.mark.parametrize(("part", "more"), [("", {"shard_size": 1}), ("b-s00000", {})])
 def test_another_export_is_not_overwritten(data: Path, tmp_path: Path, part: str, more: dict[str, Any]) -> None:
     source = data / "flockscope-train" / part
@@ -175,7 +141,7 @@ def test_another_export_is_not_overwritten(data: Path, tmp_path: Path, part: str
         out = tmp_path / f"out{len(list(tmp_path.iterdir()))}"
         webdataset(first[0], out, **first[1])
         before = content(out)
-        with pytest.raises(InputError, match=r"shard-00000\d.tar: got a shard of another export"):
+        with pytest.raises(InputError, match="another export"):
             webdataset(second[0], out, **second[1])
         assert content(out) == before
 

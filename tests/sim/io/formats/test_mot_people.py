@@ -85,9 +85,8 @@ def test_a_class_that_leaves_nobody_is_an_error_that_counts(tmp_path, wrong):
     assert len(open_source(folder, fps=25, person_class=wrong)[0].truth.id) == 6
 
 
-def test_confidences_that_are_all_zero_are_said(tmp_path):
-    with pytest.warns(UserWarning, match="column 7 is 0 in all 6 rows"):
-        assert len(open_source(text(tmp_path, ["0", "0"]), fps=25)[0].truth.id) == 6
+def test_confidences_that_are_all_zero_leave_nobody_out(tmp_path):
+    assert len(open_source(text(tmp_path, ["0", "0"]), fps=25)[0].truth.id) == 6
 
 
 def test_labels_that_are_all_to_be_ignored_are_an_error(tmp_path):

@@ -76,6 +76,17 @@ def test_groups(row, tmp_path):
     assert error.value.place.startswith("line ")
 
 
+@pytest.mark.parametrize(
+    "hull", ["POLYGON (())", "POLYGON EMPTY", "", "POLYGON((0 0, 2 0, 1 1, 0 0))", "POLYGON ((0 0, 2 0, 1 1,))"]
+)
+def test_hulls_of_other_programs(hull, tmp_path):
+    (tmp_path / "groups.csv").write_text(f'frame,group,members,x,y,hull\n1,1,1 2,,,"{hull}"\n')
+    same(
+        read_groups_csv(tmp_path / "groups.csv", 1)[0].hull,
+        (np.array([[0.0, 0], [2, 0], [1, 1]])[: 3 * ("0" in hull)],),
+    )
+
+
 def test_cameras_and_scenes_come_back_exactly(tmp_path):
     down = camera_rotation(np.pi / 2, 0.3)
     top = Camera("top", (640, 480), (1.0, 1.0), (320.0, 240.0), np.array([1.7, -2.3, 20.0]), down, 0.0, 40.3)
