@@ -73,17 +73,28 @@ class Nested:
         log_w = np.concatenate([self.log_w, np.zeros(x.shape[:2])], axis=1)
         return Nested(np.concatenate([self.x, x], axis=1), z, self.log_q, log_w, self.log_rest)
 
-    def weights(self) -> Array:
-        """Returns the weights w of step 1, (N_x,), sum 1."""
-        return normalised(self.log_w.sum(axis=1) + self.log_rest)
+    def weights(self, one_by_one: bool = False) -> Array:
+        """Returns the weights w of step 1, (N_x,), sum 1; one_by_one: only of what X as a whole adds."""
+        return normalised(self.log_rest if one_by_one else self.log_w.sum(axis=1) + self.log_rest)
 
-    def rest_weights(self) -> Array:
-        """Returns the weights of what X as a whole adds, (N_x,), sum 1."""
-        return normalised(self.log_rest)
+    def component_weights(self, one_by_one: bool = False) -> Array:
+        """Returns the weights of each component, (N_x, K), sum 1 for each: w, or one_by_one those of it alone."""
+        if one_by_one:
+            return normalised(self.log_w.T).T
+        return np.repeat(self.weights()[:, None], self.log_w.shape[1], axis=1)
 
-    def component_weights(self) -> Array:
-        """Returns the weights of each component alone, (N_x, K), sum 1 for each component."""
-        return normalised(self.log_w.T).T
+    def resampled(self, uniforms: Array, one_by_one: bool = False) -> Nested:
+        """Returns the particles after step 2, of weight 1; uniforms (K + 1,).
+
+        one_by_one: in two stages (ours), each component by its own weights, then X as a whole by the rest.
+        """
+        components = np.arange(self.log_w.shape[1])
+        chosen = systematic_resample_rows(self.weights(one_by_one)[None], uniforms[-1:])[0]
+        own = np.repeat(chosen[:, None], len(components), axis=1)
+        if one_by_one:
+            own = systematic_resample_rows(self.component_weights(True).T, uniforms[:-1]).T[chosen]
+        zero = np.zeros_like(self.log_w), np.zeros_like(self.log_rest)
+        return Nested(self.x[own, components], self.z[chosen], self.log_q[chosen], *zero)
 
 
 def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
@@ -97,18 +108,6 @@ def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
     log_group = log_sum(log_y)
     log_rest = log_dynamics + log_group - np.log(log_y.shape[1])  # step 1
     return Nested(new, z, log_y - log_group[:, None], log_w, log_rest)  # step 3
-
-
-def joint_indices(nested: Nested, uniform: float) -> Ints:
-    """Returns the indices (N_x,) of step 2 by the weights of step 1."""
-    return np.asarray(systematic_resample_rows(nested.weights()[None], np.array([uniform]))[0])
-
-
-def component_indices(nested: Nested, uniforms: Array) -> tuple[Ints, Ints]:
-    """Returns the indices of step 2 in two stages (ours): (N_x, K) of each component alone, then (N_x,) of the rest."""
-    single = systematic_resample_rows(nested.component_weights().T, uniforms[:-1]).T
-    rest = systematic_resample_rows(nested.rest_weights()[None], uniforms[-1:])[0]
-    return single, rest
 
 
 def log_sum(values: Array) -> Array:

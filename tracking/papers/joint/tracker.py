@@ -180,19 +180,9 @@ class Joint(PointTracker):
         return report.known_groups(self.identities, id), known
 
     def _resample(self) -> None:
-        nested, people = self.nested, len(self.people.id)
-        if not people:
-            return
-        uniforms = self.streams.uniforms(RESAMPLING, np.append(self.people.key, NOBODY), 1, 1)[0, :, 0]
-        if not self.config.own_weights:
-            chosen = decentralised_filter.joint_indices(nested, float(uniforms[-1]))
-            own = np.repeat(chosen[:, None], people, axis=1)
-        else:
-            single, chosen = decentralised_filter.component_indices(nested, uniforms)
-            own = single[chosen]
-        columns = np.arange(people)
-        x, z, log_q = nested.x[own, columns], nested.z[chosen], nested.log_q[chosen]
-        self.nested = Nested(x, z, log_q, np.zeros_like(nested.log_w), np.zeros_like(nested.log_rest))
+        if len(self.people.id):
+            uniforms = self.streams.uniforms(RESAMPLING, np.append(self.people.key, NOBODY), 1, 1)[0, :, 0]
+            self.nested = self.nested.resampled(uniforms, self.config.own_weights)
 
     def _keep(self, rows: Bools) -> None:
         if rows.all():
@@ -225,14 +215,12 @@ class Joint(PointTracker):
 
     def _report(self, frame: Frame) -> Tracks:
         n, c, id = self.nested, self.config, self.people.id
-        joint = n.weights()
-        weights = n.component_weights() if c.own_weights else np.repeat(joint[:, None], len(id), axis=1)
-        mean, cov = report.moments(n.x, weights)
+        mean, cov = report.moments(n.x, n.component_weights(c.own_weights))
         pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
         box = boxes_at(pos, self.people.size) if self.plane == "image" else None
         self.shown = box
         old = self.identities.groups
-        parts = [frozenset(id[rows].tolist()) for rows in self._groups(joint)]
+        parts = [frozenset(id[rows].tolist()) for rows in self._groups()]
         changes = self.identities.step(frame.index, frozenset(id.tolist()), parts)
         self.belief.see(mean[:, :2])
         self.events.add(id, mean[:, :2])
@@ -245,9 +233,9 @@ class Joint(PointTracker):
             own_events=OWN_EVENTS,
         )  # fmt: skip
 
-    def _groups(self, joint: Array) -> list[Ints]:
+    def _groups(self) -> list[Ints]:
         n = self.nested
-        particle = n.rest_weights() if self.config.own_weights else joint
+        particle = n.weights(self.config.own_weights)
         return report.histogram_partition(n.z, particle[:, None] * np.exp(n.log_q)) if n.z.shape[2] else []
 
 
