@@ -27,6 +27,7 @@ HISTORY = 6  # With 8 no figure changes.
 RATE = 0.1  # 1/s: of changes of Z.
 PERIOD = 4.0  # s: between the starts of two gaps, in which the two people are hidden in turn.
 FALSE = 1.0  # m: greatest error of a false point, per axis.
+SURE = 2.0  # Log-odds of the belief in a known Z.
 NOTHING = 1e12  # m^2: variance of the place of a person who is missed.
 
 
@@ -55,7 +56,7 @@ CONDITIONS = {
 }
 """Base: the default's Sigma and noise, 50 particles of 50 partitions, 5 % missed, a gap of 1 s every PERIOD."""
 COLUMNS = (
-    "VAR1 exact, cm", "Δ Z known", "Δ full exact", "VAR1 particles, cm", "Δ full particles",
+    "VAR1 exact, cm", "Δ Z known", "Δ full exact", "VAR1 particles, cm", "Δ missed, Z known", "Δ full",
     "log loss of Z: prior / exact / particles",
 )  # fmt: skip
 
@@ -105,7 +106,7 @@ def exact(y: Array, config: JointConfig, dt: float, z: Ints | None = None) -> tu
 
 
 class PairModel(FrameModel):
-    """The model of `exact` for the decentralised filter; beliefs of 0 make log p(Z | X) 0."""
+    """The model of `exact` for the decentralised filter; log p(Z | X) is 0 without beliefs."""
 
     def groups(self, new: Array, x: Array, z: Ints) -> Ints:
         """Step 7: the Markov chain."""
@@ -113,9 +114,9 @@ class PairModel(FrameModel):
         return np.where(changed, 1 - z, z)
 
 
-def particles(y: Array, config: JointConfig, dt: float, seed: int) -> tuple[Array, Array]:
+def particles(y: Array, config: JointConfig, dt: float, belief: Array, seed: int) -> tuple[Array, Array]:
     """Returns means of the places (T, 2, 2) and p(Z = 1) (T,) of one sequence by the decentralised filter; y (T, 2,
-    2)."""
+    2); belief (T,): log-odds of the pair."""
     streams, key, count = PersonStreams(seed), np.arange(2, dtype=np.uint64), config.particles
     nested = Nested.empty((count, config.partitions), STATE)
     start = streams.normals(BIRTHS, key, count, STATE) * np.repeat([config.point_noise, SPEED_PRIOR], 2)
@@ -125,7 +126,7 @@ def particles(y: Array, config: JointConfig, dt: float, seed: int) -> tuple[Arra
     places, together, own = [y[0]], [0.5], config.own_weights
     for t in range(1, len(y)):
         streams.frame = t
-        model = PairModel(config, dt, config.point_noise, y[t], np.zeros((2, 2)), streams, key)
+        model = PairModel(config, dt, config.point_noise, y[t], np.full((2, 2), belief[t]), streams, key)
         uniforms = streams.uniforms(RESAMPLING, key, count + 3, 1)[:, 0, 0]
         nested = advance(nested, model, uniforms[3:])
         places.append(np.einsum("ik,ikd->kd", nested.component_weights(own), nested.x[..., :2]))
@@ -187,8 +188,8 @@ def log_loss(p: Array, z: Ints) -> str:
 
 
 def coupling(given: argparse.Namespace) -> None:
-    """Prints root mean square errors of places, of seen people and at the end of gaps, differences of full and VAR1 of
-    the same filter, paired over sequences, and the log loss of Z."""
+    """Prints root mean square errors of places, of seen people and at the end of gaps, differences to VAR1 of the same
+    filter, paired over sequences, and the log loss of Z."""
     made = list(sequences(given.seeds))
     pairs, dt = [longest_pair(s.truth) for s in made if s.truth is not None], 1 / made[0].fps
     rows: dict[str, dict[str, list[str]]] = {"Seen people": {}, "Hidden people, in the last frame of a gap": {}}
@@ -200,15 +201,16 @@ def coupling(given: argparse.Namespace) -> None:
             x, z = drawn(config, dt, z.shape, draws)
         y, *masks = measured(x, config, dt, c, draws)
         found: list[tuple[Array, ...]] = [exact(y, config, dt, known) for known in (np.zeros_like(z), z, None)]
-        for variant in ("VAR1", "full"):
-            own = replace(config, variant=variant)
-            runs = [particles(y[:, s], own, dt, given.filter_seeds.start + s) for s in range(len(pairs))]
+        for variant, sure in (("VAR1", 0), ("missed", SURE), ("full", 0)):
+            own, belief = replace(config, variant=variant), sure * (2 * z - 1)
+            runs = [particles(y[:, s], own, dt, belief[:, s], given.filter_seeds.start + s) for s in range(len(pairs))]
             found.append(tuple(np.stack(one, axis=1) for one in zip(*runs, strict=True)))
-        losses = [log_loss(p, z) for p in (np.full(z.shape, z.mean()), found[2][1], found[4][1])]
+        losses = [log_loss(p, z) for p in (np.full(z.shape, z.mean()), found[2][1], found[5][1])]
         for cells, mask in zip(rows.values(), masks, strict=True):
             errors = [error(places, x, mask) for places, _ in found]
             alone, filtered = (f"{np.nanmean(errors[k]):.1f}" for k in (0, 3))
-            deltas = [tables.signed(*map(float, paired(errors[a], errors[b]))) for a, b in ((0, 1), (0, 2), (3, 4))]
-            cells[name] = [alone, *deltas[:2], filtered, deltas[2], " / ".join(losses)]
+            compared = ((0, 1), (0, 2), (3, 4), (3, 5))
+            deltas = [tables.signed(*map(float, paired(errors[a], errors[b]))) for a, b in compared]
+            cells[name] = [alone, *deltas[:2], filtered, *deltas[2:], " / ".join(losses)]
     for title, cells in rows.items():
         tables.table(f"{title}: {len(pairs)} pairs", "condition", COLUMNS, cells)

@@ -23,7 +23,7 @@ from benchmarks.support.replaced_code import Replacement, replaced_code
 from sim.types import Array, Ints
 from tracking.papers.joint.people import People
 
-DEPARTURES = ("variant=full", "belief_rate=0 belief_memory=0", "belief_memory=0", "algorithm=paper")
+DEPARTURES = ("variant=full", "variant=VAR1", "belief_rate=0 belief_memory=0", "belief_memory=0", "algorithm=paper")
 """Settings of the mode ablation."""
 
 
@@ -41,8 +41,8 @@ def ablation(given: argparse.Namespace) -> None:
     differences to the defaults."""
     made = list(sequences(given.seeds, given.suite or "friends-meet"))
     base: list[Row] = []
-    deltas = {"GDSR": "group_GDSR", "MOTA": "group_MOTA", "HOTA": "HOTA", "group F1": "group_F1_hull",
-              "event F1": "event_F1", "false events": "false"}  # fmt: skip
+    deltas = {"error, m": "RMSE_pos", "GDSR": "group_GDSR", "MOTA": "group_MOTA", "HOTA": "HOTA",
+              "group F1": "group_F1_hull", "event F1": "event_F1", "false events": "false"}  # fmt: skip
     tables.head(["setting", *(f"{name}, %" for name in SHARES), "event F1", *(f"Δ {name}" for name in deltas)])
     for setting in ("", *(given.only.split(",") if given.only else (*DEPARTURES, *RULES))):
         words = [*given.set, *([] if setting in RULES else setting.split())]

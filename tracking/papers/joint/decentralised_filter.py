@@ -25,9 +25,9 @@ from tracking.papers.joint.partition_labels_kernels import relabel
 class Distributions(Protocol):
     """The four distributions of Table 1. p_0 is any reference dynamics of the components."""
 
-    def individuals(self, x: Array) -> tuple[Array, Array]:
+    def individuals(self, x: Array, z: Ints) -> tuple[Array, Array]:
         """Step 4: return X' (N_x, K, D) drawn from pi(X' | X, y), and the log (N_x, K) of p(y | x'_k) p_0(x'_k | x_k) /
-        pi(x'_k | x_k, y)."""
+        pi(x'_k | x_k, y); z (N_x, ...): the likeliest Z under each X."""
 
     def dynamics(self, new: Array, x: Array, z: Ints) -> Array:
         """Returns the log (N_x, N_z) of p(X' | X, Z) / p_0(X' | X)."""
@@ -99,7 +99,8 @@ class Nested:
 
 def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
     """Returns the particles of the next frame: steps 4 to 7, then 1 and 3. `old` is as after step 2."""
-    new, log_w = model.individuals(old.x)  # step 4
+    likeliest = old.z[np.arange(len(old.z)), old.log_q.argmax(axis=1)]
+    new, log_w = model.individuals(old.x, likeliest)  # step 4
     log_q = old.log_q + model.dynamics(new, old.x, old.z)  # step 5
     log_dynamics = log_sum(log_q)  # p_{N_z}(X' | X) / p_0(X' | X)
     chosen = systematic_resample_rows(np.exp(log_q - log_dynamics[:, None]), uniforms)  # step 6

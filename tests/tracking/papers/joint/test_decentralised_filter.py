@@ -25,7 +25,7 @@ class Toy:
     def __init__(self, draws, ratio):
         self.draws, self.ratio, self.y, self.log_q = draws, ratio, 0.0, np.zeros(0)
 
-    def individuals(self, x):
+    def individuals(self, x, z):
         return A[0, 0] * x + WIDE * self.draws.standard_normal(x.shape), np.zeros(x.shape[:2])
 
     def dynamics(self, new, x, z):
