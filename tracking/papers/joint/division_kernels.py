@@ -9,7 +9,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
-from tracking.papers.joint.partition_labels_kernels import validity_of
+from tracking.papers.joint.partition_labels_kernels import canonical, validity_of
 
 MOST_LISTED = 6
 """Largest group of which all divisions into two parts are tried."""
@@ -43,17 +43,9 @@ def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: floa
     while row < len(sides) - 1 and uniform * total >= reached:
         row += 1
         reached += energy[row]
-    chosen = sides[row]
-    for side in range(2):
-        first, size = -1, 0
-        for k in range(n):
-            if chosen[k] == side:
-                size += 1
-                if first < 0:
-                    first = members[k]
-        for k in range(n):
-            if chosen[k] == side:
-                label[members[k]] = 1 + first if size > 1 else 0
+    for k in range(n):
+        label[members[k]] = len(label) + 1 + sides[row, k]  # no other label is that large
+    canonical(label)
 
 
 @njit(cache=True)
