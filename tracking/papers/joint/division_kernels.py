@@ -23,14 +23,10 @@ def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: floa
     people all divisions are candidates; of larger groups those that leave one person out, and cuts across the first
     principal axis of the points.
     """
-    members = members_of(cluster, g)
-    n, dims = len(members), points.shape[1]
-    own = np.empty((n, dims))
-    for k in range(n):
-        for d in range(dims):
-            own[k, d] = points[members[k], d]
+    members = np.flatnonzero(cluster == g)
+    own = points[members]
     sides = candidates(own)
-    centre, scatter = np.empty((n, dims)), np.empty(n)
+    centre, scatter = np.empty_like(own), np.empty(len(own))
     energy, least = np.empty(len(sides)), np.inf
     for c in range(len(sides)):
         energy[c] = sharpness * validity_of(own, sides[c], 2, scales, centre, scatter)
@@ -43,21 +39,9 @@ def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: floa
     while row < len(sides) - 1 and uniform * total >= reached:
         row += 1
         reached += energy[row]
-    for k in range(n):
+    for k in range(len(members)):
         label[members[k]] = len(label) + 1 + sides[row, k]  # no other label is that large
     canonical(label)
-
-
-@njit(cache=True)
-def members_of(cluster: Ints, g: int) -> Ints:
-    """Returns the people (n,) of cluster g, ascending; cluster (K,)."""
-    n = 0
-    out = np.empty(len(cluster), np.int64)
-    for k in range(len(cluster)):
-        if cluster[k] == g:
-            out[n] = k
-            n += 1
-    return out[:n]
 
 
 @njit(cache=True)
