@@ -21,10 +21,6 @@ from tracking.stats import paired
 Row = dict[str, float]
 SHARES = ("1-FP", "1-FN", "GDSR", "MOTA")
 PX_PER_M = 40.0
-OTHERS = (
-    "event F1", "latency, s (median)", "pairwise F1", "HOTA",
-    "frames/s",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -37,11 +33,11 @@ class Variant:
 
 
 def measured(sequence: Recording, variant: Variant, seeds: Iterable[int], settings: Sequence[str] = ()) -> list[Row]:
-    """Returns the scores of a variant for each filter seed, with frames/s."""
+    """Returns the scores of a variant for each filter seed."""
     params, rows = JointConfig.from_dict(dict(variant.params)).with_set(*settings), []
     for seed in seeds:
         run = track("joint", sequence, params=params, detections=variant.detections, seed=seed)
-        rows.append({**evaluate(sequence.truth, run), "speed": run.info["frames_per_second"]})
+        rows.append(evaluate(sequence.truth, run))
     return rows
 
 
@@ -82,22 +78,6 @@ def pooled(rows: Sequence[Row], end: str) -> list[str]:
     wrong = total("FP") + total("FN") + total("IDSW")
     shares = 1 - total("FP") / there, total("TP") / there, success / there, 1 - wrong / there
     return [*(f"{100 * x:.1f}" for x in shares), f"{PX_PER_M * place:.1f}"]
-
-
-def others(rows: Sequence[Row]) -> list[str]:
-    """Returns cells of event F1, latency, pairwise F1, HOTA and frames/s: means."""
-
-    def mean(key: str) -> str:
-        values = [row.get(key, np.nan) for row in rows]
-        return tables.number(float(np.nanmean(values)) if np.isfinite(values).any() else np.nan)
-
-    return [mean("event_F1"), median_latency(rows), mean("pairwise_F1"), mean("HOTA"), mean("speed").partition(".")[0]]
-
-
-def median_latency(rows: Sequence[Row]) -> str:
-    """Returns the cell of the median latency of events over the sequences that have one, s."""
-    latency = [row["event_latency"] for row in rows if np.isfinite(row["event_latency"])]
-    return tables.number(float(np.median(latency))) if latency else "–"
 
 
 def difference(first: Sequence[Row], second: Sequence[Row], key: str) -> str:

@@ -39,7 +39,7 @@ def _variants(name: str, params: Mapping[str, object]) -> list[Variant]:
 
 
 PRESET = _variants("preset", JointConfig.preset("paper").as_dict())
-DEFAULT = _variants("default", {})
+DEFAULT = [Variant("default"), *_variants("default", {})]
 PAIRS = (("full", "VAR1"), ("VAR1", "VAR2"), ("VAR2", "VAR3"), (".2", "full"))
 
 

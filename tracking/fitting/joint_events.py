@@ -95,10 +95,10 @@ def partition_rows(early: Array, late: Array, before: Ints, after: Ints) -> Even
     people = len(before)
     label = before + 1
     canonical(label)
-    features, nearest, head = np.empty((people, FEATURES)), np.empty(people, np.int64), np.empty(people, np.int64)
-    count = partition_features(early, late, label, features, nearest, head)
+    features, (nearest, cluster, head) = np.empty((people, FEATURES)), np.empty((3, people), np.int64)
+    count = partition_features(early, late, label, features, nearest, cluster, head, np.empty((people, 9)))
     event, possible = np.full(count, NONE), np.ones((count, 3), bool)
-    members = [np.flatnonzero(label == label[h]) if label[h] > 0 else np.array([h]) for h in head[:count].tolist()]
+    members = [np.flatnonzero(cluster == g) for g in range(count)]
     for g in range(count):
         own, other = after[members[g]], nearest[g]
         possible[g] = other >= 0, len(own) > 1, True

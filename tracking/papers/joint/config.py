@@ -50,9 +50,9 @@ class JointConfig(BackgroundSettings):
         "N_x, particles of individuals", "int", online=False, tunable=False)
     partitions: int = param(50, (1, 500), "particles",
         "N_z, partitions under each particle", "int", online=False, tunable=False)
-    variant: str = param("VAR1", ("full", "VAR1", "VAR2", "VAR3"), "",
-        "full: the paper; VAR1: groups move nobody; VAR2: and are uniform; VAR3: and p(Z | X) is 1",
-        "categorical", tunable=False)
+    variant: str = param("missed", ("full", "missed", "VAR1", "VAR2", "VAR3"), "",
+        "full: the paper; missed: groups move missed people alone (ours); VAR1: nobody; VAR2: and are uniform; VAR3: "
+        "and p(Z | X) is 1", "categorical", tunable=False)
     individuals: str = param("filtered", ("filtered", "measured"), "",
         "measured: the individuals are the detections, known exactly (DEEPER-JIGT.2)", "categorical", tunable=False)
     algorithm: str = param("ours", ("ours", "paper"), "",

@@ -25,9 +25,9 @@ from tracking.papers.joint.partition_labels_kernels import relabel
 class Distributions(Protocol):
     """The four distributions of Table 1. p_0 is any reference dynamics of the components."""
 
-    def individuals(self, x: Array) -> tuple[Array, Array]:
+    def individuals(self, x: Array, z: Ints) -> tuple[Array, Array]:
         """Step 4: return X' (N_x, K, D) drawn from pi(X' | X, y), and the log (N_x, K) of p(y | x'_k) p_0(x'_k | x_k) /
-        pi(x'_k | x_k, y)."""
+        pi(x'_k | x_k, y); z (N_x, ...): the likeliest Z under each X."""
 
     def dynamics(self, new: Array, x: Array, z: Ints) -> Array:
         """Returns the log (N_x, N_z) of p(X' | X, Z) / p_0(X' | X)."""
@@ -73,22 +73,34 @@ class Nested:
         log_w = np.concatenate([self.log_w, np.zeros(x.shape[:2])], axis=1)
         return Nested(np.concatenate([self.x, x], axis=1), z, self.log_q, log_w, self.log_rest)
 
-    def weights(self) -> Array:
-        """Returns the weights w of step 1, (N_x,), sum 1."""
-        return normalised(self.log_w.sum(axis=1) + self.log_rest)
+    def weights(self, one_by_one: bool = False) -> Array:
+        """Returns the weights w of step 1, (N_x,), sum 1; one_by_one: only of what X as a whole adds."""
+        return normalised(self.log_rest if one_by_one else self.log_w.sum(axis=1) + self.log_rest)
 
-    def rest_weights(self) -> Array:
-        """Returns the weights of what X as a whole adds, (N_x,), sum 1."""
-        return normalised(self.log_rest)
+    def component_weights(self, one_by_one: bool = False) -> Array:
+        """Returns the weights of each component, (N_x, K), sum 1 for each: w, or one_by_one those of it alone."""
+        if one_by_one:
+            return normalised(self.log_w.T).T
+        return np.repeat(self.weights()[:, None], self.log_w.shape[1], axis=1)
 
-    def component_weights(self) -> Array:
-        """Returns the weights of each component alone, (N_x, K), sum 1 for each component."""
-        return normalised(self.log_w.T).T
+    def resampled(self, uniforms: Array, one_by_one: bool = False) -> Nested:
+        """Returns the particles after step 2, of weight 1; uniforms (K + 1,).
+
+        one_by_one: in two stages (ours), each component by its own weights, then X as a whole by the rest.
+        """
+        components = np.arange(self.log_w.shape[1])
+        chosen = systematic_resample_rows(self.weights(one_by_one)[None], uniforms[-1:])[0]
+        own = np.repeat(chosen[:, None], len(components), axis=1)
+        if one_by_one:
+            own = systematic_resample_rows(self.component_weights(True).T, uniforms[:-1]).T[chosen]
+        zero = np.zeros_like(self.log_w), np.zeros_like(self.log_rest)
+        return Nested(self.x[own, components], self.z[chosen], self.log_q[chosen], *zero)
 
 
 def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
     """Returns the particles of the next frame: steps 4 to 7, then 1 and 3. `old` is as after step 2."""
-    new, log_w = model.individuals(old.x)  # step 4
+    likeliest = old.z[np.arange(len(old.z)), old.log_q.argmax(axis=1)]
+    new, log_w = model.individuals(old.x, likeliest)  # step 4
     log_q = old.log_q + model.dynamics(new, old.x, old.z)  # step 5
     log_dynamics = log_sum(log_q)  # p_{N_z}(X' | X) / p_0(X' | X)
     chosen = systematic_resample_rows(np.exp(log_q - log_dynamics[:, None]), uniforms)  # step 6
@@ -97,18 +109,6 @@ def advance(old: Nested, model: Distributions, uniforms: Array) -> Nested:
     log_group = log_sum(log_y)
     log_rest = log_dynamics + log_group - np.log(log_y.shape[1])  # step 1
     return Nested(new, z, log_y - log_group[:, None], log_w, log_rest)  # step 3
-
-
-def joint_indices(nested: Nested, uniform: float) -> Ints:
-    """Returns the indices (N_x,) of step 2 by the weights of step 1."""
-    return np.asarray(systematic_resample_rows(nested.weights()[None], np.array([uniform]))[0])
-
-
-def component_indices(nested: Nested, uniforms: Array) -> tuple[Ints, Ints]:
-    """Returns the indices of step 2 in two stages (ours): (N_x, K) of each component alone, then (N_x,) of the rest."""
-    single = systematic_resample_rows(nested.component_weights().T, uniforms[:-1]).T
-    rest = systematic_resample_rows(nested.rest_weights()[None], uniforms[-1:])[0]
-    return single, rest
 
 
 def log_sum(values: Array) -> Array:

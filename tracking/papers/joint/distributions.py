@@ -137,7 +137,7 @@ class FrameModel:
         """Sigma of one axis, (3,)."""
         return process_noise(self.config.place_noise, self.config.velocity_noise, self.dt)
 
-    def individuals(self, x: Array) -> tuple[Array, Array]:
+    def individuals(self, x: Array, z: Ints) -> tuple[Array, Array]:
         """Step 4: pi(X_{t+1} | X_{0:t}, y)."""
         c, shape = self.config, x.shape[:2]
         normals = self.streams.normals(MOTION, self.key, shape[0], STATE)
@@ -146,10 +146,21 @@ class FrameModel:
         if c.individuals == "measured":
             place = np.where(np.isfinite(self.z), self.z, moved(x, self.dt)[..., :2])
             return np.concatenate([place, (place - x[..., :2]) / self.dt], axis=-1), np.zeros(shape)
+        if c.variant == "missed":
+            x = self._moved_by_groups(x, z)
         return proposal.draw(x, self.z, normals, uniforms)
 
+    def _moved_by_groups(self, x: Array, z: Ints) -> Array:
+        """Returns x with B (g - x) added for missed people, so that eq. 3 makes of it what eq. 5 makes of x."""
+        out = x.copy()
+        for k in np.flatnonzero(np.isnan(self.z[:, 0])):
+            mates = (z == z[:, k : k + 1]) & (z > 0)
+            difference = np.einsum("ik,ikd->id", mates, x[..., 2:] - x[:, k : k + 1, 2:])
+            out[:, k, :2] += self.dt * difference / np.maximum(mates.sum(axis=1), 1)[:, None]
+        return out
+
     def dynamics(self, new: Array, x: Array, z: Ints) -> Array:
-        """log p(X_{t+1} | X_t, Z_t) / p_0, with eq. 3 as p_0: eq. 5, and 0 where groups do not move individuals."""
+        """log p(X_{t+1} | X_t, Z_t) / p_0, with eq. 3 as p_0: eq. 5, and 0 in the other variants."""
         out = np.zeros(z.shape[:2])
         if self.config.variant != "full":
             return out

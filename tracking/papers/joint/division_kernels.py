@@ -9,7 +9,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
-from tracking.papers.joint.partition_labels_kernels import validity_of
+from tracking.papers.joint.partition_labels_kernels import canonical, validity_of
 
 MOST_LISTED = 6
 """Largest group of which all divisions into two parts are tried."""
@@ -23,14 +23,10 @@ def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: floa
     people all divisions are candidates; of larger groups those that leave one person out, and cuts across the first
     principal axis of the points.
     """
-    members = members_of(cluster, g)
-    n, dims = len(members), points.shape[1]
-    own = np.empty((n, dims))
-    for k in range(n):
-        for d in range(dims):
-            own[k, d] = points[members[k], d]
+    members = np.flatnonzero(cluster == g)
+    own = points[members]
     sides = candidates(own)
-    centre, scatter = np.empty((n, dims)), np.empty(n)
+    centre, scatter = np.empty_like(own), np.empty(len(own))
     energy, least = np.empty(len(sides)), np.inf
     for c in range(len(sides)):
         energy[c] = sharpness * validity_of(own, sides[c], 2, scales, centre, scatter)
@@ -43,29 +39,9 @@ def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: floa
     while row < len(sides) - 1 and uniform * total >= reached:
         row += 1
         reached += energy[row]
-    chosen = sides[row]
-    for side in range(2):
-        first, size = -1, 0
-        for k in range(n):
-            if chosen[k] == side:
-                size += 1
-                if first < 0:
-                    first = members[k]
-        for k in range(n):
-            if chosen[k] == side:
-                label[members[k]] = 1 + first if size > 1 else 0
-
-
-@njit(cache=True)
-def members_of(cluster: Ints, g: int) -> Ints:
-    """Returns the people (n,) of cluster g, ascending; cluster (K,)."""
-    n = 0
-    out = np.empty(len(cluster), np.int64)
-    for k in range(len(cluster)):
-        if cluster[k] == g:
-            out[n] = k
-            n += 1
-    return out[:n]
+    for k in range(len(members)):
+        label[members[k]] = len(label) + 1 + sides[row, k]  # no other label is that large
+    canonical(label)
 
 
 @njit(cache=True)

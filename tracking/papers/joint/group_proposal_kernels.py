@@ -121,15 +121,16 @@ def features_of(early: Array, late: Array, g: int, other: int, out: Array) -> No
 
 
 @njit(cache=True)
-def partition_features(early: Array, late: Array, label: Ints, features: Array, nearest: Ints, head: Ints) -> int:
-    """Writes features (G, 6), nearest cluster and head of each cluster of one partition; return G.
+def partition_features(
+    early: Array, late: Array, label: Ints, features: Array, nearest: Ints, cluster: Ints, head: Ints, first: Array
+) -> int:
+    """Writes features (G, 6), nearest cluster, head and early moments (G, 9) of each cluster of one partition, and the
+    cluster (K,) of each person; return G.
 
     early, late (K, 4): states at both times; label (K,): the partition.
     """
-    n = len(label)
-    cluster = np.empty(n, np.int64)
     count = clusters(label, cluster, head)
-    first, second = np.empty((n, 9)), np.empty((n, 9))
+    second = np.empty_like(first)
     moments_of(early, cluster, count, first)
     moments_of(late, cluster, count, second)
     nearest_places(first, count, nearest)
@@ -193,7 +194,7 @@ def propose(
     """
     particles, partitions, n = label.shape
     cluster, head, nearest = np.empty(n, np.int64), np.empty(n, np.int64), np.empty(n, np.int64)
-    first, second, features = np.empty((n, 9)), np.empty((n, 9)), np.empty(FEATURES)
+    first, features = np.empty((n, 9)), np.empty((n, FEATURES))
     order, changed, visited = np.empty(n), np.empty(n, np.bool_), np.empty(n, np.bool_)
     merge, split = np.empty(n), np.empty(n)
     before, visits = np.empty(n, np.int64), np.empty(n, np.int64)
@@ -203,15 +204,10 @@ def propose(
             if j == 0 or not same_row(label[i, j], before):
                 for k in range(n):
                     before[k] = label[i, j, k]
-                count = clusters(before, cluster, head)
-                moments_of(early[i], cluster, count, first)
-                moments_of(late[i], cluster, count, second)
-                nearest_places(first, count, nearest)
+                count = partition_features(early[i], late[i], before, features, nearest, cluster, head, first)
                 for g in range(count):
-                    h = nearest[g]
-                    features_of(first, second, g, h, features)
-                    other = first[h, SIZE] if h >= 0 else 0.0
-                    merge[g], split[g] = event_probabilities(features, first[g, SIZE], other, weights, rules)
+                    other = first[nearest[g], SIZE] if nearest[g] >= 0 else 0.0
+                    merge[g], split[g] = event_probabilities(features[g], first[g, SIZE], other, weights, rules)
             happens = False
             for g in range(count):
                 order[g] = uniforms[i, j, head[g], ORDER]

@@ -25,11 +25,14 @@ Readings, where the paper is silent or contradicts itself:
 - Eq. 4 contradicts its own assumption, by which it would be p(y | X). It is used as printed, as an energy.
 - VAR1 has the constant velocity of eq. 3; cancelled literally, everybody would stand still.
 - pi_det has the predicted velocity.
-- In eq. 7 members are those of Z, and g' is nearest at the earlier time.
+- Resampling is systematic, in each frame.
+- d_cl is of whole states: 1 m/s counts as 1 m.
+- In eq. 7 members are those of Z, and g' has the nearest mean place at the earlier time.
+- f takes removed people out of their groups; a member who is left over is alone.
 - |e| is n + n' after Merge, n after None, n / 2 after Split.
 - In Fig. 3 a group is named by its least member; so people who are mostly together can be separated.
 - The first partition of a person is drawn by the validity: the person is alone or joins the nearest group.
-- Velocities at the start are those of a Kalman filter over `confirm_time`.
+- Velocities at the start are those of a Kalman filter over `confirm_time`; those of DEEPER-JIGT.2 are of the last step.
 
 Fitted, as the paper leaves them open: `confirm_time` and λ_cl on friends-meet, training seeds 0:2;
 event_classifier.toml, which names scenes and seeds. Not fitted: N_x, N_z, Σ, λ_y, α.
@@ -53,9 +56,10 @@ Departures. A star marks those that stay in the preset `paper`:
 - validity*: with prior scatter, virtual cluster and least distance. Paper: Davies-Bouldin. Why: undefined for one
   cluster or equal centres.
 - λ_cl*: per second. Paper: each frame. Why: any frame rate.
-- p(Z | X): by the beliefs of pairs (`belief_rate`, `belief_memory`). Paper: by the validity. Why: passing strangers
-  look alike.
-- eq. 5: left out (`variant`). Paper: the group's velocity moves people. Why: no score is surely better with it.
+- p(Z | X): by the beliefs of pairs, from the reported states and groups, the same for all particles (`belief_rate`,
+  `belief_memory`). Paper: by the validity, of each particle. Why: passing strangers look alike.
+- eq. 5: for missed people alone, with the likeliest Z of the particle, in the proposal (`variant`). Paper: for all, in
+  the weights. Why: people who are seen gain little by it, and the variance of the weights costs more.
 - events*: also people alone; in random order, each changes once. Paper: groups, all at once. Why: people alone must
   merge.
 - merges*: two groups that are each other's nearest draw it once. Paper: each group draws. Why: the classifier's
@@ -180,19 +184,9 @@ class Joint(PointTracker):
         return report.known_groups(self.identities, id), known
 
     def _resample(self) -> None:
-        nested, people = self.nested, len(self.people.id)
-        if not people:
-            return
-        uniforms = self.streams.uniforms(RESAMPLING, np.append(self.people.key, NOBODY), 1, 1)[0, :, 0]
-        if not self.config.own_weights:
-            chosen = decentralised_filter.joint_indices(nested, float(uniforms[-1]))
-            own = np.repeat(chosen[:, None], people, axis=1)
-        else:
-            single, chosen = decentralised_filter.component_indices(nested, uniforms)
-            own = single[chosen]
-        columns = np.arange(people)
-        x, z, log_q = nested.x[own, columns], nested.z[chosen], nested.log_q[chosen]
-        self.nested = Nested(x, z, log_q, np.zeros_like(nested.log_w), np.zeros_like(nested.log_rest))
+        if len(self.people.id):
+            uniforms = self.streams.uniforms(RESAMPLING, np.append(self.people.key, NOBODY), 1, 1)[0, :, 0]
+            self.nested = self.nested.resampled(uniforms, self.config.own_weights)
 
     def _keep(self, rows: Bools) -> None:
         if rows.all():
@@ -225,14 +219,12 @@ class Joint(PointTracker):
 
     def _report(self, frame: Frame) -> Tracks:
         n, c, id = self.nested, self.config, self.people.id
-        joint = n.weights()
-        weights = n.component_weights() if c.own_weights else np.repeat(joint[:, None], len(id), axis=1)
-        mean, cov = report.moments(n.x, weights)
+        mean, cov = report.moments(n.x, n.component_weights(c.own_weights))
         pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
         box = boxes_at(pos, self.people.size) if self.plane == "image" else None
         self.shown = box
         old = self.identities.groups
-        parts = [frozenset(id[rows].tolist()) for rows in self._groups(joint)]
+        parts = [frozenset(id[rows].tolist()) for rows in self._groups()]
         changes = self.identities.step(frame.index, frozenset(id.tolist()), parts)
         self.belief.see(mean[:, :2])
         self.events.add(id, mean[:, :2])
@@ -245,9 +237,9 @@ class Joint(PointTracker):
             own_events=OWN_EVENTS,
         )  # fmt: skip
 
-    def _groups(self, joint: Array) -> list[Ints]:
+    def _groups(self) -> list[Ints]:
         n = self.nested
-        particle = n.rest_weights() if self.config.own_weights else joint
+        particle = n.weights(self.config.own_weights)
         return report.histogram_partition(n.z, particle[:, None] * np.exp(n.log_q)) if n.z.shape[2] else []
 
 

@@ -7,8 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tracking.papers.joint import decentralised_filter
-from tracking.papers.joint.decentralised_filter import Nested, advance, joint_indices, log_sum, normalised
+from tracking.papers.joint.decentralised_filter import Nested, advance, log_sum, normalised
 
 A = np.array([[0.9, 0.5], [0.0, 0.8]])
 Q = np.array([0.3, 0.4])
@@ -26,7 +25,7 @@ class Toy:
     def __init__(self, draws, ratio):
         self.draws, self.ratio, self.y, self.log_q = draws, ratio, 0.0, np.zeros(0)
 
-    def individuals(self, x):
+    def individuals(self, x, z):
         return A[0, 0] * x + WIDE * self.draws.standard_normal(x.shape), np.zeros(x.shape[:2])
 
     def dynamics(self, new, x, z):
@@ -74,11 +73,8 @@ def error(particles, partitions, ratio=True, frames=25, seeds=4):
             toy.y, toy.log_q = y, nested.log_q
             nested = advance(nested, toy, rng.random(particles))
             w = nested.weights()
-            means = w @ nested.x[:, 0], w @ (np.exp(nested.log_q) * nested.z).sum(axis=1)
-            found.append([float(m[0]) if np.ndim(m) else float(m) for m in means] - exact)
-            k = joint_indices(nested, rng.random())
-            zero = np.zeros_like(nested.log_w), np.zeros_like(nested.log_rest)
-            nested = Nested(nested.x[k], nested.z[k], nested.log_q[k], *zero)
+            found.append([*(w @ nested.x[:, 0]), w @ (np.exp(nested.log_q) * nested.z).sum(axis=1)] - exact)
+            nested = nested.resampled(rng.random(1))
     return float(np.sqrt(np.mean(np.square(found))))
 
 
@@ -103,8 +99,8 @@ def test_log_sums_and_weights():
 
 def test_components_are_resampled_by_their_own_weights():
     log_w = np.log(np.array([[1.0, 0.5], [1e-9, 0.5]]))
-    parts = np.zeros((2, 2, 1)), np.zeros((2, 1, 2), int), np.zeros((2, 1))
-    nested = Nested(*parts, log_w, np.log([1e-9, 1.0]))
-    single, rest = decentralised_filter.component_indices(nested, np.full(3, 0.5))
-    assert single.T.tolist() == [[0, 0], [0, 1]]
-    assert rest.tolist() == [1, 1]
+    particle = np.tile(np.arange(2)[:, None, None], (1, 2, 2))
+    nested = Nested(particle[..., :1], particle[:, :1], np.zeros((2, 1)), log_w, np.log([1e-9, 1.0]))
+    nested = nested.resampled(np.full(3, 0.5), one_by_one=True)
+    assert nested.x[..., 0].T.tolist() == [[0, 0], [1, 1]]
+    assert nested.z[:, 0].tolist() == [[1, 1], [1, 1]]

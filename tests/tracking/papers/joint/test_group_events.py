@@ -114,9 +114,10 @@ def test_a_group_takes_part_in_one_event_of_a_frame_and_merges_with_the_nearest(
 def test_features_are_those_of_the_definition():
     early = np.array([[0, 0, 1, 0], [1, 0, 1, 0], [4, 1, 0, 0.5]], float)
     late = early + np.array([0.2, 0, 0, 0])
-    features, nearest, head = np.empty((3, 6)), np.empty(3, np.int64), np.empty(3, np.int64)
-    assert events.partition_features(early, late, np.array([1, 1, 0]), features, nearest, head) == 2
-    assert (nearest[:2].tolist(), head[:2].tolist()) == ([1, 0], [0, 2])
+    features, (nearest, cluster, head) = np.empty((3, 6)), np.empty((3, 3), np.int64)
+    found = features, nearest, cluster, head, np.empty((3, 9))
+    count = events.partition_features(early, late, np.array([1, 1, 0]), *found)
+    assert (count, nearest[:2].tolist(), cluster.tolist(), head[:2].tolist()) == (2, [1, 0], [0, 0, 1], [0, 2])
     prior = events.PRIOR**2 * np.eye(2)
     A, B = (np.diag([0.5, 0]) + prior) / 3, prior / 2
     d = np.array([3.5, 1])

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.reference_joint import all_partitions, label_of, log_group_dynamics
-from tracking.papers.joint.distributions import Proposal, log_density, moved, precision_of, process_noise
+from tracking.filters.person_streams import PersonStreams
+from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.distributions import FrameModel, Proposal, log_density, moved, precision_of, process_noise
 from tracking.papers.joint.group_proposal_kernels import group_dynamics, own_dynamics
 
 DT, NOISE = 0.1, 0.1
@@ -49,13 +53,6 @@ def test_the_informed_proposal_is_the_posterior_of_the_step():
     assert np.ptp(log_w) < 1e-9
 
 
-def test_a_person_who_is_not_measured_follows_the_dynamics():
-    state, new, log_w = drawn(0.0, True, np.full(2, np.nan))
-    assert not log_w.any()
-    np.testing.assert_allclose(new[:, 0].mean(axis=0), moved(state[0, 0], DT), atol=0.01)
-    np.testing.assert_allclose(np.cov(new[:, 0].T), covariance(SIGMA), atol=3e-3)
-
-
 def dynamics(new, old, label):
     precision, scale = precision_of(SIGMA)
     out, own = np.empty(label.shape[:2]), np.empty(new.shape[:2])
@@ -80,10 +77,20 @@ def test_eq_5_of_people_alone_is_eq_3_to_the_last_bit():
     rng = np.random.default_rng(3)
     old, new = rng.normal(0, 0.5, (2, 20, 5, 4))
     out, own = dynamics(new, old, np.zeros((20, 2, 5), np.int64))
-    total = np.zeros(20)
-    for k in range(5):
-        total += own[:, k]
-    assert np.array_equal(out, np.repeat(total[:, None], 2, axis=1))
+    assert np.array_equal(out, np.repeat(own.cumsum(axis=1)[:, -1:], 2, axis=1))
+
+
+def test_missed_people_follow_the_dynamics_and_their_group():
+    """Eq. 5; people who are seen are not moved by groups."""
+    x = np.tile([[0.0, 0, 1, 0], [0, 1, 2, 3], [9, 9, 1, 1], [0, 9, 0, 2]], (20_000, 1, 1))
+    z, nobody, keys = np.tile([1, 1, 0, 0], (20_000, 1)), np.full((4, 2), np.nan), np.arange(4, dtype=np.uint64)
+    model = FrameModel(JointConfig(), 0.5, NOISE, nobody, np.zeros((4, 4)), PersonStreams(0), keys)
+    new, log_w = model.individuals(x, z)
+    assert not log_w.any()
+    expected = [[0.75, 0.75, 1, 0], [0.75, 1.75, 2, 3], [9.5, 9.5, 1, 1], [0, 10, 0, 2]]
+    np.testing.assert_allclose(new.mean(axis=0), expected, atol=0.02)
+    np.testing.assert_allclose(np.cov(new[:, 0].T), covariance(model.sigma), atol=5e-3)
+    assert np.array_equal(*(replace(model, z=x[0, :, :2]).individuals(x, groups)[0] for groups in (z, 0 * z)))
 
 
 def test_the_density_is_the_normal_one():
