@@ -203,20 +203,17 @@ class StressOptions(Options, words="stress"):
 class MinimizeOptions(Options, words="minimize"):
     """Find the smallest scene in which a tracker still fails, by taking out whatever can be."""
 
-    source: str = ARGUMENT("Output of `track` on a generated sequence; or the sequence, a scenario, a *.toml file.",
-        metavar="RUN|SOURCE")
-    run: Path | None = ARGUMENT("Output of `track` on the sequence, if it is not below this folder.", None,
-        metavar="RUN")
+    source: str = ARGUMENT(
+        "Output of `track` on a generated sequence below this folder; or a scenario.", metavar="RUN|SCENARIO")
     condition: str = option(
         "A score with a bound, or a kind of error: HOTA<0.7, IDSW>=3, switch, switch:hidden, crash.", flag="--while",
         metavar="CONDITION")
     out: Path = TOML("Scenario to write; a replay page lies beside it.")
-    tracker: str | None = option("Tracker, if no run is given.", None, metavar="TRACKER")
-    seed: int | None = option("Seed of a scenario; a sequence has its own. Default: 0.", None, low=0)
+    tracker: str | None = option("Tracker of a scenario.", None, metavar="TRACKER")
+    seed: int | None = option("Seed of a scenario. Default: 0.", None, low=0)
     confirm: int = option("Number of other seeds on which most must fail, too.", 5, low=0, metavar="N")
     episodes: int | None = option("Stop after so many episodes.", None, low=1, metavar="N")
     minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
-    workers: int = option("Processes that play episodes.", 1, low=1)
 
 
 class ErrorsOptions(BoxOptions, words="errors"):
