@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from scenarios.errors import InputError
 from sim.io.formats.options import BoxScale, parse_box_scale
@@ -43,18 +42,13 @@ class ScoredSequence:
     """The scores of runs of one sequence."""
 
     compared: ComparedSequence
-    infos: list[Mapping[str, Any]]  # content of run.json of each run, {} without
+    given: list[str]  # the detections that each run got, in words; "" without run.json
     note: str = ""  # what was done to compare them
 
     @property
     def scores(self) -> list[Scores]:
         """The scores of each run."""
         return self.compared.scores
-
-    @property
-    def given(self) -> list[str]:
-        """The detections that each run got, in words; "" without run.json."""
-        return [input_summary(info) for info in self.infos]
 
 
 def is_class(text: str) -> bool:
@@ -116,4 +110,4 @@ def score_runs(sequence: Sequence, runs: list[TrackingRun], job: ScoringJob) -> 
     surface = compared.scores[0].surface
     moved = {"ground" if run[0].plane != "image" else "image" for run in runs if len(run)} - {surface}
     note = MOVED.format(plane=SURFACE_WORDS[surface]) if moved else ""
-    return ScoredSequence(compared, [run.info for run in runs], note)
+    return ScoredSequence(compared, [input_summary(run.info) for run in runs], note)

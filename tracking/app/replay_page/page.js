@@ -186,7 +186,6 @@ function buildHead() {
     about.push(`${new Set(side.id).size} ${side.groupRows ? "groups" : "people"} by ${side === other ? data.other.tracker : data.tracker}`);
   }
   $("about").textContent = about.join(" · ");
-  buildScores();
   $("plan-note").textContent = hasPlan && tracks && truth ? planNote() : "";
   $("image-note").textContent = hasImage && tracks && truth ? "true: solid · tracked: dashed · detected: dotted boxes" : "";
   $("plan-stage").hidden = !hasPlan;
@@ -198,24 +197,6 @@ function planNote() {
   if (flat) return `${flat.word} in the image only`;
   return wholes ? "true: bodies, solid · tracked: dashed"
     : "true: bodies, solid, ids upright · tracked: rings, dashed, ids slanted";
-}
-
-function buildScores() {
-  const families = new Map();
-  for (const [key, value, meaning, family] of data.scores) {
-    const item = document.createElement("div");
-    item.title = meaning;
-    item.append(tag("dt", key), tag("dd", value));
-    families.set(family, [...(families.get(family) || []), item]);
-  }
-  $("scores").replaceChildren(...(families.get("") || []));
-  families.delete("");
-  $("all-scores").hidden = !families.size;
-  $("all-scores").lastElementChild.replaceChildren(...[...families].flatMap(([family, items]) => {
-    const list = document.createElement("dl");
-    list.append(...items);
-    return [tag("h3", family), list];
-  }));
 }
 
 function buildControls() {

@@ -49,8 +49,6 @@ def write_page(
     sequence: Sequence,
     run: Run,
     out: str | Path,
-    scores: Mapping[str, float] | None = None,
-    title: str | None = None,
     video: PageVideo | None = None,
     other: Run | None = None,
     start: int = 1,
@@ -59,10 +57,10 @@ def write_page(
 
     other: of a second tracker, which is shown beside the first. start: the frame that is shown first.
     """
-    shown = page_data(sequence, run, other, scores, start=start)
+    shown = page_data(sequence, run, other, start=start)
     shown |= {"video": None if video is None else video.facts()}
     film = "" if video is None else video.content
-    text = page_html(title or sequence.name, script_json(shown), film)
+    text = page_html(sequence.name, script_json(shown), film)
     path = Path(out)
     write_file(path, text.encode("utf-8", "replace"))  # a title from a file's name may hold lone surrogates
     return path
@@ -96,7 +94,6 @@ def page_data(
     sequence: Sequence,
     run: Run,
     other: Run | None = None,
-    scores: Mapping[str, float] | None = None,
     span: tuple[int, int] | None = None,
     start: int = 1,
 ) -> Json:
@@ -139,7 +136,6 @@ def page_data(
         "background": None,
         "unlabelled": [] if truth is None or truth.labelled is None else spans(~truth.labelled),
         "near": [] if truth is None or truth.near is None else _near_strangers(truth.near),
-        "scores": _scores(scores or {}),
         "errors": [
             {**one.facts(sequence.fps), "side": side}
             for side, shown in (("tracks", run), ("other", other))
@@ -147,16 +143,6 @@ def page_data(
             if one.error.start <= high and one.error.end >= low
         ],
     }
-
-
-def _scores(scores: Mapping[str, float]) -> list[list[str]]:
-    """Returns [key, value, meaning, family], all texts, of each known (finite) score in the catalogue's order."""
-    from tracking.app.commands.score_tables import SHOWN, number
-    from tracking.scoring.catalogue import CATALOGUE
-
-    known = {key: number(key, scores[key]) for key in CATALOGUE if math.isfinite(scores.get(key, math.nan))}
-    few = [[key, known[key], CATALOGUE[key].meaning, ""] for key in SHOWN if key in known]
-    return few + [[key, text, CATALOGUE[key].meaning, CATALOGUE[key].family] for key, text in known.items()]
 
 
 def _tracker(run: Run) -> str:
