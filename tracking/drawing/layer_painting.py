@@ -6,17 +6,7 @@ import cv2
 import numpy as np
 
 from sim.types import Array, GroupEvent, Image
-from tracking.drawing.canvas import (
-    FLOOR,
-    TRAIL_SECONDS,
-    Canvas,
-    Colour,
-    ascii_only,
-    box_corners,
-    colour,
-    text,
-    text_width,
-)
+from tracking.drawing.canvas import FLOOR, TRAIL_SECONDS, Canvas, Colour, ascii_only, box_corners, colour, text
 from tracking.drawing.layers import FrameMarks, GroupMark, Layer
 
 CAPTION_SECONDS = 2.5  # s for which an event's caption is shown.
@@ -86,25 +76,16 @@ def _paint_group(canvas: Canvas, group: GroupMark, ink: Colour) -> None:
         canvas.fill(canvas.map(group.hull), ink, 0.18)
         canvas.line(group.hull, ink, 2, closed=True)
     _paint_ring(canvas, group.extent, ink)
-    if len(group.motion) == 2:
-        canvas.arrow(group.motion, FLOOR, 4)
-        canvas.arrow(group.motion, ink, 2)
 
 
 def _paint_ids(canvas: Canvas, marks: FrameMarks, radius: float) -> None:
-    size, at = letter_size(canvas), canvas.map(marks.at)
-    apart = np.nan_to_num(np.hypot(*(at[:, None] - at).transpose(2, 0, 1)), nan=np.inf)
-    np.fill_diagonal(apart, np.inf)
-    nearest = at[apart.argmin(axis=1)] if len(at) else at
-    for identity, corner, (x, y), other in zip(
-        marks.id.tolist(), canvas.map(marks.box[:, :2]), at, nearest, strict=True
-    ):
+    size, places = letter_size(canvas), zip(canvas.map(marks.box[:, :2]), canvas.map(marks.at), strict=True)
+    for identity, (corner, (x, y)) in zip(marks.id.tolist(), places, strict=True):
         words, ink = str(identity), colour(identity)
         if np.isfinite(corner).all():
             draw_label(canvas.image, words, corner - 1, size, ink)
-        elif np.isfinite(x + y):  # on the side where nobody is near
-            left = x + radius + 3 if other[0] <= x else x - radius - 3 - text_width(words, 0.66, 2)
-            text(canvas.image, words, (left, y + 7), 0.66, ink, 2)
+        elif np.isfinite(x + y):
+            text(canvas.image, words, (x + radius + 3, y + 7), 0.66, ink, 2)
 
 
 def _paint_ring(canvas: Canvas, ring: Array, ink: Colour) -> None:
@@ -115,11 +96,11 @@ def _paint_ring(canvas: Canvas, ring: Array, ink: Colour) -> None:
 
 
 def _paint_group_id(canvas: Canvas, prefix: str, group: GroupMark) -> None:
-    points = canvas.map(next(part for part in (group.hull, group.extent, group.motion, np.zeros(2)) if len(part)))
-    x, y = points[points[:, 1].argmax()]
-    words = f"{prefix}{group.id}" + (f" ~{round(group.size, 1):g}" if np.isfinite(group.size) else "")
-    size = letter_size(canvas)
-    draw_label(canvas.image, words, (x - 14 * size, y + 38 * size), size * 1.1, colour(group.id))
+    for points in [canvas.map(part) for part in (group.hull, group.extent) if len(part)][:1]:
+        x, y = points[points[:, 1].argmax()]
+        words = f"{prefix}{group.id}" + (f" ~{round(group.size, 1):g}" if np.isfinite(group.size) else "")
+        size = letter_size(canvas)
+        draw_label(canvas.image, words, (x - 14 * size, y + 38 * size), size * 1.1, colour(group.id))
 
 
 def letter_size(canvas: Canvas) -> float:

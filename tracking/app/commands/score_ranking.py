@@ -13,16 +13,7 @@ import numpy as np
 from scenarios.errors import counted, printable, shortened
 from sim.types import Sequence
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import (
-    GROUP_MATCH,
-    LOWER,
-    SIMILARITY,
-    TABLES,
-    arrow,
-    chance,
-    number,
-    table,
-)
+from tracking.app.commands.score_tables import GROUP_MATCH, LOWER, SIMILARITY, TABLES, arrow, chance, number, table
 from tracking.app.commands.scored_sequence import ScoredSequence
 from tracking.comparison import ComparedRuns, joined
 from tracking.scoring.catalogue import CATALOGUE
@@ -65,7 +56,7 @@ def usual_key(comparison: ComparedRuns) -> str:
 
 
 def scoring_notes(sequences: list[Sequence], found: list[ScoredSequence]) -> list[str]:
-    """Returns notes on sparse labels, on how tracks were compared, and on intervals of a short recording."""
+    """Returns notes on sparse labels and on intervals of a short recording."""
     scores, notes = [one.scores[0] for one in found], list[str]()
     sparse = [one for one in scores if one.step != 1]
     if sparse:
@@ -73,7 +64,6 @@ def scoring_notes(sequences: list[Sequence], found: list[ScoredSequence]) -> lis
         where = "" if len(scores) == 1 else f" of {len(sparse)} of {len(scores)} sequences"
         scored, length = (sum(getattr(s, name) for s in sparse) for name in ("frames", "length"))
         notes.append(f"labels{where} are sparse ({steps}): only annotated frames are scored, {scored} of {length}")
-    notes += dict.fromkeys(one.note for one in found if one.note)
     seconds = scores[0].length / sequences[0].fps
     if found[0].compared.blocks is not None and seconds < SURE:
         notes.append(f"intervals are indicative under {SURE:g} s: the recording lasts {seconds:.4g} s")

@@ -19,9 +19,6 @@ from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.misreading import likely_misreading
 from tracking.scoring.people_comparison import Similarity
 
-MOVED = "all tracks are compared {plane}"
-SURFACE_WORDS = {"ground": "on the ground, boxes by their foot points", "image": "in the image, as some lie there"}
-
 Source = StoredTracks | str  # of the tracks of a sequence: stored ones, or the text that names a tracker class
 
 
@@ -43,7 +40,6 @@ class ScoredSequence:
 
     compared: ComparedSequence
     given: list[str]  # the detections that each run got, in words; "" without run.json
-    note: str = ""  # what was done to compare them
 
     @property
     def scores(self) -> list[Scores]:
@@ -107,7 +103,4 @@ def score_runs(sequence: Sequence, runs: list[TrackingRun], job: ScoringJob) -> 
             if text:
                 warnings.warn(f"{sequence.name}: {text}", stacklevel=2)
     compared = compare_one(sequence, runs, job.similarity, job.group_match, job.blocks, job.oracles)
-    surface = compared.scores[0].surface
-    moved = {"ground" if run[0].plane != "image" else "image" for run in runs if len(run)} - {surface}
-    note = MOVED.format(plane=SURFACE_WORDS[surface]) if moved else ""
-    return ScoredSequence(compared, [input_summary(run.info) for run in runs], note)
+    return ScoredSequence(compared, [input_summary(run.info) for run in runs])
