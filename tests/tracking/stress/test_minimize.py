@@ -17,6 +17,7 @@ from scenarios.schema.values import bounds
 from tests.processes import FAKE
 from tests.refusals import answer, refused
 from tracking.app.cli import run
+from tracking.app.commands.minimize import _of_run
 from tracking.app.commands.track import TrackerSetup
 from tracking.errors import groups
 from tracking.errors.people import PersonKind
@@ -235,9 +236,10 @@ def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
     assert len(small.group) == 1
     assert ("sensor", "detect_prob") in [piece.path for piece in difficulties(small)[:2]]
     assert "</html>" in Path("small.html").read_text()
-    for words in Path("small.toml").read_text().splitlines()[:2]:
-        assert run(words.removeprefix("# flockscope ").split()) == 0
-    (sequence,) = answer(capsys, "errors", "small-data/flockscope-train/scene-s00006", "small-tracks")["sequences"]
+    command, *_ = Path("small.toml").read_text().splitlines()
+    assert run(command.removeprefix("# flockscope ").split()) == 0
+    assert run(["track", "blob", "small-data", "--out", "small-tracks", "--detections", "file"]) == 0
+    (sequence,) = answer(capsys, "errors", "small-data", "small-tracks")["sequences"]
     assert "fragment" in {error["kind"] for error in sequence["errors"]}
     assert "got HOTA = 0." in refused(capsys, *line, "HOTA<0.01", "--out", "other.toml", code=1)
     assert run([*line, "fragment", "--out", "scene.toml"]) == 2
@@ -263,9 +265,11 @@ def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, c
     assert run(f"track blob {sequence} --out tracks {given}".split()) == 0
     line = ["--while", "fragment", "--confirm", "0", "--episodes", "3", "--out", "small.toml"]
     found = answer(capsys, "minimize", "tracks", *line)
-    assert found["commands"][1].endswith(
-        "--detections truth --seed 2 --set coast_time=1.0 --set sensor.detect_prob=0.6 --out small-tracks"
-    )
+    assert found["tracker"] == "blob"
+    setup = _of_run(Path("tracks"))[1]
+    assert (setup.detections, setup.seed, setup.sensor) == ("truth", 2, {"detect_prob": 0.6})
+    assert setup.config is not None
+    assert setup.config.as_dict()["coast_time"] == 1.0
     Path("elsewhere").mkdir()
     monkeypatch.chdir("elsewhere")
     assert "recordings cannot be made smaller" in refused(capsys, "minimize", "../tracks", *line)

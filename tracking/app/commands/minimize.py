@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 from scenarios.errors import InputError, counted, printable
 from scenarios.loading.resolve import load, names, resolve
-from scenarios.loading.toml_files import dump, toml_value
+from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import refuse_foreign_file
@@ -29,6 +28,7 @@ from tracking.running.tracker_registry import find
 from tracking.stress.failures import CRASH, Failure, Outcome, parse_failure, play_episode
 from tracking.stress.minimize import Search
 from tracking.stress.reductions import OBSTACLES, difficulties, table_of
+from tracking.stress.sweep import generate_command
 
 LISTED = ("HOTA", "group_F1", "IDSW")
 SEQUENCES = ("manifest.json", "*/manifest.json", "*/*/manifest.json")  # below a folder with a dataset
@@ -136,28 +136,9 @@ def _write(out: Path, search: Search, scene: Scene, setup: TrackerSetup) -> Scen
     """Writes the smallest scene as a scenario file, and returns it as it is read again."""
     about = f"{scene.scenario.name} made small: {setup.tracker} has {search.failure.text}"
     small = search.smallest.model_copy(update={"about": about})
-    lines = "".join(f"# {line}\n" for line in _commands(setup, out, scene.seed, small))
-    write_file(out, (lines + dump(small, defaults=False)).encode())
+    command = generate_command(str(out), scene.seed, (), f"{out.stem}-data")
+    write_file(out, f"# {command}\n{dump(small, defaults=False)}".encode())
     return load(out)
-
-
-def _commands(setup: TrackerSetup, out: Path, seed: int, small: Scenario) -> list[str]:
-    """Returns the commands that generate the scene and track it."""
-    from sim.dataset.splits import split_of
-
-    data, config = f"{out.stem}-data", setup.config
-    streams = [s for s in streams_for(setup.tracker, setup.detections) if s != "background"]
-    usual = {} if config is None else type(config)().as_dict()
-    values = {} if config is None else {k: v for k, v in config.as_dict().items() if v != usual[k]}
-    values |= {f"sensor.{key}": value for key, value in setup.sensor.items()}
-    sequence = f"{data}/flockscope-{split_of(range(seed, seed + 1))}/{small.name}-s{seed:05d}"
-    generate = ["generate", str(out), "--seeds", str(seed), "--streams", ",".join(streams) or "none", "--out", data]
-    track = ["track", setup.tracker, sequence]
-    track += ["--detections", setup.detections] if setup.detections else []
-    track += ["--seed", str(setup.seed)] if setup.seed else []
-    track += [word for key, value in values.items() for word in ("--set", f"{key}={toml_value(value)}")]
-    track += ["--grouping", "rule"] if setup.grouping is not None else []
-    return [shlex.join(["flockscope", *words]) for words in (generate, [*track, "--out", f"{out.stem}-tracks"])]
 
 
 def _write_page(path: Path, setup: TrackerSetup, failure: Failure, sequence: Sequence) -> None:
@@ -188,7 +169,8 @@ def _result(
         "seeds": [
             {"seed": seed, "fails": fails[seed], "scores": dict(outcome.scores)} for seed, outcome in outcomes.items()
         ],
-        "commands": _commands(setup, out, scene.seed, small), "file": out, "page": out.with_suffix(".html"),
+        "command": generate_command(str(out), scene.seed, (), f"{out.stem}-data"), "file": out,
+        "page": out.with_suffix(".html"),
     }  # fmt: skip
     return CommandResult(data, _text(data))
 
@@ -220,4 +202,4 @@ def _text(data: dict[str, Any]) -> str:
     ]  # fmt: skip
     files = f"{data['file']}, and a replay of seed {data['seed']}: {data['page']}"
     shown = table("", (), ["seed", data["while"], *keys], rows)
-    return "\n".join([*map(printable, lines), "", shown, *map(printable, data["commands"]), printable(files)])
+    return "\n".join([*map(printable, lines), "", shown, printable(data["command"]), printable(files)])

@@ -2,7 +2,7 @@
 
 const $ = id => document.getElementById(id);
 const state = { frame: data.start, playing: false, speed: 1, clock: 0, then: 0 };
-const options = { truth: true, tracks: true, other: true, detections: false, hulls: true, ellipses: true, trails: true, ids: true, near: true, beside: Boolean(other), video: true, by: "person" };
+const options = { truth: true, tracks: true, other: true, detections: false, hulls: true, ellipses: true, trails: true, ids: true, beside: Boolean(other), video: true, by: "person" };
 const player = makePlayer(data.video, onVideoChange);
 const wholes = sides.some(side => side.groupRows);
 const background = data.background && Object.assign(new Image(), { src: data.background, onload: () => show() });
@@ -11,7 +11,7 @@ const TOGGLES = [
   ["other", other && other.word, "o", other], ["beside", "Side by side", "b", sides.length > 1],
   ["detections", "Detections", "d", found], ["hulls", "Groups", "h", true],
   ["ellipses", "Extents", "e", wholes], ["trails", "Trails", "l", hasPlan || wholes],
-  ["video", player ? "Video" : "Picture", "v", player || background], ["ids", "Ids", "i", true], ["near", "Near strangers", "s", data.near.length],
+  ["video", player ? "Video" : "Picture", "v", player || background], ["ids", "Ids", "i", true],
 ];
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const KEYS = [

@@ -19,7 +19,7 @@ import numpy as np
 
 from sim.io.files.atomic import write_file
 from sim.io.store.truth_files import spans
-from sim.types import Array, GroupEvent, Near, Sequence, Tracks
+from sim.types import Array, GroupEvent, Sequence, Tracks
 from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
 from tracking.app.replay_page.video import PageVideo
 from tracking.drawing.plan_view import plan_area
@@ -135,7 +135,6 @@ def page_data(
         "detections": detections,
         "background": None,
         "unlabelled": [] if truth is None or truth.labelled is None else spans(~truth.labelled),
-        "near": [] if truth is None or truth.near is None else _near_strangers(truth.near),
         "errors": [
             {**one.facts(sequence.fps), "side": side}
             for side, shown in (("tracks", run), ("other", other))
@@ -177,12 +176,6 @@ def _bounds(sequence: Sequence, both: list[PageRows]) -> list[float] | None:
 
 def _points(rows: PageRows) -> list[Array]:
     return [rows.pos, *(() if rows.hull is None else rows.hull)]
-
-
-def _near_strangers(near: Near) -> list[list[int]]:
-    """Returns [first frame, last frame, id, id] of each two strangers who walk as if they were in one group."""
-    listed: list[list[int]] = np.stack([near.start, near.end, near.a, near.b], axis=1).tolist()
-    return listed
 
 
 def _detections(sequence: Sequence, low: int, high: int) -> Json | None:

@@ -54,7 +54,6 @@ def test_truth_comes_back(sequence: Sequence, truth: Truth) -> None:
     assert data["tracks"] is None
     assert [e[0] for e in data["truth"]["events"]] == ["enter", "merge", "cross", "split", "leave"]
     assert data["unlabelled"] == [[151, 160]]
-    assert data["near"] == [[20, 40, 6, 7]]
 
 
 def test_tracks_come_back(sequence: Sequence, tracks: list[Tracks]) -> None:
