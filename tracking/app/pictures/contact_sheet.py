@@ -69,16 +69,15 @@ def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8, tracks: Se
     tracks: are shown in place of the truth.
     """
     layers = _layers(sequence, tracks)
-    if not sequence.has_images and not any(len(m.id) for layer in layers for m in layer.frames.values()):
-        raise InputError(
-            file=sequence.name, got="no labelled people and no pictures", expected="a sequence with gt/ or pictures",
-            remedy="name another",
-        )  # fmt: skip
     length = sequence.length or sum(1 for _ in sequence.without_pictures())
     chosen = choose_frames(layers[-1], length, sequence.fps, frames)
     if not chosen:
         raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
-    done, code = cv2.imencode(".png", _picture(sequence, views(sequence, layers, chosen), length, chosen))
+    parts = views(sequence, layers, chosen)
+    if not parts:
+        got, expected = "neither pictures nor people on the ground", "a sequence with pictures, or labels on the ground"
+        raise InputError(file=sequence.name, got=got, expected=expected, remedy="flockscope view shows boxes alone")
+    done, code = cv2.imencode(".png", _picture(sequence, parts, length, chosen))
     assert done, "PNG holds any 8-bit picture"
     path = Path(out)
     write_file(path, marked_png(code.tobytes()))
@@ -100,26 +99,15 @@ def _layers(sequence: Sequence, tracks: SequenceOf[Tracks] | None) -> list[Layer
 
 
 def views(sequence: Sequence, layers: SequenceOf[Layer], chosen: SequenceOf[int]) -> list[View]:
-    """Returns the parts of a panel: pictures, and a plan if there is a layer for it; boxes alone without both."""
+    """Returns the parts of a panel: pictures, and a plan if there is a layer for it."""
     found = []
     if sequence.has_images and sequence.image_size is not None:
         size = np.array(sequence.image_size, float)
         found.append(View(layers[0], np.zeros(2), size, False, pictures=_pictures(sequence, set(chosen))))
-    if len(layers) > 1:
-        places = np.concatenate([np.zeros((0, 2)), *(marks.at for marks in layers[1].frames.values())])
-        low, high = plan_area(sequence.scene, places) or (np.zeros(2), np.ones(2))
-        found.append(View(layers[1], low, high, True, sequence.scene))
-    return found or [View(layers[0], *_image_area(sequence, layers[0]), False)]
-
-
-def _image_area(sequence: Sequence, layer: Layer) -> tuple[Array, Array]:
-    if sequence.image_size is not None:
-        return np.zeros(2), np.array(sequence.image_size, float)
-    corners = [np.concatenate([marks.at, marks.box[:, :2], marks.box[:, :2] + marks.box[:, 2:]])
-               for marks in layer.frames.values()]  # fmt: skip
-    known = np.concatenate([np.zeros((0, 2)), *corners])
-    known = known[np.isfinite(known).all(axis=1)]
-    return (known.min(axis=0) - 1, known.max(axis=0) + 1) if len(known) else (np.zeros(2), np.ones(2))
+    places = [marks.at for layer in layers[1:] for marks in layer.frames.values() if len(marks.id)]
+    if places and (area := plan_area(sequence.scene, np.concatenate(places))) is not None:
+        found.append(View(layers[1], *area, True, sequence.scene))
+    return found
 
 
 def _pictures(sequence: Sequence, chosen: set[int]) -> dict[int, Image | None]:
