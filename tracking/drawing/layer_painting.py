@@ -6,7 +6,17 @@ import cv2
 import numpy as np
 
 from sim.types import Array, GroupEvent, Image
-from tracking.drawing.canvas import FLOOR, TRAIL_SECONDS, Canvas, Colour, ascii_only, box_corners, colour, text
+from tracking.drawing.canvas import (
+    FLOOR,
+    TRAIL_SECONDS,
+    Canvas,
+    Colour,
+    ascii_only,
+    box_corners,
+    colour,
+    text,
+    text_width,
+)
 from tracking.drawing.layers import FrameMarks, GroupMark, Layer
 
 CAPTION_SECONDS = 2.5  # s for which an event's caption is shown.
@@ -79,13 +89,18 @@ def _paint_group(canvas: Canvas, group: GroupMark, ink: Colour) -> None:
 
 
 def _paint_ids(canvas: Canvas, marks: FrameMarks, radius: float) -> None:
-    size, places = letter_size(canvas), zip(canvas.map(marks.box[:, :2]), canvas.map(marks.at), strict=True)
-    for identity, (corner, (x, y)) in zip(marks.id.tolist(), places, strict=True):
+    size, at = letter_size(canvas), canvas.map(marks.at)
+    apart = np.nan_to_num(np.hypot(*(at[:, None] - at).transpose(2, 0, 1)), nan=np.inf)
+    np.fill_diagonal(apart, np.inf)
+    nearest = at[apart.argmin(axis=1)] if len(at) else at
+    places = zip(marks.id.tolist(), canvas.map(marks.box[:, :2]), at, nearest, strict=True)
+    for identity, corner, (x, y), other in places:
         words, ink = str(identity), colour(identity)
         if np.isfinite(corner).all():
             draw_label(canvas.image, words, corner - 1, size, ink)
-        elif np.isfinite(x + y):
-            text(canvas.image, words, (x + radius + 3, y + 7), 0.66, ink, 2)
+        elif np.isfinite(x + y):  # on the side where nobody is near
+            left = x + radius + 3 if other[0] <= x else x - radius - 3 - text_width(words, 0.66, 2)
+            text(canvas.image, words, (left, y + 7), 0.66, ink, 2)
 
 
 def _paint_ring(canvas: Canvas, ring: Array, ink: Colour) -> None:
