@@ -111,7 +111,7 @@ def _of_run(folder: Path) -> tuple[Scene, TrackerSetup]:
         got = "--grouping with a belief of another file"
     if sequence is None or got:
         expected = "a run of `track` on a generated sequence below this folder, that can be repeated"
-        remedy = "track it again, or give a scenario with --tracker; recordings cannot be made smaller"
+        remedy = "run it above the dataset, or give a scenario with --tracker; recordings cannot be made smaller"
         raise InputError(file=folder, got=got, expected=expected, remedy=remedy)
     kind = getattr(find(info["tracker"]), "config_class", None)
     setup = TrackerSetup(
