@@ -24,7 +24,7 @@ tuned. The worst failures are minimised with 5 confirming seeds, and the smalles
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
 from functools import cache
@@ -305,10 +305,10 @@ def story(count: int, scenes: int, folder: Path) -> None:
         source = one.scene.source
         assert source.entry is not None
         condition = failures.parse_failure(f"HOTA<{BEST - LOSS / 2:g}")
-        made = minimize.Search(failures.Subject("t", "t"), condition, source.seed, CONFIRMED, _play_in_light)
+        made = minimize.Search(_play_in_light, condition, source.seed, CONFIRMED)
         made.run(source.entry.scenario)
-        fresh = [(made.smallest, seed) for seed in (source.seed, *made.fresh_seeds())]
-        (own, *others) = made.outcomes(fresh, budget=False)
+        fresh = source.seed, *made.fresh_seeds()
+        own, *others = (made.outcome(made.smallest, seed, budget=False) for seed in fresh)
         people = f"{made.first.people} → {own.people}"
         seconds, hard = (
             f"{of(source.entry.scenario)} → {of(made.smallest)}"
@@ -319,17 +319,15 @@ def story(count: int, scenes: int, folder: Path) -> None:
         row([source.name, f"{source.seed}", people, seconds, hard, f"{made.played}", *shares])
 
 
-def _play_in_light(episodes: SequenceOf[failures.EpisodeOf]) -> Generator[failures.Outcome]:
-    for episode in episodes:
-        try:
-            sequence = simulate(episode.scenario, episode.seed, episode.repeat, ())
-            crossings = _crossings_of(sequence)
-        except FlockscopeError as error:
-            yield failures.Outcome(problem=error)
-            continue
-        loss = LOSS * light_changes(episode.scenario, episode.seed, crossings)
-        assert sequence.truth is not None
-        yield failures.Outcome({"HOTA": BEST - loss}, people=len({*sequence.truth.id.tolist()}))
+def _play_in_light(scenario: Scenario, seed: int, repeat: int) -> failures.Outcome:
+    try:
+        sequence = simulate(scenario, seed, repeat, ())
+        crossings = _crossings_of(sequence)
+    except FlockscopeError as error:
+        return failures.Outcome(problem=error)
+    loss = LOSS * light_changes(scenario, seed, crossings)
+    assert sequence.truth is not None
+    return failures.Outcome({"HOTA": BEST - loss}, people=len({*sequence.truth.id.tolist()}))
 
 
 def main() -> None:

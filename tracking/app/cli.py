@@ -39,12 +39,9 @@ def _declare() -> None:
 
 def _version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import PackageNotFoundError, version
+        from importlib.metadata import version
 
-        try:
-            print(version("flockscope"))
-        except PackageNotFoundError:
-            print("unknown: not installed")
+        print(version("flockscope"))
         raise typer.Exit
 
 

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import errno
 import inspect
-import io
 import os
 import re
 import sys
 import warnings
 from collections import Counter
 from collections.abc import Callable
-from contextlib import redirect_stdout
+from contextlib import nullcontext, redirect_stdout
 from dataclasses import fields
 from importlib import import_module
 from typing import Annotated, Any, get_type_hints
@@ -90,8 +89,8 @@ class StrictCommand(TyperCommand):
 
 def run_command(app: typer.Typer, arguments: list[str]) -> int:
     """Runs the command that the arguments name, prints its result or error, and returns its exit code."""
-    as_json = "--json" in arguments
-    if as_json and not HELP.isdisjoint(arguments):  # some levels of the command line know --help but not --json
+    as_json = "--json" in arguments and HELP.isdisjoint(arguments)
+    if not HELP.isdisjoint(arguments):  # some levels of the command line know --help but not --json
         arguments = [argument for argument in arguments if argument != "--json"]
     code = None
     try:
@@ -106,25 +105,13 @@ def run_command(app: typer.Typer, arguments: list[str]) -> int:
 
 def _run_and_print(app: typer.Typer, arguments: list[str], as_json: bool) -> int:
     try:
-        result = _run_quietly(app, arguments) if as_json else _run(app, arguments)
+        with redirect_stdout(sys.stderr) if as_json else nullcontext():  # what trackers print is no part of the answer
+            result = _run(app, arguments)
         return _print(result, as_json) if isinstance(result, CommandResult) else result
     except FlockscopeError as error:
         if error.__cause__ is not None and os.environ.get(command_result.DEBUG):
             raise
         return print_error(error, as_json)
-
-
-def _run_quietly(app: typer.Typer, arguments: list[str]) -> CommandResult | int:
-    printed = io.StringIO()
-    try:
-        with redirect_stdout(printed):
-            result = _run(app, arguments)
-        if result == 0:
-            text, printed = printed.getvalue().rstrip("\n"), io.StringIO()
-            return CommandResult({"text": text}, text)
-        return result
-    finally:
-        print(printed.getvalue(), end="", file=sys.stderr)
 
 
 def _run(app: typer.Typer, arguments: list[str]) -> CommandResult | int:

@@ -75,6 +75,27 @@ class Options:
             COMMANDS[words] = cls, run or f"{words}:{words}"
 
 
+class SceneOptions(Options):
+    """How simulated scenes are changed."""
+
+    settings: list[str] = SET()
+    sensor: Path | None = SENSOR()
+
+
+class PictureOptions(SceneOptions):
+    """What is stored of simulated scenes."""
+
+    streams: str = STREAMS()
+    images: Images = IMAGES()
+
+
+class WorkerOptions(Options):
+    """Who does the work."""
+
+    workers: int = WORKERS()
+    cluster: str | None = CLUSTER()
+
+
 class RecordingOptions(Options):
     """What a recording may lack."""
 
@@ -108,22 +129,16 @@ class ScenariosOptions(Options, words="scenarios"):
     schema: bool = option("List every key of a scenario file.", False)
 
 
-class GenerateOptions(Options, words="generate", run="datasets:generate"):
+class GenerateOptions(PictureOptions, WorkerOptions, words="generate", run="datasets:generate"):
     """Simulate scenarios and store them as a dataset."""
 
     names: list[str] = NAMES()
     seeds: str = SEEDS(SEEDS_HELP)
     out: Path = OUT()
-    settings: list[str] = SET()
-    sensor: Path | None = SENSOR()
-    streams: str = STREAMS()
-    images: Images = IMAGES()
     stride: int = option("Store every N-th frame of the camera only.", 1, low=1, metavar="N")
-    workers: int = WORKERS()
-    cluster: str | None = CLUSTER()
 
 
-class TrackOptions(BoxOptions, words="track"):
+class TrackOptions(SceneOptions, BoxOptions, words="track"):
     """Run a tracker and store its tracks."""
 
     tracker: str = ARGUMENT("Name of a tracker, or file.py:Class, or module:Class.", metavar="TRACKER")
@@ -131,13 +146,11 @@ class TrackOptions(BoxOptions, words="track"):
     out: Path = OUT()
     params: str | None = option(
         "The tracker's parameters: a file, or a preset such as paper.", None, metavar="FILE.toml|PRESET")
-    settings: list[str] = SET()
     detections: Detections = option(
         "Detections that the tracker gets. Default: the first of image, file, truth that can be.", None)
     boxes: Path | None = option(
         "A detector's boxes on the pictures: MOT text, table with named columns (frames or times), COCO results.", None,
         metavar="FILE")
-    sensor: Path | None = SENSOR()
     grouping: Path | None = GROUPING()
     seed: int = option("The tracker's seed.", 0, low=0)
     camera: Path | None = CAMERA()
@@ -173,7 +186,7 @@ class ScoreOptions(BoxOptions, words="score"):
     workers: int = PROCESSES()
 
 
-class StressOptions(Options, words="stress"):
+class StressOptions(SceneOptions, WorkerOptions, words="stress"):
     """Play trackers on scenes that get harder, and find where they break, or the scenes in which one is worst."""
 
     trackers: list[str] = ARGUMENT("Trackers to compare: names, file.py:Class or module:Class.", metavar="TRACKER…")
@@ -193,30 +206,23 @@ class StressOptions(Options, words="stress"):
     minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
     detections: Detections = option(
         "Input of the trackers. Default: file, if they can.", None)
-    settings: list[str] = SET()
-    sensor: Path | None = SENSOR()
     step_timeout: float | None = STEP_TIMEOUT()
-    workers: int = WORKERS()
-    cluster: str | None = CLUSTER()
 
 
 class MinimizeOptions(Options, words="minimize"):
     """Find the smallest scene in which a tracker still fails, by taking out whatever can be."""
 
-    source: str = ARGUMENT("Output of `track` on a generated sequence; or the sequence, a scenario, a *.toml file.",
-        metavar="RUN|SOURCE")
-    run: Path | None = ARGUMENT("Output of `track` on the sequence, if it is not below this folder.", None,
-        metavar="RUN")
+    source: str = ARGUMENT(
+        "Output of `track` on a generated sequence below this folder; or a scenario.", metavar="RUN|SCENARIO")
     condition: str = option(
         "A score with a bound, or a kind of error: HOTA<0.7, IDSW>=3, switch, switch:hidden, crash.", flag="--while",
         metavar="CONDITION")
     out: Path = TOML("Scenario to write; a replay page lies beside it.")
-    tracker: str | None = option("Tracker, if no run is given.", None, metavar="TRACKER")
-    seed: int | None = option("Seed of a scenario; a sequence has its own. Default: 0.", None, low=0)
+    tracker: str | None = option("Tracker of a scenario.", None, metavar="TRACKER")
+    seed: int | None = option("Seed of a scenario. Default: 0.", None, low=0)
     confirm: int = option("Number of other seeds on which most must fail, too.", 5, low=0, metavar="N")
     episodes: int | None = option("Stop after so many episodes.", None, low=1, metavar="N")
     minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
-    workers: int = option("Processes that play episodes.", 1, low=1)
 
 
 class ErrorsOptions(BoxOptions, words="errors"):
@@ -240,7 +246,7 @@ class CompareOptions(Options, words="compare"):
     save: Path | None = option("Write the compared scores of NOW, as the next baseline.", None, metavar="FILE.json")
 
 
-class TuneCommandOptions(Options, words="tune"):
+class TuneCommandOptions(WorkerOptions, words="tune"):
     """Search a tracker's parameters on simulated scenes; measure the gain on others."""
 
     tracker: str = tuned("tracker", flag="")
@@ -259,15 +265,13 @@ class TuneCommandOptions(Options, words="tune"):
     out: Path = tuned("out", MISSING)
     storage: str | None = tuned("storage")
     study: str | None = tuned("study")
-    workers: int = WORKERS()
-    cluster: str | None = CLUSTER()
     step_timeout: float | None = STEP_TIMEOUT()
     prune: float = tuned("prune")
     finalists: int = tuned("finalists")
     seed: int = tuned("seed")
 
 
-class ReplayCommandOptions(Options, words="replay", run="datasets:replay"):
+class ReplayCommandOptions(PictureOptions, words="replay", run="datasets:replay"):
     """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
 
     source: Path = SOURCE()
@@ -277,10 +281,6 @@ class ReplayCommandOptions(Options, words="replay", run="datasets:replay"):
     seeds: str = SEEDS("Seeds of bodies, looks and sensor. For real recordings from 20000 on.", "20000")
     start: float = option("Second at which to begin.", 0.0, low=0.0, metavar="S")
     duration: float | None = option("Seconds to replay. Default: up to the end.", None, metavar="S")
-    settings: list[str] = SET()
-    sensor: Path | None = SENSOR()
-    streams: str = STREAMS()
-    images: Images = IMAGES()
     fps: float | None = FPS()
     calibration: Path | None = option(
         "Calibration of a recording that has boxes only: camera.json or Tsai's XML.", None, metavar="FILE")

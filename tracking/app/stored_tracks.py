@@ -145,32 +145,23 @@ def _refuse_unmatched(sequence: Sequence, by_name: dict[str, StoredTracks]) -> N
         if not each.info:
             each.check()
     file, got = stored[0].path.parent if len(stored) > 1 else stored[0].path, ", ".join(sorted(by_name)[:5])
-    remedy, text = "track it first, or give the right folder", stored[0].path / "tracks.txt"
-    if len(stored) == 1 and stored[0].info.get("truth_hash") is None and text.is_file():
-        remedy += f"; if they are of the same frames, give {text}"
+    remedy = "track it first, or give the right folder; a text that is named itself counts for any sequence"
     raise InputError(file=file, got=f"tracks of {got}", expected=f"tracks of {sequence.name}", remedy=remedy)
 
 
 def _refuse_mixture(runs: list[StoredTracks]) -> None:
     """Raises InputError if stored tracks that are scored together are of different trackers or parameters."""
     for first, each in pairwise(runs):
-        if _method(first) != _method(each):
-            got = " and ".join(
-                f"{one.info.get('tracker')}{_settings_words(one, other)} in {one.path.name}"
-                for one, other in ((first, each), (each, first))
-            )
+        if (before := _method(first)) != (now := _method(each)):
+            other = {key: value for key, value in now.items() if before.get(key) != value}
+            got = f"{shortened(str(other or now), 80)} in {each.path.name}, other than in {first.path.name}"
             remedy = "keep one folder per run: track again with another --out, and score them apart"
             raise InputError(file=each.path.parent, got=got, expected="one tracker with one config", remedy=remedy)
 
 
-def _method(stored: StoredTracks) -> tuple[object, dict[str, Any]]:
-    return stored.info.get("tracker"), {**(stored.info.get("config") or {}), **(stored.info.get("grouping") or {})}
-
-
-def _settings_words(stored: StoredTracks, other: StoredTracks) -> str:
-    (tracker, mine), (another, theirs) = _method(stored), _method(other)
-    changed = ", ".join(f"{key} = {value}" for key, value in mine.items() if theirs.get(key) != value)
-    return f" ({shortened(changed, 80)})" if changed and tracker == another else ""
+def _method(stored: StoredTracks) -> dict[str, Any]:
+    info = stored.info
+    return {"tracker": info.get("tracker"), **(info.get("config") or {}), **(info.get("grouping") or {})}
 
 
 def run_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:

@@ -73,14 +73,6 @@ class Canvas:
         x, y = fixed_point(self.map(at))[0]
         cv2.circle(self.image, (int(x), int(y)), round(radius * 2**SHIFT), ink, width, cv2.LINE_AA, SHIFT)
 
-    def arrow(self, ends: Array, ink: Colour, width: int) -> None:
-        """Draws an arrow in place; ends (2, 2): start and tip."""
-        a, b = self.map(ends)
-        far = float(np.hypot(*(b - a)))
-        tip = min(7.0, far / 2) / far if far > 0 else 0.0
-        start, end = ((int(x), int(y)) for x, y in fixed_point(np.stack([a, b])))
-        cv2.arrowedLine(self.image, start, end, ink, width, cv2.LINE_AA, SHIFT, tip)
-
     def fill(self, polygon: Array, ink: Colour, opacity: float) -> None:
         """Fills a polygon (V, 2), in pixel coordinates, in place."""
         # blend the polygon's own rectangle only, not the whole image

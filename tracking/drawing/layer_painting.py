@@ -86,9 +86,6 @@ def _paint_group(canvas: Canvas, group: GroupMark, ink: Colour) -> None:
         canvas.fill(canvas.map(group.hull), ink, 0.18)
         canvas.line(group.hull, ink, 2, closed=True)
     _paint_ring(canvas, group.extent, ink)
-    if len(group.motion) == 2:
-        canvas.arrow(group.motion, FLOOR, 4)
-        canvas.arrow(group.motion, ink, 2)
 
 
 def _paint_ids(canvas: Canvas, marks: FrameMarks, radius: float) -> None:
@@ -96,9 +93,8 @@ def _paint_ids(canvas: Canvas, marks: FrameMarks, radius: float) -> None:
     apart = np.nan_to_num(np.hypot(*(at[:, None] - at).transpose(2, 0, 1)), nan=np.inf)
     np.fill_diagonal(apart, np.inf)
     nearest = at[apart.argmin(axis=1)] if len(at) else at
-    for identity, corner, (x, y), other in zip(
-        marks.id.tolist(), canvas.map(marks.box[:, :2]), at, nearest, strict=True
-    ):
+    places = zip(marks.id.tolist(), canvas.map(marks.box[:, :2]), at, nearest, strict=True)
+    for identity, corner, (x, y), other in places:
         words, ink = str(identity), colour(identity)
         if np.isfinite(corner).all():
             draw_label(canvas.image, words, corner - 1, size, ink)
@@ -115,11 +111,11 @@ def _paint_ring(canvas: Canvas, ring: Array, ink: Colour) -> None:
 
 
 def _paint_group_id(canvas: Canvas, prefix: str, group: GroupMark) -> None:
-    points = canvas.map(next(part for part in (group.hull, group.extent, group.motion, np.zeros(2)) if len(part)))
-    x, y = points[points[:, 1].argmax()]
-    words = f"{prefix}{group.id}" + (f" ~{round(group.size, 1):g}" if np.isfinite(group.size) else "")
-    size = letter_size(canvas)
-    draw_label(canvas.image, words, (x - 14 * size, y + 38 * size), size * 1.1, colour(group.id))
+    for points in [canvas.map(part) for part in (group.hull, group.extent) if len(part)][:1]:
+        x, y = points[points[:, 1].argmax()]
+        words = f"{prefix}{group.id}" + (f" ~{round(group.size, 1):g}" if np.isfinite(group.size) else "")
+        size = letter_size(canvas)
+        draw_label(canvas.image, words, (x - 14 * size, y + 38 * size), size * 1.1, colour(group.id))
 
 
 def letter_size(canvas: Canvas) -> float:

@@ -43,14 +43,12 @@ class GroupMark:
 
     id: of the group. hull: (V, 2) polygon round the members. The other fields are known only of a group that is tracked
     as a whole. extent: (32, 2), points of the ellipse that holds 99 % of the group by the covariance of its members.
-    motion: its centre now and, if its velocity is known, in 1 s, (2, 2) or (1, 2). size: number of people, estimated.
-    Unknown or unseen arrays have no rows; an unknown size is nan.
+    size: number of people, estimated. Unknown or unseen arrays have no rows; an unknown size is nan.
     """
 
     id: int
     hull: Array
     extent: Array = field(default_factory=NO_POINTS.copy)
-    motion: Array = field(default_factory=NO_POINTS.copy)
     size: float = math.nan
 
 
@@ -146,9 +144,8 @@ def _marks(t: Tracks, camera: Camera | None, scene: Scene | None, plan: bool) ->
     to_drawing = _plane if same else partial(_in_picture, camera=camera, scene=scene)
     box, ellipses = np.full((n, 4), np.nan), np.full((n, len(UNIT_CIRCLE), 2), np.nan)
     if t.unit == "group":
-        groups = _whole_groups(t, to_drawing)
-        at = np.array([g.motion[0] if len(g.motion) else [np.nan, np.nan] for g in groups]).reshape(n, 2)
-        return FrameMarks(t.id, box, at, ellipses, np.zeros(n, bool), groups, whole_groups=True)
+        at = np.concatenate([NO_POINTS, *(_one(to_drawing(pos[None])) for pos in t.pos)])
+        return FrameMarks(t.id, box, at, ellipses, np.zeros(n, bool), _whole_groups(t, to_drawing), whole_groups=True)
     if t.box is not None and not plan:
         box = t.box
     elif not same and camera is not None:
@@ -167,15 +164,17 @@ def _whole_groups(t: Tracks, to_drawing: Callable[[Array], Array]) -> tuple[Grou
     rows = dict(zip(groups.id.tolist(), range(len(groups.id)), strict=True))
 
     def mark(k: int, name: int) -> GroupMark:
-        ends = [t.pos[k], t.pos[k] + t.vel[k]][: 1 + np.isfinite(t.vel[k]).all()]
-        row, motion = rows.get(name), to_drawing(np.stack(ends))
-        if row is None:
-            return GroupMark(name, NO_POINTS, motion=motion)
+        if (row := rows.get(name)) is None:
+            return GroupMark(name, NO_POINTS)
         hull = groups.hull[row] if groups.hull else NO_POINTS
         extent = ellipse(t.pos[k, :2], groups.extent[row], SIGMA_99)
-        return GroupMark(name, to_drawing(hull), to_drawing(extent), motion, float(groups.size[row]))
+        return GroupMark(name, to_drawing(hull), to_drawing(extent), float(groups.size[row]))
 
     return tuple(mark(k, name) for k, name in enumerate(t.id.tolist()))
+
+
+def _one(point: Array) -> Array:
+    return point if len(point) else np.full((1, 2), np.nan)
 
 
 def _feet(box: Array) -> Array:

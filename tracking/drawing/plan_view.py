@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from sim.types import Array, Scene, Stairs
+from sim.types import Array, Scene
 from tracking.drawing.canvas import FLOOR, GRID, THING, WALL, Canvas
 
 MARGIN = 1.0  # m: the least margin of a plan round people and objects.
@@ -51,7 +51,7 @@ def draw_scene(canvas: Canvas, scene: Scene | None) -> None:
     width, depth = scene.size
     canvas.line(np.array([[0, 0], [width, 0], [width, depth], [0, depth]]), THING, 2, closed=True)
     for flight in scene.stairs:
-        _draw_stairs(canvas, flight)
+        canvas.line(np.stack([flight.foot, flight.head]), THING, round(flight.width * canvas.scale))
     for wall in scene.walls:
         canvas.line(wall, WALL, 6)
     for door in scene.doors:
@@ -60,11 +60,3 @@ def draw_scene(canvas: Canvas, scene: Scene | None) -> None:
         canvas.disc(np.array([x, y]), radius * canvas.scale, THING)
     for at in scene.service:
         canvas.disc(at, 8, WALL, 2)
-
-
-def _draw_stairs(canvas: Canvas, flight: Stairs) -> None:
-    axis = flight.head - flight.foot
-    across = np.array([-axis[1], axis[0]]) / np.hypot(*axis) * flight.width / 2
-    for k in range(flight.steps + 1):
-        middle = flight.foot + axis * k / flight.steps
-        canvas.line(np.stack([middle - across, middle + across]), THING, 1)

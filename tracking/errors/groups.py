@@ -28,8 +28,9 @@ from itertools import groupby
 import numpy as np
 
 from sim.types import GroupEvent, Ints
+from tracking.errors.people import first_and_last
 from tracking.scoring.events import HEADLINE, MatchedEvents, same_lineage
-from tracking.scoring.group_scores import SharedMembers, f1, group_of_person, groups_found, shared_members
+from tracking.scoring.group_scores import group_of_person, groups_found, shared_members
 from tracking.scoring.people_and_groups import GroupRows
 from tracking.scoring.rows import FrameRows
 
@@ -133,11 +134,6 @@ def _split(of: Ints, member: Ints, count: int) -> list[list[int]]:
     return lists
 
 
-def group_f1(true: GroupRows, est: GroupRows, shared: SharedMembers) -> float:
-    """Returns 2 found / (true + estimated groups), nan without groups."""
-    return f1(int(groups_found(true, est, shared).sum()), len(true), len(est))
-
-
 def group_errors(of: Memberships, events: Sequence[GroupEvent], fps: float) -> list[GroupError]:
     """Returns all errors of groups in frames, by start; events: of the truth."""
     found = [*_errors_of_groups(of), *_false_groups(of)]
@@ -164,7 +160,7 @@ def _errors_of_groups(of: Memberships) -> Iterator[GroupError]:
         people = _ids(of, rows)
         others = tuple(id for id in _ids(of, (row for j in parts for row in of.members[j])) if id not in people)
         alone = tuple(k for j in parts for k in of.astray(j))
-        yield GroupError(kind, *_span(of.true.rows, stretch), id, people, others, tuple(rows), alone)
+        yield GroupError(kind, *first_and_last(of.true.rows, stretch), id, people, others, tuple(rows), alone)
 
 
 def _false_groups(of: Memberships) -> Iterator[GroupError]:
@@ -174,16 +170,12 @@ def _false_groups(of: Memberships) -> Iterator[GroupError]:
     false = [(j, FALSE) for j in range(len(of.est)) if j not in explained]
     for _, kind, stretch in _stretches(of.est.rows, false):
         people = _ids(of, (row for j in stretch for row in of.members[j]))
-        yield GroupError(kind, *_span(of.est.rows, stretch), None, people, false=tuple(stretch))
+        yield GroupError(kind, *first_and_last(of.est.rows, stretch), None, people, false=tuple(stretch))
 
 
 def _ids(of: Memberships, rows: Iterable[int]) -> tuple[int, ...]:
     """Returns the ids of the true people of some tracked rows."""
     return tuple(sorted({int(of.people.id[of.person[row]]) for row in rows if row >= 0 and of.person[row] >= 0}))
-
-
-def _span(rows: FrameRows, stretch: list[int]) -> tuple[int, int]:
-    return int(rows.frame[stretch[0]]), int(rows.frame[stretch[-1]])
 
 
 def _stretches(rows: FrameRows, states: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str, list[int]]]:

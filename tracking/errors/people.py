@@ -16,7 +16,7 @@ are IDSW and (with the switches after a gap) Frag, and the gaps together are FN,
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal
@@ -80,14 +80,14 @@ def _errors_of_people(matched: MatchedPeople) -> Iterator[PersonError]:
                 gap = stretch
                 continue
             frame = int(true.frame[stretch[0]])
-            span = _span(true, gap) if gap else (frame, frame)
+            span = first_and_last(true, gap) if gap else (frame, frame)
             if before not in (None, track):
                 yield PersonError("switch", span[0], frame, gap, person, before, track)
             elif gap:
                 yield PersonError("late" if before is None else "fragment", *span, gap, person, before, track)
             before, gap = track, ()
         if gap:
-            yield PersonError("miss", *_span(true, gap), gap, person, before)
+            yield PersonError("miss", *first_and_last(true, gap), gap, person, before)
 
 
 def _ghosts(matched: MatchedPeople) -> Iterator[PersonError]:
@@ -96,10 +96,11 @@ def _ghosts(matched: MatchedPeople) -> Iterator[PersonError]:
         for person, of_person in groupby(rows, key=lambda row: int(matched.person[row]) == NOBODY):
             if person:
                 stretch = tuple(of_person)
-                yield PersonError("ghost", *_span(est, stretch), stretch, None, None, track)
+                yield PersonError("ghost", *first_and_last(est, stretch), stretch, None, None, track)
 
 
-def _span(rows: FrameRows, stretch: tuple[int, ...]) -> tuple[int, int]:
+def first_and_last(rows: FrameRows, stretch: Sequence[int]) -> tuple[int, int]:
+    """Returns the first and the last frame of some rows, by frame."""
     return int(rows.frame[stretch[0]]), int(rows.frame[stretch[-1]])
 
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.errors.groups import UNSEEN, GroupError, Memberships, group_f1
+from tracking.errors.groups import UNSEEN, GroupError, Memberships
 from tracking.errors.people import NOBODY, MatchedPeople, PersonError
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
-from tracking.scoring.group_scores import shared_members
+from tracking.scoring.group_scores import f1, groups_found, shared_members
 from tracking.scoring.people_and_groups import GroupRows
 from tracking.scoring.rows import FrameRows
 from tracking.scoring.track_scores import weighted_hota, weighted_identity
@@ -153,7 +153,8 @@ def _repaired_f1(of: Memberships, errors: Collection[GroupError], added: Ints, g
     nobody_inside = np.append((est.count == 0) & ~gone, np.zeros(len(together), bool))
     repaired = repaired.keep((repaired.count > 1) | nobody_inside)
     person = np.concatenate([of.person, added, [NOBODY]])[repaired.member]
-    return group_f1(of.true, repaired, shared_members(of.true, repaired, person, len(of.people)))
+    shared = shared_members(of.true, repaired, person, len(of.people))
+    return f1(int(groups_found(of.true, repaired, shared).sum()), len(of.true), len(repaired))
 
 
 def _groups_of(home: Ints, member: Ints, count: int) -> GroupRows:

@@ -11,18 +11,18 @@ from __future__ import annotations
 import operator
 import re
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, get_args
+from typing import get_args
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.loading.toml_files import closest, did_you_mean
 from scenarios.schema.scenario import Scenario
-from sim.types import DetectionMode, Sequence
+from sim.types import Sequence
 from tracking.errors import groups
 from tracking.errors.causes import CAUSES
 from tracking.errors.people import PersonKind
-from tracking.running.run import TrackingRun, track
+from tracking.running.run import TrackingRun
 from tracking.scoring.catalogue import CATALOGUE
 
 OPERATORS: dict[str, Callable[[float, float], bool]] = {
@@ -32,30 +32,7 @@ COMPARISON = re.compile(r"\s*([\w-]+)\s*(<=|>=|<|>)\s*(-?[0-9.]+)\s*")
 CRASH = "crash"
 KINDS = (*get_args(PersonKind), *groups.KINDS, CRASH)
 
-
-@dataclass(frozen=True)
-class Subject:
-    """The tracker with its parameters and inputs, as `tracking.track` takes them; can be pickled for workers."""
-
-    tracker: str  # as find() takes it, with an absolute path
-    name: str  # as it was given
-    config: Mapping[str, Any] | None = None
-    detections: DetectionMode | None = None
-    sensor: Mapping[str, Any] = field(default_factory=dict)
-    seed: int = 0
-    rule: Mapping[str, Any] | None = None  # of groups, in place of the default grouping
-
-    def run(self, sequence: Sequence) -> TrackingRun:
-        """Tracks a sequence."""
-        from tracking.grouping.link_rule import LinkRule
-
-        grouping = None if self.rule is None else LinkRule.from_dict(self.rule)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            return track(
-                self.tracker, sequence, params=self.config, detections=self.detections, sensor=self.sensor,
-                seed=self.seed, grouping=grouping,
-            )  # fmt: skip
+Run = Callable[[Sequence], TrackingRun]  # Tracks a sequence.
 
 
 @dataclass(frozen=True)
@@ -119,50 +96,38 @@ def _wrong(text: str, expected: str, remedy: str) -> InputError:
     return InputError(place="--while", got=repr(text), expected=expected, remedy=remedy)
 
 
-@dataclass(frozen=True)
-class EpisodeOf:
-    """One episode to play: the subject on a scenario with a seed; `repeat` is that of a suite's copy."""
+def play_episode(
+    run: Run, streams: Iterable[str], failure: Failure, scenario: Scenario, seed: int, repeat: int = 0
+) -> Outcome:
+    """Plays an episode; an order that does not come true, and an unwanted error of the tracker, are its problem.
 
-    subject: Subject
-    failure: Failure
-    scenario: Scenario
-    seed: int
-    repeat: int = 0
-
-    def sequence(self) -> Sequence:
-        """Returns the simulated sequence, with pictures if the tracker works on them."""
-        from sim.sequence import simulate
-        from tracking.environment.episodes import streams_for
-
-        streams = streams_for(self.subject.tracker, self.subject.detections)
-        return simulate(self.scenario, self.seed, self.repeat, streams)
-
-
-def play_episode(episode: EpisodeOf) -> Outcome:
-    """Plays an episode; an order that does not come true, and an unwanted error of the tracker, are its problem."""
+    repeat: number of the suite's copy that the scenario is.
+    """
+    from sim.sequence import simulate
     from tracking.comparison import scorer_of
     from tracking.oracle import oracle
 
     try:
-        sequence = episode.sequence()
+        sequence = simulate(scenario, seed, repeat, streams)
         truth = sequence.truth  # raises for a script that did not come true before anything is tracked
         assert truth is not None, "a simulated sequence has labels"
+        people = len({*truth.id.tolist()})
         try:
-            run = episode.subject.run(sequence)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)
+                tracked = run(sequence)
         except WorkError:
-            if episode.failure.kind != CRASH:
+            if failure.kind != CRASH:
                 raise
-            return Outcome({}, frozenset([(CRASH, "")]), len({*truth.id.tolist()}))
+            return Outcome({}, frozenset([(CRASH, "")]), people)
         with scorer_of(sequence) as scorer:
-            scores = {key: value for key, value in scorer.evaluate(run).items() if value == value}
-            failure = episode.failure
+            scores = {key: value for key, value in scorer.evaluate(tracked).items() if value == value}
             if failure.score and failure.holds(Outcome(scores)):
-                best = scorer.evaluate(oracle(sequence, run.info))[failure.score]
+                best = scorer.evaluate(oracle(sequence, tracked.info))[failure.score]
                 scores = {key: value for key, value in scores.items() if key != failure.score or best == best}
-        errors = _errors(episode.failure, sequence, run)
+        return Outcome(scores, _errors(failure, sequence, tracked), people)
     except FlockscopeError as error:
         return Outcome(problem=error)
-    return Outcome(scores, errors, len({*truth.id.tolist()}))
 
 
 def _errors(failure: Failure, sequence: Sequence, run: TrackingRun) -> frozenset[tuple[str, str]]:

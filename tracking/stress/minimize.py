@@ -19,15 +19,14 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from scenarios.errors import WorkError, counted
+from scenarios.errors import WorkError
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario
-from tracking.stress.failures import EpisodeOf, Failure, Outcome, Subject
-from tracking.stress.reductions import STAGES, Piece, Stage, pinned, without
+from tracking.stress.failures import Failure, Outcome
+from tracking.stress.reductions import STAGES, Stage, pinned, without
 
 ALLOWED = 5  # one of so many confirming seeds may not fail
 ROUNDS = 3  # of fresh seeds
@@ -37,8 +36,8 @@ def _most(seeds: int) -> int:
     return seeds - seeds // ALLOWED
 
 
-# Yields one outcome for each episode, in order, when it is asked for; may be closed before the end.
-PlayEpisodes = Callable[[Sequence[EpisodeOf]], Generator[Outcome]]
+# Plays an episode of a scenario with a seed; the last is the number of the suite's copy that the scenario is.
+Play = Callable[[Scenario, int, int], Outcome]
 
 
 class BudgetSpentError(Exception):
@@ -54,14 +53,12 @@ class Search:
     of the scene at the start; `played`, the number of episodes; `complete`, True if no single piece can be taken out.
     """
 
-    subject: Subject
+    play: Play
     failure: Failure
     seed: int
     confirm: int
-    play: PlayEpisodes
     episodes: int | None = None  # budget
     minutes: float | None = None
-    report: Callable[[str], None] = lambda text: None
     trail: list[Scenario] = field(default_factory=list)
     guard: list[int] = field(default_factory=list)
     required: int = 0
@@ -102,7 +99,7 @@ class Search:
         return list(range(first, first + self.confirm))
 
     def _start(self, scenario: Scenario, repeat: int) -> None:
-        (outcome,) = self.play([EpisodeOf(self.subject, self.failure, scenario, self.seed, repeat)])
+        outcome = self.play(scenario, self.seed, repeat)
         self.played, self.first = 1, outcome
         if outcome.problem is not None:
             raise outcome.problem
@@ -118,7 +115,7 @@ class Search:
     def _choose_start(self, scenario: Scenario, repeat: int) -> Scenario:
         """Returns the scene or the one of fixed groups, on whichever more confirming seeds fail."""
         fixed = pinned(scenario, self.seed, repeat)
-        starts = [s for s in (fixed, scenario) if s is not None and self._fails(s, self.seed)]
+        starts = [s for s in (fixed, scenario) if s is not None and self.fails(s, self.seed)]
         if not starts:
             raise WorkError(
                 file=f"{scenario.name}, seed {self.seed}", got=f"copy {repeat} of an entry with `repeat`",
@@ -156,11 +153,7 @@ class Search:
 
     def _fix(self) -> bool:
         """Replaces drawn groups by those of the own seed; returns True if the tracker still fails then."""
-        fixed = pinned(self.smallest, self.seed)
-        if fixed in (None, self.smallest) or not (self._fails(fixed, self.seed) and self._confirmed(fixed)):
-            return False
-        self.trail.append(fixed)
-        return True
+        return self._accept(pinned(self.smallest, self.seed))
 
     def _reduce(self, stage: Stage) -> bool:
         """Takes out all pieces of one kind that can be; returns True if there were any."""
@@ -169,73 +162,49 @@ class Search:
         while size:
             first = 0
             while first < len(pieces):
-                starts = range(first, len(pieces), size)
-                kept = self._first_that_holds([pieces[k : k + size] for k in starts])
-                if kept is None:
-                    break
-                index, scenario = kept
-                self.trail.append(scenario)
-                pieces, first = stage(scenario), starts[index]
+                if self._accept(without(self.smallest, pieces[first : first + size])):
+                    pieces = stage(self.smallest)
+                else:
+                    first += size
             size //= 2
         return self.smallest is not before
 
-    def _first_that_holds(self, chunks: Sequence[list[Piece]]) -> tuple[int, Scenario] | None:
-        candidates = ((k, without(self.smallest, chunk)) for k, chunk in enumerate(chunks))
-        valid = [(k, scenario) for k, scenario in candidates if scenario not in (None, self.smallest)]
-        while valid:
-            outcomes = self.outcomes([(scenario, self.seed) for _, scenario in valid if scenario is not None])
-            with closing(outcomes):
-                failing = next((n for n, outcome in enumerate(outcomes) if self._failed(outcome)), None)
-            if failing is None:
-                return None
-            index, scenario = valid[failing]
-            assert scenario is not None
-            if self._confirmed(scenario):
-                return index, scenario
-            valid = valid[failing + 1 :]
-        return None
+    def _accept(self, scenario: Scenario | None) -> bool:
+        """Makes a scene the smallest if it is another one and the tracker fails on it; returns True if it did."""
+        if scenario is None or scenario == self.smallest:
+            return False
+        accepted = self.fails(scenario, self.seed) and self._confirmed(scenario)
+        self.trail += [scenario] * accepted
+        return accepted
 
     def _confirmed(self, scenario: Scenario) -> bool:
         """Returns True if enough confirming seeds fail; stops as soon as that is decided."""
         failed, left = 0, len(self.guard)
-        order = sorted(self.guard, key=lambda seed: -self.missed[seed])  # those that decide soonest first
-        with closing(self.outcomes([(scenario, seed) for seed in order])) as outcomes:
-            for seed in order:
-                if not failed < self.required <= failed + left:
-                    break
-                fails = self._failed(next(outcomes))
-                failed, left = failed + fails, left - 1
-                self.missed[seed] += not fails
+        for seed in sorted(self.guard, key=lambda seed: -self.missed[seed]):  # those that decide soonest first
+            if not failed < self.required <= failed + left:
+                break
+            fails = self.fails(scenario, seed)
+            failed, left = failed + fails, left - 1
+            self.missed[seed] += not fails
         return failed >= self.required
 
     def _count(self, scenario: Scenario, seeds: Iterable[int]) -> int:
-        return sum(map(self._failed, self.outcomes([(scenario, seed) for seed in seeds])))
+        return sum(self.fails(scenario, seed) for seed in seeds)
 
-    def _fails(self, scenario: Scenario, seed: int) -> bool:
-        return self._count(scenario, [seed]) == 1
-
-    def _failed(self, outcome: Outcome) -> bool:
+    def fails(self, scenario: Scenario, seed: int) -> bool:
+        """Returns True if the tracker fails on a scene."""
+        outcome = self.outcome(scenario, seed)
         return outcome.problem is None and self.failure.holds(outcome)
 
-    def outcomes(self, wanted: Sequence[tuple[Scenario, int]], budget: bool = True) -> Generator[Outcome]:
-        """Yields the outcomes in order; those that are not known yet are played when they are asked for.
+    def outcome(self, scenario: Scenario, seed: int, budget: bool = True) -> Outcome:
+        """Returns the outcome of an episode, which is played if it is not known yet.
 
-        Raises BudgetSpentError if one must be played and the budget is spent; budget: False plays it all the same.
+        Raises BudgetSpentError if it must be played and the budget is spent; budget: False plays it all the same.
         """
-        keys = [(dump(scenario), seed) for scenario, seed in wanted]
-        missing = {key: one for key, one in zip(keys, wanted, strict=True) if key not in self.known}
-        playing = self.play([EpisodeOf(self.subject, self.failure, *one) for one in missing.values()])
-        try:
-            for key in keys:
-                if key not in self.known:
-                    if budget and self._spent():
-                        raise BudgetSpentError
-                    self.known[key] = next(playing)
-                    self.played += 1
-                    self.report(f"{self.smallest.duration:g} s, {counted(len(self.smallest.group), 'group')}")
-                yield self.known[key]
-        finally:
-            playing.close()  # before other episodes are given to the workers
-
-    def _spent(self) -> bool:
-        return time.monotonic() > self._end or (self.episodes is not None and self.played >= self.episodes)
+        key = dump(scenario), seed
+        if key not in self.known:
+            if budget and (time.monotonic() > self._end or self.played == self.episodes):
+                raise BudgetSpentError
+            self.known[key] = self.play(scenario, seed, 0)
+            self.played += 1
+        return self.known[key]

@@ -1,11 +1,10 @@
 """A sweep: trackers and the oracle play scenes at values of axes until the budget is spent.
 
-Without an axis, the scenes are played as they are. Along one axis, values are placed where the curve bends. First all
+Without an axis, the scenes are played as they are. Along one axis, values are placed where the curve breaks. First all
 scenes are played at five values. Then, in turn, the widest uncertainty is reduced: if a curve breaks and its breaking
 point's interval is wider than the distance of the two values beside it, more seeds are played; else a value is added in
-the middle of them. So no value is added because a few scenes happen to be alike. Without a break, a value is added
-where the curve is steepest. Over two axes, all scenes are played at a grid of five by five values, then with more seeds
-while there is budget.
+the middle of them. So no value is added because a few scenes happen to be alike. Over two axes, all scenes are played
+at a grid of five by five values, then with more seeds while there is budget.
 
 The oracle has the detections that the first tracker gets, and the true ids: what is lost in its score is not the
 tracker's fault. It does not count as an episode of the budget. Every episode is stored when it is played, so a sweep
@@ -29,7 +28,6 @@ from scenarios.errors import InputError
 from sim.hashing import ENGINE
 from sim.types import Array, DetectionMode
 from tracking.environment.episode_cache import Source, sources
-from tracking.stats import mean_interval
 from tracking.stress.axes import Axis, BreakingPoint, breaking_point
 from tracking.stress.episodes import ORACLE, OracleTask, PlayScenes, Store
 from tracking.tuning.parallel_episodes import EpisodeTask
@@ -210,14 +208,11 @@ class Sweep:
         if len(self.plan.axes) != 1:
             limited = self.plan.episodes is not None or self.plan.minutes is not None
             return (limited or not self.plan.axes) and self._add_seeds(self.seeds)
-        for name, point in sorted(self.breaks().items(), key=lambda item: -_width(item[1])):
+        for point in sorted(self.breaks().values(), key=lambda point: -_width(point)):
             if np.isfinite(point.at):
                 if point.high - point.low > NARROW and (self._narrow(point) or self._add_seeds(self.seeds)):
                     return True
-            elif np.isfinite(point.low):
-                if self._add_seeds(self.seeds):
-                    return True
-            elif len(self.values) < FIRST_VALUES + 2 and self._bend(name):
+            elif np.isfinite(point.low) and self._add_seeds(self.seeds):
                 return True
         return False
 
@@ -227,11 +222,6 @@ class Sweep:
         gap = self.way[k] - self.way[k - 1]
         wide = gap > NARROW / 2 and gap >= point.high - point.low - ROUNDING
         return wide and len(self.values) < MOST_VALUES and self._insert(k)
-
-    def _bend(self, name: str) -> bool:
-        """Adds a value where the curve is steepest."""
-        steps = np.abs(np.diff(mean_interval(self.scores(name))[0]))
-        return bool(np.isfinite(steps).any()) and self._insert(int(np.nanargmax(steps)) + 1)
 
     def _insert(self, k: int) -> bool:
         (axis,) = self.plan.axes

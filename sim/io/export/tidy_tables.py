@@ -20,6 +20,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import warnings
 from collections.abc import Iterable, Mapping
 from collections.abc import Sequence as Series
 from dataclasses import dataclass, fields
@@ -358,7 +359,14 @@ def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:
         columns["groups_mean"] = mean(number, rows.listed)
     starts = np.array([e.start for e in rows.events], np.int64)
     columns["events"] = _per(minute(starts), minutes)
+    known = rows.pos[np.isfinite(rows.pos).all(axis=1), :2]
     for name, corners in rows.places.items():
+        ends = known.min(axis=0, initial=np.inf), known.max(axis=0, initial=-np.inf)
+        if len(known) and ((corners.max(axis=0) < ends[0]) | (corners.min(axis=0) > ends[1])).any():
+            area = " and ".join(
+                f"{axis} from {low:.4g} to {high:.4g}" for axis, low, high in zip("xy", *ends, strict=True)
+            )
+            warnings.warn(f"{name} lies outside all positions, which have {area} {rows.unit}", stacklevel=2)
         if len(corners) == LINE:
             left, right = crossings(rows.frame, rows.id, rows.pos, corners, downwards=rows.unit == "px")
             columns[f"{name}_to_left"] = _per(minute(left), minutes)

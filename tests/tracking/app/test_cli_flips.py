@@ -396,7 +396,7 @@ FLIPS = {
     OVERLAY.replace("pair", "bare"): {"camera": f"--camera {SEEN}/camera.json"},
     f"sheet {ONE} --out {{1}}/sheet.png": {"source": ("40000", "40001"), "frames": "--frames 4"},
     f"sheet {SEEN}/left.mp4 {{0}}/pair.txt --out {{1}}/sheet.png": {"tracks": ("pair", "bare")},
-    "sheet {0}/mot --out {1}/sheet.png": {"fps": "--fps 5"},
+    f"sheet {SEEN}/left.mp4 --out {{1}}/sheet.png": {"fps": "--fps 7"},
     "validate {0}/data": {"folder": ("data", "tracks")},
     "export webdataset {0}/data --out {1}": {
         "folder": ("{0}/data", ONE), "shard_size": "--shard-size 1kB",

@@ -75,3 +75,11 @@ def test_a_file_that_the_user_names_is_replaced(line: str, data: Path, tmp_path:
     Path(words[-1]).write_text("mine")
     assert run(words) == 0
     assert Path(words[-1]).read_bytes() != b"mine"
+
+
+def test_a_report_on_several_runs_leaves_what_it_does_not_write(data: Path, tmp_path: Path) -> None:
+    for name in ("a/walk.txt", "a/other.txt", "b/walk.txt", "b/other.txt", "out/walk.html"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("1,1,10,10,20,40,1,1,1\n2,1,12,10,20,40,1,1,1\n")
+    assert run(["view", str(data / "two"), *(str(tmp_path / run) for run in "ab"), "--out", str(tmp_path / "out")]) == 0
+    assert (tmp_path / "out" / "walk.html").read_text().startswith("1,1")

@@ -72,7 +72,7 @@ def test_a_deleted_file_is_no_answer_without_it(made, tracks, tmp_path, capsys, 
     assert not (tmp_path / "out").exists()
 
 
-CONFIGS = [(["--set", "gate=0.8"], "blob (gate = "), (["--grouping", "{folder}/rule.toml"], "blob (near = 0.7")]
+CONFIGS = [(["--set", "gate=0.8"], "'gate': 0."), (["--grouping", "{folder}/rule.toml"], "'near': 0.7")]
 
 
 @pytest.mark.parametrize(("option", "words"), CONFIGS)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import get_args
 
@@ -17,9 +17,11 @@ from scenarios.schema.values import bounds
 from tests.processes import FAKE
 from tests.refusals import answer, refused
 from tracking.app.cli import run
+from tracking.app.commands.minimize import _of_run
+from tracking.app.commands.track import TrackerSetup
 from tracking.errors import groups
 from tracking.errors.people import PersonKind
-from tracking.stress.failures import EpisodeOf, Outcome, Subject, parse_failure, play_episode
+from tracking.stress.failures import Outcome, parse_failure, play_episode
 from tracking.stress.minimize import Search
 from tracking.stress.reductions import STAGES, beginning, difficulties, pinned, script, without
 
@@ -27,16 +29,15 @@ FAILURE = parse_failure("HOTA<0.5")
 Oracle = Callable[[Scenario, int], bool]
 
 
-def search(fails: Oracle, seen: list[EpisodeOf] | None = None, **changes) -> Search:
+def search(fails: Oracle, seen: list[tuple[Scenario, int, int]] | None = None, **changes) -> Search:
     """A search whose episodes fail as the oracle says; nothing is simulated."""
 
-    def play(episodes: Sequence[EpisodeOf]):
-        for episode in episodes:
-            if seen is not None:
-                seen.append(episode)
-            yield Outcome({"HOTA": 0.4 if fails(episode.scenario, episode.seed) else 0.9}, people=1)
+    def play(scenario: Scenario, seed: int, repeat: int) -> Outcome:
+        if seen is not None:
+            seen.append((scenario, seed, repeat))
+        return Outcome({"HOTA": 0.4 if fails(scenario, seed) else 0.9}, people=1)
 
-    return Search(Subject("t", "t"), FAILURE, 3, **{"confirm": 5, "play": play, **changes})
+    return Search(**{"play": play, "failure": FAILURE, "seed": 3, "confirm": 5, **changes})
 
 
 def minimised(fails: Oracle, scenario: Scenario | None = None, **changes) -> Search:
@@ -68,7 +69,7 @@ HARD = load(
 
 
 def test_the_smallest_scene_is_found_and_no_single_piece_can_be_removed() -> None:
-    seen: list[EpisodeOf] = []
+    seen: list[tuple[Scenario, int, int]] = []
     made = minimised(needs, seen=seen)
     small = made.smallest
     assert names(small) == ["stop-4", "north-1"]
@@ -81,7 +82,7 @@ def test_the_smallest_scene_is_found_and_no_single_piece_can_be_removed() -> Non
         for piece in stage(small):
             left = without(small, [piece])
             assert left in (None, small) or not needs(left, 3), piece.path
-    assert len({(dump(e.scenario), e.seed) for e in seen}) == len(seen) == made.played < 400
+    assert len({(dump(scenario), seed) for scenario, seed, _ in seen}) == len(seen) == made.played < 400
 
 
 def test_orders_go_with_their_groups() -> None:
@@ -161,14 +162,14 @@ def test_a_budget_ends_with_the_smallest_scene_so_far(budget: int) -> None:
 
 
 def test_a_copy_of_a_suite_becomes_a_scene_of_its_own() -> None:
-    seen: list[EpisodeOf] = []
+    seen: list[tuple[Scenario, int, int]] = []
     made = search(needs, seen)
     made.run(HARD, repeat=2)
-    assert [episode.repeat for episode in seen] == [2] + [0] * (len(seen) - 1)
+    assert [repeat for _, _, repeat in seen] == [2] + [0] * (len(seen) - 1)
     drawn = pinned(HARD, 3, 2)
     assert drawn is not None
     assert made.trail[0] == drawn
-    alone = search(needs, play=lambda episodes: (Outcome({"HOTA": 0.4 if e.repeat else 0.9}) for e in episodes))
+    alone = search(needs, play=lambda scenario, seed, repeat: Outcome({"HOTA": 0.4 if repeat else 0.9}))
     with pytest.raises(WorkError, match="copy 2 of an entry"):
         alone.run(HARD, repeat=2)
 
@@ -176,9 +177,8 @@ def test_a_copy_of_a_suite_becomes_a_scene_of_its_own() -> None:
 def test_an_order_that_does_not_come_true_is_no_failure() -> None:
     error = OrderError(got="no merge", expected="a merge", remedy="")
 
-    def play(episodes: Sequence[EpisodeOf]):
-        for e in episodes:
-            yield Outcome({"HOTA": 0.1}) if e.scenario.duration > 30 else Outcome({"HOTA": 0.1}, problem=error)
+    def play(scenario: Scenario, seed: int, repeat: int) -> Outcome:
+        return Outcome({"HOTA": 0.1}, problem=None if scenario.duration > 30 else error)
 
     assert 30 < minimised(needs, play=play).smallest.duration <= 31
 
@@ -236,9 +236,10 @@ def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
     assert len(small.group) == 1
     assert ("sensor", "detect_prob") in [piece.path for piece in difficulties(small)[:2]]
     assert "</html>" in Path("small.html").read_text()
-    for words in Path("small.toml").read_text().splitlines()[:2]:
-        assert run(words.removeprefix("# flockscope ").split()) == 0
-    (sequence,) = answer(capsys, "errors", "small-data/flockscope-train/scene-s00006", "small-tracks")["sequences"]
+    command, *_ = Path("small.toml").read_text().splitlines()
+    assert run(command.removeprefix("# flockscope ").split()) == 0
+    assert run(["track", "blob", "small-data", "--out", "small-tracks", "--detections", "file"]) == 0
+    (sequence,) = answer(capsys, "errors", "small-data", "small-tracks")["sequences"]
     assert "fragment" in {error["kind"] for error in sequence["errors"]}
     assert "got HOTA = 0." in refused(capsys, *line, "HOTA<0.01", "--out", "other.toml", code=1)
     assert run([*line, "fragment", "--out", "scene.toml"]) == 2
@@ -249,8 +250,8 @@ def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
 def test_a_score_counts_only_where_the_oracle_has_it(tmp_path: Path, groups: bool) -> None:
     (tmp_path / "scene.toml").write_text(SCENE if groups else SCENE.replace("size = 2", "size = 1"))
     failure = parse_failure("pairwise_F1<1")
-    subject = Subject(FAKE.replace("Nearest", "OneGroup"), "one", detections="truth")
-    outcome = play_episode(EpisodeOf(subject, failure, load(str(tmp_path / "scene.toml")), 4))
+    setup = TrackerSetup(FAKE.replace("Nearest", "OneGroup"), detections="truth")
+    outcome = play_episode(setup.run, (), failure, load(str(tmp_path / "scene.toml")), 4)
     assert outcome.problem is None
     assert failure.holds(outcome) == groups
 
@@ -264,10 +265,11 @@ def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, c
     assert run(f"track blob {sequence} --out tracks {given}".split()) == 0
     line = ["--while", "fragment", "--confirm", "0", "--episodes", "3", "--out", "small.toml"]
     found = answer(capsys, "minimize", "tracks", *line)
-    assert found["commands"][1].endswith(
-        "--detections truth --seed 2 --set coast_time=1.0 --set sensor.detect_prob=0.6 --out small-tracks"
-    )
-    assert answer(capsys, "minimize", sequence, "tracks", *line) == found
+    assert found["tracker"] == "blob"
+    setup = _of_run(Path("tracks"))[1]
+    assert (setup.detections, setup.seed, setup.sensor) == ("truth", 2, {"detect_prob": 0.6})
+    assert setup.config is not None
+    assert setup.config.as_dict()["coast_time"] == 1.0
     Path("elsewhere").mkdir()
     monkeypatch.chdir("elsewhere")
     assert "recordings cannot be made smaller" in refused(capsys, "minimize", "../tracks", *line)
@@ -275,8 +277,7 @@ def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, c
 
 @pytest.mark.parametrize("condition", ["crash", "IDSW>=0"])
 def test_a_tracker_that_raises_fails_if_that_is_the_condition(condition: str) -> None:
-    subject = Subject(FAKE.replace("Nearest", "Crashes"), "c")
-    failure = parse_failure(condition)
+    setup, failure = TrackerSetup(FAKE.replace("Nearest", "Crashes")), parse_failure(condition)
     scene = load("merge", set=("duration=4", "camera.fps=4", "event=[]"))
-    outcome = play_episode(EpisodeOf(subject, failure, scene, 0))
+    outcome = play_episode(setup.run, (), failure, scene, 0)
     assert (outcome.problem is None) == failure.holds(outcome) == (condition == "crash")

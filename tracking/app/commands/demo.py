@@ -1,6 +1,6 @@
 """`flockscope demo`: generates scenes, tracks them, scores the tracks and writes pages to open.
 
-The first page has videos of one scene, and tables of scores whose rows link to replays.
+The first page has videos of one scene, and tables of scores that link to replays.
 """
 
 from __future__ import annotations
@@ -15,25 +15,21 @@ from dataclasses import dataclass
 from html import escape
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, cast
 
 from scenarios.errors import counted
 from sim.io.files.own_files import GENERATOR, output_path
-from sim.types import Array, DetectionMode, Sequence
+from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score import summary
-from tracking.app.commands.score_ranking import COLUMNS, rank_words, shown_columns, usual_key, verdict
-from tracking.app.commands.score_tables import SHOWN, SIMILARITY, arrow, number, table
+from tracking.app.commands.score_ranking import COLUMNS, interval, rank_words, shown_columns, usual_key, verdict
+from tracking.app.commands.score_tables import SIMILARITY, arrow, number, table
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
-from tracking.app.replay_page.video import PageVideo
 from tracking.comparison import ComparedRuns, compare
 from tracking.running import tracker_registry
 from tracking.running.run import TrackingRun
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import Scores
 
 SCENES = ("merge", "split", "cross", "queue", "party", "mixed")
 SEEDS = range(40_000, 40_002)
@@ -43,8 +39,10 @@ PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)  # The scene that is re
 
 QUICK_PIXEL_SETTINGS = ("camera.fps=5", "camera.image=[480,360]")  # What --quick changes in that scene.
 
-VIDEO = """<figure><video src="{address}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
-<figcaption><code>{tracker}</code></figcaption></figure>"""
+VIDEO = """<figure><video src="{video}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
+<figcaption><a href="{page}"><code>{tracker}</code></a></figcaption></figure>"""
+
+Runs = Mapping[str, list[TrackingRun]]  # By tracker, the run of each sequence.
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,18 +52,6 @@ class _TrackJob:
     folders: list[Path]  # of sequences
     out: Path  # a run is written into the folder of this that has its sequence's name
     overlay: Path | None = None  # where to draw tracks over the last sequence's pictures
-
-
-@dataclass(frozen=True)
-class ShownRun:
-    """The run of a tracker on a sequence, as a row of the page."""
-
-    name: str  # what links to the replay
-    page: Path  # the replay
-    scores: Scores
-
-
-Sections = dict[str, list[ShownRun]]  # By title.
 
 
 def demo(options: DemoOptions) -> CommandResult:
@@ -91,33 +77,38 @@ def demo(options: DemoOptions) -> CommandResult:
             )  # fmt: skip
         trackers = QUICK_TRACKERS if quick else tracker_registry.names()
         runs = _runs(_jobs(out, trackers, folders, rendered, quick), workers, tracked)
-    sequences, (scene,) = [open_source(folder)[0] for folder in folders], open_source(rendered)
-    from_points, from_pixels = ({j.tracker: r for j, r in runs.items() if j.detections == m} for m in ("file", "image"))
-    inputs = {name: "boxes" if "boxes" in tracker_registry.find(name).needs else "points" for name in trackers}
-    tables: dict[str, ComparedRuns] = {}
-    sections: Sections = {}
-    for word in sorted({*inputs.values()}, reverse=True):
-        alike = {name: from_points[name] for name in trackers if inputs[name] == word}
-        compared = tables[f"from {word}"] = compare(sequences, alike)
-        for name, scores in compared.scores.items():
-            pages = out / "pages" / name
-            sections[f"{name}, from {word}"] = [
-                _shown(name, one.name, one, run, own, output_path(pages, one.name, ".html"))
-                for one, run, own in zip(sequences, from_points[name], scores, strict=True)
-            ]
-    pixels = _shown_pixels(scene, from_pixels, out / "pages" / "pictures")
-    write_file(page, _page(out, tables, sections, scene, pixels).encode())
-    means = {title: summary([row.scores for row in rows]) for title, rows in sections.items()}
-    shown = means | {f"{row.name}, from pixels": summary([row.scores]) for row in pixels}
-    cells = [[title, *(number(key, each[key]["mean"]) for key in COLUMNS)] for title, each in shown.items()]
+    sequences, scenes = [open_source(folder)[0] for folder in folders], open_source(rendered)
+    given: dict[str, dict[str, list[TrackingRun]]] = {"points": {}, "boxes": {}, "pixels": {}}
+    for job in sorted(runs, key=lambda job: trackers.index(job.tracker)):
+        of_boxes = "boxes" in tracker_registry.find(job.tracker).needs
+        given["pixels" if job.overlay else "boxes" if of_boxes else "points"][job.tracker] = runs[job]
+    parts, cells = list[str](), list[list[str]]()
+    for word, found in given.items():
+        of = scenes if word == "pixels" else sequences
+        compared = compare(of, found)
+        key = usual_key(compared)
+        pages = _replays(of, found, out / "pages" / word)
+        parts += [f"<h2>Trackers from {word}</h2>", _ranking(compared, key), _scenes(compared, key, pages, out)]
+        rows = (row for row in compared.to_arrow(key).to_pylist() if row["first"] is not None)
+        cells += [[f"{row['run']}, from {word}", *(number(k, row[k] or math.nan) for k in COLUMNS)] for row in rows]
+    frames = scenes[0].length or 0
+    films = [
+        VIDEO.format(
+            video=escape(f"pages/pixels/{name}.mp4"), start=0.4 * frames / scenes[0].fps, tracker=name,
+            page=escape(page.relative_to(out).as_posix()),
+        ) for name, (page,) in pages.items()
+    ]  # fmt: skip
+    text = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
+    words = {"GENERATOR": GENERATOR, "FRAMES": str(frames), "PARTS": "\n".join(parts), "FILMS": "".join(films)}
+    write_file(page, re.sub("@@([A-Z]+)@@", lambda found: words[found[1]], text).encode())
     lines = [table("", ["tracker"], COLUMNS, cells)]
     lines += [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]
     lines += [f"{time.monotonic() - start:.0f} s; open this page:", str(page.resolve())]
-    return CommandResult({"sequences": len(sequences), "scores": means, "page": page}, "\n".join(lines))
+    return CommandResult({"sequences": len(sequences), "page": page}, "\n".join(lines))
 
 
 def _jobs(out: Path, trackers: Iterable[str], folders: list[Path], rendered: Path, quick: bool) -> list[_TrackJob]:
-    names, pictures, tracks = [*trackers], out / "pages" / "pictures", out / "tracks"
+    names, pictures, tracks = [*trackers], out / "pages" / "pixels", out / "tracks"
     of_pixels = names[:1] if quick else [name for name in names if "pixels" in tracker_registry.find(name).needs]
     image_jobs = [
         _TrackJob(name, "image", [rendered], tracks / f"{name}-image", pictures / f"{name}.mp4") for name in of_pixels
@@ -159,13 +150,10 @@ def _tracked(job: _TrackJob) -> list[TrackingRun]:
 def _compiled_ahead() -> Iterator[Callable[[_TrackJob], list[TrackingRun]]]:
     """Compiles the kernels of QUICK_TRACKERS in another process; yields `_tracked`, which waits for those that it
     needs."""
-    from sim.scene.visibility_kernels import sample_visibility
     from sim.workers.pool import WorkerProcess
 
-    worker, kernel = WorkerProcess(), cast("Any", sample_visibility)
-    # With one processor it would only take longer, as the process imports everything again; without a cache it is lost.
-    useful = (os.cpu_count() or 1) > 1 and kernel.stats.cache_path is not None
-    compiling = list(QUICK_TRACKERS) if useful else []
+    # With one processor it would only take longer, as the process imports everything again.
+    worker, compiling = WorkerProcess(), list(QUICK_TRACKERS) if (os.cpu_count() or 1) > 1 else []
 
     def tracked(job: _TrackJob) -> list[TrackingRun]:
         while job.tracker in compiling:
@@ -188,138 +176,85 @@ def _compile(tracker: str) -> None:
 
 
 def _made_up_people() -> Sequence:
-    """Returns pictures and points of two people side by side and one apart, all that a tracker needs to call its
-    kernels, with the types of simulated sequences."""
+    """Returns pictures of people, and points of two people side by side and one apart, all that a tracker needs to call
+    its kernels, with the types of simulated sequences."""
     import numpy as np
 
-    from sim.scene.camera import camera_rotation, project, px_per_m_at_centre
+    from sim.scene.camera import camera_rotation, px_per_m_at_centre
     from sim.types import Camera, Detections, Frame, Image
 
-    wide, high, fps = 320, 240, 5.0
-    position, rotation = np.array([0.0, -10.0, 6.0]), camera_rotation(0.6, 0.0)
-    camera = Camera("pinhole", (wide, high), (250.0, 250.0), (wide / 2, high / 2), position, rotation)
-    r = np.random.default_rng(0)
+    wide, high, fps, r = 320, 240, 5.0, np.random.default_rng(0)
+    pose = np.array([0.0, -10.0, 6.0]), camera_rotation(0.6, 0.0)
+    camera = Camera("pinhole", (wide, high), (250.0, 250.0), (wide / 2, high / 2), *pose)
     ground = r.integers(90, 170, (high, wide, 1))
-    walks = [np.array([[x - 3.0, 0.0], [x - 2.75, 0.0], [3.0 - x, 2.0]]) for x in np.linspace(0.0, 5.0, 16)]
 
-    def picture(people: Iterable[Array] = ()) -> Image:
+    def picture(*lefts: int) -> Image:
         image = ground + r.normal(0.0, 2.0, (high, wide, 3))
-        for x, y in people:
-            (u, foot), (_, head) = project(camera, np.array([[x, y, 0.0], [x, y, 1.75]]))[0]
-            half = 0.13 * (foot - head)
-            image[int(head) : int(foot), int(u - half) : int(u + half)] = 20, 20, 150
+        for left in lefts:
+            image[80:118, left : left + 10] = 20, 20, 150
         made: Image = image.clip(0, 255).astype(np.uint8)
         made.setflags(write=False)
         return made
 
     def frames() -> Iterator[Frame]:
-        for k, pos in enumerate(walks):
-            yield Frame(k + 1, k / fps, picture(pos), None, Detections(k + 1, k / fps, "ground", pos))
+        for k in range(16):
+            pos = np.array([[k / 3 - 3.0, 0.0], [k / 3 - 2.75, 0.0], [3.0 - k / 3, 2.0]])
+            yield Frame(
+                k + 1, k / fps, picture(90 + 7 * k, 230 - 7 * k), None, Detections(k + 1, k / fps, "ground", pos)
+            )
 
     return Sequence(
-        "made-up", fps, len(walks), frames, image_size=camera.image, camera=camera, has_images=True,
-        has_detections=True, px_per_m=px_per_m_at_centre(camera),
-        load_background=lambda: np.stack([picture() for _ in range(12)]),
+        "made-up", fps, 16, frames, image_size=camera.image, camera=camera, has_images=True, has_detections=True,
+        px_per_m=px_per_m_at_centre(camera), load_background=lambda: np.stack([picture() for _ in range(12)]),
     )  # fmt: skip
 
 
-def _shown_pixels(scene: Sequence, runs: Mapping[str, list[TrackingRun]], folder: Path) -> list[ShownRun]:
+def _replays(sequences: list[Sequence], runs: Runs, folder: Path) -> dict[str, list[Path]]:
+    """Writes a replay page for each run; pages of one sequence share the video beside them."""
+    from tracking.app.replay_page.page import Run, write_page
     from tracking.app.replay_page.video import page_video
 
-    video = page_video(scene, output_path(folder, scene.name, ".html"), "beside")
-    scores = compare([scene], runs).scores
-    return [
-        _shown(f"{name} from pixels", name, scene, run, scores[name][0], folder / f"{name}-image.html", video)
-        for name, (run,) in runs.items()
-    ]
+    videos = [page_video(one, output_path(folder, one.name, ".html"), "beside") for one in sequences]
+    return {
+        name: [
+            write_page(one, Run(run), folder / f"{name}-{one.name}.html", video=video)
+            for one, run, video in zip(sequences, found, videos, strict=True)
+        ]
+        for name, found in runs.items()
+    }
 
 
-def _shown(
-    title: str,
-    name: str,
-    sequence: Sequence,
-    run: TrackingRun,
-    scores: Scores,
-    page: Path,
-    video: PageVideo | None = None,
-) -> ShownRun:
-    """Writes the replay page of a run, and returns its row."""
-    from tracking.app.replay_page.page import Run, write_page
-
-    write_page(sequence, Run(run), page, scores, f"{title} on {sequence.name}", video)
-    return ShownRun(name, page, scores)
-
-
-def _page(
-    root: Path, tables: Mapping[str, ComparedRuns], sections: Sections, scene: Sequence, pixels: list[ShownRun]
-) -> str:
-    """Returns the page as HTML: rankings, videos and scores of the scene with pictures, then, folded, each section."""
-    frames = scene.length or 0
-    videos = [
-        VIDEO.format(address=escape(f"pages/pictures/{run.name}.mp4"), start=0.4 * frames / scene.fps, tracker=run.name)
-        for run in pixels
-    ]
-    parts = {
-        "GENERATOR": GENERATOR, "FRAMES": str(frames),
-        "RANKINGS": "\n".join(_ranking(f"Trackers {word}", compared) for word, compared in tables.items()),
-        "PIXELS": f'<div class="films">{"".join(videos)}</div>{_score_table(pixels, root)}',
-        "SECTIONS": "\n".join(
-            f"<details><summary>{escape(title)}</summary>{_score_table(rows, root, summed=True)}</details>"
-            for title, rows in sections.items()
-        ),
-    }  # fmt: skip
-    page = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
-    return re.sub("@@([A-Z]+)@@", lambda found: parts[found[1]], page)
-
-
-def _ranking(title: str, compared: ComparedRuns) -> str:
-    key = usual_key(compared)
+def _ranking(compared: ComparedRuns, key: str) -> str:
     entries = compared.to_arrow(key).to_pylist()
     keys = shown_columns(entries, key)
     rows = []
     for e in entries:
-        name = escape(e["run"])
-        cells = [name if e["first"] else f"<em>{name}</em>", rank_words(e), _interval(key, e)]
-        rows.append([*cells, *(number(k, e[k], mean=True) for k in keys)])
+        name, mean = escape(e["run"]), f"{number(key, e['mean'], mean=True)}<br><small>{interval(key, e)}</small>"
+        rows.append([name if e["first"] else f"<em>{name}</em>", rank_words(e), mean])
+        rows[-1] += [number(k, e[k], mean=True) for k in keys]
     words = "; ".join(verdict(compared, key))
     sure = f"<p><strong>Result:</strong> {escape(words)}.</p>" if words else ""
     by = f"people compared by {SIMILARITY[compared.similarity]}; small: 95 % interval"
     note = f"<p>{counted(len(compared.sequences), 'scene')}, {by}.</p>"
-    head = ["<th>tracker</th>", "<th>rank</th>", *map(_heading, [key, *keys])]
-    return f"<h2>{escape(title)}</h2>{note}{sure}{_table(head, rows)}"
+    return note + sure + _table(["<th>tracker</th>", "<th>rank</th>", *map(_heading, [key, *keys])], rows)
 
 
-def _score_table(runs: list[ShownRun], root: Path, summed: bool = False) -> str:
-    keys = [key for key in SHOWN if any(math.isfinite(run.scores[key]) for run in runs)]
-    rows = [
-        [f'<a href="{escape(run.page.relative_to(root).as_posix())}">{escape(run.name)}</a>',
-         *(number(key, run.scores[key]) for key in keys)]
-        for run in runs
-    ]  # fmt: skip
-    foot: list[str] = []
-    if summed and len(runs) > 1:
-        means = summary([run.scores for run in runs])
-        foot = ["mean<br><small>95 % interval</small>", *(_interval(key, means[key]) for key in keys)]
-    return _table(["<th>sequence</th>", *map(_heading, keys)], rows, foot)
+def _scenes(compared: ComparedRuns, key: str, pages: Mapping[str, list[Path]], root: Path) -> str:
+    """Returns a table of the scores of all runs, which link to their replays."""
+    rows = [[escape(name)] for name in compared.sequences]
+    for name, own in pages.items():
+        for row, page, scores in zip(rows, own, compared.scores[name], strict=True):
+            row.append(f'<a href="{escape(page.relative_to(root).as_posix())}">{number(key, scores[key])}</a>')
+    head = ["<th>sequence</th>", *(f"<th>{escape(name)}</th>" for name in pages)]
+    return f"<details><summary>Replays, by {key}</summary>{_table(head, rows)}</details>"
 
 
-def _table(head: list[str], rows: list[list[str]], foot: Iterable[str] = ()) -> str:
-    body, last = ("".join(map(_row, part)) for part in (rows, [foot] if foot else []))
-    head_row = f"<tr>{''.join(head)}</tr>"
-    table = f"<table><thead>{head_row}</thead><tbody>{body}</tbody><tfoot>{last}</tfoot></table>"
-    return f'<div class="wide">{table}</div>'
-
-
-def _row(cells: Iterable[str]) -> str:
-    return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    return f'<div class="wide"><table><thead><tr>{"".join(head)}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
 def _heading(key: str) -> str:
     score = CATALOGUE[key]
     unit = f" [{score.unit}]" if score.unit not in ("1", "count") else ""
     return f'<th title="{escape(score.meaning)}">{escape(arrow(key))}{unit}</th>'
-
-
-def _interval(key: str, mean: Mapping[str, Any]) -> str:
-    low, high = number(key, mean["low"], mean=True), number(key, mean["high"], mean=True)
-    return f"{number(key, mean['mean'], mean=True)}<br><small>{low} to {high}</small>"

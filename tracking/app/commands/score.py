@@ -55,25 +55,17 @@ def score(options: ScoreOptions, ranked: bool = False) -> CommandResult:
 
 def _run_result(sequences: list[Sequence], found: list[ScoredSequence]) -> CommandResult:
     rows = [SequenceScores(s.name, one.scores[0], one.given[0]) for s, one in zip(sequences, found, strict=True)]
-    parts = [[row for row in rows if row.given == given] for given in dict.fromkeys(row.given for row in rows)]
-    blocks = found[0].compared.blocks
-    means = [summary([row.scores for row in part]) for part in parts]
-    if blocks is not None:
-        means = [{}]
-        for key, r in blocks.items():
-            means[0][key] = {"mean": float(r.mean[0]), "low": float(r.low[0]), "high": float(r.high[0])}
-    notes, hashes = scoring_notes(sequences, found), {s.name: tracked_hash(s) for s in sequences}
+    blocks, means = found[0].compared.blocks, summary([row.scores for row in rows])
+    for key, r in ({} if blocks is None else blocks).items():
+        means[key] = {"mean": float(r.mean[0]), "low": float(r.low[0]), "high": float(r.high[0])}
+    notes = scoring_notes(sequences, found)
     data = {
-        "sequences": [{**_row_data(row), "truth": hashes[row.sequence]} for part in parts for row in part],
-        "mean": means[0] if len(parts) == 1 else None,
-        "means": [
-            {"given": part[0].given, "sequences": len(part), "mean": mean}
-            for part, mean in zip(parts, means, strict=True)
+        "sequences": [
+            {**_row_data(row), "truth": tracked_hash(sequence)} for row, sequence in zip(rows, sequences, strict=True)
         ],
-        "notes": notes,
-    }
-    texts = [tables(part, mean, notes, len(rows)) for part, mean in zip(parts, means, strict=True)]
-    return CommandResult(data, "\n".join(texts))
+        "mean": means, "notes": notes,
+    }  # fmt: skip
+    return CommandResult(data, tables(rows, means, notes))
 
 
 def _row_data(row: SequenceScores) -> dict[str, Any]:

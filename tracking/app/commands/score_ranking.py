@@ -1,13 +1,9 @@
-"""`flockscope score TRUTH TRACKS TRACKS…`: a ranking of any number of runs, below the oracles of their inputs.
-
-Also here: what differs between the runs of a ranking: tracker, parameters, input, scale and further facts of run.json.
-"""
+"""`flockscope score TRUTH TRACKS TRACKS…`: a ranking of any number of runs, below the oracles of their inputs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -17,32 +13,13 @@ import numpy as np
 from scenarios.errors import counted, printable, shortened
 from sim.types import Sequence
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import (
-    GROUP_MATCH,
-    LOWER,
-    SIMILARITY,
-    TABLES,
-    arrow,
-    chance,
-    number,
-    table,
-)
+from tracking.app.commands.score_tables import GROUP_MATCH, LOWER, SIMILARITY, TABLES, arrow, chance, number, table
 from tracking.app.commands.scored_sequence import ScoredSequence
 from tracking.comparison import ComparedRuns, joined
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import FEWEST, SURE, mean_of_known
 
-# Keys of run.json and the words for them, in the order of the output. The input is a column of the ranking.
-FACTS = {
-    "tracker": "tracker", "seed": "seed", "background": "background", "causal": "causal",
-    "px_per_m": "scale, px per m", "plane": "plane", "boxes": "boxes",
-    "truth_hash": "truth hash of what was tracked",
-}  # fmt: skip
-# Keys of run.json that hold settings by name; each setting is compared by itself.
-SETTINGS = {"config": "parameter", "grouping": "grouping"}
-
 COLUMNS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")  # Scores beside the one that ranks.
-MOST_VALUES = 3  # Most values of a run that are shown of a fact in which the runs differ.
 LONGEST_NAME = 40  # Characters of an input or run that a table shows at most.
 
 
@@ -54,7 +31,6 @@ class RankedRuns:
     key: str  # the score
     table: list[dict[str, Any]]  # rows of `ComparedRuns.to_arrow`, the oracles first
     scenarios: Mapping[str, list[int]]  # indices of its sequences by scenario
-    settings: list[dict[str, Any]]  # in what the runs differ
     notes: list[str]
 
 
@@ -64,9 +40,8 @@ def ranked_runs(names: list[str], sequences: list[Sequence], found: list[ScoredS
     key, scenarios = by or usual_key(comparison), dict[str, list[int]]()
     for k, sequence in enumerate(sequences):
         scenarios.setdefault(_scenario(sequence.name), []).append(k)
-    settings = run_differences({name: [one.infos[k] for one in found] for k, name in enumerate(names)})
     rows = comparison.to_arrow(key).to_pylist()
-    return RankedRuns(comparison, key, rows, scenarios, settings, scoring_notes(sequences, found))
+    return RankedRuns(comparison, key, rows, scenarios, scoring_notes(sequences, found))
 
 
 def _scenario(sequence: str) -> str:
@@ -80,33 +55,8 @@ def usual_key(comparison: ComparedRuns) -> str:
     return "group_F1" if people.any() and not people.all() else "objective"
 
 
-def run_differences(infos: Mapping[str, SequenceOf[Mapping[str, Any]]]) -> list[dict[str, Any]]:
-    """Returns in what runs differ: for each fact "what" and "runs", by run the values on the sequences, each once."""
-    told = {name: rows for name, rows in infos.items() if all(rows)}
-    trackers = {info.get("tracker") for rows in told.values() for info in rows}
-    tables = ["config"] if len(trackers) == 1 else []
-    tables += ["grouping"] if all(info.get("grouping") for rows in told.values() for info in rows) else []
-    facts = {name: [_facts(info, tables) for info in rows] for name, rows in told.items()}
-    found = []
-    for what in dict.fromkeys(key for rows in facts.values() for each in rows for key in each):
-        values = {name: [each.get(what) for each in rows] for name, rows in facts.items()}
-        if what == FACTS["truth_hash"]:  # a tracker class has none
-            values = {name: row for name, row in values.items() if None not in row}
-        if any(row != next(iter(values.values()), None) for row in values.values()):
-            once = {name: [v for k, v in enumerate(row) if v not in row[:k]] for name, row in values.items()}
-            found.append({"what": what, "runs": once})
-    return found
-
-
-def _facts(info: Mapping[str, Any], tables: SequenceOf[str]) -> dict[str, Any]:
-    found = {words: info.get(key) for key, words in FACTS.items()}
-    for key in tables:
-        found |= {f"{SETTINGS[key]} {name}": value for name, value in (info.get(key) or {}).items()}
-    return found
-
-
 def scoring_notes(sequences: list[Sequence], found: list[ScoredSequence]) -> list[str]:
-    """Returns notes on sparse labels, on how tracks were compared, and on intervals of a short recording."""
+    """Returns notes on sparse labels and on intervals of a short recording."""
     scores, notes = [one.scores[0] for one in found], list[str]()
     sparse = [one for one in scores if one.step != 1]
     if sparse:
@@ -114,7 +64,6 @@ def scoring_notes(sequences: list[Sequence], found: list[ScoredSequence]) -> lis
         where = "" if len(scores) == 1 else f" of {len(sparse)} of {len(scores)} sequences"
         scored, length = (sum(getattr(s, name) for s in sparse) for name in ("frames", "length"))
         notes.append(f"labels{where} are sparse ({steps}): only annotated frames are scored, {scored} of {length}")
-    notes += dict.fromkeys(one.note for one in found if one.note)
     seconds = scores[0].length / sequences[0].fps
     if found[0].compared.blocks is not None and seconds < SURE:
         notes.append(f"intervals are indicative under {SURE:g} s: the recording lasts {seconds:.4g} s")
@@ -155,7 +104,7 @@ def ranking_result(every: RankedRuns) -> CommandResult:
             {**{key: row[key] for key in own}, "scores": {key: row.get(key, math.nan) for key in CATALOGUE}}
             for row in every.table
         ],
-        "differences": pairs, "settings": every.settings, "scenarios": scenarios,
+        "differences": pairs, "scenarios": scenarios,
         "scores": {
             run: {name: dict(one) for name, one in zip(c.sequences, row, strict=True) if one is not None}
             for run, row in c.rows().items()
@@ -173,25 +122,11 @@ def ranking_result(every: RankedRuns) -> CommandResult:
 
 def _last_lines(every: RankedRuns) -> Iterable[str]:
     c = every.comparison
-    if every.settings:
-        yield "the runs differ in"
-    for d in every.settings:
-        values = ", ".join(f"{name} {_words(row)}" for name, row in d["runs"].items())
-        yield printable(f"  {d['what']}: {values}")
     yield from verdict(c, every.key)
     yield from every.notes
     match = next(iter(c.scores.values()))[0].group_match
     yield f"people compared by {SIMILARITY[c.similarity]}, groups by {GROUP_MATCH[match]}"
     yield "oracle: true ids on the same input, without false alarms"
-
-
-def _words(values: SequenceOf[Any]) -> str:
-    words = {None: "none", True: "yes", False: "no"}
-    shown = [
-        f"{v:.6g}" if isinstance(v, float) else words[v] if v is None or isinstance(v, bool) else str(v)
-        for v in values[:MOST_VALUES]
-    ]
-    return " or ".join([*shown, *(["others"] if len(values) > MOST_VALUES else [])])
 
 
 def _ranking_table(every: RankedRuns) -> str:
@@ -200,7 +135,7 @@ def _ranking_table(every: RankedRuns) -> str:
     rows = []
     for row in every.table:
         cells = [rank_words(row), shortened(row["run"], 2 * LONGEST_NAME), number(every.key, row["mean"], mean=True)]
-        cells += [_interval(every.key, row), *(number(k, row[k], mean=True) for k in keys)]
+        cells += [interval(every.key, row), *(number(k, row[k], mean=True) for k in keys)]
         rows.append([*cells, *([shortened(row["input"], LONGEST_NAME)] if len(inputs) > 1 else [])])
     count = len(every.comparison.sequences)
     of = f"mean of {counted(count, 'sequence')}" if count > 1 else "one sequence"
@@ -223,7 +158,8 @@ def rank_words(row: Mapping[str, Any]) -> str:
     return "" if first is None else str(first) if first == last else f"{first}–{last}"
 
 
-def _interval(key: str, ends: Mapping[str, Any]) -> str:
+def interval(key: str, ends: Mapping[str, Any]) -> str:
+    """Returns the 95 % interval of a score in words; "" if it is unknown."""
     if not math.isfinite(ends["low"]):
         return ""
     return f"{number(key, ends['low'], mean=True)} to {number(key, ends['high'], mean=True)}"
@@ -258,7 +194,7 @@ def _difference_table(title: str, first: str, rows: Mapping[str, tuple[str, Mapp
     cells = []
     for name, (key, d) in rows.items():
         sure = f"surely {d['sure']}" if d["sure"] else ""  # of the run named first
-        cells.append([name, number(key, d["mean"], mean=True), _interval(key, d), sure])
+        cells.append([name, number(key, d["mean"], mean=True), interval(key, d), sure])
     return table(title, [first], ["difference", "95 % interval"], cells, [""], foot)
 
 

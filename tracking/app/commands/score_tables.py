@@ -56,19 +56,17 @@ class SequenceScores:
     given: str = ""  # what detections the tracker got, in words; "" without run.json
 
 
-def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = (), total: int = 0) -> str:
+def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = ()) -> str:
     """Returns a table for each family of scores with a known mean, and how all was compared."""
-    detections = f"detections {printable(rows[0].given) or 'unknown (no run.json)'}"
+    given = " and ".join(dict.fromkeys(printable(row.given) or "unknown (no run.json)" for row in rows))
     people = _any_known(PEOPLE[1:], means)
     titles = TABLES if people else GROUP_TRACKER_TABLES
     known = {title: keys for title, keys in titles.items() if _any_known(keys, means)}
     parts = [_family(title, keys, rows, means) for title, keys in known.items()]
-    lines = [LOWER, detections, *_comparison_lines(rows, people, "groups, strict" in known)]
+    lines = [LOWER, f"detections {given}", *_comparison_lines(rows, people, "groups, strict" in known)]
     if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
         lines.append("intervals by weights of blocks of frames")
-    partial = len(rows) < total
-    head = [f"{len(rows)} of {total} sequences, {detections}", ""] if partial else []
-    return "\n".join([*head, *parts, *lines, *notes, *([""] if partial else [])])
+    return "\n".join([*parts, *lines, *notes])
 
 
 def _any_known(keys: Sequence[str], means: Means) -> bool:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from scenarios.errors import InputError
 from sim.io.formats.options import BoxScale, parse_box_scale
@@ -19,9 +18,6 @@ from tracking.scoring.evaluation import Scores
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.misreading import likely_misreading
 from tracking.scoring.people_comparison import Similarity
-
-MOVED = "all tracks are compared {plane}"
-SURFACE_WORDS = {"ground": "on the ground, boxes by their foot points", "image": "in the image, as some lie there"}
 
 Source = StoredTracks | str  # of the tracks of a sequence: stored ones, or the text that names a tracker class
 
@@ -43,18 +39,12 @@ class ScoredSequence:
     """The scores of runs of one sequence."""
 
     compared: ComparedSequence
-    infos: list[Mapping[str, Any]]  # content of run.json of each run, {} without
-    note: str = ""  # what was done to compare them
+    given: list[str]  # the detections that each run got, in words; "" without run.json
 
     @property
     def scores(self) -> list[Scores]:
         """The scores of each run."""
         return self.compared.scores
-
-    @property
-    def given(self) -> list[str]:
-        """The detections that each run got, in words; "" without run.json."""
-        return [input_summary(info) for info in self.infos]
 
 
 def is_class(text: str) -> bool:
@@ -113,7 +103,4 @@ def score_runs(sequence: Sequence, runs: list[TrackingRun], job: ScoringJob) -> 
             if text:
                 warnings.warn(f"{sequence.name}: {text}", stacklevel=2)
     compared = compare_one(sequence, runs, job.similarity, job.group_match, job.blocks, job.oracles)
-    surface = compared.scores[0].surface
-    moved = {"ground" if run[0].plane != "image" else "image" for run in runs if len(run)} - {surface}
-    note = MOVED.format(plane=SURFACE_WORDS[surface]) if moved else ""
-    return ScoredSequence(compared, [run.info for run in runs], note)
+    return ScoredSequence(compared, [input_summary(run.info) for run in runs])

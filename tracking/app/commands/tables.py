@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-
 from scenarios.errors import InputError
 from sim.io.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
 from sim.io.source import open_source
@@ -48,8 +45,8 @@ def _export(options: TrajnetOptions, form: Form, places: Places) -> CommandResul
             raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=remedy)
     rows, lines = [], []
     with ProgressMeter("export", len(jobs)) as meter:
-        for (sequence, make), folder in zip(jobs, folders, strict=True):
-            tables, facts = make(places), {"sequence": sequence.name, "fps": sequence.fps}
+        for (sequence, stored), folder in zip(jobs, folders, strict=True):
+            tables, facts = _tables(sequence, stored, places), {"sequence": sequence.name, "fps": sequence.fps}
             files = write_tables(tables, folder, form, facts)
             sizes = {name: len(table.to_arrow()) for name, table in vars(tables).items()}
             rows.append({**facts, "folder": folder, "files": files, "rows": sizes})
@@ -59,23 +56,17 @@ def _export(options: TrajnetOptions, form: Form, places: Places) -> CommandResul
     return CommandResult({"tables": rows}, "\n".join(lines))
 
 
-Job = tuple[Sequence, Callable[[Places], TidyTables]]  # a sequence, or what stands for it, and what makes its tables
+Job = tuple[Sequence, StoredTracks | None]  # a sequence, or what stands for it, and the run whose tables are made
 
 
 def _of_runs(options: TrajnetOptions) -> list[Job]:
-    jobs: list[Job] = []
-    for stored in find_tracks(options.source):
+    found = find_tracks(options.source)
+    for stored in found:
         stored.check()
         if not stored.info:
             got, expected = "tracks of another program", "what `flockscope track` or `group` wrote"
             raise InputError(file=stored.path, got=got, expected=expected, remedy="give the text itself")
-        sequence = stored.sequence(options.fps)
-        jobs.append((sequence, partial(_run, stored, sequence.fps)))
-    return jobs
-
-
-def _run(stored: StoredTracks, fps: float, places: Places) -> TidyTables:
-    return run_tables(read_checked_tracks(stored.path), fps, places)
+    return [(stored.sequence(options.fps), stored) for stored in found]
 
 
 def _of_sequences(options: TrajnetOptions) -> list[Job]:
@@ -85,9 +76,11 @@ def _of_sequences(options: TrajnetOptions) -> list[Job]:
             file, expected = sequence.source.get("path", options.source), "a run, or people with ids"
             remedy = "`flockscope track` it, and give the --out of that"
             raise InputError(file=file, got="no labelled people", expected=expected, remedy=remedy)
-    return [(sequence, partial(_truth, sequence)) for sequence in sequences]
+    return [(sequence, None) for sequence in sequences]
 
 
-def _truth(sequence: Sequence, places: Places) -> TidyTables:
+def _tables(sequence: Sequence, stored: StoredTracks | None, places: Places) -> TidyTables:
+    if stored is not None:
+        return run_tables(read_checked_tracks(stored.path), sequence.fps, places)
     assert sequence.truth is not None
     return truth_tables(sequence.truth, places)

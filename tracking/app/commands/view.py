@@ -42,7 +42,8 @@ def view(options: ViewOptions) -> CommandResult:
             got, expected = counted(len(names), "run"), "one or two for a single sequence"
             raise InputError(place="TRACKS", got=got, expected=expected, remedy="give two, or the whole dataset")
         return _pages(options, sequences, names)
-    _files(sequences, options.out, ".html")  # refuses files of others before anything is tracked
+    written = sequences if len(names) < 2 else []  # of several runs a report alone is written
+    _files(written, _folder(options.out, ".html", len(sequences)), ".html")  # refuses files of others before all work
     unlabelled = next((sequence.name for sequence in sequences if sequence.load_truth is None), None)
     if len(names) > 1 and unlabelled is not None:
         expected, remedy = "labels, by which several runs are compared", "give one run, or one sequence"
@@ -159,10 +160,14 @@ def _write_each(
 def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
     if len(sequences) == 1:
         return [option_parsing.output_file(out, suffix)]
-    if out.suffix.lower() == suffix:
-        got, remedy = f"one file for {len(sequences)} sequences", "give a folder, or one sequence"
-        raise InputError(file=out, place="--out", got=got, expected="a folder", remedy=remedy)
-    files = output_paths(out, [sequence.name for sequence in sequences], suffix)
+    files = output_paths(_folder(out, suffix, len(sequences)), [sequence.name for sequence in sequences], suffix)
     for file in files:
         refuse_foreign_file(file)
     return files
+
+
+def _folder(out: Path, suffix: str, count: int) -> Path:
+    if out.suffix.lower() == suffix:
+        got, remedy = f"one file for {count} sequences", "give a folder, or one sequence"
+        raise InputError(file=out, place="--out", got=got, expected="a folder", remedy=remedy)
+    return out

@@ -16,11 +16,11 @@ import numpy as np
 from scenarios.errors import InputError, counted
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import marked_png
-from sim.types import Array, GroupEvent, Image, Ints, Scene, Sequence, Tracks
+from sim.types import Array, GroupEvent, Image, Scene, Sequence, Tracks
 from tracking.drawing.canvas import FLOOR, INK, QUIET, THING, TRAIL_SECONDS, Canvas, text, text_width
 from tracking.drawing.layer_painting import KIND_COLOUR, event_words, kind_colour, paint_layer
-from tracking.drawing.layers import FrameMarks, Layer, layer_of_tracks, layer_of_truth
-from tracking.drawing.plan_view import MARGIN, draw_scene, plan_area
+from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
+from tracking.drawing.plan_view import draw_scene, plan_area
 from tracking.running.run import grouped
 
 GREY = 128
@@ -28,8 +28,6 @@ GREY = 128
 # px before the sheet is shrunk to half its size: width of a panel; heights of the sheet's head and foot; gap between
 # panels; height of a panel's title.
 WIDTH, HEAD, FOOT, GAP, TITLE = 880, 76, 96, 20, 40
-
-RING_MARGIN = 0.7  # m between an event's ring and the outermost of its members.
 
 # Kinds of events that are shown, with their rank; events of rank 0 come first. Enter and leave are not shown.
 SHOWN_KINDS = {"merge": 0, "split": 0, "cross": 1, "queue": 1, "form": 2, "dissolve": 2}
@@ -63,10 +61,6 @@ class View:
         if self.plan:
             draw_scene(canvas, self.scene)
         paint_layer(canvas, self.layer, index, fps)
-        for event in events_near(self.layer, index, fps) if self.plan else []:
-            at, radius = event_ring(event, self.layer.at(index))
-            if np.isfinite(at).all():
-                canvas.disc(at, radius * canvas.scale, kind_colour(event.kind), 3)
 
 
 def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8, tracks: SequenceOf[Tracks] | None = None) -> Path:
@@ -75,16 +69,15 @@ def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8, tracks: Se
     tracks: are shown in place of the truth.
     """
     layers = _layers(sequence, tracks)
-    if not sequence.has_images and not any(len(m.id) for layer in layers for m in layer.frames.values()):
-        raise InputError(
-            file=sequence.name, got="no labelled people and no pictures", expected="a sequence with gt/ or pictures",
-            remedy="name another",
-        )  # fmt: skip
     length = sequence.length or sum(1 for _ in sequence.without_pictures())
     chosen = choose_frames(layers[-1], length, sequence.fps, frames)
     if not chosen:
         raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
-    done, code = cv2.imencode(".png", _picture(sequence, views(sequence, layers, chosen), length, chosen))
+    parts = views(sequence, layers, chosen)
+    if not parts:
+        got, expected = "neither pictures nor people on the ground", "a sequence with pictures, or labels on the ground"
+        raise InputError(file=sequence.name, got=got, expected=expected, remedy="flockscope view shows boxes alone")
+    done, code = cv2.imencode(".png", _picture(sequence, parts, length, chosen))
     assert done, "PNG holds any 8-bit picture"
     path = Path(out)
     write_file(path, marked_png(code.tobytes()))
@@ -106,26 +99,15 @@ def _layers(sequence: Sequence, tracks: SequenceOf[Tracks] | None) -> list[Layer
 
 
 def views(sequence: Sequence, layers: SequenceOf[Layer], chosen: SequenceOf[int]) -> list[View]:
-    """Returns the parts of a panel: pictures, and a plan if there is a layer for it; boxes alone without both."""
+    """Returns the parts of a panel: pictures, and a plan if there is a layer for it."""
     found = []
     if sequence.has_images and sequence.image_size is not None:
         size = np.array(sequence.image_size, float)
         found.append(View(layers[0], np.zeros(2), size, False, pictures=_pictures(sequence, set(chosen))))
-    if len(layers) > 1:
-        places = np.concatenate([np.zeros((0, 2)), *(marks.at for marks in layers[1].frames.values())])
-        low, high = plan_area(sequence.scene, places) or (np.zeros(2), np.ones(2))
-        found.append(View(layers[1], low, high, True, sequence.scene))
-    return found or [View(layers[0], *_image_area(sequence, layers[0]), False)]
-
-
-def _image_area(sequence: Sequence, layer: Layer) -> tuple[Array, Array]:
-    if sequence.image_size is not None:
-        return np.zeros(2), np.array(sequence.image_size, float)
-    boxes = np.concatenate([np.zeros((0, 4)), *(marks.box for marks in layer.frames.values())])
-    boxes = boxes[np.isfinite(boxes).all(axis=1)]
-    points = np.concatenate([np.zeros((0, 2)), *(marks.at for marks in layer.frames.values())])
-    corners = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:], points[np.isfinite(points).all(axis=1)]])
-    return (corners.min(axis=0) - 1, corners.max(axis=0) + 1) if len(corners) else (np.zeros(2), np.ones(2))
+    places = [marks.at for layer in layers[1:] for marks in layer.frames.values() if len(marks.id)]
+    if places and (area := plan_area(sequence.scene, np.concatenate(places))) is not None:
+        found.append(View(layers[1], *area, True, sequence.scene))
+    return found
 
 
 def _pictures(sequence: Sequence, chosen: set[int]) -> dict[int, Image | None]:
@@ -171,26 +153,14 @@ def events_near(layer: Layer, index: int, fps: float) -> list[GroupEvent]:
     return sorted(near, key=lambda event: SHOWN_KINDS[event.kind])
 
 
-def event_ring(event: GroupEvent, marks: FrameMarks) -> tuple[Array, float]:
-    """Returns centre (2,) and radius (m) of a ring round the event's members, with 0.7 m to spare."""
-    members = marks.at[np.isin(marks.id, event.members)]
-    if not len(members):
-        return np.array(event.pos), MARGIN
-    centre = members.mean(axis=0)
-    return centre, float(np.linalg.norm(members - centre, axis=1).max()) + RING_MARGIN
-
-
 def _draw_head(sheet: Image, sequence: Sequence, part: View, length: int) -> None:
     text(sheet, sequence.name, (GAP, 48), 1.3, INK, 3)
-    low, high = part.low, part.high
-    if part.plan and sequence.scene is not None:
-        low, high = np.zeros(2), sequence.scene.size
+    size = sequence.scene.size if part.plan and sequence.scene is not None else part.high - part.low
     count = len({identity for marks in part.layer.frames.values() for identity in marks.id.tolist()})
-    noun = "tracks" if part.layer.name == "tracked" else "people"
-    facts = f"{count} {noun}, " if count else ""
-    facts += f"{counted(length, 'frame')}, {sequence.fps:g}/s, "
-    facts += f"{high[0] - low[0]:.4g} x {high[1] - low[1]:.4g} {'m' if part.plan else 'px'}; trails {TRAIL_SECONDS:g} s"
-    text(sheet, facts, (GAP + text_width(sequence.name, 1.3, 3) + 30, 46), 0.75, QUIET)
+    noun, unit = "tracks" if part.layer.name == "tracked" else "people", "m" if part.plan else "px"
+    facts = [f"{count} {noun}"] * (count > 0) + [counted(length, "frame"), f"{sequence.fps:g}/s"]
+    words = ", ".join([*facts, f"{size[0]:.4g} x {size[1]:.4g} {unit}; trails {TRAIL_SECONDS:g} s"])
+    text(sheet, words, (GAP + text_width(sequence.name, 1.3, 3) + 30, 46), 0.75, QUIET)
 
 
 def _draw_foot(area: Image, layer: Layer, length: int, fps: float, chosen: Iterable[int]) -> None:
@@ -217,27 +187,16 @@ def _draw_foot(area: Image, layer: Layer, length: int, fps: float, chosen: Itera
 def choose_frames(layer: Layer, length: int, fps: float, count: int) -> list[int]:
     """Returns the numbers, from 1, of `count` frames in ascending order.
 
-    Frames in which events become known come first, by rank, if they are more than a second apart; then others. Each is
-    far from those that are chosen already; of frames without an event that are far enough, one with the most people.
+    Frames in which events become known come first, by rank, if they are more than a second apart; then others, each as
+    far as can be from those that are chosen already.
     """
-    every = np.arange(1, length + 1)
-    people = np.array([len(layer.at(index).id) for index in every.tolist()])
-    chosen: list[int] = []
-    for rank in (0, 1, 2, None):
-        known = {start for start, event in layer.events if SHOWN_KINDS.get(event.kind) == rank}
-        pool = every if rank is None else np.array(sorted(known.intersection(every.tolist())), np.int64)
-        least = 0.0 if rank is None else CLOSE_SECONDS * fps
-        while len(chosen) < min(max(1, count), length):
-            gap = _gaps(pool, chosen, length)
-            if gap.max(initial=0) <= least:
-                break
-            most = people * (4 * gap >= 3 * gap.max()) if rank is None else np.zeros(len(pool))
-            chosen.append(int(pool[np.lexsort((-gap, -most))[0]]))
+    shown = [(known, e.kind) for known, e in layer.events if e.kind in SHOWN_KINDS and 1 <= known <= length]
+    every, wanted, chosen = np.arange(1, length + 1), min(max(1, count), length), list[int]()
+    for known, _ in sorted(shown, key=lambda item: (SHOWN_KINDS[item[1]], item[0])):
+        if len(chosen) < wanted and all(abs(known - one) > CLOSE_SECONDS * fps for one in chosen):
+            chosen.append(known)
+    while len(chosen) < wanted:
+        # The ends count as an eighth of the length further out, so that frames near them are chosen, too.
+        marks = np.array([-(length // 8), length + 1 + length // 8, *chosen])
+        chosen.append(int(every[np.abs(every[:, None] - marks).min(axis=1).argmax()]))
     return sorted(chosen)
-
-
-def _gaps(pool: Ints, chosen: list[int], length: int) -> Ints:
-    """Returns the distance of each frame to the nearest chosen one, or the ends."""
-    # The ends count as an eighth of the length further out, so that frames near them are chosen, too.
-    marks = np.array([-(length // 8), length + 1 + length // 8, *chosen])
-    return np.asarray(np.abs(pool[:, None] - marks).min(axis=1))

@@ -78,7 +78,7 @@ def overlay_pictures(sequence: Sequence, layers: SequenceOf[Layer]) -> Iterator[
     for frame, picture in shown_pictures(sequence):
         body = _drawn(picture, sequence.fps, frame.index, layers)
         banner = np.zeros((BANNER_HEIGHT, body.shape[1], 3), np.uint8)
-        draw_banner(banner, banner_words(sequence, frame, layers), _warning(sequence, frame), 0.55)
+        draw_banner(banner, banner_words(sequence, frame, layers), "lost frame" if frame.image is None else "", 0.55)
         yield even_size(np.concatenate([banner, body]))
 
 
@@ -99,9 +99,3 @@ def banner_words(sequence: Sequence, frame: Frame, layers: SequenceOf[Layer]) ->
     marks = {layer.name: layer.at(frame.index) for layer in layers}
     count = "".join(f"   {name} {len(m.id)}{' groups' * m.whole_groups}" for name, m in marks.items())
     return f"{sequence.name}   frame {frame.index}{of}   {frame.t:.2f} s{count}"
-
-
-def _warning(sequence: Sequence, frame: Frame) -> str:
-    empty = frame.detections is None or not len(frame.detections.pos)
-    lacks = {"lost frame": frame.image is None, "no detections": sequence.has_detections and empty}
-    return ", ".join(words for words, holds in lacks.items() if holds)

@@ -2,7 +2,7 @@
 
 const $ = id => document.getElementById(id);
 const state = { frame: data.start, playing: false, speed: 1, clock: 0, then: 0 };
-const options = { truth: true, tracks: true, other: true, detections: false, hulls: true, ellipses: true, trails: true, ids: true, near: true, beside: Boolean(other), video: true, by: "person" };
+const options = { truth: true, tracks: true, other: true, detections: false, hulls: true, ellipses: true, trails: true, ids: true, beside: Boolean(other), video: true, by: "person" };
 const player = makePlayer(data.video, onVideoChange);
 const wholes = sides.some(side => side.groupRows);
 const background = data.background && Object.assign(new Image(), { src: data.background, onload: () => show() });
@@ -11,7 +11,7 @@ const TOGGLES = [
   ["other", other && other.word, "o", other], ["beside", "Side by side", "b", sides.length > 1],
   ["detections", "Detections", "d", found], ["hulls", "Groups", "h", true],
   ["ellipses", "Extents", "e", wholes], ["trails", "Trails", "l", hasPlan || wholes],
-  ["video", player ? "Video" : "Picture", "v", player || background], ["ids", "Ids", "i", true], ["near", "Near strangers", "s", data.near.length],
+  ["video", player ? "Video" : "Picture", "v", player || background], ["ids", "Ids", "i", true],
 ];
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const KEYS = [
@@ -186,7 +186,6 @@ function buildHead() {
     about.push(`${new Set(side.id).size} ${side.groupRows ? "groups" : "people"} by ${side === other ? data.other.tracker : data.tracker}`);
   }
   $("about").textContent = about.join(" · ");
-  buildScores();
   $("plan-note").textContent = hasPlan && tracks && truth ? planNote() : "";
   $("image-note").textContent = hasImage && tracks && truth ? "true: solid · tracked: dashed · detected: dotted boxes" : "";
   $("plan-stage").hidden = !hasPlan;
@@ -198,24 +197,6 @@ function planNote() {
   if (flat) return `${flat.word} in the image only`;
   return wholes ? "true: bodies, solid · tracked: dashed"
     : "true: bodies, solid, ids upright · tracked: rings, dashed, ids slanted";
-}
-
-function buildScores() {
-  const families = new Map();
-  for (const [key, value, meaning, family] of data.scores) {
-    const item = document.createElement("div");
-    item.title = meaning;
-    item.append(tag("dt", key), tag("dd", value));
-    families.set(family, [...(families.get(family) || []), item]);
-  }
-  $("scores").replaceChildren(...(families.get("") || []));
-  families.delete("");
-  $("all-scores").hidden = !families.size;
-  $("all-scores").lastElementChild.replaceChildren(...[...families].flatMap(([family, items]) => {
-    const list = document.createElement("dl");
-    list.append(...items);
-    return [tag("h3", family), list];
-  }));
 }
 
 function buildControls() {

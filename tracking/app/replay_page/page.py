@@ -19,7 +19,7 @@ import numpy as np
 
 from sim.io.files.atomic import write_file
 from sim.io.store.truth_files import spans
-from sim.types import Array, GroupEvent, Near, Sequence, Tracks
+from sim.types import Array, GroupEvent, Sequence, Tracks
 from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
 from tracking.app.replay_page.video import PageVideo
 from tracking.drawing.plan_view import plan_area
@@ -49,8 +49,6 @@ def write_page(
     sequence: Sequence,
     run: Run,
     out: str | Path,
-    scores: Mapping[str, float] | None = None,
-    title: str | None = None,
     video: PageVideo | None = None,
     other: Run | None = None,
     start: int = 1,
@@ -59,10 +57,10 @@ def write_page(
 
     other: of a second tracker, which is shown beside the first. start: the frame that is shown first.
     """
-    shown = page_data(sequence, run, other, scores, start=start)
+    shown = page_data(sequence, run, other, start=start)
     shown |= {"video": None if video is None else video.facts()}
     film = "" if video is None else video.content
-    text = page_html(title or sequence.name, script_json(shown), film)
+    text = page_html(sequence.name, script_json(shown), film)
     path = Path(out)
     write_file(path, text.encode("utf-8", "replace"))  # a title from a file's name may hold lone surrogates
     return path
@@ -96,7 +94,6 @@ def page_data(
     sequence: Sequence,
     run: Run,
     other: Run | None = None,
-    scores: Mapping[str, float] | None = None,
     span: tuple[int, int] | None = None,
     start: int = 1,
 ) -> Json:
@@ -138,8 +135,6 @@ def page_data(
         "detections": detections,
         "background": None,
         "unlabelled": [] if truth is None or truth.labelled is None else spans(~truth.labelled),
-        "near": [] if truth is None or truth.near is None else _near_strangers(truth.near),
-        "scores": _scores(scores or {}),
         "errors": [
             {**one.facts(sequence.fps), "side": side}
             for side, shown in (("tracks", run), ("other", other))
@@ -147,16 +142,6 @@ def page_data(
             if one.error.start <= high and one.error.end >= low
         ],
     }
-
-
-def _scores(scores: Mapping[str, float]) -> list[list[str]]:
-    """Returns [key, value, meaning, family], all texts, of each known (finite) score in the catalogue's order."""
-    from tracking.app.commands.score_tables import SHOWN, number
-    from tracking.scoring.catalogue import CATALOGUE
-
-    known = {key: number(key, scores[key]) for key in CATALOGUE if math.isfinite(scores.get(key, math.nan))}
-    few = [[key, known[key], CATALOGUE[key].meaning, ""] for key in SHOWN if key in known]
-    return few + [[key, text, CATALOGUE[key].meaning, CATALOGUE[key].family] for key, text in known.items()]
 
 
 def _tracker(run: Run) -> str:
@@ -191,12 +176,6 @@ def _bounds(sequence: Sequence, both: list[PageRows]) -> list[float] | None:
 
 def _points(rows: PageRows) -> list[Array]:
     return [rows.pos, *(() if rows.hull is None else rows.hull)]
-
-
-def _near_strangers(near: Near) -> list[list[int]]:
-    """Returns [first frame, last frame, id, id] of each two strangers who walk as if they were in one group."""
-    listed: list[list[int]] = np.stack([near.start, near.end, near.a, near.b], axis=1).tolist()
-    return listed
 
 
 def _detections(sequence: Sequence, low: int, high: int) -> Json | None:

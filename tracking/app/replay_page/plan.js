@@ -71,7 +71,6 @@ function planPane(ctx, width, height, shown, frame, options) {
   const people = shown.filter(side => !side.groupRows), wholeGroups = shown.filter(side => side.groupRows);
   if (options.hulls) for (const side of people) drawPlanHulls(plan, side);
   for (const side of wholeGroups) drawWholeGroups(plan, side, map);
-  if (options.near && truth && shown.includes(truth)) drawNearStrangers(plan);
   if (options.trails) for (const side of people) drawTrails(plan, side, map);
   if (options.detections && found && found.plane !== "image") drawPlanDetections(plan);
   for (const side of people) drawPlanPeople(plan, side);
@@ -171,19 +170,6 @@ function drawTrails(pane, side, map) {
     strokeLine(ctx, points.filter(Boolean));
   }
   ctx.globalAlpha = 1;
-  ctx.setLineDash([]);
-}
-
-function drawNearStrangers(plan) {
-  const { ctx } = plan, rowOf = new Map();
-  for (const row of truth.rows(plan.frame)) rowOf.set(truth.id[row], row);
-  ctx.strokeStyle = theme.thing;
-  ctx.lineWidth = 1.5;
-  ctx.setLineDash([1, 4]);
-  for (const [start, end, a, b] of data.near) {
-    if (plan.frame < start || plan.frame > end || !rowOf.has(a) || !rowOf.has(b)) continue;
-    strokeLine(ctx, [positionOf(plan, truth, rowOf.get(a)), positionOf(plan, truth, rowOf.get(b))]);
-  }
   ctx.setLineDash([]);
 }
 

@@ -46,6 +46,8 @@ def test_counts_have_columns_of_places():
     assert (first["door_to_left"], first["door_to_right"]) == (0, 2), "two people walk along +x over it"
     assert (first["hall_people"], second["hall_people"]) == (2, 1)
     assert second["hall_people_mean"] == 1.0
+    with pytest.warns(UserWarning, match="far lies outside all positions, which have x from"):
+        assert rows(run_tables(walk(), 2.0, parse_places(["far=90,-1,90,5"], [])).counts)[0]["far_to_left"] == 0
 
 
 NO_PLACES = [

@@ -151,9 +151,6 @@ def test_a_run(walk, tmp_path, capsys):
     before, after = (check_run(folder / "scene-s40001") for folder in (first, tmp_path / "again"))
     assert (before["grouping"]["near"], after["grouping"]["near"], after["grouping"]["acquaintance"]) == (0.5, 1.5, 0.2)
     assert all(before[key] == after[key] for key in ("tracker", "config", "truth_hash", "detections", "px_per_m"))
-    scored = answer(capsys, "score", data, tmp_path / "again", first)
-    assert scored["settings"]
-    assert all(d["what"].startswith("grouping") for d in scored["settings"])
     answer(capsys, "group", tmp_path / "again" / "scene-s40000" / "tracks.parquet", "--out", tmp_path / "third")
     assert check_run(tmp_path / "third")["grouping"]["grouping"] == "belief", "the default"
     for folder in (first, first / "scene-s40000"):

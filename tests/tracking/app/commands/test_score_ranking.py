@@ -13,7 +13,6 @@ from tests.refusals import answer
 from tests.short_scene import write_short_scene
 from tracking import track
 from tracking.app.cli import run
-from tracking.app.commands.score_ranking import run_differences
 
 
 @pytest.fixture(scope="module")
@@ -46,16 +45,3 @@ def test_the_ranking_is_that_of_compare(made: Path, capsys) -> None:
     assert [r["run"] for r in found["ranking"][:2]] == ["oracle from boxes (file)", "oracle from points (file)"]
     assert found["similarity"] == "ground"
     assert len(found["differences"]) == 3
-
-
-def test_a_parameter_that_one_run_lacks_is_a_difference() -> None:
-    new = {"tracker": "a", "config": {"gate": 0.5}}
-    (found,) = run_differences({"old": [{"tracker": "a", "config": {}}], "new": [new]})
-    assert found == {"what": "parameter gate", "runs": {"old": [None], "new": [0.5]}}
-
-
-def test_a_class_without_a_truth_hash_is_no_difference() -> None:
-    stored, played = {"tracker": "a", "truth_hash": "x"}, {"tracker": "a"}
-    assert run_differences({"a": [stored], "b": [played]}) == []
-    (found,) = run_differences({"a": [stored], "b": [played], "c": [{**stored, "truth_hash": "y"}]})
-    assert found == {"what": "truth hash of what was tracked", "runs": {"a": ["x"], "c": ["y"]}}
