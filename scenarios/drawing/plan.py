@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from scenarios.drawing import words as describe
-from scenarios.schema.geometry import queue_places, walls_without_doors
+from scenarios.schema.geometry import cut_walls, queue_places
 from scenarios.schema.scenario import GroupSpec, MergeOrder, Scenario, ScriptOrder, SplitOrder, expand, group_names
 from scenarios.schema.values import Distribution, Point, Value, bounds
 
@@ -132,7 +132,7 @@ def _draw_world(axes: Any, scenario: Scenario) -> None:
         for end, colour in ((head + along * stairs.landing, "#eaeef2"), (head, "#d8dee4")):
             axes.fill(*np.concatenate([foot + side, (end + side)[::-1]]).T, fc=colour, ec=PALE)
         _label(axes, stairs.head, f"stairs, {stairs.rise:+g} m", GREY, 0)
-    for x1, y1, x2, y2 in walls_without_doors(world):
+    for x1, y1, x2, y2 in cut_walls(world)[0]:
         axes.plot([x1, x2], [y1, y2], color="#24292f", lw=3.5, solid_capstyle="butt", clip_on=False)
     for x, y, radius in world.pillars:
         axes.add_patch(Circle((x, y), radius, color=GREY))
