@@ -104,9 +104,13 @@ def _unfulfilled(order: Order, motion: Motion) -> OrderError:
     else:
         fired = _fired(order, s)
         end = min(length, fired + 1 + round(PATIENCE * s.rate))
-        got = f"a {order.kind} that fired at {order.time:g} s and had not come true at {(end - 1) / s.rate:g} s: "
+        until = "when the recording ended" if end == length else f"at {(end - 1) / s.rate:g} s"
+        got = f"a {order.kind} that fired at {order.time:g} s and had not come true {until}: "
         got += closest(order, s, slice(fired, end))
-        expected, remedy = WORDS[order.kind], "move starts and goals, fire it earlier, or record for longer"
+        expected, remedy = (
+            f"{WORDS[order.kind]}, within {PATIENCE:g} s",
+            "move starts and goals, fire it earlier, or record for longer",
+        )
     place = f"event {order.id} (seed {motion.seed})"
     return OrderError(file=f"scenario {motion.name}", place=place, got=got, expected=expected, remedy=remedy)
 

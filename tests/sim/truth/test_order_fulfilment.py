@@ -58,7 +58,7 @@ def test_too_early_and_too_late(onset: int) -> None:
     assert caught.value.file == "scenario made-up"
     assert "m1" in caught.value.place
     assert "seed 7" in caught.value.place
-    assert "within 10 s" in caught.value.got
+    assert "within 10 s" in caught.value.expected
     assert "nearest" in caught.value.got
     assert "1.5 m" in caught.value.expected
 
@@ -106,5 +106,5 @@ def test_queues_want_three_of_their_people() -> None:
 
 def test_the_recording_may_end_first() -> None:
     motion = merging(140)
-    with pytest.raises(WorkError, match="until the recording ends"):
+    with pytest.raises(WorkError, match="when the recording ended"):
         check(motion, truth_of(motion, 30))
