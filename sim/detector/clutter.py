@@ -23,7 +23,7 @@ import numpy as np
 
 from sim.detector.box_noise import move_edges
 from sim.detector.draws import CLOCK, Readings, false_scores, ticks
-from sim.detector.visible_ground import VisibleGround, clip_boxes, furthest_row
+from sim.detector.visible_ground import VisibleGround, clip_boxes, furthest_row, labelled_points
 from sim.elementary import exp, log
 from sim.rng import normals, poisson_quantiles, rng, uniforms
 from sim.scene.body import PERSON_HEIGHT, SHOULDER_SHARE, person_boxes
@@ -199,7 +199,7 @@ def _boxes_alone(
     u, v = u + away * n[VX], v + away * n[VY]
     box = _boxes_on_feet(u, v, np.full(len(age), tall), model, n)
     foot = v - (1.0 - standing_share(ground.camera)) * tall
-    return box, ground.ground_points(u, foot, np.tile(ground.labelled_point(x, y), (len(age), 1)))
+    return box, ground.ground_points(u, foot, labelled_points(ground.truth, np.tile([x, y], (len(age), 1))))
 
 
 def _boxes_on_feet(middle: Array, foot: Array, tall: Array, model: FalseAlarms, n: Array) -> Array:
@@ -293,10 +293,7 @@ def _placed_by_labels(truth: Truth, image_size: tuple[int, int] | None, u: Array
     labelled positions, or 0 if the truth has no positions. Boxes are None if it has no boxes.
     """
     spread = u[:, [ACROSS, DOWN]]
-    pos = np.zeros((len(u), 2))
-    if truth.pos is not None and len(u):
-        low, high = truth.pos.min(axis=0), truth.pos.max(axis=0)
-        pos = low + spread * (high - low)
+    pos = labelled_points(truth, spread)
     if truth.box is None:
         return pos, None
     if not len(u):

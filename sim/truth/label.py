@@ -85,17 +85,15 @@ def bodies(motion: Motion, camera: Camera | None, people: RecordedBodies | None 
     """
     people = recorded_bodies(motion) if people is None else people
     t, p = people.frame - 1, people.id - 1
-    seen = None if camera is None else measure_visibility(
-        camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes
+    box, visibility, truncation, visible_box = (None, np.ones(len(p)), None, None) if camera is None else (
+        measure_visibility(camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes)
     )  # fmt: skip
     return Truth(
         name=motion.name, fps=motion.fps, length=len(motion.present),
         px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera), frame=people.frame, id=people.id,
         group=np.full(len(p), -1, np.int64), pos=motion.pos[t, p], vel=motion.vel[t, p],
-        box=None if seen is None else seen.box, visibility=np.ones(len(p)) if seen is None else seen.visibility,
-        z=people.pos3[:, 2], heading=motion.heading[t, p], height=motion.height[p],
-        truncation=None if seen is None else seen.truncation, visible_box=None if seen is None else seen.visible_box,
-        orders=motion.orders,
+        box=box, visibility=visibility, z=people.pos3[:, 2], heading=motion.heading[t, p], height=motion.height[p],
+        truncation=truncation, visible_box=visible_box, orders=motion.orders,
     )  # fmt: skip
 
 
