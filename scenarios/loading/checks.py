@@ -38,8 +38,7 @@ def check(scenario: Scenario, file: str | Path = "") -> None:
 
 
 def _check_amounts(scenario: Scenario) -> None:
-    frames = scenario.duration * scenario.camera.fps
-    people = sum(group.repeat * bounds(group.size)[1] for group in scenario.group)
+    frames, people = scenario.duration * scenario.camera.fps, most_people(scenario)
     if frames > FRAMES:
         fail("duration", f"{frames:,.0f} frames", f"at most {FRAMES:,}", "shorten it, or lower camera.fps")
     if people > PEOPLE:
@@ -47,6 +46,11 @@ def _check_amounts(scenario: Scenario) -> None:
     if people * frames > CELLS:
         got = f"{frames:,.0f} frames with up to {people:,.0f} people"
         fail("duration", got, f"at most {CELLS:,} frames times people", "shorten it, or take fewer people")
+
+
+def most_people(scenario: Scenario) -> float:
+    """Returns how many people there can be."""
+    return sum(group.repeat * bounds(group.size)[1] for group in scenario.group)
 
 
 def _check_world(scenario: Scenario) -> None:

@@ -38,17 +38,11 @@ WORDS = {
 }
 
 
-def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
-    """Returns for each order id the index in `truth.events` of the event that fulfils it.
-
-    Raises OrderError for the first order that no event fulfils.
-    """
-    fulfilled = {}
+def check_orders(motion: Motion, truth: Truth) -> None:
+    """Raises OrderError for the first order that no event fulfils."""
     for order in truth.orders:
         if order.event is None:
             raise _unfulfilled(order, motion)
-        fulfilled[order.id] = order.event
-    return fulfilled
 
 
 def _fired(order: Order, s: States) -> int:

@@ -23,7 +23,8 @@ def check(motion: Motion, truth: Truth) -> dict[str, int]:
     group[truth.frame[column] - 1, truth.id[column] - 1] = truth.group[column]
     found = [fulfilment(o, truth.events or (), group, motion.states()) for o in motion.orders]
     orders = tuple(replace(o, event=k) for o, k in zip(motion.orders, found, strict=True))
-    return check_orders(motion, truth.replace(orders=orders))
+    check_orders(motion, truth.replace(orders=orders))
+    return {order.id: order.event for order in orders}
 
 
 def merging(fired: int | None = 20, kind: str = "merge") -> Motion:
