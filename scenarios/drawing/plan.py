@@ -102,8 +102,9 @@ def svg(scenario: Scenario) -> str:
         plan = figure.subplots()
         _draw_world(plan, scenario)
         _draw_ways(plan, scenario, orders)
-        for words, up, style in ((scenario.name, 22, {"size": 13, "weight": "bold"}), (scenario.about, 8, {})):
-            plan.annotate(describe.cut(words, 140), (0, 1), (0, up), "axes fraction", "offset points", **style)
+        above: Any = {"xycoords": "axes fraction", "textcoords": "offset points"}
+        plan.annotate(scenario.name, (0, 1), (0, 22), size=13, weight="bold", **above)
+        plan.annotate(describe.cut(scenario.about, 140), (0, 1), (0, 8), **above)
         plan.set_xlabel("\n".join(["Script", *script]), loc="left", labelpad=20, linespacing=1.8)
         figure.savefig(out, format="svg", bbox_inches="tight", metadata={"Date": None})
     return out.getvalue()
