@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -70,9 +71,63 @@ def _cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|")
 
 
+def keys_of_scenarios() -> list[dict[str, str]]:
+    """Returns every key of a scenario file with its type, default and meaning, from the JSON schema."""
+    schema = import_module("scenarios.schema.scenario").Scenario.model_json_schema(by_alias=True)
+    return list(_keys(schema, schema["$defs"], ""))
+
+
+def _keys(table: dict[str, Any], known: dict[str, Any], prefix: str) -> Iterator[dict[str, str]]:
+    required = table.get("required", [])
+    for name, node in table["properties"].items():
+        many = "[]" if any("items" in each for each in (node, *node.get("anyOf", ()))) else ""
+        tables = list(_tables(node, known))
+        for inner in tables:
+            which = f"({inner['properties']['type']['const']})" if len(tables) > 1 else ""
+            yield from _keys(inner, known, f"{prefix}{name}{many}{which}.")
+        if not tables:
+            default = "required" if name in required else _default(node)
+            yield {
+                "key": prefix + name, "type": _type(node), "default": default, "meaning": node.get("description", "")
+            }  # fmt: skip
+
+
+def _tables(node: dict[str, Any], known: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    ref = node.get("$ref", "").rpartition("/")[2]
+    if ref and ref != "Distribution":
+        yield known[ref]
+    for inner in [node.get("items", {}), *node.get("anyOf", ()), *node.get("oneOf", ())]:
+        if inner:
+            yield from _tables(inner, known)
+
+
+def _type(node: dict[str, Any]) -> str:
+    if "$ref" in node:
+        return str(node["$ref"]).rpartition("/")[2].lower()
+    for choices in (node.get("enum"), [node["const"]] if "const" in node else None):
+        if choices:
+            return " | ".join(map(json.dumps, choices))
+    for choices in (node.get("anyOf"), node.get("oneOf")):
+        if choices:
+            return " or ".join(_type(inner) for inner in choices if inner.get("type") != "null")
+    if "prefixItems" in node:
+        return f"[{', '.join(map(_type, node['prefixItems']))}]"
+    return f"[{_type(node['items'])}, …]" if "items" in node else str(node.get("type", "value"))
+
+
+def _default(node: dict[str, Any]) -> str:
+    value = node.get("default")
+    if isinstance(value, dict):
+        value = {key: v for key, v in value.items() if v is not None}
+    return "absent" if value is None else f"default {json.dumps(value)}"
+
+
 def scenario_keys() -> str:
-    """Returns the list that `flockscope scenarios --schema` prints."""
-    return f"```text\n{import_module('tracking.app.commands.scenarios').list_keys().text.rstrip()}\n```"
+    """Returns the list of all keys of a scenario file."""
+    rows = keys_of_scenarios()
+    width = max(len(row["key"]) for row in rows)
+    lines = [f"{row['key']:<{width}}  {row['type']}; {row['default']}; {row['meaning']}" for row in rows]
+    return "\n".join(["```text", *lines, "```"])
 
 
 def catalogue() -> str:

@@ -45,8 +45,6 @@ def _parsed(load: Callable[[str], Any], text: str, file: object, form: str, reme
             place, got = f"line {error.lineno}", f"no JSON ({error.msg})"
         elif isinstance(error, tomllib.TOMLDecodeError) and " (at " in got:
             got, _, place = got.removesuffix(")").rpartition(" (at ")
-        elif "integer string conversion" in got:  # Python's advice to raise its limit of digits helps no user
-            got = "a number of thousands of digits"
         raise InputError(file=file, place=place, got=got, expected=form, remedy=remedy) from None
     _require_plain(value, file)
     return value
@@ -74,12 +72,6 @@ def _require_plain(value: Any, file: object) -> None:
     raise _too_deep(file)
 
 
-KINDS = {
-    stat.S_IFIFO: "a FIFO", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
-    stat.S_IFDIR: "a folder",
-}  # fmt: skip
-
-
 def require_regular(path: Path, remedy: str = "check the path", missing: bool = False) -> int:
     """Returns the size in bytes of the regular file `path`, which is not opened; links are followed.
 
@@ -93,7 +85,7 @@ def require_regular(path: Path, remedy: str = "check the path", missing: bool = 
         got = getattr(error, "strerror", None) or "a path that cannot be"
         raise InputError(file=path, got=got, expected="a readable file", remedy=remedy) from None
     if not stat.S_ISREG(found.st_mode):
-        got = KINDS.get(stat.S_IFMT(found.st_mode), "no regular file")
+        got = "a folder" if stat.S_ISDIR(found.st_mode) else "a FIFO, a socket or a device"
         raise InputError(file=path, got=got, expected="a regular file", remedy=remedy)
     return found.st_size
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.geometry.polygons import convex_hull, footprint_hull
+from sim.geometry.polygons import convex_hull
 from sim.types import Array, FrameTruth, GroupEvent, Groups, Sequence, Tracks
+from tests.reference_polygons import footprint_hull
 
 LATE = 4
 PX = 40.0

@@ -10,7 +10,6 @@ from types import ModuleType
 import pytest
 
 from tests.processes import ROOT
-from tracking.app.commands.scenarios import list_keys
 
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -66,5 +65,5 @@ def test_public_names_have_an_entry(site: ModuleType) -> None:
     assert site.undocumented() == []
 
 
-def test_every_key_of_a_scenario_has_a_meaning() -> None:
-    assert all(row["meaning"] for row in list_keys().data["keys"])
+def test_every_key_of_a_scenario_has_a_meaning(site: ModuleType) -> None:
+    assert all(row["meaning"] for row in site.keys_of_scenarios())

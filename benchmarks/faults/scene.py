@@ -9,7 +9,7 @@ import numpy as np
 
 from scenarios import load
 from sim import simulate
-from sim.geometry.polygons import footprint_hull
+from sim.geometry.polygons import footprint_hulls
 from sim.render.weather import draw_illumination
 from sim.types import EVENT_KINDS, Array, Bools, Groups, Ints, Sequence, Tracks
 from tracking.grouping.foot_points import groups_of_people
@@ -91,7 +91,8 @@ class FaultScene:
 
     def _hulls(self, k: int, label: Ints) -> Tracks:
         names = [int(g) for g in np.unique(label[self.there[k]]) if g >= 0]
-        hull = [footprint_hull(self.pos[k, self.there[k] & (label == g)]) for g in names]
+        own = [self.pos[k, self.there[k] & (label == g)] for g in names]
+        hull = footprint_hulls(np.concatenate([np.zeros((0, 2)), *own]), np.array([len(pos) for pos in own], np.int64))
         id = np.array(names, np.int64)
         n = len(id)
         pos = np.array([h.mean(axis=0) for h in hull]).reshape(n, 2)

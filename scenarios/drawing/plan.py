@@ -9,21 +9,19 @@ from __future__ import annotations
 
 import io
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from scenarios.drawing import words as describe
-from scenarios.schema.geometry import queue_places, walls_without_doors
+from scenarios.schema.geometry import cut_walls, queue_places
 from scenarios.schema.scenario import GroupSpec, MergeOrder, Scenario, ScriptOrder, SplitOrder, expand, group_names
 from scenarios.schema.values import Distribution, Point, Value, bounds
 
 XY = tuple[float, float]
 Way = tuple[XY, ...]
 SLOTS = 6  # greatest number of places of a queue that are drawn
-WIDTH, TALLEST = 9.0, 6.2  # inches: of the drawing; greatest height of the plan
-ROW = 0.3  # inches between the words of orders
+SIZE = (9.0, 6.2)  # inches: of the plan
 # Of groups: dark enough to read on white, and distinct for colour-blind readers.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa3377", "#8a6d00", "#3d6fd6", "#b2182b", "#4d7c0f", "#6a51a3", "#5c5c5c")
 DARK, GREY, PALE = "#1b1f24", "#57606a", "#8c959f"
@@ -31,14 +29,10 @@ STYLE: Any = {"svg.fonttype": "none", "svg.hashsalt": "flockscope", "font.size":
 CLEAR = {"facecolor": "white", "alpha": 0.7, "edgecolor": "none", "pad": 0.5}  # behind labels
 
 
-@dataclass(frozen=True)
-class OrderMark:
+class OrderMark(NamedTuple):
     """An order of the script as drawn on the plan."""
 
-    number: int  # of the order in the file, from 1
-    event: ScriptOrder  # the order
     at: XY  # x, y of where it happens, m
-    group: str  # the first of its groups before it
     ways: dict[str, Way]  # those it opens, by name of the group; empty if groups stay or keep their goals
     slots: Way = ()  # x, y of the places of a queue, m; empty for other orders
 
@@ -47,12 +41,8 @@ def middle(value: Value) -> float:
     """Returns the mean of a value, moved into its `clip`."""
     if not isinstance(value, Distribution):
         return float(value)
-    if value.normal is not None:
-        mean = value.normal[0]
-    elif values := value.uniform or value.choice:
-        mean = float(np.mean(values))
-    else:
-        mean = value.exponential or value.poisson or 0.0
+    drawn = value.normal[:1] if value.normal is not None else value.uniform or value.choice
+    mean = float(np.mean(drawn)) if drawn else value.exponential or value.poisson or 0.0
     low, high = bounds(value)
     return min(max(mean, low), high)
 
@@ -62,10 +52,8 @@ def spread(value: Value) -> float:
     if not isinstance(value, Distribution):
         return 0.0
     low, high = bounds(value)
-    wide = (high - low) / 2
-    if value.normal is not None:
-        return min(wide, 2 * value.normal[1])
-    return wide if math.isfinite(wide) else 2 * middle(value)
+    usual = 2 * value.normal[1] if value.normal is not None else 2 * middle(value) if math.isinf(high) else math.inf
+    return min((high - low) / 2, usual)
 
 
 def _at(point: Point) -> XY:
@@ -77,25 +65,25 @@ def _mean(*points: XY) -> XY:
     return float(x), float(y)
 
 
-def _mark(number: int, event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> OrderMark:
+def _mark(event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> OrderMark:
     """Returns an order as drawn, and changes the start and goal of its groups in `places`."""
-    ways: dict[str, Way]
     if isinstance(event, MergeOrder):
         at = _mean(*(_mean(*places.pop(name)) for name in event.groups))
         goal = at if isinstance(event.goal, str) else _at(event.goal)
         places[event.into] = (at, goal)
-        ways = {} if goal == at else {event.into: (at, *map(_at, event.via), goal)}
-        return OrderMark(number, event, at, event.groups[0], ways)
+        return OrderMark(at, {} if goal == at else {event.into: (at, *map(_at, event.via), goal)})
     if isinstance(event, SplitOrder):
         at = _mean(*places.pop(event.group))
         ways = {part.id: (at, *map(_at, part.via), _at(part.goal)) for part in event.parts}
         places.update({name: (at, way[-1]) for name, way in ways.items()})
-        return OrderMark(number, event, at, event.group, ways)
-    names = [name for pattern in event.groups for name in expand(pattern, list(places))]
+        return OrderMark(at, ways)
     inside = tuple((x, y) for x, y in queue_places(event, SLOTS) if 0 <= x <= world[0] and 0 <= y <= world[1])
-    ways = {} if event.goal is None else {"served": (event.at, _at(event.goal))}
-    places.update({name: (event.at, way[-1]) for way in ways.values() for name in names})
-    return OrderMark(number, event, event.at, names[0], ways, inside)
+    if event.goal is None:
+        return OrderMark(event.at, {}, inside)
+    way = event.at, _at(event.goal)
+    names = [name for pattern in event.groups for name in expand(pattern, list(places))]
+    places.update(dict.fromkeys(names, way))
+    return OrderMark(event.at, {names[0]: way}, inside)
 
 
 def svg(scenario: Scenario) -> str:
@@ -104,38 +92,22 @@ def svg(scenario: Scenario) -> str:
     from matplotlib.figure import Figure
 
     places = {name: (_at(group.start), _at(group.goal)) for group in scenario.group for name in group_names(group)}
-    orders = [_mark(k, event, places, scenario.world.size) for k, event in enumerate(scenario.event, 1)]
-    colour = _colours(scenario, orders)
-    width, depth = scenario.world.size
-    tall = min(TALLEST, (WIDTH - 0.6) * depth / width)
-    script = tall + 1.2  # inches from the top to the script
-    height = script + ROW * (len(orders) + 1)
-    texts: list[tuple[float, float, str, dict[str, Any]]] = [
-        (0.03, 0.25, scenario.name, {"size": 13, "weight": "bold"}),
-        (0.03, 0.5, describe.cut(scenario.about, 140), {"color": GREY}),
-        (0.03, script - 0.05, "Script", {"weight": "bold"}),
+    orders = [_mark(event, places, scenario.world.size) for event in scenario.event]
+    script = [
+        describe.cut(f"{k}  {event.id}: {describe.order(event)} — {describe.trigger(event.when)}", 128)
+        for k, event in enumerate(scenario.event, 1)
     ]
-    for k, mark in enumerate(orders, 1):
-        words = f"{mark.event.id}: {describe.order(mark.event)} — {describe.trigger(mark.event.when)}"
-        texts.append((0.065, script + ROW * k, describe.cut(words, 128), {"va": "center"}))
     with rc_context(STYLE):
-        figure, out = Figure((WIDTH, height)), io.StringIO()
-        for x, down, words, style in texts:
-            figure.text(x, 1 - down / height, words, **style)
-        wide = tall * width / depth
-        plan = figure.add_axes(((WIDTH - wide) / 2 / WIDTH, 1 - (0.7 + tall) / height, wide / WIDTH, tall / height))
+        figure, out = Figure(SIZE), io.StringIO()
+        plan = figure.subplots()
         _draw_world(plan, scenario)
-        _draw_orders(plan, scenario, orders, colour)
-        for k, mark in enumerate(orders, 1):
-            _number(figure, (0.04, 1 - (script + ROW * k) / height), mark.number)
-        figure.savefig(out, format="svg", metadata={"Date": None})
+        _draw_ways(plan, scenario, orders)
+        above: Any = {"xycoords": "axes fraction", "textcoords": "offset points"}
+        plan.annotate(scenario.name, (0, 1), (0, 22), size=13, weight="bold", **above)
+        plan.annotate(describe.cut(scenario.about, 140), (0, 1), (0, 8), **above)
+        plan.set_xlabel("\n".join(["Script", *script]), loc="left", labelpad=20, linespacing=1.8)
+        figure.savefig(out, format="svg", bbox_inches="tight", metadata={"Date": None})
     return out.getvalue()
-
-
-def _number(place: Any, at: XY, number: int) -> None:
-    """Writes an order's number in a black disc on axes or figure."""
-    disc = {"boxstyle": "circle,pad=0.25", "facecolor": DARK, "edgecolor": "white"}
-    place.text(*at, str(number), color="white", weight="bold", ha="center", va="center", bbox=disc, zorder=5)
 
 
 def _label(axes: Any, at: XY, words: str, colour: str, up: float, **style: Any) -> None:
@@ -149,21 +121,19 @@ def _draw_world(axes: Any, scenario: Scenario) -> None:
     world, (width, depth) = scenario.world, scenario.world.size
     step = 1.0 if width <= 40 else 5.0
     axes.set(xlim=(0, width), ylim=(0, depth), xticks=np.arange(0, width, step), yticks=np.arange(0, depth, step))
-    axes.set(facecolor="#f6f8fa", axisbelow=True)
+    axes.set(facecolor="#f6f8fa", axisbelow=True, aspect="equal")
     axes.tick_params(length=0, labelbottom=False, labelleft=False)
     axes.spines[:].set_color(PALE)
     axes.grid(color="#e3e7ec")
-    note = f"{width:g} × {depth:g} m, a line each {'metre' if step == 1 else f'{step:g} m'}"
-    _label(axes, (0, 0), note, GREY, -11, weight="normal", ha="left")
+    _label(axes, (0, 0), f"{width:g} × {depth:g} m, a line each {step:g} m", GREY, -11, weight="normal", ha="left")
     for stairs in world.stairs:
         foot, head = np.array(stairs.foot), np.array(stairs.head)
         along = (head - foot) / math.dist(foot, head)
         side = np.array([[-along[1], along[0]], [along[1], -along[0]]]) * stairs.width / 2
-        axes.fill(*np.concatenate([foot + side, (head + along * stairs.landing + side)[::-1]]).T, fc="#eaeef2", ec=PALE)
-        for share in np.linspace(0, 1, stairs.steps + 1):
-            axes.plot(*(foot + share * (head - foot) + side).T, color=PALE, lw=0.7)
+        for end, colour in ((head + along * stairs.landing, "#eaeef2"), (head, "#d8dee4")):
+            axes.fill(*np.concatenate([foot + side, (end + side)[::-1]]).T, fc=colour, ec=PALE)
         _label(axes, stairs.head, f"stairs, {stairs.rise:+g} m", GREY, 0)
-    for x1, y1, x2, y2 in walls_without_doors(world):
+    for x1, y1, x2, y2 in cut_walls(world)[0]:
         axes.plot([x1, x2], [y1, y2], color="#24292f", lw=3.5, solid_capstyle="butt", clip_on=False)
     for x, y, radius in world.pillars:
         axes.add_patch(Circle((x, y), radius, color=GREY))
@@ -173,34 +143,41 @@ def _draw_world(axes: Any, scenario: Scenario) -> None:
         _label(axes, at, name, GREY, 6, weight="normal")
 
 
-def _draw_orders(axes: Any, scenario: Scenario, orders: list[OrderMark], colour: dict[str, str]) -> None:
+def _draw_ways(axes: Any, scenario: Scenario, orders: list[OrderMark]) -> None:
     """Draws the ways and starts of groups, and the orders with the ways that they open."""
     from matplotlib.patches import Circle
 
-    width, used = scenario.world.size[0], list[XY]()
-    for group in scenario.group:
+    colour: dict[str, str] = {}
+    used: list[XY] = []
+    for k, group in enumerate(scenario.group):
+        colour |= dict.fromkeys(group_names(group), COLOURS[k % len(COLOURS)])
         points = tuple(map(_at, (group.start, *(stop.at for stop in group.stops), *group.via, group.goal)))
-        _draw_way(axes, points, colour[group.id], lw=1.4, alpha=0.75)
-        _draw_spread(axes, group.goal, colour[group.id])
-        axes.plot(*points[-1], "o", ms=10, mfc="none", mec=colour[group.id])
+        _draw_way(axes, points, COLOURS[k % len(COLOURS)], lw=1.4, alpha=0.75)
+        _draw_spread(axes, group.goal, COLOURS[k % len(COLOURS)])
+    for k, name in enumerate(
+        (name for mark in orders for name in mark.ways if name not in colour), len(scenario.group)
+    ):
+        colour[name] = COLOURS[k % len(COLOURS)]
     for mark in orders:
         for name, way in mark.ways.items():
-            c = colour.get(mark.group if name == "served" else name, GREY)
-            _draw_way(axes, way, c, lw=2, alpha=0.9, ls="--")
-            if name != "served":
-                _label(axes, way[-1], name, c, 6)
+            _draw_way(axes, way, colour[name], lw=2, alpha=0.9, ls="--")
+            _label(axes, way[-1], name, colour[name], 6)
         for slot in mark.slots:
             axes.add_patch(Circle(slot, 0.25, fill=False, ec=GREY, ls=":"))
     for group in scenario.group:
         # Names of groups that start at nearly one place stand above each other, numbers of orders side by side.
-        beside = sum(math.dist(_at(group.start), at) < width / 35 for at in used)
-        used.append(_at(group.start))
-        _draw_start(axes, group, colour[group.id], beside)
+        _draw_start(axes, group, colour[group_names(group)[0]], _neighbours(scenario, _at(group.start), used))
     used.clear()
-    for mark in orders:
-        beside = sum(math.dist(mark.at, at) < width / 35 for at in used)
-        used.append(mark.at)
-        _number(axes, (mark.at[0] + beside * width / 40, mark.at[1]), mark.number)
+    for number, mark in enumerate(orders, 1):
+        beside = _neighbours(scenario, mark.at, used) * scenario.world.size[0] / 40
+        disc = {"boxstyle": "circle,pad=0.25", "facecolor": DARK, "edgecolor": "white"}
+        axes.text(mark.at[0] + beside, mark.at[1], str(number), color="white", weight="bold", ha="center", bbox=disc)
+
+
+def _neighbours(scenario: Scenario, place: XY, used: list[XY]) -> int:
+    """Returns how many places of `used` are nearly the same, and adds the place to them."""
+    used.append(place)
+    return sum(math.dist(place, at) < scenario.world.size[0] / 35 for at in used) - 1
 
 
 def _draw_way(axes: Any, way: Way, colour: str, **style: Any) -> None:
@@ -221,26 +198,8 @@ def _draw_spread(axes: Any, point: Point, colour: str) -> None:
 
 
 def _draw_start(axes: Any, group: GroupSpec, colour: str, lift: int) -> None:
-    """Draws a group's start: its people as discs, the range of a random start, name, copies and mean size."""
-    from matplotlib.patches import Circle
-
-    people, (x, y) = middle(group.size), _at(group.start)
-    n = min(max(round(people), 1), 12)
+    """Draws a group's start: a disc, the range of a random start, name, copies and mean size."""
     _draw_spread(axes, group.start, colour)
-    reach = 0.0 if n == 1 else 0.75 / (2 * math.sin(math.pi / n))
-    for angle in 2.4 + np.arange(n) * math.tau / n:
-        axes.add_patch(Circle((x + reach * math.cos(angle), y + reach * math.sin(angle)), 0.22, fc=colour, ec="white"))
+    axes.plot(*_at(group.start), "o", ms=10, color=colour, mec="white")
     copies = f" ×{group.repeat}" if group.repeat > 1 else ""
-    words = f"{group.id}{copies} ({people:.2g})"
-    _label(axes, (x, y + reach + 0.22), words, colour, 4 + 12 * lift)
-
-
-def _colours(scenario: Scenario, orders: list[OrderMark]) -> dict[str, str]:
-    names = [[group.id, *group_names(group)] for group in scenario.group] + [
-        [name] for mark in orders for name in mark.ways
-    ]
-    named: dict[str, str] = {}
-    for k, some in enumerate(names):
-        for name in some:
-            named.setdefault(name, COLOURS[k % len(COLOURS)])
-    return named
+    _label(axes, _at(group.start), f"{group.id}{copies} ({middle(group.size):.2g})", colour, 8 + 12 * lift)

@@ -20,16 +20,9 @@ def number(value: Value, unit: str = "") -> str:
     if value.uniform is not None:
         return f"{value.uniform[0]:g} to {value.uniform[1]:g}{tail}"
     if value.choice is not None:
-        return _choice(value.choice) + tail
+        return " or ".join(f"{v:g}" for v in value.choice) + tail
     mean = value.exponential if value.exponential is not None else value.poisson
     return f"about {mean:g}{tail}{clip}"
-
-
-def _choice(values: tuple[float, ...]) -> str:
-    times = {v: values.count(v) for v in values}
-    if len(set(times.values())) == 1:
-        return " or ".join(f"{v:g}" for v in times)
-    return " or ".join(f"{v:g} ({n / len(values):.0%})".replace("%", " %") for v, n in times.items())
 
 
 def place(point: Point) -> str:

@@ -15,8 +15,15 @@ from scenarios.errors import InputError
 from scenarios.limits import CELLS, FRAMES, PEOPLE
 from scenarios.loading.toml_files import did_you_mean
 from scenarios.schema.geometry import clearance, door_fits, queue_places
-from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, ScriptOrder, SplitOrder, expand, group_names
-from scenarios.schema.values import SURE, Distribution, Point, Value, bounds, fixed
+
+# isort: off
+# fmt: off
+from scenarios.schema.scenario import (
+    GroupSpec, MergeOrder, QueueOrder, Scenario, ScriptOrder, SplitOrder, SplitPart, expand, group_names,
+)
+# fmt: on
+# isort: on
+from scenarios.schema.values import Point, bounds, fixed
 
 BODY = 0.2  # m: least distance from a person's middle to a wall or pillar (the radius of a body in the physics)
 
@@ -24,7 +31,7 @@ BODY = 0.2  # m: least distance from a person's middle to a wall or pillar (the 
 def check(scenario: Scenario, file: str | Path = "") -> None:
     """Raises InputError, naming `file`, for the first thing in the scenario that cannot work."""
     try:
-        for part in (_check_world, _check_groups, _check_amounts, _check_sensor, _check_points, _check_script):
+        for part in (_check_world, _check_groups, _check_amounts, _check_points, _check_script):
             part(scenario)
     except InputError as error:
         raise error.replaced(file=file) from None
@@ -42,18 +49,8 @@ def _check_amounts(scenario: Scenario) -> None:
 
 
 def most_people(scenario: Scenario) -> float:
-    """Returns how many people there can be, by the sizes that 999 of 1000 draws do not exceed."""
-    return sum(group.repeat * _most(group.size) for group in scenario.group)
-
-
-def _most(size: Value) -> float:
-    if not isinstance(size, Distribution):
-        return max(1.0, float(round(size)))
-    most = 1
-    # A power of 2 is near enough for a bound.
-    while size.share_within(-math.inf, most) < SURE:
-        most *= 2
-    return most
+    """Returns how many people there can be."""
+    return sum(group.repeat * bounds(group.size)[1] for group in scenario.group)
 
 
 def _check_world(scenario: Scenario) -> None:
@@ -87,18 +84,6 @@ def _check_groups(scenario: Scenario) -> None:
             fail(f"group.{group.id}.enter", got, expected, "enter later, or make `warmup` longer")
 
 
-def _check_sensor(scenario: Scenario) -> None:
-    known = [name for group in scenario.group for name in group_names(group)]
-    for event in scenario.event:
-        known += [event.into] if isinstance(event, MergeOrder) else []
-        known += [part.id for part in event.parts] if isinstance(event, SplitOrder) else []
-    for k, hide in enumerate(scenario.sensor.hide):
-        if hide.group is not None and hide.group not in known:
-            fail(f"sensor.hide.{k}.group", repr(hide.group), "a group of the script", did_you_mean(hide.group, known))
-        if hide.end <= hide.start:
-            fail(f"sensor.hide.{k}", f"{hide.start:g} to {hide.end:g} s", "an end after its start", "swap them")
-
-
 def _check_points(scenario: Scenario) -> None:
     # A script that may be turned is anywhere; only a simulation tells whether it fits.
     if bounds(scenario.turn_deg) != (0.0, 0.0):
@@ -122,24 +107,26 @@ def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
     """Yields (key, point in m) for every place where people start, pass, are sent, or trigger an order."""
     for group in scenario.group:
         yield f"group.{group.id}.start", group.start
-        yield f"group.{group.id}.goal", group.goal
         yield from ((f"group.{group.id}.stops.{k}.at", stop.at) for k, stop in enumerate(group.stops))
-        yield from ((f"group.{group.id}.via.{k}", point) for k, point in enumerate(group.via))
+        yield from _way(f"group.{group.id}", group)
     for event in scenario.event:
         key = f"event.{event.id}"
         if event.when.reach is not None and event.when.reach.at is not None:
             yield f"{key}.when.reach.at", event.when.reach.at
         if isinstance(event, SplitOrder):
             for part in event.parts:
-                yield f"{key}.parts.{part.id}.goal", part.goal
-                yield from ((f"{key}.parts.{part.id}.via.{k}", point) for k, point in enumerate(part.via))
+                yield from _way(f"{key}.parts.{part.id}", part)
             continue
         if isinstance(event, QueueOrder):
             yield from ((f"{key}.at", slot) for slot in queue_places(event, QUEUE_PEOPLE))
-        else:
-            yield from ((f"{key}.via.{k}", point) for k, point in enumerate(event.via))
-        if event.goal is not None and not isinstance(event.goal, str):
-            yield f"{key}.goal", event.goal
+        yield from _way(key, event)
+
+
+def _way(key: str, row: GroupSpec | SplitPart | MergeOrder | QueueOrder) -> Iterator[tuple[str, Point]]:
+    if row.goal is not None and not isinstance(row.goal, str):
+        yield f"{key}.goal", row.goal
+    if not isinstance(row, QueueOrder):
+        yield from ((f"{key}.via.{k}", point) for k, point in enumerate(row.via))
 
 
 Sizes = dict[str, tuple[float, float]]  # least and greatest number of people of each existing group
@@ -171,15 +158,24 @@ def _check_script(scenario: Scenario) -> None:
         else:
             _queue(event, key, alive, gone)
         orders.append(event.id)
+    for k, hide in enumerate(scenario.sensor.hide):
+        if hide.group is not None:
+            _named(hide.group, f"sensor.hide.{k}.group", [*alive, *gone], "a group of the script")
+        if hide.end <= hide.start:
+            fail(f"sensor.hide.{k}", f"{hide.start:g} to {hide.end:g} s", "an end after its start", "swap them")
+
+
+def _named(name: str, place: str, known: list[str], expected: str) -> None:
+    if name not in known:
+        fail(place, repr(name), expected, did_you_mean(name, known))
 
 
 def _check_when(
     event: ScriptOrder, key: str, orders: list[str], alive: Sizes, gone: dict[str, str], duration: float
 ) -> None:
     when = event.when
-    if when.after is not None and when.after not in orders:
-        remedy = did_you_mean(when.after, orders)
-        fail(f"{key}.when.after", repr(when.after), "the id of an order before this one", remedy)
+    if when.after is not None:
+        _named(when.after, f"{key}.when.after", orders, "the id of an order before this one")
     if when.reach is not None:
         _exists(when.reach.group, f"{key}.when.reach.group", alive, gone)
     delay = bounds(when.delay)[0]
@@ -194,8 +190,7 @@ def _exists(name: str, place: str, alive: Sizes, gone: dict[str, str]) -> None:
     if name in gone:
         expected = "a group that still exists: " + ", ".join(alive)
         fail(place, f"{name!r}, which ended with {gone[name]!r}", expected, "name another group, or move the order up")
-    if name not in alive:
-        fail(place, repr(name), "a group that exists at this point of the script", did_you_mean(name, list(alive)))
+    _named(name, place, list(alive), "a group that exists at this point of the script")
 
 
 def _add_group(name: str, size: tuple[float, float], place: str, alive: Sizes, gone: dict[str, str]) -> None:

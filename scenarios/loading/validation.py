@@ -14,7 +14,7 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, is_number
 from scenarios.loading.toml_files import KeyPath, Table, did_you_mean, place_of
 
-TAGS = {"number", "distribution", "point", "word"}  # of the discriminators of values, in pydantic's locations
+TAGS = {"number", "distribution", "point", "meet"}  # of the discriminators of values, in pydantic's locations
 # our words for those of pydantic's messages
 WORDS = {
     "^(Input should be |Value error, )": "", "a valid tuple": "a list",

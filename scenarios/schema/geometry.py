@@ -6,7 +6,7 @@ Distances are from a point to the nearest wall or pillar. The places of a queue 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from functools import partial
 
 from scenarios.schema.scenario import DoorSpec, QueueOrder, WorldSpec
 from scenarios.schema.values import FixedPoint
@@ -15,44 +15,47 @@ WallSegment = tuple[float, float, float, float]
 DOOR_TOLERANCE = 0.05  # m
 
 
-def along(wall: WallSegment, point: FixedPoint) -> FixedPoint:
-    """Returns where a point lies relative to a wall: metres along it from its first end, and metres from its line."""
-    x, y = point[0] - wall[0], point[1] - wall[1]
-    length = math.dist(wall[:2], wall[2:])
-    if length == 0:
-        return 0.0, math.hypot(x, y)
-    ex, ey = (wall[2] - wall[0]) / length, (wall[3] - wall[1]) / length
-    return x * ex + y * ey, abs(x * ey - y * ex)
+def wall_distance(wall: WallSegment, point: FixedPoint) -> float:
+    """Returns the distance in m from a point to a wall."""
+    dx, dy, x, y = wall[2] - wall[0], wall[3] - wall[1], point[0] - wall[0], point[1] - wall[1]
+    share = min(max((x * dx + y * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
+    x, y = x - share * dx, y - share * dy
+    return math.sqrt(x * x + y * y)
 
 
 def door_fits(door: DoorSpec, wall: WallSegment) -> bool:
     """Returns True if the whole opening of a door lies on a wall."""
-    s, off = along(wall, door.at)
-    length = math.dist(wall[:2], wall[2:])
-    return off <= DOOR_TOLERANCE and door.width / 2 <= s + 1e-9 and s + door.width / 2 <= length + 1e-9
+    room = min(math.dist(wall[:2], door.at), math.dist(wall[2:], door.at))
+    return wall_distance(wall, door.at) <= DOOR_TOLERANCE and door.width / 2 <= room + 1e-9
 
 
-def walls_without_doors(world: WorldSpec) -> Iterator[WallSegment]:
-    """Yields the pieces of all walls, x1, y1, x2, y2 in m, that remain without the openings of doors."""
-    for wall in world.walls:
-        length = math.dist(wall[:2], wall[2:])
-        ex, ey = ((wall[2] - wall[0]) / length, (wall[3] - wall[1]) / length) if length else (0.0, 0.0)
-        start = 0.0
-        openings = sorted((along(wall, d.at)[0], d.width / 2) for d in world.doors if door_fits(d, wall))
-        for s, half in [*openings, (length, 0.0)]:
-            if s - half > start or not openings:
-                end = s - half
-                yield wall[0] + start * ex, wall[1] + start * ey, wall[0] + end * ex, wall[1] + end * ey
-            start = s + half
+def cut_walls(world: WorldSpec) -> tuple[list[WallSegment], list[WallSegment]]:
+    """Returns the pieces of all walls, x1, y1, x2, y2 in m, without the openings of doors, and these openings.
+
+    A door is cut out of the wall nearest to it. The order and the last bits of the pieces decide the motion.
+    """
+    pieces, openings = list(world.walls), []
+    for door in world.doors:
+        wall = min(pieces, key=partial(wall_distance, point=door.at))
+        pieces.remove(wall)
+        x, y, dx, dy = wall[0], wall[1], wall[2] - wall[0], wall[3] - wall[1]
+        length = math.sqrt(dx * dx + dy * dy)
+        dx, dy = dx / length, dy / length
+        s = dx * (door.at[0] - x) + dy * (door.at[1] - y)
+        low, high = max(0.0, s - door.width / 2), min(length, s + door.width / 2)
+        before, opening, after = (
+            (x + a * dx, y + a * dy, x + b * dx, y + b * dy) for a, b in ((0.0, low), (low, high), (high, length))
+        )
+        openings.append(opening)
+        pieces += [before] * (low > 1e-9) + [after] * (length - high > 1e-9)
+    return pieces, openings
 
 
 def clearance(point: FixedPoint, world: WorldSpec) -> tuple[float, str]:
     """Returns the distance in m from a point to the nearest wall or pillar, and words for that obstacle."""
     best = (math.inf, "nothing")
-    for wall in walls_without_doors(world):
-        s, off = along(wall, point)
-        beyond = max(-s, s - math.dist(wall[:2], wall[2:]), 0.0)
-        best = min(best, (math.hypot(off, beyond), f"the wall {[round(v, 2) for v in wall]}"))
+    for wall in cut_walls(world)[0]:
+        best = min(best, (wall_distance(wall, point), f"the wall {[round(v, 2) for v in wall]}"))
     for x, y, radius in world.pillars:
         best = min(best, (math.dist(point, (x, y)) - radius, f"the pillar {[x, y, radius]}"))
     return best

@@ -352,9 +352,13 @@ class SplitPart(Model):
     at_goal: AtGoal = "stand"
 
 
+def _kind_of_goal(goal: object) -> str | None:
+    return "meet" if goal == "meet" else "point" if isinstance(goal, tuple | list) else None
+
+
 Goal = Annotated[
-    Annotated[Point, Tag("point")] | Annotated[Literal["meet"], Tag("word")],
-    Discriminator(lambda goal: "word" if isinstance(goal, str) else "point"),
+    Annotated[Point, Tag("point")] | Annotated[Literal["meet"], Tag("meet")],
+    Discriminator(_kind_of_goal, custom_error_type="no_goal", custom_error_message="a point [x, y], or 'meet'"),
 ]
 
 

@@ -11,18 +11,10 @@ from __future__ import annotations
 import math
 import re
 from inspect import cleandoc
+from statistics import NormalDist
 from typing import Annotated, Any, Self
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Discriminator,
-    Field,
-    GetJsonSchemaHandler,
-    Tag,
-    model_validator,
-)
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from scenarios.limits import PICTURE_SIDE
@@ -57,9 +49,9 @@ class Model(BaseModel):
         return table
 
     @classmethod
-    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(cls, core: Any, handler: Any) -> dict[str, Any]:
         """Returns the JSON schema, with the meanings of the keys from the section Attributes of the docstring."""
-        reference = handler(core)
+        reference: dict[str, Any] = handler(core)
         schema = handler.resolve_ref_schema(reference)
         for kind in (kind for kind in reversed(cls.__mro__) if issubclass(kind, Model)):
             meanings = cleandoc(kind.__doc__ or "").partition("Attributes:")[2]  # Python 3.13 has no indents there
@@ -88,41 +80,36 @@ class Distribution(Model):
             raise ValueError("clip = [low, high] with low <= high")
         if self.uniform is not None and self.uniform[0] > self.uniform[1]:
             raise ValueError("uniform = [low, high] with low <= high")
-        if self.clip is not None and self._below(self.clip[1]) - self._below(self.clip[0], strictly=True) < LEAST_SHARE:
+        if self.clip is not None and self._share(*self.clip) < LEAST_SHARE:
             raise ValueError(f"a clip that keeps at least {LEAST_SHARE:.0%} of the draws")
         return self
 
-    def _below(self, x: float, strictly: bool = False) -> float:
-        """Returns the probability that one draw, ignoring `clip`, is at most x, or with `strictly` below x."""
+    def _share(self, low: float, high: float) -> float:
+        """Returns the probability that one draw, ignoring `clip`, lies between low and high, both included."""
+        if low > high:
+            return 0.0
         if self.choice is not None:
-            return sum(v < x if strictly else v <= x for v in self.choice) / len(self.choice)
+            return sum(low <= v <= high for v in self.choice) / len(self.choice)
         if self.poisson is not None:
             from scipy.special import pdtr
 
-            k = math.ceil(x) - 1 if strictly else math.floor(x)
-            return float(pdtr(k, self.poisson)) if k >= 0 else 0.0
+            ends = math.ceil(max(low, 0.0)) - 1, math.floor(min(high, 1e9))
+            low, high = (float(pdtr(k, self.poisson)) if k >= 0 else 0.0 for k in ends)
+            return high - low
         if self.exponential is not None:
-            return -math.expm1(-max(x, 0.0) / self.exponential)
-        low, high = self.uniform if self.uniform is not None else (0.0, 0.0)
-        if self.normal is not None and self.normal[1] > 0:
-            return math.erfc((self.normal[0] - x) / (self.normal[1] * math.sqrt(2))) / 2
+            return math.exp(-max(low, 0.0) / self.exponential) - math.exp(-max(high, 0.0) / self.exponential)
         if self.normal is not None:
-            low = high = self.normal[0]
-        if low == high:
-            return float(low < x if strictly else low <= x)
-        return min(max((x - low) / (high - low), 0.0), 1.0)
+            mean, sd = self.normal
+            normal = NormalDist(mean, sd or 1.0)
+            return normal.cdf(high) - normal.cdf(low) if sd else float(low <= mean <= high)
+        assert self.uniform is not None
+        a, b = self.uniform
+        return float(low <= a <= high) if a == b else max(min(b, high) - max(a, low), 0.0) / (b - a)
 
     def share_within(self, low: float, high: float) -> float:
         """Returns the probability that a value drawn within `clip` lies between low and high."""
         a, b = (-math.inf, math.inf) if self.clip is None else self.clip
-        kept = self._share(a, b)
-        return self._share(max(a, low), min(b, high)) / kept
-
-    def _share(self, low: float, high: float) -> float:
-        if low > high:
-            return 0.0
-        above = 1.0 if math.isinf(high) else self._below(high)
-        return max(0.0, above - (0.0 if math.isinf(low) else self._below(low, strictly=True)))
+        return self._share(max(a, low), min(b, high)) / self._share(a, b)
 
 
 def _kind(value: Any) -> str | None:

@@ -108,11 +108,8 @@ class GroupArrays(NamedTuple):
         )  # fmt: skip
 
     def with_room(self, w: int) -> GroupArrays:
-        """Returns the same arrays with room for at least w waypoints; route and kind are copied if they have less."""
-        more = max(w - self.kind.shape[1], 0)
-        if not more:
-            return self
-        room = ((0, 0), (0, more))
+        """Returns the same arrays with room for at least w waypoints; route and kind are copied."""
+        room = ((0, 0), (0, max(w - self.kind.shape[1], 0)))
         return self._replace(route=np.pad(self.route, (*room, (0, 0))), kind=np.pad(self.kind, room))
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from scenarios.schema.geometry import cut_walls
 from scenarios.schema.scenario import WorldSpec
 from sim.elementary import dot, length
 from sim.types import Array, Bools, Scene
@@ -16,32 +17,9 @@ BEHIND = 0.7  # m behind a door, where nobody touches the wall any more
 CLEARANCE = 0.6  # m kept from a wall's end on the way round it
 
 
-def cut_walls(walls: Array, doors: list[tuple[Array, float]]) -> tuple[Array, Array]:
-    """Returns the walls (W, 2, 2) with the doors' openings cut out, and the openings (D, 2, 2), m.
-
-    doors: middle (2,) and width of each; a door is cut out of the wall nearest to it.
-    """
-    pieces = [np.asarray(w, dtype=float) for w in walls]
-    openings = []
-    for at, width in doors:
-        k = int(np.argmin([wall_distances(at, w) for w in pieces]))
-        wall = pieces.pop(k)
-        far = float(length(wall[1] - wall[0]))
-        along = (wall[1] - wall[0]) / far
-        s = float(dot(along, at - wall[0]))
-        low, high = max(0.0, s - width / 2), min(far, s + width / 2)
-        openings.append(np.stack([wall[0] + low * along, wall[0] + high * along]))
-        pieces += [
-            np.stack([wall[0] + a * along, wall[0] + b * along]) for a, b in ((0.0, low), (high, far)) if b - a > 1e-9
-        ]
-    return np.array(pieces).reshape(-1, 2, 2), np.array(openings).reshape(-1, 2, 2)
-
-
 def scene_of(world: WorldSpec) -> Scene:
     """Returns the world of a scenario as the arrays of a Scene, m."""
-    walls = np.array(world.walls, dtype=float).reshape(-1, 2, 2)
-    doors = [(np.array(d.at, dtype=float), d.width) for d in world.doors]
-    return Scene.of(world, *cut_walls(walls, doors))
+    return Scene.of(world, *cut_walls(world))
 
 
 def wall_distances(point: Array, wall: Array) -> Array:

@@ -112,8 +112,8 @@ class PendingOrder:
     held_for: float = 0.0
     # before, after: columns (person id - 1) of the people of each group before and after the order; empty until it
     # fires. Times count from the first recorded frame.
-    before: tuple[tuple[int, ...], ...] = field(default=())
-    after: tuple[tuple[int, ...], ...] = field(default=())
+    before: tuple[tuple[int, ...], ...] = ()
+    after: tuple[tuple[int, ...], ...] = ()
 
     def is_due(self, t: float, state: Array, groups: GroupState, come_true: set[str]) -> bool:
         """Returns True if the order fires at time t (s): `delay` after its trigger was first met.
@@ -223,13 +223,12 @@ class OrderExecution:
         for pending in self.pending:
             if pending.fired is None and pending.is_due(t, state, self.groups, self.come_true):
                 pending.fired, changed = tick, True
-                match pending.order:
-                    case MergeOrder():
-                        self._merge(pending, pending.order, state)
-                    case SplitOrder():
-                        self._split(pending, pending.order, state)
-                    case QueueOrder():
-                        self._line_up(pending, pending.order)
+                if isinstance(pending.order, MergeOrder):
+                    self._merge(pending, pending.order, state)
+                elif isinstance(pending.order, SplitOrder):
+                    self._split(pending, pending.order, state)
+                else:
+                    self._line_up(pending, pending.order)
             elif pending.fired is not None and pending.true_at is None:
                 pending.watch(t, rule_holds(pending, state, self.groups.targets))
                 if pending.true_at is not None:
@@ -242,15 +241,14 @@ class OrderExecution:
         groups, arrays = self.groups, self.groups.arrays
         parents = [self._end(name) for name in order.groups]
         parts = [list(groups.members[g]) for g in parents]
-        pending.before = tuple(tuple(c) for c in parts)
+        pending.before, speeds = tuple(map(tuple, parts)), arrays.speed[parents]
         columns = sorted(c for part in parts for c in part)
         pending.after = (tuple(columns),)
         g = groups.new_group(order.into, columns, float(np.mean([groups.spacing[p] for p in parents])))
         # No faster than the slowest parent: nobody runs to a merge.
-        pace = min(float(arrays.speed[p]) for p in parents)
+        pace = float(speeds.min())
         r = self._rng("event", pending.index, 2)
         middles = np.array([state[c, :2].mean(axis=0) for c in parts])
-        speeds = np.array([arrays.speed[p] for p in parents])
         goal = None if order.goal == "meet" else draw_point(order.goal, self.placement, r)
         meeting = meeting_point(middles, speeds, goal)
         groups.goals[g] = (meeting, "stand") if goal is None else (goal, order.at_goal)
@@ -311,13 +309,9 @@ class OrderExecution:
         groups.queue_of[columns] = pending.index
         pending.before = tuple(tuple(groups.members[g]) for g in queuing)
         pending.after = (tuple(sorted(columns)),)
-        q = self._rng("event", pending.index, 2)
-        for g in queuing:
-            goal, finish = groups.goals[g]
-            groups.goals[g] = (
-                goal if order.goal is None else draw_point(order.goal, self.placement, q),
-                finish if order.goal is None else order.at_goal,
-            )
+        if order.goal is not None:
+            q = self._rng("event", pending.index, 2)
+            groups.goals.update({g: (draw_point(order.goal, self.placement, q), order.at_goal) for g in queuing})
 
     def _serve(self, queue: ServiceQueue, t: float, state: Array) -> None:
         groups = self.groups

@@ -70,13 +70,11 @@ class ScriptPlacement:
 
     def point(self, p: Array) -> Array:
         """Returns where a point (2,) of the script lies in the world: mirrored if flip is -1, then turned."""
-        d = (p - self.middle) * np.array([self.flip, 1.0])
-        return self.middle + self.vector(d, flip=False)
+        return self.middle + self.vector(p - self.middle)
 
-    def vector(self, d: Array, *, flip: bool = True) -> Array:
-        """Returns a direction (2,) of the script in the world; flip=False leaves out the mirror."""
-        if flip:
-            d = d * np.array([self.flip, 1.0])
+    def vector(self, d: Array) -> Array:
+        """Returns a direction (2,) of the script in the world: mirrored if flip is -1, then turned."""
+        d = d * np.array([self.flip, 1.0])
         c, s = unit(self.turn)
         return np.array([c * d[0] - s * d[1], s * d[0] + c * d[1]])
 

@@ -153,8 +153,7 @@ class World:
                 raise self._blown_up()
             pymunk.batch.set_space_bodies(self.space, WRITE, self._write_buffer)
             self.space.step(STEP_TIME)
-            self._read_buffer.clear()
-            pymunk.batch.get_space_bodies(self.space, READ, self._read_buffer)
+            self._read(READ)
             if self.between is not None:
                 self.between[step, self.columns] = self.state
         self.groups.waypoint[self.columns] = self.people.tag[:, WAYPOINT]
@@ -209,8 +208,7 @@ class World:
 
     def _map_rows(self) -> None:
         """Rebuilds columns, state, force and people after bodies came or went, in the physics engine's order."""
-        self._read_buffer.clear()
-        pymunk.batch.get_space_bodies(self.space, pymunk.batch.BodyFields.BODY_ID, self._read_buffer)
+        self._read(pymunk.batch.BodyFields.BODY_ID)
         ids = np.frombuffer(self._read_buffer.int_buf(), dtype=np.uintp)
         column = {body.id: c for c, body in self.bodies.items()}
         n = len(self.bodies)
@@ -218,12 +216,15 @@ class World:
         self.columns = np.array([column[int(i)] for i in ids[:n]], dtype=np.int64)
         self.force = np.zeros((len(ids), 2))
         self._write_buffer.set_float_buf(self.force)
-        self._read_buffer.clear()
-        pymunk.batch.get_space_bodies(self.space, READ, self._read_buffer)
+        self._read(READ)
         self.state = np.frombuffer(self._read_buffer.float_buf()).reshape(-1, 4)[:n]
         self.people = PeopleArrays.empty(n)
         self.states[:], self.group_of[:] = np.nan, -1
         self._fill_people()
+
+    def _read(self, fields: pymunk.batch.BodyFields) -> None:
+        self._read_buffer.clear()
+        pymunk.batch.get_space_bodies(self.space, fields, self._read_buffer)
 
     def _fill_people(self) -> None:
         self.groups.fill(self.people, self.columns)

@@ -16,13 +16,14 @@ higher rate adds alarms and keeps the earlier ones.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sim.detector.box_noise import move_edges
 from sim.detector.draws import CLOCK, Readings, false_scores, ticks
-from sim.detector.visible_ground import VisibleGround, clip_boxes, furthest_row
+from sim.detector.visible_ground import VisibleGround, clip_boxes, furthest_row, labelled_points
 from sim.elementary import exp, log
 from sim.rng import normals, poisson_quantiles, rng, uniforms
 from sim.scene.body import PERSON_HEIGHT, SHOULDER_SHARE, person_boxes
@@ -36,21 +37,6 @@ if TYPE_CHECKING:
 LIFE, AT_PERSON, SITE, X, Y, TALL, ASPECT, VX, VY, BIRTH_DRAWS = range(10)  # an alarm's draws at birth
 SHOWN, EDGES, SCORE, ORDER, FRAME_DRAWS = 0, slice(1, 5), 5, 6, 7  # an alarm's draws in each frame
 SITE_SPREAD = 0.03  # standard deviation of positions round the sites `at`, as a share of the ground part of the image
-AlarmRows = tuple[Ints, Array, Array]
-
-
-class Birth(NamedTuple):
-    """A false alarm of a sequence that lives in at least one frame."""
-
-    frame: int  # first frame in which it lives, from 1 on
-    age: float  # time from its birth to that frame, s
-    name: tuple[int, int]  # tick of birth, and number among those born at this tick, from 0: names its random streams
-    # (9,) uniforms in (0, 1] that draw: LIFE (number of frames), AT_PERSON (whether it goes with a person), SITE (which
-    # of the given sites), X, Y (place), TALL (height), ASPECT (width over height), VX, VY (velocity)
-    at_birth: Array
-    # (L, 7) uniforms, one row for each of the L frames that it lives: columns SHOWN (whether it is reported), errors of
-    # the left, top, right and lower edge, SCORE, ORDER (place in the frame's list)
-    in_frames: Array
 
 
 def persistent_false_alarms(
@@ -70,13 +56,11 @@ def persistent_false_alarms(
     model = sensor.false_alarms
     assert model is not None
     ground = VisibleGround(truth, camera, size)
+    none = np.zeros(0, np.int64), np.zeros((0, 4)), np.zeros((0, 2)), np.zeros((0, FRAME_DRAWS))
     born = _draw_births(model, sensor.clutter_rate, truth, seed, repeat)
-    parts = [_one_alarm(model, ground, birth, seed, repeat) for birth in born]
-    frame = np.concatenate([np.zeros(0, np.int64), *(p[0] for p in parts)])
-    rows = np.concatenate([np.zeros((0, 6)), *(p[1] for p in parts)])
-    u = np.concatenate([np.zeros((0, FRAME_DRAWS)), *(p[2] for p in parts)])
+    parts = [none, *(_one_alarm(model, ground, *birth, seed, repeat) for birth in born)]
+    frame, box, pos, u = (np.concatenate(part) for part in zip(*parts, strict=True))
     keep = u[:, SHOWN] < model.seen
-    box, pos = rows[:, :4], rows[:, 4:]
     if truth.box is not None:
         if sensor.box == "visible" and size is not None:
             box = clip_boxes(box, (int(size[0]), int(size[1])))
@@ -87,13 +71,15 @@ def persistent_false_alarms(
     return Readings(frame, pos, None if truth.box is None else box, false_scores(u[:, SCORE], sensor), u[:, ORDER])
 
 
-def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repeat: int) -> list[Birth]:
-    """Returns all alarms of a sequence, with the uniforms that draw them, sorted by time of birth.
+def _draw_births(
+    model: FalseAlarms, rate: float, truth: Truth, seed: int, repeat: int
+) -> Iterator[tuple[int, float, tuple[int, int], Array, Array]]:
+    """Yields each alarm of a sequence that lives in a frame, in order of birth: first frame (from 1), age there, s, its
+    name (tick of birth, and number among those born then), which names its random streams, and its uniforms.
 
-    The first tick starts with the stationary number of living alarms, as if some had begun earlier. truth: gives the
-    frame rate and the number of frames. rate: mean number of alarms reported per frame. An alarm's life has the mean
-    `model.life` (s); 0 means one frame. seed, repeat (number of the suite entry's copy): name the random streams.
-    Raises ValueError for a negative seed or rate.
+    The uniforms are (9,) at birth, columns LIFE …, and (L, 7) in the L frames that it lives, columns SHOWN …. The first
+    tick starts with the stationary number of living alarms, as if some had begun earlier. rate: mean number of alarms
+    reported per frame.
     """
     frames = np.arange(1, truth.length + 1)
     # the steps at which alarms may be born, and the step of each frame; without a life every frame is a step
@@ -104,7 +90,6 @@ def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repea
     u = uniforms(rng(seed, "clutter", 0, 1, repeat=repeat), int(step[-1]) + 1 if len(step) else 0)
     number = poisson_quantiles(alive * (1.0 - q), u)
     number[:1] = poisson_quantiles(alive, u[:1])
-    born = []
     for start in np.flatnonzero(number).tolist():
         for nth in range(number[start]):
             stream = rng(seed, "clutter", 1, start, nth, repeat=repeat)
@@ -113,20 +98,19 @@ def _draw_births(model: FalseAlarms, rate: float, truth: Truth, seed: int, repea
             first, end = np.searchsorted(step, (start, start + life)).tolist()
             if first < end:
                 age, in_frames = (step[first] - start) / per_s, uniforms(stream, (end - first, FRAME_DRAWS))
-                born.append(Birth(first + 1, age, (start, nth), at_birth, in_frames))
-    return born
+                yield first + 1, age, (start, nth), at_birth, in_frames
 
 
-def _one_alarm(model: FalseAlarms, ground: VisibleGround, birth: Birth, seed: int, repeat: int) -> AlarmRows:
-    """Returns one alarm as its frames (L,), rows (L, 6) and uniforms in those frames (L, 7).
+def _one_alarm(
+    model: FalseAlarms, ground: VisibleGround, start: int, age: float, name: tuple[int, int], at_birth: Array,
+    in_frames: Array, seed: int, repeat: int,
+) -> tuple[Ints, Array, Array, Array]:  # fmt: skip
+    """Returns one alarm, as of `_draw_births`: its frames (L,), boxes (L, 4) px, points (L, 2) m and uniforms (L, 7).
 
-    Frames count from 1. Rows are left, top, width, height in px of the box, then x, y in m of the point. Columns of the
-    uniforms: SHOWN (whether it is reported), four edges, SCORE, ORDER. With probability `model.near` the alarm goes
-    with a person who is present in its frame of birth, and ends when that person is first absent. Otherwise, or without
-    people in that frame, it is on its own. `model.jitter`: standard deviation of the random error of each edge in each
-    frame, in box heights. seed, repeat: name the random streams.
+    With probability `model.near` the alarm goes with a person who is present in its frame of birth, and ends when that
+    person is first absent. Otherwise, or without people in that frame, it is on its own. `model.jitter`: standard
+    deviation of the random error of each edge in each frame, in box heights.
     """
-    start, age, name, at_birth, in_frames = birth
     frame = start + np.arange(len(in_frames))
     n = normals(at_birth)
     here = ground.truth.rows(start)
@@ -140,7 +124,7 @@ def _one_alarm(model: FalseAlarms, ground: VisibleGround, birth: Birth, seed: in
         box, pos = _boxes_alone(model, ground, ages, at_birth, n)
     if model.jitter:
         box = move_edges(box, model.jitter * box[:, 3:] * normals(in_frames[:, EDGES]))
-    return frame, np.concatenate([box, pos], axis=1), in_frames
+    return frame, box, pos, in_frames
 
 
 def _draw_person(ids: Ints, seed: int, name: tuple[int, int], repeat: int) -> int:
@@ -215,7 +199,7 @@ def _boxes_alone(
     u, v = u + away * n[VX], v + away * n[VY]
     box = _boxes_on_feet(u, v, np.full(len(age), tall), model, n)
     foot = v - (1.0 - standing_share(ground.camera)) * tall
-    return box, ground.ground_points(u, foot, np.tile(ground.labelled_point(x, y), (len(age), 1)))
+    return box, ground.ground_points(u, foot, labelled_points(ground.truth, np.tile([x, y], (len(age), 1))))
 
 
 def _boxes_on_feet(middle: Array, foot: Array, tall: Array, model: FalseAlarms, n: Array) -> Array:
@@ -253,17 +237,12 @@ def false_alarms(
         known = None if size is None else np.array(size, dtype=float)
         return persistent_false_alarms(truth, sensor, seed, camera, known, repeat)
     count = false_alarm_counts(sensor.clutter_rate, truth.length, seed, repeat)
-    streams = [
-        (
-            np.flatnonzero(count > k) + 1,
-            uniforms(rng(seed, "clutter", 1 + k, repeat=repeat), (truth.length, DRAWS)),
-        )
-        for k in range(int(count.max(initial=0)))
-    ]
-    frame = np.concatenate([f for f, _ in streams]) if streams else np.zeros(0, np.int64)
-    u = np.concatenate([draws[f - 1] for f, draws in streams]) if streams else np.zeros((0, DRAWS))
-    if len(truth.id) == 0 and camera is None:  # sizes and places are unknown
-        frame, u = frame[:0], u[:0]
+    frame, u = np.zeros(0, np.int64), np.zeros((0, DRAWS))
+    if len(truth.id) or camera is not None:  # else sizes and places are unknown
+        for k in range(int(count.max(initial=0))):
+            here = np.flatnonzero(count > k)
+            drawn = uniforms(rng(seed, "clutter", 1 + k, repeat=repeat), (truth.length, DRAWS))
+            frame, u = np.append(frame, here + 1), np.concatenate([u, drawn[here]])
     pos, box = _placed_by_camera(camera, u) if camera is not None else _placed_by_labels(truth, image_size, u)
     if box is not None and size is not None and sensor.box == "visible":
         box = clip_boxes(box, size)
@@ -314,10 +293,7 @@ def _placed_by_labels(truth: Truth, image_size: tuple[int, int] | None, u: Array
     labelled positions, or 0 if the truth has no positions. Boxes are None if it has no boxes.
     """
     spread = u[:, [ACROSS, DOWN]]
-    pos = np.zeros((len(u), 2))
-    if truth.pos is not None and len(u):
-        low, high = truth.pos.min(axis=0), truth.pos.max(axis=0)
-        pos = low + spread * (high - low)
+    pos = labelled_points(truth, spread)
     if truth.box is None:
         return pos, None
     if not len(u):

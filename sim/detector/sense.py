@@ -20,18 +20,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.detector import draws
 from sim.detector.box_noise import perturb_boxes, seen_shift
 from sim.detector.clutter import false_alarms
-from sim.detector.draws import (
-    CLOCK,
-    Readings,
-    correlated_normals,
-    detections_by_frame,
-    frame_uniforms,
-    interpolated_quantiles,
-    ticks,
-    true_scores,
-)
+from sim.detector.draws import Readings
 from sim.elementary import normal_quantile, power
 from sim.rng import normals, rng, uniforms
 from sim.scene.body import SHOULDER_SHARE
@@ -63,18 +55,12 @@ def sense(
     copies): name the random streams. people: ids of the people of each group that the script names, for `sensor.hide`;
     None: no groups.
 
-    Raises InputError if `sensor.hide` names a group that is not in `people`, or if `sensor.box` is "visible" and the
-    truth has boxes but no visible boxes. Raises AssertionError if the truth has neither positions nor boxes, ValueError
-    for a negative seed or person id.
+    Raises InputError if `sensor.hide` names a group that is not in `people`, AssertionError if the truth has neither
+    positions nor boxes, ValueError for a negative seed or person id.
     """
-    if sensor.box == "visible" and truth.box is not None and truth.visible_box is None:
-        raise InputError(
-            file=truth.name, place="sensor.box", got="visible", expected="amodal: visible parts are not labelled",
-            remedy="leave sensor.box out",
-        )  # fmt: skip
     true = _true_detections(truth, sensor, seed, repeat, people or {}, camera)
     false = false_alarms(truth, sensor, seed, camera, image_size, repeat)
-    return detections_by_frame(true, false, truth)
+    return draws.detections_by_frame(true, false, truth)
 
 
 def _true_detections(
@@ -97,7 +83,7 @@ def _true_detections(
     else:
         assert box is not None, "labels have positions or boxes"
         pos = box[:, :2] + box[:, 2:] / 2
-    score = true_scores(u[:, SCORE], truth.visibility[seen], sensor)
+    score = draws.true_scores(u[:, SCORE], truth.visibility[seen], sensor)
     return Readings(truth.frame[seen], pos, box, score, u[:, ORDER])
 
 
@@ -144,13 +130,13 @@ def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> tuple[
 
 def _one_person(id: int, frame: Ints, seed: int, repeat: int, sensor: Sensor, fps: float) -> tuple[Array, Array]:
     first, count = int(frame[0]), int(frame[-1] - frame[0]) + 1
-    drawn = frame_uniforms(rng(seed, "detect", id, repeat=repeat), first, count, NORMALS + UNIFORMS)
+    drawn = draws.frame_uniforms(rng(seed, "detect", id, repeat=repeat), first, count, NORMALS + UNIFORMS)
     n, u = normals(drawn[:, :NORMALS]), drawn[:, NORMALS:]
     parts = ((0, slice(DETECT, DETECT + 1), sensor.miss_memory), (1, EDGES, sensor.box_noise.memory))
     for key, columns, memory in parts:
-        n[:, columns] = correlated_normals(n[:, columns], memory or (), first, fps, seed, id, key, repeat=repeat)
+        n[:, columns] = draws.correlated_normals(n[:, columns], memory or (), first, fps, seed, id, key, repeat=repeat)
     if sensor.persistence:
-        tick = ticks(np.arange(first, first + count), fps)
+        tick = draws.ticks(np.arange(first, first + count), fps)
         n[:, DETECT] = _kept(sensor.persistence, int(tick[-1]) + 1, rng(seed, "detect", id, 2, repeat=repeat))[tick]
     return n[frame - first], u[frame - first]
 
@@ -159,7 +145,7 @@ def _kept(persistence: float, count: int, r: np.random.Generator) -> Array:
     """Returns standard normals (count,) at ticks of the detector's clock; each is that of the tick before with a
     probability that leaves the share `persistence` after PERSISTENCE_STEP."""
     drawn = uniforms(r, (count, 2))
-    fresh = drawn[:, 0] >= power(persistence, 1.0 / (CLOCK * PERSISTENCE_STEP))
+    fresh = drawn[:, 0] >= power(persistence, 1.0 / (draws.CLOCK * PERSISTENCE_STEP))
     fresh[0] = True
     return normals(drawn[:, 1])[np.maximum.accumulate(np.where(fresh, np.arange(count), 0))]
 
@@ -175,7 +161,7 @@ def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = 
     """
     visible = truth.visibility
     curve = sensor.by_visibility
-    factor = power(visible, sensor.occlusion_power) if curve is None else interpolated_quantiles(curve, visible)
+    factor = power(visible, sensor.occlusion_power) if curve is None else draws.interpolated_quantiles(curve, visible)
     p = sensor.detect_prob * factor
     if sensor.small_px and truth.box is not None:
         from_above = camera is not None and camera.kind == "top"

@@ -89,17 +89,17 @@ class VisibleGround:
         pos = to_ground(self.camera, np.stack([u, np.maximum(v, top)], axis=1))
         return np.where(np.isfinite(pos), pos, otherwise)
 
-    def labelled_point(self, x: float, y: float) -> Array:
-        """Returns the point (2,) in m at shares x, y (0 to 1) of the rectangle round all labelled positions.
 
-        (0, 0) is the corner of least x and y. Shares outside 0 to 1 give points outside the rectangle. Without labelled
-        positions the result is zeros; if a labelled position is nan, it is nan.
-        """
-        pos = self.truth.pos
-        if pos is None or not len(pos):
-            return np.zeros(2)
-        low, high = pos.min(axis=0), pos.max(axis=0)
-        return np.asarray(low + np.array([x, y]) * (high - low))
+def labelled_points(truth: Truth, shares: Array) -> Array:
+    """Returns the points (N, 2) in m at shares (N, 2), 0 to 1, of the rectangle round all labelled positions.
+
+    (0, 0) is the corner of least x and y. Without labelled positions the result is zeros; if a labelled position is
+    nan, it is nan.
+    """
+    if truth.pos is None or not len(truth.pos):
+        return np.zeros_like(shares)
+    low, high = truth.pos.min(axis=0), truth.pos.max(axis=0)
+    return np.asarray(low + shares * (high - low))
 
 
 def furthest_row(camera: Camera) -> float:

@@ -1,4 +1,4 @@
-"""Convex polygons in the plane: hull, area, overlap (IoU), distance, point-in-polygon; many pairs at once.
+"""Convex polygons in the plane: hull, overlap (IoU), distance; many pairs at once.
 
 A polygon is an array (V, 2) of vertices, counter-clockwise in (x, y), not closed, without three vertices on a line.
 With fewer than 3 vertices it has no area. `PackedPolygons` holds N polygons in one array, so that the `*_pairs`
@@ -65,11 +65,6 @@ def cross(a: Array, b: Array) -> Array:
     """Returns the cross products (…) of vectors (…, 2)."""
     product: Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return product
-
-
-def area(polygon: Array) -> float:
-    """Returns the signed area of one polygon (V, 2): negative if clockwise."""
-    return float(_shoelace(np.asarray(polygon, float)[None])[0]) if len(polygon) > 2 else 0.0
 
 
 def convex_hull(points: Array) -> Array:
@@ -217,18 +212,6 @@ def _distance_to_edges(points: Array, polygon: Array) -> Array:
     return np.asarray(np.sqrt((dx * dx + dy * dy).min(axis=(1, 2))))
 
 
-def contains(polygon: Array, points: Array, dilate: float = 0.0) -> Bools:
-    """Returns which points (N, 2) are in the convex polygon (V, 2), on its edge, or at most `dilate` away."""
-    points = np.asarray(points, float).reshape(-1, 2)
-    if not len(polygon):
-        return np.zeros(len(points), bool)
-    inside = (_left_of_edges(points[None], polygon[None])[0].min(axis=0) >= 0) & (len(polygon) > 2)
-    if dilate <= 0:
-        return np.asarray(inside)
-    far = _distance_to_edges(points[:, None], np.broadcast_to(polygon, (len(points), *polygon.shape)))
-    return np.asarray(inside | (far <= dilate))
-
-
 FOOTPRINT_RADIUS = 0.25  # m
 FOOTPRINT_SIDES = 16
 STEP = 2 * np.pi / FOOTPRINT_SIDES  # rad: width of the normal cone of each footprint vertex
@@ -236,12 +219,6 @@ FOOTPRINT = FOOTPRINT_RADIUS * unit(STEP * np.arange(FOOTPRINT_SIDES))  # (16, 2
 CONES = STEP * (np.arange(FOOTPRINT_SIDES) - 0.5)  # rad: the angle at which each vertex's normal cone begins
 GROUPS = 512  # groups per pass
 FLAT = 1e-9  # rad: a narrower cone is a rounding error, and its vertex lies on an edge
-
-
-def footprint_hull(pos: Array) -> Array:
-    """Returns the hull (V, 2) of the footprints of N people at pos (N, 2); (0, 2) of nobody."""
-    pos = np.asarray(pos, float).reshape(-1, 2)
-    return footprint_hulls(pos, np.array([len(pos)]))[0]
 
 
 def footprint_hulls(pos: Array, count: Ints) -> list[Array]:

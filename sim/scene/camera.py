@@ -224,12 +224,12 @@ def _facts(camera: Camera) -> Iterator[tuple[str, bool, str, str]]:
         yield from _lens(camera)
     with np.errstate(over="ignore", invalid="ignore"):
         off = float(np.abs(product(r, r.T) - np.eye(3)).max())
-    got = f"rows that are no unit vectors at right angles (off by {off:.2g})"
-    yield "rotation", off <= ROTATION_TOLERANCE, got, "a rotation matrix, world to camera"
-    turn, expected = float(dot(r[0], np.cross(r[1], r[2]))), "determinant +1: x right, y down, z forward"
-    yield "rotation", turn > 0, "a mirrored rotation (determinant -1)", expected
-    yield "position", bool((np.abs(p) <= COORDINATE).all()), str(p.tolist()), f"coordinates within {COORDINATE:g} m"
-    yield "position", bool(p[2] > 0), f"a camera at height {p[2]:g} m", "above the ground, z = 0 (in m)"
+    turn = float(dot(r[0], np.cross(r[1], r[2])))
+    got = f"rows that are no unit vectors at right angles (off by {off:.2g}), or mirrored (determinant {turn:.2g})"
+    expected = "a rotation matrix, world to camera: x right, y down, z forward"
+    yield "rotation", off <= ROTATION_TOLERANCE and turn > 0, got, expected
+    good, expected = bool((np.abs(p) <= COORDINATE).all() and p[2] > 0), f"within {COORDINATE:g} m, above the ground"
+    yield "position", good, f"a camera at {p.tolist()} m", expected
     down = camera.kind == "pinhole" or bool(r[2, 2] <= -DOWN)
     yield "rotation", down, "a camera of kind top that does not look down", "one that looks straight down"
     scale = px_per_m_at_centre(camera)

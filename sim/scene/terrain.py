@@ -33,8 +33,6 @@ def _flight_height(stairs: Stairs, xy: Array) -> Array:
     """
     axis = stairs.head - stairs.foot
     length = float(length_of(axis))
-    if length == 0.0:
-        return np.zeros(xy.shape[:-1])
     d = xy - stairs.foot
     along = dot(d, axis / length)
     across = np.abs(d[..., 1] * axis[0] - d[..., 0] * axis[1]) / length

@@ -20,26 +20,17 @@ here: walls and other objects are unknown.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from sim.scene import body
-from sim.scene.body import (
-    PERSON_HEIGHT,
-    Ellipsoids,
-    Outlines,
-    occlusion_distance,
-    outline_boxes,
-    outlines,
-    packed_inverse,
-)
+from sim.scene.body import Ellipsoids, Outlines
 from sim.scene.raycast import only_flights, solids_of, unprojection
 from sim.types import Array, Camera, Ints, Scene, Truth
 
 
-@dataclass(frozen=True)
-class BodyVisibility:
+class BodyVisibility(NamedTuple):
     """What a camera sees of R people, one row each."""
 
     # (R, 4) left, top, width, height in px of the whole body, hidden parts included, not clipped to the image; nan if
@@ -59,12 +50,12 @@ def measure_visibility(
     """
     from sim.scene.visibility_kernels import sample_visibility
 
-    ellipses = outlines(camera, shapes)
-    box, solids, has_eye = outline_boxes(ellipses), solids_of(scene), camera.kind == "pinhole"
+    ellipses = body.outlines(camera, shapes)
+    box, solids, has_eye = body.outline_boxes(ellipses), solids_of(scene), camera.kind == "pinhole"
     hides, climbs = has_eye and len(solids.walls) + len(solids.pillars) > 0, has_eye and len(solids.flights) > 0
     visibility, truncation, visible_box = sample_visibility(
-        frame_starts(frame), box, np.ascontiguousarray(ellipses.centre), packed_inverse(ellipses.shape),
-        occlusion_distance(camera, pos3, height), pos3[:, :2].copy(), np.array(camera.image, dtype=float),
+        frame_starts(frame), box, np.ascontiguousarray(ellipses.centre), body.packed_inverse(ellipses.shape),
+        body.occlusion_distance(camera, pos3, height), pos3[:, :2].copy(), np.array(camera.image, dtype=float),
         np.array(camera.position, dtype=float), unprojection(camera), solids if hides else None,
         only_flights(solids.flights) if climbs else None,
     )  # fmt: skip
@@ -89,12 +80,12 @@ def scale_of_first_boxes(frame: Ints, height: Array) -> tuple[float, int]:
     if not len(frame):
         return float("nan"), 0
     last = int(np.sort(frame)[min(BOXES, len(frame)) - 1])
-    return float(np.median(height[frame <= last])) / PERSON_HEIGHT, last
+    return float(np.median(height[frame <= last])) / body.PERSON_HEIGHT, last
 
 
 def scale_of_all_boxes(height: Array) -> float:
     """Returns the image scale, px per m, by the heights (R,) px of all labelled boxes."""
-    return float(np.median(height)) / PERSON_HEIGHT if len(height) else float("nan")
+    return float(np.median(height)) / body.PERSON_HEIGHT if len(height) else float("nan")
 
 
 def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
@@ -110,7 +101,7 @@ def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
     ellipses = inscribed_outlines(truth.box)
     seen, truncation, visible_box = sample_visibility(
         frame_starts(truth.frame), np.array(truth.box), np.ascontiguousarray(ellipses.centre),
-        packed_inverse(ellipses.shape), -(truth.box[:, 1] + truth.box[:, 3]), np.zeros((len(truth.box), 2)), size,
+        body.packed_inverse(ellipses.shape), -(truth.box[:, 1] + truth.box[:, 3]), np.zeros((len(truth.box), 2)), size,
         np.zeros(3), np.eye(3), None, None,
     )  # fmt: skip
     labelled = bool((truth.visibility < 1).any())

@@ -85,22 +85,21 @@ def bodies(motion: Motion, camera: Camera | None, people: RecordedBodies | None 
     """
     people = recorded_bodies(motion) if people is None else people
     t, p = people.frame - 1, people.id - 1
-    seen = None if camera is None else measure_visibility(
-        camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes
+    box, visibility, truncation, visible_box = (None, np.ones(len(p)), None, None) if camera is None else (
+        measure_visibility(camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes)
     )  # fmt: skip
     return Truth(
         name=motion.name, fps=motion.fps, length=len(motion.present),
         px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera), frame=people.frame, id=people.id,
         group=np.full(len(p), -1, np.int64), pos=motion.pos[t, p], vel=motion.vel[t, p],
-        box=None if seen is None else seen.box, visibility=np.ones(len(p)) if seen is None else seen.visibility,
-        z=people.pos3[:, 2], heading=motion.heading[t, p], height=motion.height[p],
-        truncation=None if seen is None else seen.truncation, visible_box=None if seen is None else seen.visible_box,
-        orders=motion.orders,
+        box=box, visibility=visibility, z=people.pos3[:, 2], heading=motion.heading[t, p], height=motion.height[p],
+        truncation=truncation, visible_box=visible_box, orders=motion.orders,
     )  # fmt: skip
 
 
 def label(motion: Motion, camera: Camera | None) -> Truth:
     """Returns the whole Truth: bodies, and groups, events and hard negatives measured from motion and intent."""
+    from sim.truth.group_hulls import groups_over_time
     from sim.truth.merge_split_events import groups_and_events
 
     people = recorded_bodies(motion)
@@ -109,7 +108,9 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     found = groups_and_events(s.pos, s.vel, s.present, s.intent, s.rate)
     shown = FrameTicks.of(truth.length, motion.fps, s.rate, s.present)
     truth = truth.replace(group=found.group[shown.tick[people.frame - 1], people.id - 1])
-    ground = _ground_groups(truth)
+    assert truth.pos is not None
+    assert truth.vel is not None
+    ground = tuple(groups_over_time(truth.frame, truth.id, truth.group, truth.pos, truth.vel, 1, truth.length))
     events, orders = _events_in_frames(_events(s, found), motion, found.group, shown)
     return truth.replace(
         groups=ground, groups_px=None if camera is None else image_groups(truth, ground, camera, people.shapes),
@@ -163,11 +164,3 @@ def _near_in_frames(near: Near, shown: FrameTicks) -> Near:
     end = np.searchsorted(shown.tick, near.end - 1, side="right")
     kept = start <= end
     return Near(start[kept], end[kept], near.a[kept], near.b[kept])
-
-
-def _ground_groups(truth: Truth) -> tuple[Groups, ...]:
-    from sim.truth.group_hulls import groups_over_time
-
-    assert truth.pos is not None
-    assert truth.vel is not None
-    return tuple(groups_over_time(truth.frame, truth.id, truth.group, truth.pos, truth.vel, 1, truth.length))

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations, pairwise
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -26,16 +26,6 @@ Rule = Literal["merge", "split"]
 NEVER = np.iinfo(np.int64).max
 
 
-class MeasuredMotion(NamedTuple):
-    """The motion from which groups are found: T frames, P people."""
-
-    pos: Array  # (T, P, 2) m, nan while absent
-    vel: Array  # (T, P, 2) m/s, nan while absent
-    present: Bools  # (T, P) flags
-    intent: Ints  # (T, P) index of the group that the script means a person to belong to, -1 while absent
-    hold: int  # number of frames for which the merge or split rule must hold
-
-
 def partitions(
     pos: Array, vel: Array, present: Bools, intent: Ints, fps: float
 ) -> Iterator[tuple[int, list[PersonSet]]]:
@@ -44,16 +34,13 @@ def partitions(
     parts: disjoint sets of columns (person id - 1) that make up all people present, valid until the next t. pos, vel
     (T, P, 2): m, m/s. present (T, P). intent (T, P): the group a person is meant to belong to, -1 while absent.
     """
-    there = present[..., None]
-    pos, vel = np.where(there, pos, np.nan), np.where(there, vel, np.nan)
-    motion = MeasuredMotion(pos, vel, present, intent, frames_of(HOLD_TIME, fps))
     turns = _turns(present, intent)
     parts: list[PersonSet] = []
-    rules = _RuleTimes(motion)
+    rules = _RuleTimes(pos, vel, present, intent, frames_of(HOLD_TIME, fps))
     t, k = 0, 0
     while t < len(present):
         if k < len(turns) and turns[k] == t:
-            parts = _enter_and_leave(parts, motion, t)
+            parts = rules.enter_and_leave(parts, t)
             k += 1
         parts = rules.join_and_divide(parts, t)
         yield t, parts
@@ -68,20 +55,6 @@ def _turns(present: Bools, intent: Ints) -> Ints:
     return np.concatenate([[0], np.flatnonzero(moved) + 1])
 
 
-def _enter_and_leave(parts: list[PersonSet], motion: MeasuredMotion, t: int) -> list[PersonSet]:
-    here = frozenset(np.flatnonzero(motion.present[t]).tolist())
-    stay = [part & here for part in parts if part & here]
-    return stay + list(_by_intent(here - frozenset().union(*stay), motion, t).values())
-
-
-def _by_intent(people: Iterable[int], motion: MeasuredMotion, t: int) -> dict[int, PersonSet]:
-    """Returns the people by the group that they are meant to belong to in frame t."""
-    found: dict[int, set[int]] = {}
-    for p in sorted(people):
-        found.setdefault(int(motion.intent[t, p]), set()).add(p)
-    return {g: frozenset(some) for g, some in found.items()}
-
-
 class _RuleTimes:
     """When parts of the crowd will join or divide in one motion.
 
@@ -89,9 +62,24 @@ class _RuleTimes:
     when both parts exist for the first time, and remain valid while the parts stay the same.
     """
 
-    def __init__(self, motion: MeasuredMotion) -> None:
-        self.motion = motion
+    def __init__(self, pos: Array, vel: Array, present: Bools, intent: Ints, hold: int) -> None:
+        there = present[..., None]
+        self.pos, self.vel = np.where(there, pos, np.nan), np.where(there, vel, np.nan)
+        self.present, self.intent, self.hold = present, intent, hold
         self._known: dict[tuple[Rule, PersonSet, PersonSet], Ints] = {}
+
+    def enter_and_leave(self, parts: list[PersonSet], t: int) -> list[PersonSet]:
+        """Returns the parts of those present in frame t; people who enter together are one part."""
+        here = frozenset(np.flatnonzero(self.present[t]).tolist())
+        stay = [part & here for part in parts if part & here]
+        return stay + list(self._by_intent(here - frozenset().union(*stay), t).values())
+
+    def _by_intent(self, people: Iterable[int], t: int) -> dict[int, PersonSet]:
+        """Returns the people by the group that they are meant to belong to in frame t."""
+        found: dict[int, set[int]] = {}
+        for p in sorted(people):
+            found.setdefault(int(self.intent[t, p]), set()).add(p)
+        return {g: frozenset(some) for g, some in found.items()}
 
     def join_and_divide(self, parts: list[PersonSet], t: int) -> list[PersonSet]:
         """Returns the parts after all joins and divisions that are due in frame t (from 0)."""
@@ -114,7 +102,7 @@ class _RuleTimes:
         """Yields ((a, b), frames of the merge rule) for each two parts that are meant to be one group in frame t."""
         meant: dict[int, list[tuple[PersonSet, PersonSet]]] = {}
         for part in parts:
-            g, core = max(_by_intent(part, self.motion, t).items(), key=lambda item: len(item[1]))
+            g, core = max(self._by_intent(part, t).items(), key=lambda item: len(item[1]))
             # A part joins as the group that most of its people are meant to be in; the rule is measured between these.
             if 2 * len(core) > len(part):
                 meant.setdefault(g, []).append((part, core))
@@ -123,14 +111,14 @@ class _RuleTimes:
                 yield (a, b), self._onsets("merge", core_a, core_b, t)
 
     def _meant_to_divide(self, part: PersonSet, t: int) -> Iterator[tuple[PersonSet, PersonSet]]:
-        return combinations(_by_intent(part, self.motion, t).values(), 2) if len(part) > 1 else iter(())
+        return combinations(self._by_intent(part, t).values(), 2) if len(part) > 1 else iter(())
 
     def _divide(self, part: PersonSet, t: int) -> list[PersonSet]:
         if len(part) == 1:
             return [part]
         # Two subsets stay together, too, if a third one connects them.
         unsplit = [(a, b) for a, b in self._meant_to_divide(part, t) if _first(self._onsets("split", a, b, t), t) != t]
-        return _connected(list(_by_intent(part, self.motion, t).values()), unsplit)
+        return _connected(list(self._by_intent(part, t).values()), unsplit)
 
     def _onsets(self, rule: Rule, a: PersonSet, b: PersonSet, t: int) -> Ints:
         """Returns the frames, ascending, from which the rule will hold long enough between parts a and b."""
@@ -140,23 +128,19 @@ class _RuleTimes:
         return self._known[key]
 
     def _measure(self, rule: Rule, a: Ints, b: Ints, t: int) -> Ints:
-        motion = self.motion
-        both = motion.present[t:, a].any(axis=1) & motion.present[t:, b].any(axis=1)
+        both = self.present[t:, a].any(axis=1) & self.present[t:, b].any(axis=1)
         ends = np.flatnonzero(both)
         if not len(ends):
             return ends
         window = slice(t, t + int(ends[-1]) + 1)
-        found = separation(motion.pos[window], motion.vel[window], a, b)
+        intent, present = self.intent[window], self.present[window]
+        found = separation(self.pos[window], self.vel[window], a, b)
         holds = found.merge_rule() if rule == "merge" else found.split_rule()
-        holds &= self._intended(rule, window, a, b)
-        return np.flatnonzero(holds_for(holds, motion.hold)) + t
-
-    def _intended(self, rule: Rule, window: slice, a: Ints, b: Ints) -> Bools:
-        intent, present = self.motion.intent[window], self.motion.present[window]
+        # Everybody must be meant to be in one group, or in two.
         same = intent[:, a, None] == intent[:, None, b]
-        there = present[:, a, None] & present[:, None, b]
-        ok = ~there | (same if rule == "merge" else ~same)
-        return np.asarray(ok.all(axis=(1, 2)))
+        meant = same if rule == "merge" else ~same
+        holds &= (meant | ~(present[:, a, None] & present[:, None, b])).all(axis=(1, 2))
+        return np.flatnonzero(holds_for(holds, self.hold)) + t
 
 
 def _first(frames: Ints, t: int) -> int:

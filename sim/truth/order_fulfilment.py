@@ -13,14 +13,14 @@ import numpy as np
 
 from scenarios.errors import OrderError
 from sim.elementary import length
+
+# isort: off
+# fmt: off
 from sim.truth.merge_split_rules import (
-    HOLD_TIME,
-    MERGE_DISTANCE,
-    MERGE_VELOCITY,
-    SPLIT_DISTANCE,
-    SPLIT_VELOCITY,
-    separation,
+    HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, SPLIT_VELOCITY, separation,
 )
+# fmt: on
+# isort: on
 from sim.truth.queue_detection import MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED
 from sim.types import GroupEvent, Ints, Motion, Order, States, Truth
 
@@ -30,26 +30,19 @@ RULE_TIME = {"merge": HOLD_TIME, "split": HOLD_TIME, "queue": QUEUE_TIME}
 # kinds of events that fulfil each kind of order
 KINDS = {"merge": ("merge", "form"), "split": ("split", "dissolve"), "queue": ("queue",)}
 WORDS = {
-    "merge": f"nearest members < {MERGE_DISTANCE:g} m and velocities differing < {MERGE_VELOCITY:g} m/s "
-    f"for {HOLD_TIME:g} s",
-    "split": f"nearest members of the parts > {SPLIT_DISTANCE:g} m, or > {MERGE_DISTANCE:g} m with velocities "
-    f"differing > {SPLIT_VELOCITY:g} m/s, for {HOLD_TIME:g} s",
-    "queue": f"{QUEUE_PEOPLE} people in order, {MIN_SPACING:g} to {MAX_SPACING:g} m apart, < {WAITING_SPEED:g} m/s, "
+    "merge": f"parts < {MERGE_DISTANCE:g} m apart, velocities differing < {MERGE_VELOCITY:g} m/s, for {HOLD_TIME:g} s",
+    "split": f"parts > {SPLIT_DISTANCE:g} m apart, or > {MERGE_DISTANCE:g} m with velocities differing "
+    f"> {SPLIT_VELOCITY:g} m/s, for {HOLD_TIME:g} s",
+    "queue": f"{QUEUE_PEOPLE} people in line, {MIN_SPACING:g} to {MAX_SPACING:g} m apart, < {WAITING_SPEED:g} m/s, "
     f"for {QUEUE_TIME:g} s",
 }
 
 
-def check_orders(motion: Motion, truth: Truth) -> dict[str, int]:
-    """Returns for each order id the index in `truth.events` of the event that fulfils it.
-
-    Raises OrderError for the first order that no event fulfils.
-    """
-    fulfilled = {}
+def check_orders(motion: Motion, truth: Truth) -> None:
+    """Raises OrderError for the first order that no event fulfils."""
     for order in truth.orders:
         if order.event is None:
             raise _unfulfilled(order, motion)
-        fulfilled[order.id] = order.event
-    return fulfilled
 
 
 def _fired(order: Order, s: States) -> int:
@@ -98,22 +91,22 @@ def _apart(wanted: list[Ints], group: Ints) -> bool:
 
 def _unfulfilled(order: Order, motion: Motion) -> OrderError:
     s = motion.states()
-    place, length = f"event {order.id} (seed {motion.seed})", len(s.present)
+    length = len(s.present)
     if order.time is None:
-        return OrderError(
-            file=f"scenario {motion.name}", place=place, got=f"a {order.kind} that never fired",
-            expected=f"its trigger within the {length / s.rate:g} s recorded",
-            remedy="loosen its `when`, or let the groups come closer",
-        )  # fmt: skip
-    fired = _fired(order, s)
-    end = min(length, fired + 1 + round(PATIENCE * s.rate))
-    short = (end - fired - 1) / s.rate
-    limit = f"{PATIENCE:g} s" if short >= PATIENCE - 1e-9 else f"the {max(short, 0):.1f} s until the recording ends"
-    return OrderError(
-        file=f"scenario {motion.name}", place=place,
-        got=f"no such {order.kind} within {limit} of its firing: {closest(order, s, slice(fired, end))}",
-        expected=WORDS[order.kind], remedy="move starts and goals, fire it earlier, or record for longer",
-    )  # fmt: skip
+        got, expected = f"a {order.kind} that never fired", f"its trigger within the {length / s.rate:g} s recorded"
+        remedy = "loosen its `when`, or let the groups come closer"
+    else:
+        fired = _fired(order, s)
+        end = min(length, fired + 1 + round(PATIENCE * s.rate))
+        until = "when the recording ended" if end == length else f"at {(end - 1) / s.rate:g} s"
+        got = f"a {order.kind} that fired at {order.time:g} s and had not come true {until}: "
+        got += closest(order, s, slice(fired, end))
+        expected, remedy = (
+            f"{WORDS[order.kind]}, within {PATIENCE:g} s",
+            "move starts and goals, fire it earlier, or record for longer",
+        )
+    place = f"event {order.id} (seed {motion.seed})"
+    return OrderError(file=f"scenario {motion.name}", place=place, got=got, expected=expected, remedy=remedy)
 
 
 def closest(order: Order, s: States, window: slice) -> str:

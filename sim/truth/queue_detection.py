@@ -16,7 +16,6 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import NamedTuple
 
 import numpy as np
 
@@ -33,22 +32,13 @@ MIN_CROWD_SHARE = 2 / 3  # of a crowd that must be in the line: else it is no qu
 MAX_CELLS = 2_000_000  # numbers handled together: bounds memory
 
 
-class QueueShapes(NamedTuple):
-    """M lines of people who stand behind one another."""
-
-    # (M, n) row numbers, in the table of positions, of the people in order along the line; only the first `number`
-    # (M,) of each are valid
-    rows: Ints
-    number: Ints
-    u: Array  # (M, 2) unit vector along the line from the first person towards the last
-    middle: Array  # (M, 2) mean position x, y, m
-
-
-def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
+def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[tuple[Ints, Ints, Array, Array]]:
     """Yields tables of the lines of all crowds, at most one for each crowd; a table holds crowds of equal size.
 
     pos (N, 2): m. i, j (K,): rows that stand close to each other; a crowd is connected by such pairs. The line is the
-    whole crowd, else the longest line of three people and two thirds of the crowd; of several, the straightest.
+    whole crowd, else the longest line of three people and two thirds of the crowd; of several, the straightest. A table
+    of M lines holds: rows (M, n) of the people in order, of which the first `number` (M,) are valid, unit vectors (M,
+    2) from the first person towards the last, and mean positions (M, 2), m.
     """
     for crowd in _crowds(len(pos), i, j):
         portion = max(1, MAX_CELLS // (crowd.shape[1] * crowd.shape[1] * crowd.shape[1]))
@@ -57,7 +47,7 @@ def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[QueueShapes]:
             order, count = _best(pos[some])
             found = count > 0
             rows, count = np.take_along_axis(some[found], order[found], axis=1), count[found]
-            yield QueueShapes(rows, count, *_axes(pos[rows], count)[:2])
+            yield rows, count, *_axes(pos[rows], count)[:2]
 
 
 def _crowds(people: int, i: Ints, j: Ints) -> Iterator[Ints]:
@@ -132,9 +122,8 @@ def _turns_fit(p: Array) -> Bools:
 def _lines_through_pairs(p: Array, least: int) -> tuple[Ints, Ints, Ints, Array]:
     """Returns crowd, order, length and misfit of lines sought through each two people of crowds (C, n, 2)."""
     i, j = np.triu_indices(p.shape[1], 1)
-    crowd, seed = np.nonzero(
-        _steps_fit(np.stack([np.zeros((len(p), len(i))), length(p[:, j] - p[:, i])], axis=1))[:, 0]
-    )
+    apart = length(p[:, j] - p[:, i])
+    crowd, seed = np.nonzero((apart >= MIN_SPACING) & (apart <= MAX_SPACING))
     i, j, places = i[seed], j[seed], p[crowd]
     rows = np.arange(len(crowd))
     u = places[rows, j] - places[rows, i]

@@ -225,10 +225,3 @@ def test_false_alarms_look_like_people(camera: Any) -> None:
     )
     assert clipped.min() >= 0
     assert (clipped[:, :2] + clipped[:, 2:]).max() <= 640
-
-
-def test_visible_boxes_that_nobody_labelled_are_refused() -> None:
-    truth = seen(people=2, frames=3).replace(visible_box=None)
-    with pytest.raises(InputError, match="amodal") as error:
-        sense(truth, perfect(box="visible"), 1)
-    assert error.value.place == "sensor.box"

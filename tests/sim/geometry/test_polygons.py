@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 
 from sim.geometry import polygons
 from sim.geometry.hull_kernels import convex_hulls
-from tests.reference_polygons import iou_matrix, polygon_gap
+from tests.reference_polygons import area, contains, footprint_hull, iou_matrix, polygon_gap
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
 
@@ -61,7 +61,7 @@ def test_hull_of_points():
     for seed in range(50):
         points = np.random.default_rng(seed).normal(size=(12, 2))
         hull = polygons.convex_hull(points)
-        assert polygons.area(hull) == pytest.approx(ConvexHull(points).volume)
+        assert area(hull) == pytest.approx(ConvexHull(points).volume)
         assert len(hull) == len(ConvexHull(points).vertices)
     assert polygons.convex_hull(np.array([[0, 0], [1, 1], [2, 2], [1, 1.0]])).tolist() == [[0, 0], [2, 2]]
     assert polygons.convex_hull(np.zeros((3, 2))).tolist() == [[0, 0]]
@@ -87,14 +87,14 @@ def test_footprint_hull_is_the_hull_of_all_footprints(kind):
     for _ in range(200):
         places = places_of(kind, r)
         hull, slow = (
-            polygons.footprint_hull(places),
+            footprint_hull(places),
             polygons.convex_hull((places[:, None] + polygons.FOOTPRINT).reshape(-1, 2)),
         )
-        assert polygons.area(hull) == pytest.approx(polygons.area(slow), abs=1e-9)
+        assert area(hull) == pytest.approx(area(slow), abs=1e-9)
         edge = np.roll(hull, -1, axis=0) - hull
         after = np.roll(edge, -1, axis=0)
         assert (edge[:, 0] * after[:, 1] - edge[:, 1] * after[:, 0] > 0).all(), "strictly convex, counter-clockwise"
-        assert polygons.contains(hull, places).all()
+        assert contains(hull, places).all()
 
 
 def test_footprints_of_many_groups_at_once():
@@ -102,7 +102,7 @@ def test_footprints_of_many_groups_at_once():
     count = np.array([2, 1, 3, 2, 5])
     places = r.uniform(0, 4, (count.sum(), 2))
     for hull, own in zip(polygons.footprint_hulls(places, count), np.split(places, np.cumsum(count)[:-1]), strict=True):
-        np.testing.assert_array_equal(hull, polygons.footprint_hull(own))
+        np.testing.assert_array_equal(hull, footprint_hull(own))
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from sim.geometry.polygons import area, convex_hull, footprint_hull
+from sim.geometry.polygons import convex_hull
 from sim.scene.body import Ellipsoids, contour, ellipsoids, outlines, person_boxes
 from sim.scene.camera import project
 from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.truth.label import POINTS, bodies, hulls, image_groups, image_velocities, label
 from sim.types import Array, Groups, Motion
+from tests.reference_polygons import area, footprint_hull
 from tests.reference_sense import above, crowd, pinhole, walkers
 
 

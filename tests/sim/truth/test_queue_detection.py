@@ -8,9 +8,9 @@ from tests.reference_queue_shapes import chain
 def found(pos):
     """The queue_shapes among places, as lists of rows, each from its smaller end; all stand close to one another."""
     rows = [
-        c.rows[k, : c.number[k]].tolist()
-        for c in queue_shapes(pos, *np.triu_indices(len(pos), 1))
-        for k in range(len(c.number))
+        rows[k, : number[k]].tolist()
+        for rows, number, *_ in queue_shapes(pos, *np.triu_indices(len(pos), 1))
+        for k in range(len(number))
     ]
     return [min(r, r[::-1]) for r in rows]
 
@@ -43,8 +43,8 @@ def test_many_crowds_at_once_are_each_by_itself():
     pos, ends = np.concatenate(places), np.cumsum([len(p) for p in places])
     edges = [np.array(np.triu_indices(len(p), 1)) + end - len(p) for p, end in zip(places, ends, strict=True)]
     together = []
-    for c in queue_shapes(pos, *np.concatenate(edges, axis=1)):
-        for rows, n, u, middle in zip(c.rows, c.number, c.u, c.middle, strict=True):
+    for shapes in queue_shapes(pos, *np.concatenate(edges, axis=1)):
+        for rows, n, u, middle in zip(*shapes, strict=True):
             together.append(min(rows[:n].tolist(), rows[:n].tolist()[::-1]))
             assert middle == pytest.approx(pos[rows[:n]].mean(axis=0))
             assert (pos[rows[n - 1]] - pos[rows[0]]) @ u > 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import runpy
 import shutil
 from functools import cache
 from pathlib import Path
@@ -18,10 +19,9 @@ from scenarios.schema.scenario import Scenario
 from sim.io.store.sequence_folder import sequence_files
 from sim.io.store.track_files import tracks_files
 from tests.commands import commands
-from tests.processes import FAKE
+from tests.processes import FAKE, ROOT
 from tracking import track
 from tracking.app.cli import run
-from tracking.app.commands.scenarios import list_keys
 from tracking.running import tracker_registry
 
 pytestmark = pytest.mark.slow
@@ -160,7 +160,7 @@ def differ(before: str, after: str) -> bool:
 
 
 def test_every_key_is_in_the_table():
-    known = {row["key"] for row in list_keys().data["keys"]}
+    known = {row["key"] for row in runpy.run_path(str(ROOT / "docs/conf.py"))["keys_of_scenarios"]()}
     when = {key for key in known if ".when." in key} | {key for key in known if key.endswith(".type")}
     profile = {key for key in known if key.removeprefix("sensor.").startswith(PROFILE) and key.startswith("sensor.")}
     assert known - when - profile == set(KEYS) | set(PICTURES) | TEXT_ONLY

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.geometry.polygons import contains, convex_hull
+from sim.geometry.polygons import convex_hull
 from sim.scene.camera import project
 from sim.types import Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tests.coded_pictures import SIZE, coded, number, sequence
 from tests.groups_as_wholes import wholes
+from tests.reference_polygons import contains
 from tracking.app.pictures.overlay import overlay_pictures, write_overlay
 from tracking.drawing.canvas import colour
 from tracking.drawing.layers import layer_of_tracks

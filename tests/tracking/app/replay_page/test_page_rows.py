@@ -8,9 +8,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.geometry.polygons import area, convex_hull, footprint_hull
+from sim.geometry.polygons import convex_hull
 from sim.types import GroupEvent, Sequence
 from tests.groups_as_wholes import wholes
+from tests.reference_polygons import area, footprint_hull
 from tracking.app.replay_page import page_rows
 from tracking.app.replay_page.page import Run, page_data
 from tracking.app.replay_page.page_rows import Bar, Link, bars, links

@@ -9,9 +9,9 @@ import pytest
 
 from benchmarks.stereo.density import HALF, in_image
 from scenarios.errors import InputError
-from sim.geometry.polygons import contains
 from sim.scene.camera import project
 from sim.types import Context, Frame, Groups, Tracks
+from tests.reference_polygons import contains
 from tests.sim.scene.test_stereo import rig
 from tracking.detect.features import SpacePoints
 from tracking.papers.stereo import space_group
