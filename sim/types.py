@@ -328,13 +328,14 @@ class PixelTruth(Frozen):
     1), -2 for walls and pillars, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the point;
     None if not computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number inside the
     image that would without occlusion. box (N, 4): left, top, width, height in px of the visible pixels, nan without
-    any."""
+    any. blob (N,): number, from 0, of the region of people who touch each other in the image, -1 if hidden."""
 
     ids: Ints
     disparity: Array | None
     visible_px: Array
     amodal_px: Array
     box: Array
+    blob: Ints
 
     @property
     def visibility(self) -> Array:

@@ -123,7 +123,7 @@ def pixel_truth(r: np.random.Generator, rows: int, stereo: bool) -> PixelTruth:
     box[::4] = np.nan
     return PixelTruth(
         ids, np.where(r.random(ids.shape) < 0.1, np.nan, far) if stereo else None,
-        np.floor(r.uniform(0, 90, rows)), np.floor(r.uniform(90, 99, rows)), box,
+        np.floor(r.uniform(0, 90, rows)), np.floor(r.uniform(90, 99, rows)), box, r.integers(-1, 3, rows),
     )  # fmt: skip
 
 

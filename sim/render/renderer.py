@@ -6,7 +6,8 @@ scenario wants it, compressed as JPEG. The people of up to 16 consecutive frames
 
 The disparity of a point is u_left - u_right = f B / depth: focal length f in px, baseline B and depth in m; nan where
 the right camera does not see the point. An id map (H, W) holds the id of the person that each pixel shows. From it
-follow each person's number of visible pixels and the box round them in px (`types.PixelTruth`).
+follow each person's number of visible pixels, the box round them in px, and the number of the connected region of
+people (`types.PixelTruth`).
 """
 
 from __future__ import annotations
@@ -36,18 +37,20 @@ Seen = tuple[PeopleInView, PeopleShadows | None]  # None if the light casts no s
 
 
 def pixel_truth(ids: Ints, rows: Ints, seen: PeopleInView, amodal: Ints, disparity: Array | None) -> PixelTruth:
-    """Returns the PixelTruth of an id map (H, W): visible pixels and box of the people of these rows.
+    """Returns the PixelTruth of an id map (H, W): visible pixels, box and connected region of the people of these rows.
 
     amodal (N,): pixels of the whole silhouettes of all people of the batch.
     """
     from sim.render.pixel_truth_kernels import count_pixels
 
     id = seen.id[rows]
-    count, edges = np.zeros(len(id), np.int64), np.empty((len(id), 4), np.int64)
-    count_pixels(ids, seen.outlines.bounds[rows], id, count, edges)
+    count, blob, edges = np.zeros(len(id), np.int64), np.empty(len(id), np.int64), np.empty((len(id), 4), np.int64)
+    row_of = np.zeros(int(id.max(initial=0)) + 1, np.int64)
+    row_of[id] = np.arange(len(id))
+    count_pixels(ids, seen.outlines.bounds[rows], id, row_of, count, edges, blob)
     low, high = edges[:, 0::2].astype(float), edges[:, 1::2].astype(float)
     box = np.where(count[:, None] > 0, np.concatenate([low, high - low], axis=1), np.nan)
-    return PixelTruth(ids, disparity, count.astype(float), amodal[rows].astype(float), box)
+    return PixelTruth(ids, disparity, count.astype(float), amodal[rows].astype(float), box, blob)
 
 
 @dataclass(frozen=True, eq=False)

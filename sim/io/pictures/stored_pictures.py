@@ -139,7 +139,7 @@ def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
     """Returns the table of visible pixels, a row per person and frame in the order of the truth's rows.
 
     visible_px, amodal_px: pixels that show the person, and that would without occlusion; visibility_px: their ratio;
-    modal_…: box of the visible pixels.
+    modal_…: box of the visible pixels; blob: region of people who touch in the image, from 0 in each frame.
     """
 
     def joined(name: str) -> NDArray[Any]:
@@ -149,7 +149,7 @@ def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
     columns = [
         Column("frame", truth.frame), Column("id", truth.id), Column("visible_px", joined("visible_px"), "px²"),
         Column("amodal_px", joined("amodal_px"), "px²"), Column("visibility_px", joined("visibility")),
-        *columns_of(BOX, box, "px"),
+        *columns_of(BOX, box, "px"), Column("blob", joined("blob")),
     ]  # fmt: skip
     return table_bytes(columns, {"frames": len(known)})
 
@@ -226,17 +226,17 @@ class StoredPictures:
         """Returns a function that maps a frame (from 1) to its PixelTruth; the stream ids is stored."""
 
         @cache
-        def columns() -> tuple[Ints, Array, Array, Array]:
+        def columns() -> tuple[Ints, Array, Array, Array, Ints]:
             table = read_table(self.folder / TABLE)
             counts = (table.floats("visible_px"), table.floats("amodal_px"))
-            return table.ints("frame"), *counts, table.floats(*BOX)
+            return table.ints("frame"), *counts, table.floats(*BOX), table.ints("blob")
 
         def pixels(index: int) -> PixelTruth:
-            frame, visible, amodal, box = columns()
+            frame, visible, amodal, box, blob = columns()
             rows = slice(*np.searchsorted(frame, (index, index + 1)).tolist())
             ids = streams.decode_ids(self.one("ids", index))
             known = "disparity" in self.streams
             disparity = streams.decode_disparity(self.one("disparity", index)) if known else None
-            return PixelTruth(ids, disparity, visible[rows], amodal[rows], box[rows])
+            return PixelTruth(ids, disparity, visible[rows], amodal[rows], box[rows], blob[rows])
 
         return pixels

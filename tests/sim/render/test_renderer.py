@@ -77,6 +77,23 @@ def test_disparities_are_those_of_a_slow_renderer(view: str, scene: str) -> None
     assert np.isnan(found).sum() == pytest.approx(np.isnan(wanted).sum(), abs=12)
 
 
+def test_blobs_are_connected_regions() -> None:
+    import cv2
+
+    motion = motion_in(BUILT, 25)
+    pixels = Renderer(motion, VIEWS["low"]).pixels(5)
+    _, label = cv2.connectedComponents((pixels.ids > 0).astype(np.uint8), connectivity=8)
+    ids = np.flatnonzero(motion.present[4]) + 1
+    regions = {int(i): set(label[pixels.ids == i].tolist()) for i in ids}
+    for a, ra in zip(ids, pixels.blob, strict=True):
+        assert (ra == -1) == (not regions[int(a)])
+        for b, rb in zip(ids, pixels.blob, strict=True):
+            if regions[int(a)] & regions[int(b)]:
+                assert ra == rb
+    assert len(set(pixels.blob.tolist()) - {-1}) <= label.max()
+    assert len(set(pixels.blob.tolist()) - {-1}) > 3
+
+
 @pytest.mark.parametrize("view", ["high", "above"])
 def test_shadows_fall_where_somebody_stands_before_the_sun(view: str) -> None:
     motion, camera = motion_in(BARE), VIEWS[view]
@@ -220,6 +237,7 @@ def test_nobody_behind_the_camera_and_no_people_at_all() -> None:
     pixels = Renderer(motion, behind).pixels(1)
     assert not (pixels.ids > 0).any()
     assert pixels.amodal_px.tolist() == [0.0] * 5
+    assert pixels.blob.tolist() == [-1] * 5
     nobody = crowd(0, people=0, frames=2)
     assert Renderer(nobody, VIEWS["high"]).draw(1, pixels=True, right=True, disparity=True).pixels is not None
 
