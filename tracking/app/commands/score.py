@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence as SequenceOf
 from pathlib import Path
 from typing import Any
@@ -59,11 +60,15 @@ def _run_result(sequences: list[Sequence], found: list[ScoredSequence]) -> Comma
     for key, r in ({} if blocks is None else blocks).items():
         means[key] = {"mean": float(r.mean[0]), "low": float(r.low[0]), "high": float(r.high[0])}
     notes = scoring_notes(sequences, found)
+    mixed = len({row.given for row in rows}) > 1
+    if mixed:  # what trackers saw differently has no mean
+        means = {key: {**one, "low": math.nan} for key, one in means.items()}
+        notes.append("no mean: the sequences have different detections")
     data = {
         "sequences": [
             {**_row_data(row), "truth": tracked_hash(sequence)} for row, sequence in zip(rows, sequences, strict=True)
         ],
-        "mean": means, "notes": notes,
+        "mean": None if mixed else means, "notes": notes,
     }  # fmt: skip
     return CommandResult(data, tables(rows, means, notes))
 

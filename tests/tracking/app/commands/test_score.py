@@ -79,7 +79,7 @@ def test_files_are_memory_for_groups_as_wholes(one: Path, scene: Sequence, tmp_p
             assert row[key] == (None if np.isnan(value) else pytest.approx(value, abs=1e-12)), key
 
 
-def test_all_that_trackers_saw_is_named(made: Path, tmp_path: Path, capsys) -> None:
+def test_no_mean_over_what_trackers_saw_differently(made: Path, tmp_path: Path, capsys) -> None:
     """A seed tracked from its sensor's boxes, one from labels, one from noisy ones, one as a text without run.json."""
     write_short_scene(tmp_path, "3:7")
     data, tracks = tmp_path / "data" / "flockscope-train", tmp_path / "tracks"
@@ -92,9 +92,11 @@ def test_all_that_trackers_saw_is_named(made: Path, tmp_path: Path, capsys) -> N
     found = answer(capsys, "score", tmp_path / "data", tracks)
     expected = ["file", "truth", "truth (box_noise.scale = 2)", ""]
     assert [row["given"] for row in found["sequences"]] == expected
+    assert found["mean"] is None
     assert run(["score", str(tmp_path / "data"), str(tracks)]) == 0
-    words = "detections file and truth and truth (box_noise.scale = 2) and unknown (no run.json)\n"
-    assert words in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert "detections file and truth and truth (box_noise.scale = 2) and unknown (no run.json)\n" in text
+    assert "95 % low" not in text and "no mean: " in text
 
 
 def test_the_mean_has_every_key_and_an_interval(made: Path, one: Path, capsys) -> None:
