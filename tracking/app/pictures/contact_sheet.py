@@ -75,8 +75,8 @@ def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8, tracks: Se
         raise InputError(file=sequence.name, got="no frame", expected="one or more", remedy="give a longer sequence")
     parts = views(sequence, layers, chosen)
     if not parts:
-        got, expected = "neither pictures nor people on the ground", "a sequence with pictures, or labels on the ground"
-        raise InputError(file=sequence.name, got=got, expected=expected, remedy="flockscope view shows boxes alone")
+        got, expected = "no labelled people and no pictures", "a sequence with gt/ or pictures"
+        raise InputError(file=sequence.name, got=got, expected=expected, remedy="name another")
     done, code = cv2.imencode(".png", _picture(sequence, parts, length, chosen))
     assert done, "PNG holds any 8-bit picture"
     path = Path(out)
@@ -99,7 +99,7 @@ def _layers(sequence: Sequence, tracks: SequenceOf[Tracks] | None) -> list[Layer
 
 
 def views(sequence: Sequence, layers: SequenceOf[Layer], chosen: SequenceOf[int]) -> list[View]:
-    """Returns the parts of a panel: pictures, and a plan if there is a layer for it."""
+    """Returns the parts of a panel: pictures, and a plan if there is a layer for it; boxes alone without both."""
     found = []
     if sequence.has_images and sequence.image_size is not None:
         size = np.array(sequence.image_size, float)
@@ -107,7 +107,20 @@ def views(sequence: Sequence, layers: SequenceOf[Layer], chosen: SequenceOf[int]
     places = [marks.at for layer in layers[1:] for marks in layer.frames.values() if len(marks.id)]
     if places and (area := plan_area(sequence.scene, np.concatenate(places))) is not None:
         found.append(View(layers[1], *area, True, sequence.scene))
-    return found
+    area = None if found else _image_area(sequence, layers[0])
+    return found if area is None else [View(layers[0], *area, False)]
+
+
+def _image_area(sequence: Sequence, layer: Layer) -> tuple[Array, Array] | None:
+    marks = [m for m in layer.frames.values() if len(m.id)]
+    corners = np.concatenate(
+        [np.zeros((0, 2)), *(x for m in marks for x in (m.at, m.box[:, :2], m.box[:, :2] + m.box[:, 2:]))]
+    )
+    corners = corners[np.isfinite(corners).all(axis=1)]
+    if not len(corners):
+        return None
+    size = sequence.image_size
+    return (corners.min(axis=0) - 1, corners.max(axis=0) + 1) if size is None else (np.zeros(2), np.array(size, float))
 
 
 def _pictures(sequence: Sequence, chosen: set[int]) -> dict[int, Image | None]:

@@ -69,9 +69,23 @@ def test_people_are_drawn_where_they_are(sequence: Sequence, truth: Truth, tmp_p
 def test_without_people_there_is_no_sheet(sequence: Sequence, tmp_path: Path) -> None:
     nobody = bare(10, {}).replace(box=np.zeros((0, 4)))
     for load in (None, lambda: bare(10, {}), lambda: nobody):
-        with pytest.raises(InputError, match="neither pictures nor people"):
+        with pytest.raises(InputError, match="no labelled people"):
             contact_sheet.write_sheet(Sequence("none", 10.0, 10, sequence.frames, load), tmp_path / "none.png")
     assert not (tmp_path / "none.png").exists()
+
+
+def test_points_in_an_image_without_size_are_in_view_however_far_they_go() -> None:
+    truth = bare(10, {})
+    tracks = [t.replace(plane="image") for t in people_as_tracks(truth.replace(
+        frame=np.arange(1, 11), id=np.ones(10, np.int64), group=np.full(10, -1), visibility=np.ones(10),
+        pos=np.array([[200.0, 400.0 * k] for k in range(10)]),
+    ))]  # fmt: skip
+    unknown = Sequence("t", 10.0, 10, lambda: iter(()))
+    (part,) = contact_sheet.views(unknown, [layer_of_tracks(tracks, None, None, False)], [5])
+    area = np.zeros((part.height(), contact_sheet.WIDTH, 3), np.uint8)
+    part.draw(area, 5, 10.0)
+    assert part.height() <= 1.2 * contact_sheet.WIDTH
+    assert len(np.unique(area.reshape(-1, 3), axis=0)) > 1
 
 
 def test_each_panel_shows_its_frame(tmp_path: Path) -> None:
