@@ -41,7 +41,10 @@ def can_stand(tracks: Sequence[Tracks], camera: Camera | None, pixels: bool) -> 
     return plane_of_run(tracks) == "image" and camera is not None and boxed(tracks) and not pixels
 
 
-def ground_below(tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, pixels: bool) -> Ground:
+def ground_below(
+    tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, pixels: bool,
+    image_size: tuple[int, int] | None = None,
+) -> Ground:  # fmt: skip
     """Returns the ground to which tracks in the image can be moved, by the camera, else by the first boxes.
 
     Tracks of a tracker that names groups are moved by a camera only.
@@ -50,7 +53,7 @@ def ground_below(tracks: Sequence[Tracks], camera: Camera | None, px_per_m: floa
         return Ground()
     if camera is not None:
         return Ground(camera)
-    return Ground() if names_groups(tracks) else ground_of_boxes(tracks, px_per_m)
+    return Ground() if names_groups(tracks) else ground_of_boxes(tracks, px_per_m, image_size)
 
 
 def as_measured(pos: Array, camera: Camera) -> Array:
@@ -78,15 +81,16 @@ def completed(
     camera: Camera | None,
     scene: Scene | None,
     pixels: bool,
+    image_size: tuple[int, int] | None = None,
 ) -> tuple[tuple[Tracks, ...], Ground]:
     """Returns the tracks with groups and events, as `with_groups`, or from where boxes stand on the ground; and the
     ground that was used.
 
-    Without a camera the ground is that of the boxes, if they tell it.
+    Without a camera the ground is that of the boxes, if they tell it. image_size: width, height, px; None: unknown.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks), Ground()
-    ground = ground_below(tracks, camera, px_per_m, pixels)
+    ground = ground_below(tracks, camera, px_per_m, pixels, image_size)
     if ground.camera is None:
         return with_groups(tracks, fps, px_per_m, rule), ground
     stairs = None if camera is None else scene  # the boxes tell no place in the scene

@@ -226,8 +226,11 @@ def track(
             progress(frame.index)
     whole = clock() - begun
     scale, pixels = prepared.scale(reported), prepared.mode == "image"
-    camera, scene = prepared.context.camera, prepared.context.scene
-    tracks, ground = completed(reported, sequence.fps, scale.px_per_m, rule, camera=camera, scene=scene, pixels=pixels)
+    known = prepared.context
+    tracks, ground = completed(
+        reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene, pixels=pixels,
+        image_size=known.image_size,
+    )  # fmt: skip
     named, late, odd = names_groups(reported), late_groups(reported), list[str | None]()
     if named and chosen is not None:
         odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
@@ -276,9 +279,10 @@ def group(
     if any(t.plane == "image" and len(t.id) for t in people) and not np.isfinite(scale.px_per_m):
         got, remedy = "people in the image, without its scale", "give --px-per-m, pixels per metre"
         raise InputError(file=file, got=got, expected="metres, or a scale", remedy=remedy)
-    camera, pixels = sequence.camera, run is not None and run.info.get("detections") == "image"
-    given = (people, sequence.fps, scale.px_per_m, rule)
-    tracks, ground = completed(*given, camera=camera, scene=sequence.scene, pixels=pixels)
+    tracks, ground = completed(
+        people, sequence.fps, scale.px_per_m, rule, camera=sequence.camera, scene=sequence.scene,
+        pixels=run is not None and run.info.get("detections") == "image", image_size=sequence.image_size,
+    )  # fmt: skip
     odd: list[str | None] = [*implausible(sequence.name, people, sequence.fps, scale.px_per_m)]
     if ground.camera is None:  # on the ground no velocity is used
         odd.append(velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule))
@@ -304,4 +308,7 @@ def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...
     truth = sequence.truth if known.frames or not np.isfinite(known.px_per_m) else None
     px_per_m = known.px_per_m if truth is None else truth.px_per_m
     pixels = getattr(tracks, "info", {}).get("detections") == "image"
-    return completed(tracks, sequence.fps, px_per_m, camera=sequence.camera, scene=sequence.scene, pixels=pixels)[0]
+    return completed(
+        tracks, sequence.fps, px_per_m, camera=sequence.camera, scene=sequence.scene, pixels=pixels,
+        image_size=sequence.image_size,
+    )[0]  # fmt: skip
