@@ -60,9 +60,7 @@ def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
 
 def prefixes(points: Array, weights: Array, start: int, rule: Constraint) -> Bools:
     """Returns flags (M - start + 1,): True if the first start, start + 1, … M points are exactly one group."""
-    return kernels.prefixes(
-        points, weights, start, rule.link, rule.gate, rule.prior_entries, rule.strength, rule.least
-    )
+    return kernels.prefixes(points, weights, start, rule.link, rule.gate, rule.prior_entries, rule.strength, rule.least)
 
 
 def regions_overlap(mean: Array, covariance: Array, gate: float) -> Bools:

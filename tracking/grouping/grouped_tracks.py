@@ -103,7 +103,7 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
     if not named:
         # groups that appear later would change frames that are reported already
         given = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in given]
-    table, events = tabulate(given, fps, px_per_m, rule.smooth), list[GroupEvent]()
+    table, events = tabulate(given, fps, px_per_m), list[GroupEvent]()
     if not named or own.get("merge", math.inf) > 1:
         table, events = _grouped(table, named, fps, rule)
     events += _crossings_and_queues(table, fps)

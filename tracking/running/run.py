@@ -187,9 +187,8 @@ def track(
 ) -> TrackingRun:
     """Tracks every frame of a sequence, and derives groups and events if the tracker names none.
 
-    A UserWarning says that `grouping` has no effect, that the tracker's velocities are too far from its motion to
-    derive groups by the baseline rule, that most detections score too low to start a track, or that groups which the
-    tracker began to name only later were replaced by derived ones.
+    A UserWarning says that `grouping` has no effect, that most detections score too low to start a track, or that
+    groups which the tracker began to name only later were replaced by derived ones.
 
     Args:
         tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
@@ -211,7 +210,6 @@ def track(
     from sim.compiler import clock
     from tracking.grouping.foot_points import completed
     from tracking.grouping.grouped_tracks import late_groups, names_groups
-    from tracking.grouping.plausibility import velocity_warning
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
@@ -231,7 +229,7 @@ def track(
         reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene, pixels=pixels,
         image_size=known.image_size,
     )  # fmt: skip
-    named, late, odd = names_groups(reported), late_groups(reported), list[str | None]()
+    named, late, odd = names_groups(reported), late_groups(reported), list[str]()
     if named and chosen is not None:
         odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
     if late is not None:
@@ -239,9 +237,7 @@ def track(
             f"{prepared.name}: names groups from frame {late} on, but not in its first answer with people: its "
             "groups are replaced by derived ones. Report groups = Groups.none() as long as there is no group"
         )
-    if not named and ground.camera is None:  # on the ground no velocity is reported
-        odd.append(velocity_warning(prepared.name, reported, sequence.fps, scale.px_per_m, rule))
-    for text in filter(None, odd):
+    for text in odd:
         warnings.warn(text, UserWarning, stacklevel=2)
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
     info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
@@ -266,7 +262,7 @@ def group(
     from tracking.grouping.foot_points import completed
     from tracking.grouping.grouped_tracks import without_groups
     from tracking.grouping.known_people import known_people
-    from tracking.grouping.plausibility import implausible, velocity_warning
+    from tracking.grouping.plausibility import implausible
 
     rule = (grouping_of(grouping) if isinstance(grouping, str | Path) else grouping) or default_grouping()
     people = known_people(sequence) if run is None else without_groups(run)
@@ -283,10 +279,7 @@ def group(
         people, sequence.fps, scale.px_per_m, rule, camera=sequence.camera, scene=sequence.scene,
         pixels=run is not None and run.info.get("detections") == "image", image_size=sequence.image_size,
     )  # fmt: skip
-    odd: list[str | None] = [*implausible(sequence.name, people, sequence.fps, scale.px_per_m)]
-    if ground.camera is None:  # on the ground no velocity is used
-        odd.append(velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule))
-    for text in filter(None, odd):
+    for text in implausible(sequence.name, people, sequence.fps, scale.px_per_m):
         warnings.warn(text, UserWarning, stacklevel=2)
     begins = 1 if run is None else run.info.get("causal_from", 1)
     info = _facts(sequence, tracks, scale, ground, begins)
