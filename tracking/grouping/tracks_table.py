@@ -85,11 +85,3 @@ def _named_groups(tracks: Sequence[Tracks]) -> list[Ints]:
         # a tracker may name groups by members only; of several that list a person the last counts
         found.append(np.where(t.group >= 0, t.group, listed))
     return found
-
-
-def boxes_of_rows(tracks: Sequence[Tracks]) -> Array:
-    """Returns the boxes (R, 4) of group hulls, sorted by frame, then id; nan where hulls go round no boxes."""
-    return np.concatenate([
-        np.full((len(t.id), 4), np.nan) if t.box is None or t.plane != "image" else t.box[np.argsort(t.id)]
-        for t in tracks
-    ])  # fmt: skip
