@@ -138,22 +138,18 @@ def default_belief() -> Belief:
 
 
 def _table(path: str | Path, number: int, row: Any) -> Table:
-    place = f"table {number}"
-    keys = ("name", "at", *DECISIONS)
-    if not isinstance(row, dict) or set(row) != set(keys):
-        _refuse(path, place, sorted(row) if isinstance(row, dict) else row, ", ".join(keys))
-    if row["name"] not in NAMES:
-        _refuse(path, f"{place}: name", row["name"], "one of " + "; ".join(NAMES))
-    columns = []
-    for key in keys[1:]:
-        values = row[key]
-        if not isinstance(values, list) or not all(is_number(v, -math.inf, math.inf) for v in values):
-            _refuse(path, f"{place}: {key}", values, "a list of numbers")
-        columns.append(np.array(values, float))
-    at = columns[0]
-    if len(at) < 2 or any(len(c) != len(at) for c in columns) or (np.diff(at) <= 0).any():
-        _refuse(path, f"{place}: at", row["at"], "ascending numbers, two or more, as many as log-odds in each column")
-    return Table(row["name"], at, np.array(columns[1:]))
+    try:
+        table = Table(row["name"], np.array(row["at"], float), np.array([row[key] for key in DECISIONS], float))
+        right = set(row) == {"name", "at", *DECISIONS} and table.name in NAMES and table.at.ndim == 1
+        right = right and len(table.at) > 1 and table.log_odds.shape == (len(DECISIONS), len(table.at))
+        right = right and bool((np.diff(table.at) > 0).all()) and bool(np.isfinite([table.at, *table.log_odds]).all())
+    except (KeyError, TypeError, ValueError):
+        right = False
+    if not right:
+        columns = f"at: ascending numbers, two or more; {', '.join(DECISIONS)}: as many log-odds each"
+        got = row.get("name", sorted(row)) if isinstance(row, dict) else row
+        _refuse(path, f"table {number}", got, f"name: one of {'; '.join(NAMES)}; {columns}")
+    return table
 
 
 def _refuse(path: str | Path, place: str, got: object, expected: str) -> None:

@@ -127,11 +127,12 @@ BAD_FILES = [
     ("bias = [", "bias = [nan, ", "bias"),
     ("memory = ", "memory = -", "memory"),
     ("stay", "wait", "wait"),
-    ('name = "sideways, 5 s"', 'name = "sideways, 3 s"', "table 8: name"),
-    ("now = [", "now = [1, ", "table 1: at"),
-    ("at = [", "at = [9, ", "table 1: at"),
-    ("events = [", 'events = ["x", ', "table 1: events"),
+    ('name = "sideways, 5 s"', 'name = "sideways, 3 s"', "table 8"),
+    ("now = [", "now = [1, ", "table 1"),
+    ("at = [", "at = [9, ", "table 1"),
+    ("events = [", 'events = ["x", ', "table 1"),
     ("events = [", "change = [", "table 1"),
+    ("at = [", "at = [nan, ", "table 1"),
     ("[[table]]", "[[row]]", "grouping"),
 ]
 
