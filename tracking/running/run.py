@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
 PACKAGES = ("flockscope", "numpy", "scipy")  # Packages whose versions run.json holds.
 
-SENSOR_SETTINGS_SHOWN = 6  # Most sensor settings that `input_summary` shows; run.json holds all of them.
-
 
 def run_info(
     prepared: PreparedTracker,
@@ -107,10 +105,8 @@ def causal_from(sequence: Sequence) -> int | None:
 def input_summary(info: Mapping[str, Any]) -> str:
     """Returns one line on what a tracker was given, from the content of its run.json."""
     mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
-    settings = [f"{key} = {value}" for key, value in (sensor or {}).items()]
-    hidden = len(settings) - SENSOR_SETTINGS_SHOWN
     more = [f"background: {background}"] if background else []
-    more += [*settings[:SENSOR_SETTINGS_SHOWN], *([f"{hidden} more"] if hidden > 0 else [])]
+    more += [f"{key} = {value}" for key, value in (sensor or {}).items()]
     return f"{mode} ({', '.join(more)})" if more else str(mode or "")
 
 
