@@ -95,7 +95,7 @@ def _tracked_members(sides: ComparedSides, tracks: Sequence[Tracks], px_per_m: f
 def _derived_groups(sides: ComparedSides, tracks: Sequence[Tracks], px_per_m: float) -> tuple[GroupRows, Ints]:
     """Returns the groups of two or more that the default grouping derives, and the true person of each membership."""
     fps = sides.truth.fps
-    table = tabulate(tracks, fps, px_per_m, default_belief().smooth)
+    table = tabulate(tracks, fps, px_per_m)
     # a label for each row, equal for members of one group in a frame, -1 alone
     group = table.group if names_groups(tracks) else groups_now(table, fps, default_belief())
     order = np.lexsort((group, table.frame))

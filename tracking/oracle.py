@@ -32,8 +32,7 @@ from sim.types import (
     Tracks,
     Truth,
 )
-from tracking.grouping.foot_points import groups_in_frames
-from tracking.grouping.grouped_tracks import with_velocities
+from tracking.grouping.grouped_tracks import groups_in_frames, with_velocities
 from tracking.running.prepare import prepare
 from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import Scorer

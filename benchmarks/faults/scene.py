@@ -12,7 +12,7 @@ from sim import simulate
 from sim.geometry.polygons import footprint_hulls
 from sim.render.weather import draw_illumination
 from sim.types import EVENT_KINDS, Array, Bools, Groups, Ints, Sequence, Tracks
-from tracking.grouping.foot_points import groups_of_people
+from tracking.grouping.grouped_tracks import groups_in_frames
 
 NOBODY = -1
 Ghost = tuple[int, int, float, float]  # frame from 1, id, x, y in m
@@ -82,7 +82,7 @@ class FaultScene:
             k + 1, k / self.fps, "ground", "person", id, group, pos, vel, np.zeros((n, 4, 4)), None, np.ones(n),
             own_events=EVENT_KINDS,
         )  # fmt: skip
-        return t.replace(groups=groups_of_people(t))
+        return t.replace(groups=groups_in_frames([t])[0])
 
     def wholes(self, label: Ints) -> list[Tracks]:
         """Returns the groups of these labels (T, P) as a tracker of whole groups reports them."""

@@ -1,9 +1,8 @@
-"""Tracks without velocities, or with bad ones: the same answers score the same from a class, a table and a text."""
+"""Tracks without velocities: the same answers score the same from a class, a table and a text."""
 
 from __future__ import annotations
 
 import shutil
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,6 @@ from sim.sequence import simulate
 from sim.types import Sequence, Tracks
 from tests.fake_tracker import Nearest
 from tracking.grouping.grouped_tracks import with_velocities
-from tracking.grouping.link_rule import LinkRule
-from tracking.grouping.plausibility import velocity_error, velocity_warning
 from tracking.running.run import grouped, track
 from tracking.scoring import evaluate
 
@@ -29,48 +26,15 @@ class Numbers(Nearest):
     needs = ("boxes",)
     plane = "image"
 
-    def velocities(self, id, pos, before):
-        return np.full(pos.shape, np.nan)
-
     def step(self, frame, detections):
-        box, before = detections.box.round(), dict(zip(self.id.tolist(), self.pos, strict=True))
+        box = detections.box.round()
         pos = (box[:, :2] + box[:, 2:] / 2) if self.plane == "image" else detections.pos.round(2)
         found = super().step(frame, detections.replace(plane=self.plane, pos=pos, box=box))
-        return found.replace(vel=self.velocities(found.id, pos, before), score=np.ones(len(pos)))
+        return found.replace(vel=np.full(pos.shape, np.nan), score=np.ones(len(pos)))
 
 
 class OnTheGround(Numbers):
     plane = "ground"
-
-
-class Differences(Numbers):
-    """The difference to the place of the frame before."""
-
-    def velocities(self, id, pos, before):
-        steps = [p - before.get(i, p) for i, p in zip(id.tolist(), pos, strict=True)]
-        return np.array(steps).reshape(-1, 2) * self.fps
-
-
-class Standing(Numbers):
-    def velocities(self, id, pos, before):
-        return np.zeros(pos.shape)
-
-
-class Exact(Numbers):
-    """The mean velocity over the last 0.5 s."""
-
-    def reset(self, context, seed):
-        super().reset(context, seed)
-        self.places = {}
-
-    def velocities(self, id, pos, before):
-        found = np.zeros(pos.shape)
-        for k, i in enumerate(id.tolist()):
-            path = self.places.setdefault(i, [])
-            path.append(pos[k])
-            past = path[-6:]
-            found[k] = (past[-1] - past[0]) * self.fps / max(len(past) - 1, 1)
-        return found
 
 
 @pytest.fixture(scope="module")
@@ -99,24 +63,6 @@ def test_class_table_and_text_of_the_same_answers_score_the_same(merge, tmp_path
     assert same(scores, evaluate(merge.truth, text)) == []
 
 
-def test_good_velocities_make_no_warning_and_bad_ones_do(merge) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        track(Exact, merge, detections="truth", grouping="rule")
-        track(Numbers, merge, detections="truth", grouping="rule")
-        track("blob", merge, grouping="rule")
-        for kind in (Differences, Standing):
-            track(on_the_ground(kind), merge, detections="file")  # the belief looks at positions only
-            track(kind, merge, detections="file", grouping="rule")  # boxes are grouped where they stand
-    for kind in (Differences, Standing):
-        with pytest.warns(UserWarning, match=f"{kind.__name__}: one velocity in 5 differs by .* Report nan"):
-            track(on_the_ground(kind), merge, detections="file", grouping="rule")
-
-
-def on_the_ground(kind: type[Numbers]) -> type[Numbers]:
-    return type(kind.__name__, (kind,), {"plane": "ground"})
-
-
 def moving(vel: float, n: int = 40) -> list[Tracks]:
     """One person who walks at 1 m/s along x, and reports `vel`."""
     one, alone = np.array([3]), np.array([-1])
@@ -125,18 +71,6 @@ def moving(vel: float, n: int = 40) -> list[Tracks]:
                np.zeros((1, 4, 4)))
         for k in range(n)
     ]  # fmt: skip
-
-
-def test_the_error_of_velocities() -> None:
-    rule = LinkRule()
-    assert velocity_error(moving(1.0, 60), FPS, 1.0, rule) == pytest.approx(0.0, abs=1e-9)
-    assert velocity_error(moving(0.0, 60), FPS, 1.0, rule) == pytest.approx(np.sqrt(2))
-    assert np.isnan(velocity_error(moving(0.0, 20), FPS, 1.0, rule))
-    assert velocity_warning("x", moving(0.0, 60), FPS, 1.0, rule) is not None
-    assert velocity_warning("x", moving(0.0, 60), FPS, 1.0, None) is None, "the belief takes none"
-    assert velocity_warning("x", moving(np.nan, 60), FPS, 1.0, rule) is None
-    assert velocity_warning("x", moving(0.0, 60), FPS, 1.0, LinkRule(smooth=0.5)) is None
-    assert velocity_warning("x", [], FPS, 1.0, rule) is None
 
 
 def test_unknown_velocities_become_the_motion_over_half_a_second() -> None:

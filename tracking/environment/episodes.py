@@ -183,8 +183,9 @@ class Rollout:
 
         context, mode, judge = self.prepared.context, self.prepared.mode, self.opened.judge
         tracks, _ = completed(
-            self.tracks, context.fps, px_per_m, camera=context.camera, scene=context.scene, pixels=mode == "image"
-        )
+            self.tracks, context.fps, px_per_m, camera=context.camera, scene=context.scene, pixels=mode == "image",
+            image_size=context.image_size,
+        )  # fmt: skip
         run = TrackingRun(tracks, {"detections": mode})
         return judge.scorer.evaluate(run, similarity=self.similarity, frames=len(run))
 

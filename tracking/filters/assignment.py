@@ -35,25 +35,9 @@ def cheapest_per_track(rows: Ints, columns: Ints, cost: Array) -> tuple[Ints, In
 
 def optimal(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
     """Returns rows and columns (K,) of the one-to-one pairs with the least total cost, none of `unassigned` or more."""
-    # A pair that shares neither row nor column with another possible pair needs no solver.
-    rows, columns = np.nonzero(cost < unassigned)
-    in_row = np.bincount(rows, minlength=cost.shape[0])
-    in_column = np.bincount(columns, minlength=cost.shape[1])
-    alone = (in_row[rows] == 1) & (in_column[columns] == 1)
-    if alone.all():
-        return rows, columns
-    contested_rows, contested_columns = np.unique(rows[~alone]), np.unique(columns[~alone])
-    # scipy refuses a table of which no full assignment is finite, so that inf becomes the cost of no measurement
-    part = np.minimum(cost[np.ix_(contested_rows, contested_columns)], unassigned)
-    r, c = _solve(part, unassigned)
-    rows = np.concatenate([rows[alone], contested_rows[r]])
-    columns = np.concatenate([columns[alone], contested_columns[c]])
-    return rows, columns
-
-
-def _solve(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
     from scipy.optimize import linear_sum_assignment
 
-    r, c = linear_sum_assignment(cost)
-    inside = cost[r, c] < unassigned
-    return r[inside], c[inside]
+    # scipy refuses a table of which no full assignment is finite, so that inf becomes the cost of no measurement
+    rows, columns = linear_sum_assignment(np.minimum(cost, unassigned))
+    inside = cost[rows, columns] < unassigned
+    return rows[inside], columns[inside]

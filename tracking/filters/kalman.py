@@ -95,21 +95,13 @@ def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
 def distances(state: Array, z: Array, noise: Array | float, scale: Array | float = 1.0) -> Array:
     """Returns squared Mahalanobis distances (N, M) of N predicted filters and M measurements z (M, D) (eq. 9).
 
-    scale: units of z per square root of the covariances' unit (px per m), (N,) or a number.
+    noise: variance of all measurements, (D,) or a number. scale: units of z per square root of the covariances' unit
+    (px per m), (N,) or a number.
     """
-    place, spread = state[PLACE], np.reshape(np.square(scale), (-1, 1))
-    # one noise for all measurements: matrix products are several times faster than (N, M, D) arrays
-    if np.ndim(noise) < 2:
-        return _common_noise(place, z, 1.0 / ((state[VAR] + noise) * spread))
-    y = z[None] - place[:, None]
-    s = (state[VAR][:, None] + np.asarray(noise)[None]) * spread[..., None]
-    return np.asarray(np.sum(y * y / s, 2))
-
-
-def _common_noise(place: Array, z: Array, w: Array) -> Array:
-    """Returns the sum over coordinates of w (z - place)^2, (N, M), at least 0, by matrix products."""
+    place, w = state[PLACE], 1.0 / ((state[VAR] + noise) * np.reshape(np.square(scale), (-1, 1)))
     if not len(place) or not len(z):
         return np.zeros((len(place), len(z)))
+    # matrix products are several times faster than (N, M, D) arrays
     # relative to the first measurement, so that little precision cancels in p² - 2 p m + m²
     p, m = place - z[0], z - z[0]
     pw = p * w

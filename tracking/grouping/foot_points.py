@@ -15,10 +15,9 @@ import numpy as np
 
 from sim.scene.camera import foot_points
 from sim.scene.terrain import height_at
-from sim.truth.group_hulls import box_groups, groups_over_time
-from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks
+from sim.types import Array, Bools, Camera, GroupEvent, Ints, Scene, Tracks
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
-from tracking.grouping.grouped_tracks import names_groups, with_groups, with_velocities
+from tracking.grouping.grouped_tracks import groups_in_frames, names_groups, with_groups, with_velocities
 from tracking.grouping.grouping_choice import Grouping
 
 FLATTENED = 0.4  # k of `as_measured`: F1 of pairs was greatest, of 0 to 1, seen from 5 to 25 degrees above people.
@@ -41,7 +40,10 @@ def can_stand(tracks: Sequence[Tracks], camera: Camera | None, pixels: bool) -> 
     return plane_of_run(tracks) == "image" and camera is not None and boxed(tracks) and not pixels
 
 
-def ground_below(tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, pixels: bool) -> Ground:
+def ground_below(
+    tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, pixels: bool,
+    image_size: tuple[int, int] | None = None,
+) -> Ground:  # fmt: skip
     """Returns the ground to which tracks in the image can be moved, by the camera, else by the first boxes.
 
     Tracks of a tracker that names groups are moved by a camera only.
@@ -50,7 +52,7 @@ def ground_below(tracks: Sequence[Tracks], camera: Camera | None, px_per_m: floa
         return Ground()
     if camera is not None:
         return Ground(camera)
-    return Ground() if names_groups(tracks) else ground_of_boxes(tracks, px_per_m)
+    return Ground() if names_groups(tracks) else ground_of_boxes(tracks, px_per_m, image_size)
 
 
 def as_measured(pos: Array, camera: Camera) -> Array:
@@ -78,15 +80,16 @@ def completed(
     camera: Camera | None,
     scene: Scene | None,
     pixels: bool,
+    image_size: tuple[int, int] | None = None,
 ) -> tuple[tuple[Tracks, ...], Ground]:
     """Returns the tracks with groups and events, as `with_groups`, or from where boxes stand on the ground; and the
     ground that was used.
 
-    Without a camera the ground is that of the boxes, if they tell it.
+    Without a camera the ground is that of the boxes, if they tell it. image_size: width, height, px; None: unknown.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks), Ground()
-    ground = ground_below(tracks, camera, px_per_m, pixels)
+    ground = ground_below(tracks, camera, px_per_m, pixels, image_size)
     if ground.camera is None:
         return with_groups(tracks, fps, px_per_m, rule), ground
     stairs = None if camera is None else scene  # the boxes tell no place in the scene
@@ -99,7 +102,7 @@ def completed(
 def _grouped_as(t: Tracks, grouped: Tracks, named: bool) -> Tracks:
     new = moved_events(grouped.events[len(t.events) :], t.id, t.pos)
     out = t.replace(group=grouped.group, events=(*t.events, *new), derived=True)
-    return out if named and t.groups is not None else out.replace(groups=groups_of_people(out))
+    return out if named and t.groups is not None else out.replace(groups=groups_in_frames([out])[0])
 
 
 def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> list[Tracks]:
@@ -116,27 +119,6 @@ def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> l
     named = [t.groups is not None or bool((t.group >= 0).any()) for t in moved]
     every = groups_in_frames(moved) if any(named) else [None] * len(moved)
     return [t.replace(groups=groups if own else None) for t, groups, own in zip(moved, every, named, strict=True)]
-
-
-def groups_of_people(t: Tracks) -> Groups:
-    """Returns the groups that follow from `group`: hulls round boxes in the image, else round footprints."""
-    return groups_in_frames([t])[0]
-
-
-def groups_in_frames(tracks: Sequence[Tracks]) -> list[Groups]:
-    """Returns the groups of each of several frames in one plane, as `groups_of_people`."""
-    if not tracks:
-        return []
-    there = [np.isfinite(t.pos).all(axis=1) for t in tracks]
-    pairs = [*zip(tracks, there, strict=True)]
-    frame = np.repeat(np.arange(len(tracks)), [kept.sum() for kept in there])
-    id, group, pos, vel = (
-        np.concatenate([getattr(t, name)[kept] for t, kept in pairs]) for name in ("id", "group", "pos", "vel")
-    )
-    boxes = [t.box[kept] for t, kept in pairs if t.box is not None]
-    if tracks[0].plane != "image" or len(boxes) < len(tracks):
-        return groups_over_time(frame, id, group, pos, vel, 0, len(tracks))
-    return box_groups(frame, id, group, pos, vel, np.concatenate(boxes), 0, len(tracks))
 
 
 def feet(box: Array, camera: Camera, scene: Scene | None) -> Array:

@@ -7,9 +7,8 @@ height H who stands there has a box of height h. With r = 1 - h / (focal s), the
     H / C = (1 - r) / (1 - r s sin t cos t)                                                                         (1)
 
 so that each tilt gives one value for each box. The tilt is the one on which the boxes agree best: with the least mean
-absolute deviation of ln (H / C) from its median. Lone deviations are bounded, as boxes are cut and people sit. Where
-the boxes do not agree much better than on one height in px (equal boxes, all people at one row, stairs, a moving
-camera), the ground is unknown.
+absolute deviation of ln (H / C) from its median. Where the boxes do not agree much better than on one height in px
+(equal boxes, all people at one row, stairs, a moving camera), the ground is unknown.
 
 The first boxes decide, so that later frames change nothing. The focal length hardly matters for who is together: scores
 of groups are the same from 0.8 to 1.1 of the width of the picture, and a little lower at 1.5.
@@ -28,7 +27,7 @@ from sim.types import Array, Camera, Tracks
 BOXES, LEAST = 300, 100  # boxes that the first frames hold together, and least number
 TILTS = np.radians(np.arange(-10.0, 71.0))
 FOCAL = 1.1  # focal length over the width of the picture: between wide lenses (0.8) and surveillance (1.5)
-FARTHEST = 0.5  # largest deviation of ln (H / C) that counts, and that of boxes that cannot stand on the ground
+CANNOT_STAND = 0.5  # deviation of ln (H / C) that counts for boxes that cannot stand on the ground
 SURE = 2 / 3  # the mean deviation must be below that of ln h times this
 
 
@@ -45,9 +44,10 @@ class Ground:
         return None if self.camera is None else "boxes" if self.frames else "camera"
 
 
-def ground_of_boxes(tracks: Sequence[Tracks], px_per_m: float) -> Ground:
+def ground_of_boxes(tracks: Sequence[Tracks], px_per_m: float, image_size: tuple[int, int] | None = None) -> Ground:
     """Returns the ground by the first 300 measured boxes. px_per_m: the scale of the image, px per m, at the median of
-    these boxes, so that H = median of h / px_per_m."""
+    these boxes, so that H = median of h / px_per_m. image_size: width, height, px; None: the image ends with the
+    boxes."""
     box, last = np.zeros((0, 4)), 0
     for t in tracks:
         if len(box) >= BOXES:
@@ -57,7 +57,7 @@ def ground_of_boxes(tracks: Sequence[Tracks], px_per_m: float) -> Ground:
             box, last = np.concatenate([box, t.box[measured]]), t.index
     if len(box) < LEAST or not px_per_m > 0:
         return Ground(None, last)
-    width, height = (box[:, :2] + box[:, 2:]).max(axis=0).tolist()  # of the picture, whose size need not be known
+    width, height = image_size or (box[:, :2] + box[:, 2:]).max(axis=0).tolist()
     size, focal = box[:, 3], FOCAL * width
     differ = _spread(np.log(size / np.median(size)))
     if width <= 0:
@@ -85,5 +85,4 @@ def _log_ratios(foot: Array, size: Array) -> Array:
 
 
 def _spread(deviation: Array) -> Array:
-    size = np.minimum(np.abs(deviation), FARTHEST)
-    return np.asarray(np.where(np.isnan(size), FARTHEST, size).mean(axis=-1))
+    return np.asarray(np.where(np.isnan(deviation), CANNOT_STAND, np.abs(deviation)).mean(axis=-1))

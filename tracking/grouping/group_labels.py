@@ -83,7 +83,10 @@ def label_people(
     cuts = np.searchsorted(links.frame, np.arange(length + 1))
     for t, until in pairwise([*sorted({*spells, *changes_now, *links.frame.tolist()}), length]):
         for p, since in spells.get(t, ()):
-            _come_or_go(state, p, since)
+            if since is None:
+                state.present.pop(p, None)
+            else:
+                state.present[p] = since
         now = slice(int(cuts[t]), int(cuts[t + 1]))
         switched = list(zip(*(getattr(links, k)[now].tolist() for k in ("a", "b", "on")), strict=True))
         old = state.identities.groups
@@ -147,13 +150,6 @@ def _spells(frame: Ints, column: Ints, memory: int, length: int) -> dict[int, li
         if last + memory + 1 < length:
             found.setdefault(int(last) + memory + 1, []).append((int(p), None))
     return found
-
-
-def _come_or_go(state: LinkedPeople, p: int, since: int | None) -> None:
-    if since is None:
-        state.present.pop(p, None)
-    else:
-        state.present[p] = since
 
 
 def _entered(state: LinkedPeople, switched: Iterable[LinkSwitch], arrival: int) -> PersonSet:

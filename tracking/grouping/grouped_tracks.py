@@ -29,11 +29,11 @@ from sim.truth.crossing_events import SAME_BEFORE, crossings
 from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.queue_detection import ADVANCE_TIME, BRIDGE_TIME, queues
-from sim.types import EVENT_KINDS, Array, Bools, GroupEvent, Groups, Ints, Tracks
+from sim.types import EVENT_KINDS, Bools, GroupEvent, Groups, Tracks
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.grouping_choice import Grouping, default_grouping, find_groups
 from tracking.grouping.merge_split_events import TrackedMotion, events_of_labels
-from tracking.grouping.tracks_table import TracksTable, boxes_of_rows, tabulate
+from tracking.grouping.tracks_table import TracksTable, tabulate
 
 # Kinds of events in which the membership of groups changes.
 MEMBERSHIP_KINDS = frozenset(EVENT_KINDS) - {"cross", "queue"}
@@ -103,7 +103,7 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
     if not named:
         # groups that appear later would change frames that are reported already
         given = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in given]
-    table, events = tabulate(given, fps, px_per_m, rule.smooth), list[GroupEvent]()
+    table, events = tabulate(given, fps, px_per_m), list[GroupEvent]()
     if not named or own.get("merge", math.inf) > 1:
         table, events = _grouped(table, named, fps, rule)
     events += _crossings_and_queues(table, fps)
@@ -152,7 +152,6 @@ def _crossings_and_queues(table: TracksTable, fps: float) -> list[GroupEvent]:
 
 
 def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupEvent]) -> list[Tracks]:
-    groups = _groups_of_frames(given, table)
     cuts = np.searchsorted(table.frame, np.arange(table.length + 1))
     by_frame: dict[int, list[GroupEvent]] = {}
     for event in events:
@@ -162,9 +161,9 @@ def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupE
         r = slice(int(cuts[t.index - 1]), int(cuts[t.index]))
         label = table.group[r][np.searchsorted(table.id[r], t.id)]
         new = tuple(sorted(by_frame.pop(t.index, ()), key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
-        own = groups[t.index - 1] if t.groups is None else t.groups
-        out.append(t.replace(group=label, groups=own, events=(*t.events, *new), derived=True))
-    return out
+        out.append(t.replace(group=label, events=(*t.events, *new), derived=True))
+    groups = groups_in_frames(out, table.scale)
+    return [t.replace(groups=g) if t.groups is None else t for t, g in zip(out, groups, strict=True)]
 
 
 def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
@@ -172,15 +171,20 @@ def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
     return replace(event, members=tuple(int(table.ids[p - 1]) for p in event.members), pos=(x, y))
 
 
-def _groups_of_frames(given: Sequence[Tracks], table: TracksTable) -> list[Groups]:
-    pos, vel, box = table.pos * table.scale, table.vel * table.scale, boxes_of_rows(given)
-    boxed = np.isfinite(box[:, 0])
-
-    def rows(kept: Bools) -> tuple[Ints, Ints, Ints, Array, Array]:
-        return table.frame[kept], table.id[kept], table.group[kept], pos[kept], vel[kept]
-
-    around = groups_over_time(*rows(~boxed), 0, table.length, table.scale)
-    if not boxed.any():
+def groups_in_frames(tracks: Sequence[Tracks], px_per_m: float = 1.0) -> list[Groups]:
+    """Returns the groups of each of several frames that follow from `group`: hulls round boxes in the image, else round
+    footprints, for which px_per_m is the scale of the image."""
+    if not tracks:
+        return []
+    frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])
+    id, group, pos, vel = (np.concatenate([getattr(t, name) for t in tracks]) for name in ("id", "group", "pos", "vel"))
+    box = np.concatenate([
+        np.full((len(t.id), 4), np.nan) if t.box is None or t.plane != "image" else t.box for t in tracks
+    ])  # fmt: skip
+    there, boxed = np.isfinite(pos).all(axis=1), np.isfinite(box[:, 0])
+    a, b = there & ~boxed, there & boxed
+    around = groups_over_time(frame[a], id[a], group[a], pos[a], vel[a], 0, len(tracks), px_per_m)
+    if not b.any():
         return around
-    in_boxes = box_groups(*rows(boxed), box[boxed], 0, table.length)
-    return [a if len(a.id) else b for a, b in zip(around, in_boxes, strict=True)]
+    in_boxes = box_groups(frame[b], id[b], group[b], pos[b], vel[b], box[b], 0, len(tracks))
+    return [one if len(one.id) else other for one, other in zip(around, in_boxes, strict=True)]

@@ -25,7 +25,6 @@ from sim.types import Array, Bools, Ints
 from tracking.config import Config, param
 
 CELLS = 4_000_000  # Most frames times pairs that are worked on together: bounds memory.
-NEVER = 10.0  # m/s: velocities of people never differ by more, so that this value switches `diverge` off.
 ARRIVAL = 1.0  # s: a link that began within this time of a track's first frame is an arrival, no merge.
 
 
@@ -50,10 +49,6 @@ class LinkRule(Config):
     patience: float = param(HOLD_TIME, (0.1, 6.0), "s", "time apart after which a link breaks")
     idle: float = param(0.0, (0.0, 1.0), "m/s",
         "two people who are both slower than this are not near; 0: standing people can be linked")
-    diverge: float = param(NEVER, (0.2, NEVER), "m/s",
-        "a pair farther than `near` whose velocities differ by more than this is apart, too; 10: never", "log")
-    smooth: float = param(0.0, (0.0, 3.0), "s",
-        "time over which velocities are taken as chords of positions; 0: the tracker's own velocities")
     memory: float = param(1.0, (0.0, 5.0), "s", "time for which a member that is missed stays in the group")
     arrival: float = param(ARRIVAL, (0.0, 5.0), "s",
         "a link that began within this time of a track's first frame is no merge")
@@ -90,7 +85,7 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
     known = np.unique(pair[near])
     present = np.zeros((length, people), bool)
     present[frame, column] = True
-    within = (distance <= rule.apart) & ~((distance > rule.near) & (differ > rule.diverge))
+    within = distance <= rule.apart
     found = []
     # in portions, as tables of all frames and pairs would not fit in memory
     size = max(1, CELLS // max(length, 1))

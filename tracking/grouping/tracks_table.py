@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.labels import WINDOW, chords
+from sim.io.formats.labels import chords
 from sim.types import Array, Bools, Ints, Tracks
 
 
@@ -48,11 +48,11 @@ class TracksTable:
         return out
 
 
-def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, smooth: float = 0.0) -> TracksTable:
+def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float) -> TracksTable:
     """Returns the table of a sequence's person tracks, one `Tracks` per frame, at least one.
 
-    Unknown velocities are replaced by chords over the last 0.5 s, or, if `smooth` (s) is above 0, all by chords over
-    it. Raises InputError if the tracks are in the image and px_per_m is not a finite number above 0.
+    Unknown velocities are replaced by chords over the last 0.5 s. Raises InputError if the tracks are in the image and
+    px_per_m is not a finite number above 0.
     """
     scale = px_per_m if tracks[0].plane == "image" else 1.0
     if not math.isfinite(scale) or scale <= 0:
@@ -70,9 +70,8 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, smooth: floa
     ids, column = np.unique(id, return_inverse=True)
     length = int(max(t.index for t in tracks))
     unknown: Bools = np.asarray(np.isnan(vel).any(axis=1))
-    if smooth > 0 or unknown.any():
-        chord = chords(frame, id, pos, fps, smooth or WINDOW)
-        vel = chord if smooth > 0 else np.where(unknown[:, None], chord, vel)
+    if unknown.any():
+        vel = np.where(unknown[:, None], chords(frame, id, pos, fps), vel)
     return TracksTable(frame, id, column, ids, pos, vel, group, length, scale, seen)
 
 
@@ -86,11 +85,3 @@ def _named_groups(tracks: Sequence[Tracks]) -> list[Ints]:
         # a tracker may name groups by members only; of several that list a person the last counts
         found.append(np.where(t.group >= 0, t.group, listed))
     return found
-
-
-def boxes_of_rows(tracks: Sequence[Tracks]) -> Array:
-    """Returns the boxes (R, 4) of group hulls, sorted by frame, then id; nan where hulls go round no boxes."""
-    return np.concatenate([
-        np.full((len(t.id), 4), np.nan) if t.box is None or t.plane != "image" else t.box[np.argsort(t.id)]
-        for t in tracks
-    ])  # fmt: skip

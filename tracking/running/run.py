@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
 PACKAGES = ("flockscope", "numpy", "scipy")  # Packages whose versions run.json holds.
 
-SENSOR_SETTINGS_SHOWN = 6  # Most sensor settings that `input_summary` shows; run.json holds all of them.
-
 
 def run_info(
     prepared: PreparedTracker,
@@ -107,10 +105,8 @@ def causal_from(sequence: Sequence) -> int | None:
 def input_summary(info: Mapping[str, Any]) -> str:
     """Returns one line on what a tracker was given, from the content of its run.json."""
     mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
-    settings = [f"{key} = {value}" for key, value in (sensor or {}).items()]
-    hidden = len(settings) - SENSOR_SETTINGS_SHOWN
     more = [f"background: {background}"] if background else []
-    more += [*settings[:SENSOR_SETTINGS_SHOWN], *([f"{hidden} more"] if hidden > 0 else [])]
+    more += [f"{key} = {value}" for key, value in (sensor or {}).items()]
     return f"{mode} ({', '.join(more)})" if more else str(mode or "")
 
 
@@ -187,9 +183,8 @@ def track(
 ) -> TrackingRun:
     """Tracks every frame of a sequence, and derives groups and events if the tracker names none.
 
-    A UserWarning says that `grouping` has no effect, that the tracker's velocities are too far from its motion to
-    derive groups by the baseline rule, that most detections score too low to start a track, or that groups which the
-    tracker began to name only later were replaced by derived ones.
+    A UserWarning says that `grouping` has no effect, that most detections score too low to start a track, or that
+    groups which the tracker began to name only later were replaced by derived ones.
 
     Args:
         tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
@@ -211,7 +206,6 @@ def track(
     from sim.compiler import clock
     from tracking.grouping.foot_points import completed
     from tracking.grouping.grouped_tracks import late_groups, names_groups
-    from tracking.grouping.plausibility import velocity_warning
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
@@ -226,9 +220,12 @@ def track(
             progress(frame.index)
     whole = clock() - begun
     scale, pixels = prepared.scale(reported), prepared.mode == "image"
-    camera, scene = prepared.context.camera, prepared.context.scene
-    tracks, ground = completed(reported, sequence.fps, scale.px_per_m, rule, camera=camera, scene=scene, pixels=pixels)
-    named, late, odd = names_groups(reported), late_groups(reported), list[str | None]()
+    known = prepared.context
+    tracks, ground = completed(
+        reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene, pixels=pixels,
+        image_size=known.image_size,
+    )  # fmt: skip
+    named, late, odd = names_groups(reported), late_groups(reported), list[str]()
     if named and chosen is not None:
         odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
     if late is not None:
@@ -236,9 +233,7 @@ def track(
             f"{prepared.name}: names groups from frame {late} on, but not in its first answer with people: its "
             "groups are replaced by derived ones. Report groups = Groups.none() as long as there is no group"
         )
-    if not named and ground.camera is None:  # on the ground no velocity is reported
-        odd.append(velocity_warning(prepared.name, reported, sequence.fps, scale.px_per_m, rule))
-    for text in filter(None, odd):
+    for text in odd:
         warnings.warn(text, UserWarning, stacklevel=2)
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
     info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
@@ -263,7 +258,7 @@ def group(
     from tracking.grouping.foot_points import completed
     from tracking.grouping.grouped_tracks import without_groups
     from tracking.grouping.known_people import known_people
-    from tracking.grouping.plausibility import implausible, velocity_warning
+    from tracking.grouping.plausibility import implausible
 
     rule = (grouping_of(grouping) if isinstance(grouping, str | Path) else grouping) or default_grouping()
     people = known_people(sequence) if run is None else without_groups(run)
@@ -276,13 +271,11 @@ def group(
     if any(t.plane == "image" and len(t.id) for t in people) and not np.isfinite(scale.px_per_m):
         got, remedy = "people in the image, without its scale", "give --px-per-m, pixels per metre"
         raise InputError(file=file, got=got, expected="metres, or a scale", remedy=remedy)
-    camera, pixels = sequence.camera, run is not None and run.info.get("detections") == "image"
-    given = (people, sequence.fps, scale.px_per_m, rule)
-    tracks, ground = completed(*given, camera=camera, scene=sequence.scene, pixels=pixels)
-    odd: list[str | None] = [*implausible(sequence.name, people, sequence.fps, scale.px_per_m)]
-    if ground.camera is None:  # on the ground no velocity is used
-        odd.append(velocity_warning(sequence.name, people, sequence.fps, scale.px_per_m, rule))
-    for text in filter(None, odd):
+    tracks, ground = completed(
+        people, sequence.fps, scale.px_per_m, rule, camera=sequence.camera, scene=sequence.scene,
+        pixels=run is not None and run.info.get("detections") == "image", image_size=sequence.image_size,
+    )  # fmt: skip
+    for text in implausible(sequence.name, people, sequence.fps, scale.px_per_m):
         warnings.warn(text, UserWarning, stacklevel=2)
     begins = 1 if run is None else run.info.get("causal_from", 1)
     info = _facts(sequence, tracks, scale, ground, begins)
@@ -304,4 +297,7 @@ def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...
     truth = sequence.truth if known.frames or not np.isfinite(known.px_per_m) else None
     px_per_m = known.px_per_m if truth is None else truth.px_per_m
     pixels = getattr(tracks, "info", {}).get("detections") == "image"
-    return completed(tracks, sequence.fps, px_per_m, camera=sequence.camera, scene=sequence.scene, pixels=pixels)[0]
+    return completed(
+        tracks, sequence.fps, px_per_m, camera=sequence.camera, scene=sequence.scene, pixels=pixels,
+        image_size=sequence.image_size,
+    )[0]  # fmt: skip

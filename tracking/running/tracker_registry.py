@@ -9,9 +9,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import importlib.util
-import inspect
 import sys
-from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, cast
@@ -134,21 +132,4 @@ def _class_fault(found: Any) -> str | None:
         return f"needs = {needs!r}"
     if kind is not None and not (isinstance(kind, type) and issubclass(kind, Config)):
         return f"config_class = {kind!r}, which is no tracking.config.Config"
-    if not _takes(found, 0 if kind is None else 1):
-        return f"__init__{inspect.signature(found)}, called with {'nothing' if kind is None else 'a config'}"
-    for name in ("reset", "step"):
-        method = getattr(found, name)
-        if not callable(method):
-            return f"{name} = {method!r}"
-        if not _takes(method, 2 + inspect.isfunction(inspect.getattr_static(found, name))):  # a function: self too
-            return f"{name}{inspect.signature(method)}"
     return None
-
-
-def _takes(function: Any, count: int) -> bool:
-    with suppress(ValueError):  # some functions of C have no signature
-        try:
-            inspect.signature(function).bind(*range(count))
-        except TypeError:
-            return False
-    return True

@@ -18,8 +18,8 @@ import numpy as np
 
 from sim.truth.group_hulls import groups_over_time
 from sim.types import Array, Tracks, Truth
-from tracking.grouping.foot_points import boxed, can_stand, completed, feet, groups_of_people, moved_events, standing
-from tracking.grouping.grouped_tracks import with_groups
+from tracking.grouping.foot_points import boxed, can_stand, completed, feet, moved_events, standing
+from tracking.grouping.grouped_tracks import groups_in_frames, with_groups
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.people_and_groups import PersonRows, Surface
@@ -137,4 +137,4 @@ def _track_in_image(t: Tracks) -> Tracks:
     box = np.zeros((0, 4)) if t.box is None else t.box
     middle, none = box[:, :2] + box[:, 2:] / 2, np.full((len(box), 2), np.nan)
     moved = t.replace(plane="image", pos=middle, vel=none, events=moved_events(t.events, t.id, middle))
-    return moved.replace(groups=groups_of_people(moved))
+    return moved.replace(groups=groups_in_frames([moved])[0])

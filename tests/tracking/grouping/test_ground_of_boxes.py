@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import scenarios
+import sim
+import tracking
 from sim.scene.body import person_boxes
 from sim.scene.camera import camera_rotation
 from sim.types import Camera, Tracks
+from tracking.grouping import foot_points
 from tracking.grouping.foot_points import as_measured, ground_below
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
+from tracking.grouping.grouped_tracks import without_groups
+from tracking.running.run import grouped
 
 
 @pytest.mark.parametrize(
@@ -27,10 +35,23 @@ def test_ground_is_that_of_the_camera_or_unknown(tilt: float, height: float, kno
     found = ground.camera
     assert (ground.source, found is not None) == ("boxes" if known else None, known)
     assert ground_below([tracks.replace(group=one[0])], None, px_per_m, pixels=False) == Ground(), "it names groups"
+    sized = ground_of_boxes([tracks], px_per_m, (640, 480)).camera
     if found is not None:
+        assert sized is not None
+        assert (sized.image, sized.focal_px[0]) == ((640, 480), pytest.approx(704))
         assert [found.position[2] / height, *found.rotation[2]] == pytest.approx([1, *view[2]], abs=0.15)
         far = as_measured(np.array([[0.0, 1000.0], [0.0, 1001.0]]), camera)
         assert far[1, 1] - far[0, 1] == pytest.approx(height / (0.4 * 1000), rel=0.01)
+
+
+def test_the_size_of_the_picture_is_the_sequences(monkeypatch) -> None:
+    scene = sim.simulate(scenarios.load("cross", set=["camera.fps=5"]), 30_000, streams=())
+    bare, sizes = replace(scene, camera=None, scene=None), []
+    monkeypatch.setattr(foot_points, "ground_of_boxes", lambda tracks, scale, size: sizes.append(size) or Ground())
+    run = tracking.track("blob", bare, detections="file")
+    tracking.group(bare, run)
+    grouped(without_groups(run), bare)
+    assert sizes == 3 * [scene.image_size]
 
 
 def test_a_ground_that_is_refused_depends_on_its_boxes_too() -> None:

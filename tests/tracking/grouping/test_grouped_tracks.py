@@ -139,7 +139,6 @@ RULES = [
     (joining(), LinkRule(share=1.0), 133), (joining(), LinkRule(window=1.0), 121),
     (joining(), LinkRule(alike=0.3), 146),  # not before it stops drifting, in frame 131
     (leaving(), LinkRule(apart=2.0), 103), (leaving(), LinkRule(patience=1.0), 106),
-    (leaving(), LinkRule(diverge=0.3), 91),
 ]  # fmt: skip
 
 

@@ -12,21 +12,14 @@ from sim.types import Array
 
 def centred_from_ltwh(box: Array) -> Array:
     """Returns centred boxes (M, 4): centre x, y, height, width, px, of boxes (M, 4): left, top, width, height, px."""
-    z = np.empty_like(box)
-    np.multiply(box[:, 2:], 0.5, out=z[:, :2])
-    z[:, :2] += box[:, :2]
-    z[:, 2], z[:, 3] = box[:, 3], box[:, 2]
-    return z
+    return np.concatenate([box[:, :2] + box[:, 2:] / 2, box[:, :1:-1]], 1)
 
 
 def ltwh_from_centred(place: Array) -> Array:
     """Returns boxes (N, 4) left, top, width, height, px, of centred boxes `place` (N, 4): centre x, y, height, width,
     px."""
-    box = np.empty_like(place)
-    np.maximum(place[:, :1:-1], 1.0, out=box[:, 2:])
-    np.multiply(box[:, 2:], -0.5, out=box[:, :2])
-    box[:, :2] += place[:, :2]
-    return box
+    size = np.maximum(place[:, :1:-1], 1.0)
+    return np.concatenate([place[:, :2] - size / 2, size], 1)
 
 
 def inscribed_ellipses(box: Array) -> Array:

@@ -16,11 +16,6 @@ from tracking.papers.blob import person_template_search_kernels as search
 from tracking.papers.blob.person_look_kernels import POINTS
 from tracking.papers.blob.person_template_kernels import Cover, kernel
 
-REACH = (
-    search.MOST_STEPS + search.SWEEPS * search.FINE_STEPS
-)  # most coarse steps that fit_places moves a template, and some more
-ROUNDING = 1e-9  # added to an upper bound, so that rounding excludes nothing
-
 
 @kernel
 def fit_new_people(
@@ -41,14 +36,12 @@ def fit_new_people(
     row per guess: standard deviation of x and foot, px) and `nats`, the log-likelihood of full support. person: area of
     a person, px^2. The best number has the largest joint support in units of `person`, less `support` for each person.
     Joint support: covered pixels, 1 for foreground, -1/2 for background. Each template must have the share `support` of
-    its own. Numbers that cannot be better than the best so far are not tried.
+    its own.
     """
     best, worth = np.zeros((0, 4)), 0.0
     no_image, no_looks = np.zeros((0, 0, 3), np.uint8), np.zeros((0, POINTS, 5))
-    first, bound = 0, unexplained_within_reach(foreground, cover, guesses) / person + ROUNDING
+    first = 0
     for count in range(1, most + 1):
-        if bound - count * support <= worth:
-            break
         one, far = guesses[first : first + count], spread[first : first + count]
         first += count
         at = search.fit_places(foreground, cover, one, far, nats, no_image, no_looks)
@@ -62,25 +55,6 @@ def fit_new_people(
             best, worth = at, value
     kernels.paint_all(cover, best, 1)
     return best
-
-
-@kernel
-def unexplained_within_reach(foreground: Bools, cover: Cover, guesses: Array) -> int:
-    """Returns the number of foreground pixels with cover 0 in a box that templates cannot leave while they are fitted.
-
-    foreground, cover (H, W); guesses (K, 4): first places x, foot, h, w, px. The part outside the image is cut off.
-    """
-    low, high, left, right = np.inf, -np.inf, np.inf, -np.inf
-    for k in range(len(guesses)):
-        x, foot, h, w = guesses[k]
-        far = REACH * max(h / search.STEPS_PER_HEIGHT, 1.0)
-        low, high = min(low, foot - h - far), max(high, foot + far)
-        left, right = min(left, x - w / 2 - far), max(right, x + w / 2 + far)
-    found = 0
-    for row in range(int(max(low, 0)), int(min(high + 1, foreground.shape[0]))):
-        for column in range(int(max(left, 0)), int(min(right + 1, foreground.shape[1]))):
-            found += foreground[row, column] and cover[row, column] == 0
-    return found
 
 
 @kernel

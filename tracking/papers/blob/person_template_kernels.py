@@ -145,54 +145,27 @@ def count_pixels(foreground: Bools, cover: Cover, template: Array, covered: int)
 
 
 @kernel
-def support(foreground: Bools, cover: Cover, template: Array, covered: int) -> float:
+def support(foreground: Bools, cover: Cover, template: Array, covered: int, by_pieces: bool = False) -> float:
     """Returns the support of a template (4,) x, foot, h, w, px: at most 1, may be negative.
 
     It is the sum over its pixels whose cover (H, W), the number of templates there, is `covered`: 1 for foreground and
-    -1/2 for background, divided by its area. covered: 1 for a painted template, 0 for one that is not painted.
+    -1/2 for background, divided by its area. covered: 1 for a painted template, 0 for one that is not painted. If
+    `by_pieces`: the share of foreground among these pixels, 0 if they are less than BARE = 0.1 of the template's area,
+    as the template is hidden then.
     """
     bare, seen = count_pixels(foreground, cover, template, covered)
-    halves = HALVES * seen + EMPTY * (bare - seen)
-    return halves / HALVES / area(template, cover.shape[0], cover.shape[1])
-
-
-@kernel
-def supports(foreground: Bools, cover: Cover, templates: Array, covered: int) -> Array:
-    """Returns the support (K,) of each of the templates (K, 4) x, foot, h, w, px, from the pixels whose cover is
-    `covered`.
-
-    Support: 1 for each such foreground pixel, -1/2 for each such background pixel, divided by the template's area; at
-    most 1, may be negative. foreground, cover (H, W). covered: 1 if the templates are painted into the cover, 0 if not.
-    """
-    found = np.zeros(len(templates))
-    for k in range(len(templates)):
-        found[k] = support(foreground, cover, templates[k], covered)
-    return found
-
-
-@kernel
-def piece_support(foreground: Bools, cover: Cover, template: Array) -> float:
-    """Returns the share of foreground, 0 to 1, among the pixels that a painted template (4,) x, foot, h, w alone
-    covers.
-
-    0 if these pixels are less than BARE = 0.1 of the template's area, as the template is hidden then.
-    """
-    bare, seen = count_pixels(foreground, cover, template, 1)
     whole = area(template, cover.shape[0], cover.shape[1])
-    return seen / whole / (bare / whole) if bare / whole >= BARE else 0.0
+    if by_pieces:
+        return seen / whole / (bare / whole) if bare / whole >= BARE else 0.0
+    return (HALVES * seen + EMPTY * (bare - seen)) / HALVES / whole
 
 
 @kernel
-def piece_supports(foreground: Bools, cover: Cover, templates: Array) -> Array:
-    """Returns for each painted template (K, 4) x, foot, h, w the share of foreground, (K,), 0 to 1, among the pixels it
-    alone covers.
-
-    foreground (H, W) bool; cover (H, W): number of templates per pixel. 0 for a template of which less than BARE = 0.1
-    is free of others.
-    """
+def supports(foreground: Bools, cover: Cover, templates: Array, covered: int, by_pieces: bool = False) -> Array:
+    """Returns the support (K,) of each of the templates (K, 4) x, foot, h, w, px, as `support`."""
     found = np.zeros(len(templates))
     for k in range(len(templates)):
-        found[k] = piece_support(foreground, cover, templates[k])
+        found[k] = support(foreground, cover, templates[k], covered, by_pieces)
     return found
 
 
@@ -247,7 +220,7 @@ def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pi
     share of foreground among these pixels. Without templates the flags are empty.
     """
     stays = np.ones(len(templates), np.bool_)
-    worth = piece_supports(foreground, cover, templates) if by_pieces else supports(foreground, cover, templates, 1)
+    worth = supports(foreground, cover, templates, 1, by_pieces)
     for _ in range(len(stays)):
         k = 0
         for other in range(1, len(stays)):
@@ -259,10 +232,7 @@ def prune(foreground: Bools, cover: Cover, templates: Array, least: float, by_pi
         paint(cover, templates[k], -1)
         for other in range(len(stays)):
             if stays[other] and boxes_touch(templates[k], templates[other]):
-                one = templates[other]
-                worth[other] = (
-                    piece_support(foreground, cover, one) if by_pieces else support(foreground, cover, one, 1)
-                )
+                worth[other] = support(foreground, cover, templates[other], 1, by_pieces)
     return stays
 
 

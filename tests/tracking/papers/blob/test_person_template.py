@@ -56,9 +56,8 @@ def test_all_together_are_the_slow_way(seed):
     assert np.array_equal(at, slow.settle(foreground, cover, expected, spread, 40.0))
     assert np.array_equal(scene.cover, cover + slow.painted(cover.shape, at))
     assert np.allclose(scene.support(at), slow.alone(foreground, cover, at), atol=1e-12)
-    assert np.allclose(
-        kernels.piece_supports(scene.foreground, scene.cover, at), slow.pieces(foreground, cover, at), atol=1e-12
-    )
+    pieces = kernels.supports(scene.foreground, scene.cover, at, 1, True)
+    assert np.allclose(pieces, slow.pieces(foreground, cover, at), atol=1e-12)
     assert np.allclose(scene.visible_share(at), slow.shown(cover, at), atol=1e-12)
     for by_pieces in (True, False):
         again = ExplainedForeground(foreground)
@@ -107,7 +106,7 @@ def test_a_piece_of_who_is_partly_covered_is_enough_but_two_on_one_are_one():
     cut[:48, 73:] = False
     scene, both = ExplainedForeground(cut), np.stack([near, far])
     kernels.paint_all(scene.cover, both, 1)
-    assert 0.4 < kernels.piece_supports(scene.foreground, scene.cover, both)[1] < 0.9
+    assert 0.4 < kernels.supports(scene.foreground, scene.cover, both, 1, True)[1] < 0.9
     assert scene.prune(both, 0.3, pieces=True).tolist() == [0, 1]
     twice = np.stack([near, near + np.array([4.0, 0, 0, 0])])
     scene = ExplainedForeground(mask_of(near))
