@@ -41,6 +41,11 @@ class Constraint:
         return np.array([self.prior[0, 0], self.prior[0, 1], self.prior[1, 1]])
 
 
+def linked(points: Array, link: float) -> Ints:
+    """Returns the component of each point (M,), by first points: at most `link` apart, also through others."""
+    return kernels.components(points, np.ones(len(points)), link)[0]
+
+
 def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
     """Returns the group of each point (M,), numbered in order of first points; -1 for noise."""
     label, sums = kernels.components(points, weights, rule.link)
@@ -48,9 +53,16 @@ def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
     group = np.full(len(sums), -1)
     if len(parts):
         # noise must not bridge two groups, so that only the heavy components are joined
-        joined = kernels.closure(sums[parts], rule.gate, rule.prior_entries, rule.strength)
+        joined = kernels.closure(sums[parts], rule.gate, rule.prior_entries, rule.strength)[0]
         group[parts] = np.unique(joined, return_inverse=True)[1]
     return np.asarray(group[label])
+
+
+def prefixes(points: Array, weights: Array, start: int, rule: Constraint) -> Bools:
+    """Returns flags (M - start + 1,): True if the first start, start + 1, … M points are exactly one group."""
+    return kernels.prefixes(
+        points, weights, start, rule.link, rule.gate, rule.prior_entries, rule.strength, rule.least
+    )[0]
 
 
 def regions_overlap(mean: Array, covariance: Array, gate: float) -> Bools:

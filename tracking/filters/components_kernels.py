@@ -22,7 +22,7 @@ from math import sqrt
 import numpy as np
 
 from sim.compiler import njit, shared_njit
-from sim.elementary_kernels import find_root
+from sim.elementary_kernels import find_root, sort_by
 from sim.types import Array, Bools, Ints
 
 STEPS = 60
@@ -31,12 +31,16 @@ WEIGHT, X, Y, XX, XY, YY = range(6)
 """Columns of `sums`."""
 MEAN_X, MEAN_Y, A_XX, A_XY, A_YY = range(5)
 """Slots of `shape`: an ellipse (y - mean)' A^-1 (y - mean) <= 1."""
-SLACK = 1 + 1e-6
-"""A region's box is larger by this factor, so that rounding excludes no pair."""
+FEW = 16
+"""Components of which all pairs are compared; more are sorted first."""
+SLACK, ROUNDING = 1 + 1e-6, 1e-15
+"""A region's box is larger by this factor, and by this share of its place, so that rounding excludes no pair."""
 AROUND = 20
 """Cells round a cell from which points can be linked with its points."""
 LOW_X, LOW_Y, HIGH_X, HIGH_Y = range(4)
 """Columns of `box`."""
+VISITS, COMPONENTS = range(2)
+"""Slots of `work`: cells and points compared so far; number of components."""
 FAR = 2.0**40
 """Cells from the first point beyond which a point is moved nearer, so that cell numbers fit in int64."""
 
@@ -147,34 +151,70 @@ def unset(count: int) -> Ints:
 
 
 @shared_njit(cache=True)
-def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
-    """Returns the first component that each of K is joined with, (K,) (G_x, 3.1)."""
-    k = len(sums)
-    tree, alive = np.empty(k, np.int64), np.empty(k, np.bool_)
+def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[Ints, int]:
+    """Returns the first component that each of K is joined with (K,) (G_x, 3.1), and the number of pairs compared."""
+    k, compared = len(sums), 0
+    label, alive, order, tree = (
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+    )
     pooled, shape = np.empty((k, 6)), np.empty((k, 5))
+    left, wide = np.empty(k), np.empty(k)  # of a region: least x, half of its width
+    fresh = np.empty(k, np.bool_)  # only pairs with a changed component are compared again
     for i in range(k):
-        tree[i], alive[i] = i, True
+        alive[i] = tree[i] = i
+        fresh[i] = True
         for c in range(6):
             pooled[i, c] = sums[i, c]
-    # A joined region may overlap one that none of its parts did: repeat until nothing changes.
-    changed = True
+    count = k
+    changed = k > 1
     while changed:
-        changed = False
-        for i in range(k):
-            if alive[i]:
+        for n in range(count):
+            order[n] = alive[n]
+            i = alive[n]
+            if fresh[i]:
                 fit(pooled[i], gate, prior, strength, shape[i])
-                for j in range(i):
-                    if alive[j] and meet(shape[i], shape[j]):
-                        p, q = find_root(tree, i), find_root(tree, j)
-                        tree[max(p, q)] = min(p, q)
-        for i in range(k):
+                wide[i] = SLACK * np.sqrt(shape[i, A_XX]) + ROUNDING * abs(shape[i, MEAN_X])
+                left[i] = shape[i, MEAN_X] - wide[i]
+        # Few are compared in all pairs; of many only those whose boxes overlap along x.
+        many = count > FEW
+        if many:
+            sort_by(left, order[:count])
+        for n in range(count):
+            for later in range(n + 1, count):
+                p, q = order[n], order[later]
+                if many and left[q] > left[p] + 2 * wide[p]:
+                    break
+                compared += 1
+                if (
+                    (fresh[p] or fresh[q])
+                    # pairs that are joined already need no test
+                    and find_root(tree, p) != find_root(tree, q)
+                    # in one order of arguments, so that rounding does not depend on who is first
+                    and meet(shape[max(p, q)], shape[min(p, q)])
+                ):
+                    i, j = find_root(tree, p), find_root(tree, q)
+                    tree[max(i, j)] = min(i, j)
+        kept = 0
+        for n in range(count):
+            fresh[alive[n]] = False
+        for n in range(count):
+            i = alive[n]
             top = find_root(tree, i)
-            if alive[i] and top != i:
+            if top == i:
+                alive[kept] = i
+                kept += 1
+            else:
                 pool(pooled[top], pooled[i])
-                alive[i], changed = False, True
+                fresh[top] = True
+        # A joined region may overlap one that none of its parts did: repeat until nothing changes.
+        changed = 1 < kept < count
+        count = kept
     for i in range(k):
-        tree[i] = find_root(tree, i)
-    return tree
+        label[i] = find_root(tree, i)
+    return label, compared
 
 
 @njit(cache=True)
@@ -226,7 +266,7 @@ def _slot(table: Ints, place: Ints, first: Ints, x: int, y: int) -> int:
 @njit(cache=True)
 def add_point(
     k: int, points: Array, weight: float, link: float, cell: Ints, around: Ints,
-    parent: Ints, head: Ints, after: Ints, box: Array, sums: Array,
+    parent: Ints, head: Ints, after: Ints, box: Array, sums: Array, work: Ints,
 ) -> None:  # fmt: skip
     """Adds point k to the components of the points before it, in place (4.2.1).
 
@@ -238,8 +278,10 @@ def add_point(
     parent[k] = k
     sums[k, WEIGHT], sums[k, X], sums[k, Y] = weight, x, y
     sums[k, XX], sums[k, XY], sums[k, YY] = 0.0, 0.0, 0.0
+    work[VISITS] += 1
+    work[COMPONENTS] += 1
     if head[c] >= 0:
-        _join(parent, sums, k, head[c])
+        _join(parent, sums, k, head[c], work)
         box[c, LOW_X], box[c, LOW_Y] = min(box[c, LOW_X], x), min(box[c, LOW_Y], y)
         box[c, HIGH_X], box[c, HIGH_Y] = max(box[c, HIGH_X], x), max(box[c, HIGH_Y], y)
     else:
@@ -248,7 +290,13 @@ def add_point(
     top = find_root(parent, k)
     for n in range(AROUND):
         other = around[c, n]
-        if other < 0 or head[other] < 0 or find_root(parent, head[other]) == top:
+        # everything is one component: nothing more can be joined
+        if work[COMPONENTS] == 1:
+            break
+        if other < 0 or head[other] < 0:
+            continue
+        work[VISITS] += 1
+        if find_root(parent, head[other]) == top:
             continue
         # the bounding box of the cell's points rules most cells out without a look at its points
         gap_x = max(box[other, LOW_X] - x, x - box[other, HIGH_X], 0.0)
@@ -257,21 +305,25 @@ def add_point(
             continue
         p = head[other]
         while p >= 0:
+            work[VISITS] += 1
             if (points[p, 0] - x) ** 2 + (points[p, 1] - y) ** 2 <= link * link:
-                _join(parent, sums, k, p)
+                _join(parent, sums, k, p, work)
                 top = find_root(parent, k)
                 break
             p = after[p]
 
 
 @njit(cache=True)
-def _join(parent: Ints, sums: Array, a: int, b: int) -> None:
-    """Joins the components of points a and b, two, under the older root, so that roots depend on the order of points
-    only."""
+def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
+    """Joins the components of points a and b under the older root, so that roots depend only on the order of points."""
     a, b = find_root(parent, a), find_root(parent, b)
+    if a == b:
+        return
+    # the older root wins: roots depend on the order of points only, not on that of joins
     low, high = min(a, b), max(a, b)
     parent[high] = low
     pool(sums[low], sums[high])
+    work[COMPONENTS] -= 1
 
 
 @shared_njit(cache=True)
@@ -284,8 +336,9 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
         return label, sums
     cell, around = cells(points, link)
     head, after, box = unset(len(around)), unset(m), np.empty((len(around), 4))
+    work = np.zeros(2, np.int64)
     for k in range(m):
-        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums)
+        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
     for k in range(m):
         top = find_root(parent, k)
         if top == k:
@@ -301,42 +354,78 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
 @njit(cache=True)
 def prefixes(
     points: Array, weights: Array, start: int, link: float, gate: float, prior: Array, strength: float, least: float
-) -> Bools:
-    """Returns whether the first start, … M points are one group, (M - start + 1,)."""
+) -> tuple[Bools, int]:
+    """Returns whether the first start, … M points are one group, (M - start + 1,), and the comparisons made."""
     # All associations of a group at once: the points of the group alone, then one shared point more each time (4.2.1).
+    # While a single component is heavy, n points cost O(n). Of more, only the region of the last point's is new; it is
+    # compared with the M others if no two of those overlap. Else all are sorted along x and joined in rounds, O(M^1.5)
+    # a point or less on scattered points. The least weight bounds M.
     m = len(points)
     one = np.zeros(m - start + 1, np.bool_)
     if m == 0:
-        return one
+        return one, 0
     cell, around = cells(points, link)
-    parent, sums, moments = np.empty(m, np.int64), np.empty((m, 6)), np.empty((m, 6))
+    parent, sums = np.empty(m, np.int64), np.empty((m, 6))
     head, after, box = unset(len(around)), unset(m), np.empty((len(around), 4))
-    heavy, count = np.empty(m, np.int64), 0  # roots of the components that are not left out, from the first prefix on
+    work = np.zeros(2, np.int64)
+    # Roots of the components that are not left out, ascending, from the first prefix on; their moments and regions.
+    heavy, count, moments, shape = np.empty(m, np.int64), 0, np.empty((m, 6)), np.empty((m, 5))
+    apart = False  # True if no two of the regions overlap
     for k in range(m):
-        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums)
+        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
         if k + 1 < start:
             continue
         top, now = find_root(parent, k), k + 1 - start
-        if k + 1 == max(start, 1):  # all components once; later only that of the new point changes
+        # all components once; later only that of the new point changes
+        if k + 1 == max(start, 1):
             for p in range(k + 1):
                 if parent[p] == p and sums[p, WEIGHT] >= least:
-                    heavy[count] = p
+                    top = heavy[count] = p
                     count += 1
+                    fit(sums[top], gate, prior, strength, shape[top])
         elif sums[top, WEIGHT] < least:  # the others are as before
             one[now] = one[now - 1]
             continue
         else:
-            kept = 0
+            count = _with_root(top, heavy, count, parent, sums, least)
+        fit(sums[top], gate, prior, strength, shape[top])
+        if count < 2:
+            one[now], apart = count == 1, True
+            continue
+        if apart or count == 2:  # no region has changed but that of the last point's component
+            apart = True
             for n in range(count):
-                if heavy[n] != top and parent[heavy[n]] == heavy[n]:
-                    heavy[kept] = heavy[n]
-                    kept += 1
-            heavy[kept], count = top, kept + 1
-        one[now] = count > 0
-        if count > 1:
+                other = heavy[n]
+                work[VISITS] += 1
+                if other != top and meet(shape[max(top, other)], shape[min(top, other)]):
+                    apart = False
+                    break
+            one[now] = count == 2 and not apart
+        if not apart and count > 2:
             for n in range(count):
                 for c in range(6):
                     moments[n, c] = sums[heavy[n], c]
-            for first in closure(moments[:count], gate, prior, strength):
-                one[now] = one[now] and first == 0
-    return one
+            label, compared = closure(moments[:count], gate, prior, strength)
+            one[now] = apart = True
+            for n in range(count):
+                one[now] = one[now] and label[n] == 0
+                apart = apart and label[n] == n
+            work[VISITS] += count + compared
+    return one, work[VISITS]
+
+
+@njit(cache=True)
+def _with_root(top: int, heavy: Ints, count: int, parent: Ints, sums: Array, least: float) -> int:
+    """Adds a root to the ascending list heavy[:count], takes out those that are no roots now, and returns the count."""
+    kept = 0
+    for n in range(count):
+        p = heavy[n]
+        if p != top and parent[p] == p and sums[p, WEIGHT] >= least:
+            heavy[kept] = p
+            kept += 1
+    at = kept
+    while at > 0 and heavy[at - 1] > top:
+        heavy[at] = heavy[at - 1]
+        at -= 1
+    heavy[at] = top
+    return kept + 1

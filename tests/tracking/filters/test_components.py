@@ -6,20 +6,10 @@ import numpy as np
 import pytest
 
 from tests import reference_components as reference
-from tracking.filters import components_kernels as kernels
-from tracking.filters.components import Constraint, partition
+from tracking.filters.components import Constraint, linked, partition, prefixes
 
 LINK = 1.5
 RULE = Constraint(LINK, 9.21, 0.09 * np.eye(2), 3.0)
-
-
-def linked(points, link):
-    return kernels.components(points, np.ones(len(points)), link)[0]
-
-
-def prefixes(points, weights, start, rule):
-    prior = rule.prior_entries
-    return kernels.prefixes(points, weights, start, rule.link, rule.gate, prior, rule.strength, rule.least)
 
 
 def random_set(r):

@@ -141,7 +141,7 @@ def associate(
             prior = rules[PRIOR_XX : PRIOR_YY + 1]
             feasible = prefixes(
                 mine, people, start, rules[LINK], rules[GATE], prior, rules[PRIOR_WEIGHT], rules[LEAST_WEIGHT]
-            )
+            )[0]
             if rules[ASSOCIATION] != PREFIXES:
                 feasible[:-1] = False
         taken = 0
