@@ -99,7 +99,6 @@ from tracking.papers.stereo.space_group import (
 )
 from tracking.running.image_scale import required
 
-LEAST_GROUP = 5  # From pixels: least number of linked features that form a group.
 LEAST_FEATURES = 3  # From pixels: least number of features that update a group (sec. 3.3).
 FEATURE_OUTLINE = 0.5  # Share of a person's footprint that a feature covers, as features lie all over the body.
 
@@ -196,7 +195,7 @@ class Stereo:
     def _measure(self, points: SpacePoints, t: float) -> None:
         c, motion = self.config, self.motion
         radius, least, update = (
-            (c.point_radius, 1, 1) if self.pictures is None else (c.radius, LEAST_GROUP, LEAST_FEATURES)
+            (c.point_radius, 1, 1) if self.pictures is None else (c.radius, c.group_points, LEAST_FEATURES)
         )
         owner = associated(self.groups, points, c)
         children: list[SpaceGroup] = []
