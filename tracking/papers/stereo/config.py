@@ -53,6 +53,8 @@ class StereoConfig(BackgroundSettings):
         "from pixels: radius of a feature's sphere; features 2 r apart are linked (eq. 12)", sees="pixels")
     point_radius: float = param(0.75, (0.1, 2.0), "m",
         "from points: radius of a point's sphere; points 2 r apart are linked (eq. 12)", sees="points")
+    group_points: int = param(5, (1, 50), "points",
+        "from pixels: least number of linked features that form a group (sec. 3.4)", "int", sees="pixels")
     merge_gate: float = param(9.0, (0.5, 30.0), "",
         "squared Mahalanobis radius of the six-dimensional regions of merging (eq. 13)")
     split_time: float = param(0.5, (0.0, 100.0), "s",

@@ -19,10 +19,10 @@ whose regions of X overlap (`merge_gate`). The foreground, subtraction stereo (s
 tracking.detect.
 
 Readings: eq. 6 is printed with y for x, and takes world for camera coordinates; here f contains the camera's pose. A
-feature has the covariance J^-1 R J^-T, with the Jacobian J of (u, v, d) and R from `pixel_noise` and
-`disparity_noise`: its error grows with the squared depth. The mean position of sec. 3.3 is that of (x, y, z),
-projected by f: the mean disparity would be biased in depth. The number of sec. 3.4 is that of the points of a
-connected component. I_n of eq. 13 is transitive. The filter is an extended one, as f is not linear.
+feature has the covariance J^-1 R J^-T, with the Jacobian J of (u, v, d) and R from `pixel_noise` and `disparity_noise`:
+its error grows with the squared depth. The mean position of sec. 3.3 is that of (x, y, z), projected by f: the mean
+disparity would be biased in depth. The number of sec. 3.4 (`group_points`) is that of the points of a connected
+component. I_n of eq. 13 is transitive. The filter is an extended one, as f is not linear.
 
 Departures. Without a parameter that switches it off, one holds in the preset `paper`, too:
 
@@ -99,7 +99,6 @@ from tracking.papers.stereo.space_group import (
 )
 from tracking.running.image_scale import required
 
-LEAST_GROUP = 5  # From pixels: least number of linked features that form a group.
 LEAST_FEATURES = 3  # From pixels: least number of features that update a group (sec. 3.3).
 FEATURE_OUTLINE = 0.5  # Share of a person's footprint that a feature covers, as features lie all over the body.
 
@@ -196,7 +195,7 @@ class Stereo:
     def _measure(self, points: SpacePoints, t: float) -> None:
         c, motion = self.config, self.motion
         radius, least, update = (
-            (c.point_radius, 1, 1) if self.pictures is None else (c.radius, LEAST_GROUP, LEAST_FEATURES)
+            (c.point_radius, 1, 1) if self.pictures is None else (c.radius, c.group_points, LEAST_FEATURES)
         )
         owner = associated(self.groups, points, c)
         children: list[SpaceGroup] = []

@@ -227,17 +227,11 @@ def beside(gap: float, frames: int) -> list[SpacePoints]:
     return made
 
 
-def count_single_features(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One feature forms and updates a group."""
-    for name in ("LEAST_GROUP", "LEAST_FEATURES"):
-        monkeypatch.setattr(f"tracking.papers.stereo.tracker.{name}", 1)
-
-
 @pytest.mark.parametrize(("gap", "parts"), [(1.6, 1), (1.9, 2)])
 def test_parts_that_would_merge_at_once_do_not_split(gap: float, parts: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Points are linked up to 1.5 m, and the regions of two points of one velocity overlap up to 1.7 m."""
-    count_single_features(monkeypatch)
-    tracker, _ = scripted(beside(gap, 90), StereoConfig(radius=0.75))
+    monkeypatch.setattr("tracking.papers.stereo.tracker.LEAST_FEATURES", 1)
+    tracker, _ = scripted(beside(gap, 90), StereoConfig(radius=0.75, group_points=1))
     assert len(tracker.groups) == parts
     assert tracker.groups[0].first_seen == 0.0
     if parts == 1:
