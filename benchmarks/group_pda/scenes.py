@@ -29,6 +29,7 @@ HEADLINE = ("merge_TP", "merge_FN", "split_TP", "split_FN")
 Column = Callable[[Sequence[Row]], str]
 WITHOUT: Mapping[str, Mapping[str, object]] = {
     "corrections": {"corrections": False},
+    "missed and hidden members": {"carry_time": 0.0},
     "association by masses: the most probable group": {"association": "nearest"},
     "association by masses: all points": {"association": "all"},
     "association and group constraint": {"association": "none"},

@@ -12,10 +12,11 @@ regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
 Splitting (sec. 3.3): a group without feasible associations for `split_time` falls apart. An association (a set of
 points that may be a group's) is feasible if its points form one group under the group constraint G_y
 (tracking.filters.components). `fall_apart` partitions the points (M, 2) of such a group by G_y and replaces its row of
-the bank by one row per part. A group that G_y leaves whole stays. With `corrections` the parts stay parts of one group
-(ours), and so do newborn groups beside a member: misses, sway and noise take people apart for a moment. Each part is
-tracked by itself; the group is their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates
-become one row again. Sets of parts whose people have been more than 1.5 m from the rest's for `confirm_time` split off.
+the bank by one row per part. A group that G_y leaves whole stays. Each member's place, hidden or not, goes to the part
+with the nearest point (ours). With `corrections` the parts stay parts of one group (ours), and so do newborn groups
+beside a member: misses, sway and noise take people apart for a moment. Each part is tracked by itself; the group is
+their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates become one row again. Sets of
+parts whose people have been more than 1.5 m from the rest's for `confirm_time` split off.
 
 Onsets (ours): when an event that is known now began. The onset of a split is measured from the group's earlier points,
 divided among the parts. Distances are metres on the ground (in an image depth is stretched to it). The distances and
@@ -45,9 +46,8 @@ from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
-# s before and after a moment for the chord of parts that leave: one step, so that sway has no part in it.
-STEP_TIME = 0.5
-WALK_TIME = 0.8  # s before and after a moment for the difference of two groups' velocities: that of two steps in all.
+# s before and after a moment for the difference of two groups' or parts' velocities: that of two steps in all.
+WALK_TIME = 0.8
 BEFORE = 16  # Places by which the way before the first moment is known.
 # Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three.
 REACH = 1.1
@@ -122,7 +122,7 @@ def split_onset(
         apart.append(middle[1] - middle[0])
     when, d = np.array(times[::-1]), np.array(apart[::-1])
     gap = np.hypot(*d.T) - reach
-    slow = chords(when, d, STEP_TIME) < SPLIT_VELOCITY
+    slow = chords(when, d, WALK_TIME) < SPLIT_VELOCITY
     together = (gap <= MERGE_DISTANCE) | ((gap <= SPLIT_DISTANCE) & slow)
     k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(when) - 1)
     return float(when[k]), before[k][1].mean(0) / metres_per_unit
@@ -334,6 +334,11 @@ def fall_apart(
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
     parts.recent_points[largest] = bank.recent_points[row]
+    places, members = bank.positions(row), bank.members[row]
+    of = group[cKDTree(points).query(places)[1]]
+    for k in range(len(parts)):
+        offset = places[of == k] - parts.x[k, :2]
+        parts.members[k] = MemberPlaces(offset, members.last_seen[of == k], members.known[of == k])
     if bank.id[row] != NO_ID:
         parts.parent[:] = bank.group[row]
         parts.parent[largest] = bank.parent[row]

@@ -54,8 +54,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - pixels: on a grid of 0.1 m, each a share of a person. Paper: all, each counts one. Why: N in people; speed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
   similar groups cross.
-- split: after `split_time`; measured frames count back; (c) parent's velocity. Paper: after infeasible frames, at
-  rest. Why: misses.
+- split: after `split_time`; measured frames count back; members' places go along; (c) parent's velocity. Paper: after
+  infeasible frames, at rest. Why: misses.
 - parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
   some have been more than 1.5 m from the rest for `confirm_time`; a part that is not measured holds the others; R_x
   joins parts again. Paper: new groups at once. Why: misses and sway take people apart for a moment.
