@@ -35,10 +35,9 @@ HIGHEST_FALSE_SCORE = 0.7  # of a false alarm whose detector has no measured sco
 def frame_uniforms(generator: np.random.Generator, first: int, frames: int, per_frame: int) -> Array:
     """Returns uniforms, (frames, per_frame), for frames `first` to `first` + frames - 1 (frames from 1 on).
 
-    They are above 0 and at most 1; a value may round to 1. The generator must be new, and is advanced: past the numbers
-    of the frames before `first` and those returned. It spends `per_frame` numbers on each frame, so that a frame's
-    draws do not depend on `first`. Raises AttributeError if the generator's bit generator cannot be advanced; numpy's
-    default can.
+    They are above 0 and at most 1. The generator must be new. It first skips `per_frame` numbers for each frame before
+    `first`, so that the numbers of a frame do not depend on `first`. Raises AttributeError if the generator's bit
+    generator cannot be advanced; numpy's default can.
     """
     generator.bit_generator.advance((first - 1) * per_frame)  # type: ignore[attr-defined]
     return uniforms(generator, (frames, per_frame))
@@ -150,5 +149,5 @@ def correlated_normals(
 
 
 def ticks(frame: Ints, fps: float) -> Ints:
-    """Returns the ticks (F,) of the detector's clock, from 0 on, that are nearest to the times of frames (F,)."""
+    """Returns the ticks (F,), from 0, of the detector's clock (50 Hz) nearest to the times of frames (F,), from 1."""
     return np.asarray(np.floor((frame - 1) / fps * CLOCK + 0.5), np.int64)
