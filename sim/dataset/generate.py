@@ -205,7 +205,7 @@ def generate(
 
     Returns:
         The folders, in the order of entries, all seeds of an entry together. `left_out` has the errors of sequences
-        left out because their script did not come true.
+        left out because an order of their script did not come true.
 
     Raises:
         InputError: An argument is wrong, a folder holds another sequence, or all failures are InputErrors.

@@ -88,7 +88,7 @@ def _normals() -> NDArray[np.float32]:
 
 
 def noise_pool(sd: float, unit: float) -> NDArray[np.int16]:
-    """Returns the pool (POOL + LONGEST,) of normal numbers of `sd` grey levels, times `unit`, rounded to int16."""
+    """Returns (POOL + LONGEST,) int16: normal numbers of standard deviation `sd` grey levels, times `unit`, rounded."""
     return np.asarray(np.clip(np.rint(_normals() * np.float32(sd * unit)), -32768, 32767), np.int16)
 
 
@@ -98,7 +98,7 @@ def _offsets_of_frames(rows: int, seed: int, side: int, draw: int, repeat: int) 
 
 
 def noise_offsets(rows: int, seed: int, side: int, frame: int, repeat: int = 0) -> Ints:
-    """Returns where in the pool the noise of each image row begins: (rows,).
+    """Returns the index in the noise pool at which the noise of each image row begins, (rows,).
 
     side: 0 the left camera, 1 the right one. frame: number from 1 plus BACKGROUNDS; background images have 1 to 50.
     """
@@ -135,7 +135,7 @@ class CameraView:
         return FrameCanvas(self.empty_canvas.copy(), self.geometry.depth.copy(), np.zeros(size, np.uint8), dirty)
 
     def return_canvas(self, canvas: FrameCanvas) -> None:
-        """Restores a canvas of this view to the empty scene, and keeps it for a later `take_canvas`."""
+        """Takes back a canvas of `take_canvas`: restores it to the empty scene and keeps it for the next call."""
         from sim.render.canvas_kernels import restore
 
         flat = self.height, 3 * self.width
@@ -200,7 +200,7 @@ class CameraView:
 
     @cached_property
     def level(self) -> bool:
-        """Returns True if the image shows nothing but level ground and sky, so that shadows fall only on z = 0."""
+        """True if the image shows only level ground and sky, so that shadows fall only on z = 0."""
         return bool(((self.geometry.kind == GROUND) | (self.geometry.kind == NOTHING)).all())
 
     @cached_property
