@@ -80,8 +80,7 @@ def labels_hash(truth: Truth) -> str:
 
 
 def content_hash(truth: str, detections: Any, pixels: Mapping[str, str] | None = None) -> str:
-    """Returns the SHA-256 (64 hex digits) of a whole sequence: its truth, its detections, and the raw pixels of its
-    streams.
+    """Returns the SHA-256 (64 hex digits) of a sequence: its truth, detections and raw pixels.
 
     truth: the sequence's truth_hash. detections: list of Detections, one per frame, empty without a detector. pixels:
     hash of the pictures before encoding, by stream name; None or empty without pictures. The hash is therefore the same

@@ -470,7 +470,7 @@ def group_names(group: GroupSpec) -> list[str]:
 
 
 def expand(pattern: str, names: list[str]) -> list[str]:
-    """Returns the names that a pattern means: for `g-*` those that begin with `g-`, else the pattern itself."""
+    """Returns for a pattern `g-*` those of `names` that begin with `g-`; for any other pattern the pattern itself."""
     return [n for n in names if n.startswith(pattern[:-1])] if pattern.endswith("*") else [pattern]
 
 

@@ -52,8 +52,7 @@ def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> A
 
 
 def move_edges(box: Array, move: Array) -> Array:
-    """Returns boxes (R, 4), left, top, width, height in px, whose edges are moved by move (R, 4) px; `box` is not
-    changed.
+    """Returns boxes (R, 4), left, top, width, height in px, whose edges are moved by move (R, 4) px.
 
     Columns of move: left edge, top edge, right edge, lower edge; positive is to the right or downwards. Width and
     height keep at least 1 px, or their former value if that was less; then the right or lower edge yields.

@@ -44,11 +44,10 @@ def frame_uniforms(generator: np.random.Generator, first: int, frames: int, per_
 
 
 def interpolated_quantiles(curve: tuple[float, ...], u: Array) -> Array:
-    """Returns the quantiles (N,) at u (N,), 0 to 1, of a distribution given by evenly spaced quantiles, linear between
-    them.
+    """Returns the quantiles (N,) at u (N,), 0 to 1, of a distribution given by some of its quantiles.
 
-    curve: the quantiles from u = 0 to u = 1, at least two numbers, in ascending order. u outside 0 to 1 gives the first
-    or last of them.
+    The result is linear between these. curve: evenly spaced quantiles from u = 0 to u = 1, at least two numbers, in
+    ascending order. u outside 0 to 1 gives the first or last of them.
     """
     values = np.array(curve)
     place = np.clip(u, 0.0, 1.0) * (len(values) - 1)
@@ -57,8 +56,7 @@ def interpolated_quantiles(curve: tuple[float, ...], u: Array) -> Array:
 
 
 def true_scores(u: Array, visibility: Array, sensor: Sensor) -> Array:
-    """Returns the scores (N,) in [0, 1] of N true detections at uniforms u (N,), 0 to 1, by their visibility (N,), 0 to
-    1.
+    """Returns the scores (N,) in [0, 1] of N true detections at uniforms u (N,) and visibility (N,), both 0 to 1.
 
     If `sensor.true_scores` is given, they are its quantiles at u, whatever the visibility. Else they are 1 for a
     detector without misses and false alarms (`sensor.detect_prob` 1, `sensor.clutter_rate` 0). Otherwise the score is
@@ -100,12 +98,11 @@ class Readings:
 
 
 def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> list[Detections]:
-    """Returns a list of truth.length Detections, for frames 1 on: true detections and false alarms mixed, in random
-    order.
+    """Returns one Detections for each of the frames 1 to truth.length: true detections and false alarms together.
 
-    A frame without any has empty Detections. The plane is "ground" (positions in m) if the truth has positions, else
-    "image" (px). Boxes are None unless `true` and `false` both have boxes. Velocities are None. Readings outside frames
-    1 to truth.length are dropped.
+    They are in the order of `order`. A frame without any has empty Detections. The plane is "ground" (positions in m)
+    if the truth has positions, else "image" (px). Boxes are None unless `true` and `false` both have boxes. Velocities
+    are None. Readings outside frames 1 to truth.length are dropped.
     """
     frame = np.concatenate([true.frame, false.frame])
     order = np.lexsort((np.concatenate([true.order, false.order]), frame))

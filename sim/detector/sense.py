@@ -42,8 +42,7 @@ def sense(
     truth: Truth, sensor: Sensor, seed: int, camera: Camera | None = None, image_size: tuple[int, int] | None = None,
     repeat: int = 0, people: Mapping[str, tuple[int, ...]] | None = None,
 ) -> list[Detections]:  # fmt: skip
-    """Returns a list of truth.length Detections, for frames 1 on: what the simulated detector reports, false alarms
-    included.
+    """Returns one Detections for each of the frames 1 to truth.length, with the false alarms of the detector.
 
     If the truth has positions, `pos` is the ground point (m), with the box beside it if boxes are known. Else `pos` is
     the centre of the box (px). A person whose box has a nan is not detected. Detections of a frame are in random order,

@@ -128,8 +128,7 @@ class Identities:
         self, t: int, people: PersonSet, parts: Iterable[PersonSet], entered: PersonSet = frozenset(),
         known: Members = NOBODY,
     ) -> list[GroupChange]:  # fmt: skip
-        """Takes the partition at time t and returns the changes since the last step; in the first step all groups
-        enter.
+        """Takes the partition at time t and returns the changes since the last step; at first all groups enter.
 
         people: all people present. parts: the partition. entered: as for `lineage`. known: as for `name`.
         """

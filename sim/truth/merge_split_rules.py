@@ -128,8 +128,7 @@ def runs(first: Ints, end: Ints) -> tuple[Ints, Ints]:
 
 
 def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Ints, Ints, Ints]:
-    """Returns pair, first frame and last frame, (S,) each, of all stretches from first to last of `least` frames or
-    more.
+    """Returns pair, first frame and last frame, (S,) each, of all stretches of at least `least` frames.
 
     pair, frame (K,): rows sorted by pair, then frame. A stretch has rows of one pair; the difference of one frame to
     the next is at most `bridge`. The result is sorted by pair, then frame.

@@ -153,8 +153,7 @@ class _TrackFacts(BaseModel):
 
 
 def read_track_table(folder: Path) -> list[Tracks]:
-    """Returns the tracks of tracks.parquet in `folder`, one Tracks per frame, with its groups.parquet, without
-    events."""
+    """Returns the tracks of tracks.parquet in `folder`, one Tracks per frame, with groups but without events."""
     table = tables.read_table(folder / EXACT)
     f = table.facts_as(_TrackFacts)
     state = _state(f.plane)
@@ -207,10 +206,10 @@ def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["meas
 
 
 def upright_boxes(camera: Camera, pos: Array) -> Array:
-    """Returns the boxes (N, 4), left, top, width, height in px, of people 1.7 m tall and 0.5 m wide at `pos` (N, 2 or
-    3) m.
+    """Returns the boxes (N, 4), left, top, width, height in px, of people at `pos` (N, 2 or 3) m.
 
-    Not clipped to the image; nan for a person who is partly behind the camera, and for a nan position.
+    A person is 1.7 m tall and 0.5 m across. Not clipped to the image; nan for a person who is partly behind the camera,
+    and for a nan position.
     """
     from sim.scene.camera import project
 
@@ -350,8 +349,8 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
         length: Frames of a text; None: to the last frame in the file.
 
     Returns:
-        One Tracks per frame, each with the events that the file puts there; without a frame, an event is in that of
-        its field `emitted`, else in its last frame.
+        One Tracks per frame, each with the events reported in this frame. An event stored without that frame is put
+        in the frame `emitted`, else in its last frame.
 
     Raises:
         InputError: There are no tracks, or they are unfinished, damaged, invalid or mixed with those of another run.

@@ -30,8 +30,8 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
         folder: A sequence, a run, or a folder of some.
 
     Returns:
-        Leftovers of interrupted runs, faults of seqmaps/, then those of each sequence and run, sorted by path. If files
-        are damaged, nothing else is reported for their sequence or run.
+        Leftovers of interrupted runs, faults of seqmaps/, then faults of each sequence and run, sorted by path; [] if
+        all is well. If files are damaged, nothing else is reported for their sequence or run.
 
     Raises:
         InputError: There is nothing to check.
