@@ -104,7 +104,7 @@ def order(event: ScriptOrder) -> str:
 
 
 def sensor(scenario: Scenario) -> list[str]:
-    """Returns lines about the scenario's sensor: how often it detects, and the keys that differ from the defaults."""
+    """Returns lines of text about the sensor: its rates, each other key that differs from the default, `hide`."""
     s = scenario.sensor
     changed = s.model_dump(exclude_defaults=True, exclude={"detect_prob", "clutter_rate", "hide"})
     rate = f"{s.clutter_rate:g} false alarms per frame"

@@ -54,7 +54,7 @@ def sensor_settings(path: str | Path) -> tuple[str, ...]:
 
 
 def sensor_table(path: str | Path) -> Table:
-    """Returns the keys given in the file's [sensor] table with their values, without defaults."""
+    """Returns the keys that are given in the file's [sensor] table, with their values; no defaults are added."""
     path = Path(path)
     table = toml_files.parse(path, "check the path, or make one with `flockscope fit sensor`")
     validate(table, path, model=SensorFile)
@@ -156,8 +156,7 @@ def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
 
 
 def rows(name: str) -> list[SuiteEntry]:
-    """Returns one SuiteEntry for each scenario with settings that a name, as of `resolve`, stands for; copies count
-    once.
+    """Returns one SuiteEntry for each scenario for which a name, as `resolve` takes it, stands; copies count once.
 
     `scenario` of each can be given to `load` from any working folder.
     """

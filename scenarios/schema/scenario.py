@@ -29,7 +29,7 @@ Pixels = Annotated[float, within(0.0, 100.0, " px")]
 
 
 class LightSwitch(Model):
-    """A sudden change of brightness, as of a lamp or a cloud; those of several switches multiply.
+    """A sudden change of brightness, as of a lamp or a cloud; the factors of several switches are multiplied.
 
     Attributes:
         at: time of the change, s
@@ -335,7 +335,7 @@ class When(Model):
 
 
 class SplitPart(Model):
-    """One part of a group that splits; the first parts without size get one more of a rest.
+    """One part of a group that splits; of parts without size, the first ones get one more person if needed.
 
     Attributes:
         id: name of the new group

@@ -34,7 +34,7 @@ FixedPoint = tuple[float, float]
 
 
 class Model(BaseModel):
-    """Base class of all tables of scenario files: frozen, without unknown keys, infinite numbers and nan."""
+    """Base class of all tables of scenario files. It is frozen and refuses unknown keys, infinite numbers and nan."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
@@ -62,7 +62,7 @@ class Model(BaseModel):
 
 
 class Distribution(Model):
-    """One of five distributions of a number: exactly one of the keys besides `clip` is given."""
+    """A distribution of a number, of one of five kinds: exactly one of the keys other than `clip` is given."""
 
     normal: tuple[float, Annotated[float, Field(ge=0)]] | None = None
     uniform: tuple[float, float] | None = None

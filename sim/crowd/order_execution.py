@@ -44,7 +44,7 @@ class ServiceQueue:
     busy_until: float | None = None
 
     def slot(self, k: int) -> Array:
-        """Returns the place (2,) with index k in the queue; 0 is the head's."""
+        """Returns the place (2,) m of the k-th person in the queue; k = 0 is the head."""
         return self.head + k * self.spacing * self.along
 
     def remove(self, g: int) -> None:
@@ -97,7 +97,7 @@ EPS = 1e-9  # s
 
 @dataclass
 class PendingOrder:
-    """One order of the script and what became of it. Times count from the first recorded frame, s."""
+    """One order of the script and its progress. Times are in s after the first recorded frame."""
 
     order: MergeOrder | SplitOrder | QueueOrder
     index: int  # in the file, from 0;
@@ -117,9 +117,9 @@ class PendingOrder:
     after: tuple[tuple[int, ...], ...] = ()
 
     def is_due(self, t: float, state: Array, groups: GroupState, come_true: set[str]) -> bool:
-        """Returns True if the order fires at time t (s): `delay` after its trigger was first met.
+        """Returns True if the order fires at time t (s): its groups are present, and its trigger was met `delay` s ago.
 
-        state (P, 4): x, y, vx, vy by column. come_true: ids of the orders that have come true.
+        state (P, 4): x, y, vx, vy by column. come_true: ids of the orders whose rule has held long enough.
         """
         names = concerned(self.order, list(groups.alive))
         # An order waits until every group that it concerns exists and is wholly in the scene.

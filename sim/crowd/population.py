@@ -23,7 +23,7 @@ from sim.types import Array, Order, Scene
 
 @dataclass(frozen=True)
 class PlannedStop:
-    """One stop of one group, drawn."""
+    """One stop of one group, with all random values drawn."""
 
     at: Array  # (2,) place in the world, m
     stay: float  # s
@@ -64,7 +64,7 @@ PLACE_TIME = 10.0  # s, correlation time of the fluctuation of the place in the 
 
 @dataclass(frozen=True)
 class ScriptPlacement:
-    """How a seed places a whole script in the world."""
+    """How the script is mirrored, turned and advanced in the world; drawn with the seed."""
 
     middle: Array  # (2,) middle of the world, m, about which the script is turned
     turn: float  # angle in radians, counter-clockwise
@@ -115,7 +115,7 @@ class EnteringGroup:
 
     @property
     def walks(self) -> bool:
-        """True if the first stop, else the goal, is more than STANDING_DISTANCE from the start."""
+        """True if the group's first stop, or its goal if it has no stops, is more than 0.3 m from its start."""
         return bool(length(self.leg(self.stops)[1] - self.start) > STANDING_DISTANCE)
 
     def leg(self, stops: Sequence[PlannedStop]) -> tuple[list[Array], Array, str]:

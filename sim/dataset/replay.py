@@ -104,7 +104,7 @@ def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: flo
 
 
 def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
-    """Returns f (N, 2), the values at its knots t (N,) of the natural cubic spline that minimises Σ |y - f|² + weight ∫
+    """Returns the values f (N, 2) at its knots t (N,) of the natural cubic spline of least Σ |y - f|² + weight ∫
     |f''|².
 
     Reinsch (1967): f = y - weight Q γ with (R + weight Qᵀ Q) γ = Qᵀ y. γ (N - 2,) is f'' at the inner knots. Qᵀ forms

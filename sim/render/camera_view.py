@@ -59,7 +59,7 @@ class PixelGeometry:
 
 @dataclass(frozen=True)
 class EmptyScene:
-    """The painted empty scene, float32; per pixel the mean of `picture.samples` rays each way, at least 2 at edges."""
+    """The painted empty scene, float32; each pixel is a mean of samples x samples rays, at least 2 x 2 at edges."""
 
     colour: Floats  # (H, W, 3) BGR in grey levels, 0 or more, not clipped at 255; lit, without plants' sway and noise
     # (H, W) share of direct sun in the pixel's light, 0 to 1; 0 for sky and where a solid thing hides the sun
@@ -127,7 +127,7 @@ class CameraView:
         self._spare: list[FrameCanvas] = []
 
     def take_canvas(self) -> FrameCanvas:
-        """Returns a canvas of the empty scene to draw on, all tiles clean; give it back with `return_canvas`."""
+        """Returns a canvas that shows the empty scene, to draw on; give it back with `return_canvas`."""
         if self._spare:
             return self._spare.pop()
         size = self.height, self.width
@@ -225,7 +225,7 @@ class CameraView:
         return self.light.clouds.sampled(*self._nodes)
 
     def brightness(self, t: float, key: int) -> NDArray[np.float32]:
-        """Returns the brightness at time t (s) at the nodes (J, I), or (1, 1) if it is the same everywhere.
+        """Returns the factor of brightness at time t (s) at every 16th pixel, (J, I); (1, 1) if equal everywhere.
 
         key: frame number from 1 plus BACKGROUNDS; it names the random stream of the flicker.
         """
@@ -241,7 +241,7 @@ class CameraView:
         return [waves.sampled(places, np.zeros(len(places))) for waves in self.plants.sway]
 
     def wind(self, t: float) -> NDArray[np.float32]:
-        """Returns the sway of plants at time t (s) at the nodes, (2, J, I): px across, px down."""
+        """Returns how far plants are displaced at time t (s) at the nodes, (2, J, I): px to the right, px down."""
         assert self.plants is not None
         strength = self.plants.strength(t)
         return np.stack([self._grid(strength * field(t)) for field in self._sway])

@@ -93,7 +93,7 @@ class Renderer:
 
     @cached_property
     def left_view(self) -> CameraView:
-        """The empty scene as the camera sees it."""
+        """The empty scene as the left (or only) camera sees it."""
         return self._view(self.camera, 0)
 
     @cached_property
@@ -169,7 +169,7 @@ class Renderer:
         return self._draw(self._shown_right_view, index, shade=True, label=False)[0]
 
     def pixels(self, index: int, *, disparity: bool = False) -> PixelTruth:
-        """Returns the PixelTruth of frame `index`, from 1, with disparities if asked for."""
+        """Returns the PixelTruth of frame `index`, from 1. disparity: True adds the disparities, else they are None."""
         truth = self._draw(self.left_view, index, shade=False, label=True, disparity=disparity)[1]
         assert truth is not None
         return truth

@@ -28,7 +28,7 @@ XX, XY, YY = 0, 1, 2  # entries of a symmetric 2 x 2 matrix packed by `packed_in
 
 @dataclass(frozen=True)
 class BodyPart:
-    """One ellipsoid (body or head) of a person of height 1; all numbers are shares without unit."""
+    """The shape of one ellipsoid, body or head, of every person; all numbers are shares without unit."""
 
     centre: float  # height of its centre above the ground, share of the person's height
     across: float  # half axis to the right; share of the height for HEAD, of the person's width for BODY
@@ -71,7 +71,7 @@ class RecordedBodies:
 
 
 def half_axes(height: Array, width: Array | None = None, depth: Array | None = None) -> Array:
-    """Returns the half axes (N, 2, 3) m of N people: body, head; across, along the heading, up.
+    """Returns the half axes (N, 2, 3) m of N people. Second axis: body, head; third: across, along the heading, up.
 
     height, width, depth (N,): m; None: of the usual proportions. Width and depth change the body only.
     """

@@ -52,12 +52,12 @@ def solids_of(scene: Scene) -> Solids:
 
 
 def only_flights(flights: Array) -> Solids:
-    """Returns these flights of stairs (S, 9) without walls and pillars."""
+    """Returns the Solids that consist of these flights of stairs (S, 9), without walls and pillars."""
     return Solids(np.zeros((0, 4)), 0.0, np.zeros((0, 3)), 0.0, flights)
 
 
 def unprojection(camera: Camera) -> Array:
-    """Returns Rᵀ K⁻¹ (3, 3) of a pinhole camera, which maps (u, v, 1) px to the direction of sight, of depth 1."""
+    """Returns Rᵀ K⁻¹ (3, 3) of a pinhole camera: it maps (u, v, 1) px to the direction of sight in the world."""
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     inverse = np.array([[1 / fx, 0, -cx / fx], [0, 1 / fy, -cy / fy], [0, 0, 1]])
     return product(camera.rotation.T, inverse)

@@ -59,7 +59,7 @@ class Separation:
 
 
 def separation(pos: Array, vel: Array, a: Ints, b: Ints) -> Separation:
-    """Returns how far apart the people in columns a and those in columns b are in each frame.
+    """Returns the Separation of two parts of a crowd, the people in columns a and those in columns b, in each frame.
 
     pos, vel (T, P, 2): m, m/s, nan while absent.
     """

@@ -194,10 +194,10 @@ def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> l
     """Returns a queue event for each queue, in order of first and last frame.
 
     pos, vel (T, P, 2): m, m/s. present (T, P). group (T, P): group ids, -1 = alone. A queue is a line (see
-    `queue_shapes`) of people who wait, that has QUEUE_PEOPLE for QUEUE_TIME and may be lost for BRIDGE_TIME. A line
-    that moves sideways is none. The event starts in the first frame with 3 people and ends in the last with two in
-    line. About MAX_RATE frames per second are examined. Its members are all who were in line for MEMBER_TIME. Its
-    position is the middle of the line when it was first followed.
+    `queue_shapes`) of waiting people that has at least 3 people for 3 s; it may be lost for up to 1.5 s. A line that
+    moves sideways is no queue. The event starts in the first frame with 3 people and ends in the last frame with 2 in
+    line. Its members are all people who were in the line for at least 1 s. Its position is the middle of the line when
+    it was first found. About 10 frames per s are examined.
     """
     there = present & np.isfinite(pos).all(axis=2)
     stride = max(1, round(fps / MAX_RATE))

@@ -125,7 +125,7 @@ def _submit(client: Any, function: Callable[[Any], Any], item: Any) -> Any:
 
 @dataclass(frozen=True)
 class ClusterCall:
-    """A call whose unpickling runs it, and gives a pickled WorkResult."""
+    """A call that runs when it is unpickled: unpickling gives the pickled WorkResult."""
 
     call: bytes
     required: tuple[tuple[str, str], ...]

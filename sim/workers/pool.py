@@ -108,7 +108,7 @@ class WorkerProcess:
         return self._pipe
 
     def receive(self) -> WorkResult | None:
-        """Returns the outcome of the call that was sent last; None if the process died, and then sets `ended`."""
+        """Returns the outcome of the call that was sent last; if the process died, sets `ended` and returns None."""
         try:
             body = self._pipe.recv_bytes()
         except (EOFError, OSError):
@@ -158,7 +158,7 @@ def _serve(pipe: Any) -> None:
 
 
 def run_pickled(call: bytes) -> bytes:
-    """Runs a pickled (function, item) and returns the pickled WorkResult; never raises, not even SystemExit."""
+    """Runs a pickled (function, item) and returns the pickled WorkResult; exceptions are put in it, never raised."""
     try:
         function, item = pickle.loads(call)
         return pickle.dumps(WorkResult(function(item)))

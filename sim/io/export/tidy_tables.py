@@ -61,7 +61,7 @@ class TidyTable:
     """One tidy table; `to_arrow` and `to_pandas` give it to other libraries.
 
     Attributes:
-        columns: By name one value for each row: an array with nan for unknown, or a list of texts or of lists of ids.
+        columns: The values of all rows by name of the column: an array, nan if unknown, or a list of texts or id lists.
     """
 
     columns: Mapping[str, Any]

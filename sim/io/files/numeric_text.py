@@ -97,7 +97,7 @@ class TextRows:
         return "," if self.text and "," in self.text[0] else None
 
     def cells(self) -> Iterator[list[str]]:
-        """Yields the cells of each row."""
+        """Yields the cells of each row as a list of texts."""
         separator = self.separator
         return (line.split(separator) for line in self.text)
 
@@ -151,7 +151,7 @@ class TextRows:
 
 
 def read_rows(path: Path, comments: bool = False) -> TextRows:
-    """Returns the rows of a text. comments: True leaves out the lines that begin with #."""
+    """Returns the rows of the text file `path`. comments: True leaves out lines that begin with #."""
     numbered = enumerate(read_text(path).splitlines(), 1)
     found = [(k, line) for k, line in numbered if line.strip() and not (comments and line[:1] == "#")]
     return TextRows(path, tuple(line for _, line in found), np.array([k for k, _ in found], np.int64))
@@ -180,7 +180,7 @@ def whole_or_number(text: str) -> int | float | str:
 
 
 def number_or_nan(text: str | None) -> float:
-    """Returns the number of a text, nan for another text and for None."""
+    """Returns the number that a text states; nan for None and for a text that is no number."""
     return read_number(text) if text is not None and is_number_text(text) else float("nan")
 
 

@@ -53,7 +53,7 @@ SOFTWARE = _chunk(b"tEXt", b"Software\0" + GENERATOR.encode())  # the second chu
 
 
 def marked_png(picture: bytes) -> bytes:
-    """Returns a PNG file's bytes with the name of our program in it."""
+    """Returns the bytes of a PNG file, `picture`, with the name of flockscope added, by which `is_ours` knows it."""
     return picture[:IHDR_END] + SOFTWARE + picture[IHDR_END:]
 
 

@@ -100,7 +100,7 @@ class StoredTable:
         return column
 
     def facts_as(self, kind: type[M]) -> M:
-        """Returns the table's metadata as a model."""
+        """Returns the table's metadata as the model `kind`; raises InputError for wrong values."""
         return validated(self.file, self.facts, kind, REDO, "schema")
 
     def cuts(self, first: int, count: int) -> Ints:

@@ -59,7 +59,7 @@ def _parted(slot: Ints, people: list[set[int]]) -> Ints:
 
 
 def read_groups(path: Path) -> dict[int, int]:
-    """Returns the group label of each person in a groups.txt, by person id; people alone have no entry."""
+    """Returns by person id the group label that a groups.txt gives each person; people alone have no entry."""
     label: dict[int, int] = {}
     for number, line in enumerate(read_text(path).splitlines(), 1):
         members = person_ids(path, f"line {number}", line)

@@ -53,7 +53,7 @@ def labelled_sequence(
     kind: str, path: Path, name: str, fps: float, length: int, load_truth: Callable[[], Truth],
     px_per_m: float = float("nan"), **more: Any,
 ) -> Sequence:  # fmt: skip
-    """Returns a recording of labels alone, without pictures and detections. more: further entries of its source."""
+    """Returns a Sequence with a truth, but no pictures and detections. more: further entries of its `source`."""
 
     def frames() -> Iterator[Frame]:
         return (Frame(index, (index - 1) / fps) for index in range(1, length + 1))
@@ -135,7 +135,8 @@ def differentiate(frame: Ints, id: Ints, pos: Array, fps: float, window: float =
 
 
 def chords(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:
-    """Returns the velocity of each row (R, D): the chord from the id's earliest row of the last `window` s to the row.
+    """Returns the velocity of each row (R, D): displacement since the id's earliest row in the last `window` s, over
+    time.
 
     frame, id (R,), pos (R, D): rows in any order, each id once in a frame. nan without an earlier row within the
     window.

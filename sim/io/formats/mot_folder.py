@@ -41,7 +41,7 @@ class SeqInfo:
 
 
 def read_seqinfo(path: Path) -> SeqInfo:
-    """Reads the section [Sequence] of a seqinfo.ini; in an empty file every key counts as missing."""
+    """Returns the values in the section [Sequence] of a seqinfo.ini; default values for missing keys."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read_string(read_text(path))

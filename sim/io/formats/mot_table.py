@@ -133,7 +133,7 @@ EXPECTED = (
 
 
 def column_names(text: TextRows) -> list[str] | None:
-    """Returns the names in the first line of a text, in lower case; None if a cell of it is a number."""
+    """Returns the column names in a text's first line, in lower case; None if it has a number, and so no names."""
     line = text.text[0] if text.text else ""
     if ";" in line:
         got, expected = line[:80], "columns apart by commas, blanks or tabs"
@@ -263,7 +263,7 @@ def read_table(
     path: Path, *, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None,
     frames_at: FramesAt | None = None,
 ) -> MotTable:  # fmt: skip
-    """Reads a MOTChallenge text of 6 to 10 columns, or of 4: frame, id, x, y in m.
+    """Returns the MotTable of a MOTChallenge text of 6 to 10 columns, or of 4: frame, id, x, y in m.
 
     length: the last frame allowed. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors that make the
     boxes pixels. frames_at: as `read_named` takes it. Rows stay in the order of the file.

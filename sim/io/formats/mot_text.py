@@ -226,7 +226,7 @@ def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bool
 
 
 def classes_of(table: MotTable, named: bool) -> Array | None:
-    """Returns column 8 (N,) if it holds classes, else None. named: True if the user named one (--class)."""
+    """Returns column 8 (N,) if it holds classes, else None. named: True if the user gave --class."""
     if table.rest.shape[1] < 2 or table.on_ground or (table.rest[:, 1] == -1).all():
         return None
     column = table.rest[:, 1]

@@ -129,6 +129,5 @@ class BackgroundSample:
 
 
 def with_copies(sample: Image, empty: Image) -> Image:
-    """Returns a sample (K, H, W, 3) followed by K + 1 copies of a picture of the empty place, which then has the
-    majority at each pixel."""
+    """Returns a sample (K, H, W, 3) and K + 1 copies of `empty`, which is then the majority at each pixel."""
     return np.concatenate([sample, np.broadcast_to(empty, (len(sample) + 1, *empty.shape))])

@@ -53,7 +53,7 @@ Key = tuple[tuple[str, ...], tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Numbering:
-    """How picture numbers become frames: frame = (number - origin) / step + 1."""
+    """How the number of a picture becomes its frame (from 1): frame = (number - origin) / step + 1."""
 
     origin: int = 1  # the number of frame 1
     step: int = 1  # between the numbers of successive frames

@@ -170,7 +170,7 @@ class StoredPictures:
 
     @property
     def images(self) -> str:
-        """File type of the pictures; "png" without pictures or with 16-bit streams only."""
+        """File type of the pictures; "png" if there are none, or only 16-bit streams (ids, disparity)."""
         return self.manifest.get("images") or "png"
 
     def body(self, name: str) -> bytes:
@@ -204,7 +204,7 @@ class StoredPictures:
         return width, height
 
     def all(self, stream: str, count: int, wanted: list[int] | None = None) -> Iterator[NDArray[Any]]:
-        """Yields the pictures 1 to `count` of a stream, or only the numbers `wanted` (ascending, from 1)."""
+        """Yields pictures 1 to `count` of a stream; wanted: only those of these numbers (from 1, ascending)."""
         if streams.suffix(stream, self.images) != "mp4":
             yield from (self.one(stream, k) for k in wanted or range(1, count + 1))
             return
@@ -219,7 +219,7 @@ class StoredPictures:
             raise InputError(file=path, got=f"{found} pictures", expected=count, remedy=REDO)
 
     def sample(self, wanted: list[int]) -> Iterable[tuple[int, Image]]:
-        """Returns (frame, picture) of the left camera for the frames `wanted` (from 1, ascending)."""
+        """Yields (frame, picture) of the left camera for the frames `wanted` (from 1, ascending)."""
         return zip(wanted, self.all("left", self.manifest["sequence"]["length"], wanted), strict=True)
 
     def pixel_loader(self) -> Callable[[int], PixelTruth]:

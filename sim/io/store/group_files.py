@@ -62,7 +62,7 @@ def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
 
 
 def read_near(path: Path) -> Near:
-    """Reads a near.csv."""
+    """Returns the hard negatives in a near.csv; raises InputError for a wrong line."""
     text = read_rows(path)
     header = "".join(text.text[:1])
     if header != NEAR_COLUMNS:
@@ -90,7 +90,7 @@ class _Orders(BaseModel):
 
 
 def read_script(path: Path) -> tuple[Order, ...]:
-    """Reads the orders of a script.json; a missing list gives none."""
+    """Returns the orders in a script.json; () if it has no list of orders."""
     found = validated(path, tables.read_document(path), _Orders, "restore it").orders
     return tuple(Order(**order.model_dump()) for order in found)
 
@@ -233,7 +233,7 @@ class _GroupRow(BaseModel):
 def read_groups_csv(path: Path, length: int) -> list[Groups]:
     """Reads a groups.csv, ours or another program's, as the Groups of each frame from 1 to `length`.
 
-    Velocities are 0, extents nan. Groups and members are sorted by id.
+    The file has no velocities and extents: they are 0 and nan. Groups and members are sorted by id.
     """
     reader = csv.DictReader(io.StringIO(read_text(path)))
     frames: dict[int, dict[int, _GroupRow]] = {k: {} for k in range(1, length + 1)}

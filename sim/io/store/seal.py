@@ -109,7 +109,7 @@ class _Run(_Sealed):
 
 
 def file_facts(files: Mapping[str, bytes | Path]) -> dict[str, dict[str, Any]]:
-    """Returns what a seal states of each file, {"sha256", "bytes"} by name, sorted. files: contents or paths."""
+    """Returns {"sha256": …, "bytes": size} for each file, by name, sorted. files: content or path, by name."""
     sizes = {name: len(body) if isinstance(body, bytes) else body.stat().st_size for name, body in files.items()}
     return {name: {"sha256": hashing.file_hash(body), "bytes": sizes[name]} for name, body in sorted(files.items())}
 
@@ -192,7 +192,7 @@ def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (),
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Reads the manifest.json of a sequence folder, and checks its seal and values, but no other file."""
+    """Returns the manifest.json of a sequence folder; checks its own hash and its values, but no other file."""
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
@@ -230,7 +230,7 @@ def reject_foreign(folder: Path) -> None:
 
 
 def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
-    """Returns the run.json of a run: `info` with the facts of all its other files (content by name) and its hash."""
+    """Returns the content of run.json: `info`, size and hash of each of `files` (content by name), its own hash."""
     stated = {"format": tables.FORMAT, **info, "files": file_facts(files)}
     read = json.loads(tables.json_text(stated))  # hashed as it will be read
     validated(Path(RUN), read, _Run, "correct info")

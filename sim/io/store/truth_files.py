@@ -119,7 +119,7 @@ class _TruthFacts(BaseModel):
 
 
 def read_truth(folder: Path) -> Truth:
-    """Reads the truth of a sequence folder; what is not stored becomes None."""
+    """Returns the truth in a sequence folder; fields that are not stored are None."""
     gt = folder / "gt"
     table = read_table(gt / "truth.parquet")
     facts = table.facts_as(_TruthFacts)
@@ -206,7 +206,7 @@ class _DetectionFacts(BaseModel):
 
 
 def read_detections(path: Path) -> list[Detections]:
-    """Reads a det.parquet: one Detections per frame, from frame 1."""
+    """Returns the detections in a det.parquet, one Detections for each frame from 1."""
     table = read_table(path)
     axes = ("x", "y", "z") if "z" in table.columns else ("x", "y")
     pos, score, facts = table.floats(*axes), table.floats("score"), table.facts_as(_DetectionFacts)
