@@ -78,7 +78,7 @@ class FrameTicks:
     """For each of T frames the tick whose groups the frame shows; frames and ticks count from 0.
 
     tick (T,): that tick, ascending. It is the last tick whose nearest frame is this frame or an earlier one. But it is
-    never beyond a tick at which people come or go after the time of the frame.
+    always before the next tick, after the time of the frame, at which people come or go.
     """
 
     tick: Ints

@@ -61,8 +61,8 @@ class Groups(Frozen):
     around it. id (G,). members: person ids of each group, () if the method knows groups only. pos (G, D): the centre;
     vel (G, D): its velocity, unit per s. extent (G, 2, 2): covariance of the members' x and y (divided by their
     number), unit squared, nan if unknown. size (G,): number of people, nan if unknown. hull: a polygon (V, 2) for each
-    group, x, y counter-clockwise; V = 0 if unknown, () if all are unknown. In the truth ids
-    ascend, and pos and vel are means over the members."""
+    group, x, y counter-clockwise; V = 0 if unknown, () if all are unknown. In the truth ids ascend,
+    and pos and vel are means over the members."""
 
     id: Ints
     members: tuple[Ints, ...]
@@ -312,8 +312,8 @@ class FrameTruth(Frozen):
     """The truth of frame `index` (from 1) at time t (s), one row for each of N people. It never reaches a tracker. id
     (N,): persons. group (N,): id of the person's group, -1 for alone. pos (N, 2): x, y in m. vel (N, 2): m/s. box (N,
     4): left, top, width, height in px, of the whole body, unclipped. visibility (N,): visible share of the whole body,
-    0 to 1. groups: on the ground, in m; groups_px: in the image, in px. pixels: who is in each
-    pixel. A field that is None is unknown."""
+    0 to 1. groups: on the ground, in m; groups_px: in the image, in px. pixels: who is in
+    each pixel. A field that is None is unknown."""
 
     index: int
     t: float
@@ -416,8 +416,8 @@ class Sequence:
     """A sequence of frames, simulated, stored or recorded; it can be iterated any number of times, from frame 1. fps:
     frames/s. length: number of frames, None if unknown before reading. frames(): a new iterator over Frame, with the
     detections. bare(): a new iterator over the same frames without pictures; bare is None if this would not be
-    quicker. has_images, has_right, has_detections:
-    what the frames hold. image_size: (width, height) px, camera, scene: None if unknown. px_per_m: nan if unknown.
+    quicker. has_images, has_right, has_detections: what the frames hold. image_size: (width, height) px. image_size,
+    camera and scene are None if unknown, px_per_m is nan.
     Fields that load are functions, or None if there is nothing to load: load_truth() gives the Truth; load_background()
     pictures (K, H, W, 3) of a scene to train a background model; load_people() the person ids of each group that the
     script names; load_pixels(index) the PixelTruth of frame `index`; load_light() the factor of brightness of each

@@ -109,7 +109,7 @@ class GroupState:
         self.write_way(g, way, finish, speed, start)
 
     def write_way(self, g: int, way: list[tuple[Array, int]], finish: str, speed: float, start: Array) -> None:
-        """Overwrites the waypoints, speed (m/s) and finish of group g, which begins at the first waypoint.
+        """Overwrites the waypoints, speed (m/s) and finish of group g; the group starts anew at the first waypoint.
 
         way: pairs of a point (2,) m and a kind of waypoint (PASS, NARROW, GATHER, END). finish: as in `go`. start (2,):
         the group's position in m, from which the group turns to its first waypoint.

@@ -245,7 +245,7 @@ def _apart(pos: Array) -> bool:
 def is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
     """Returns True if all points pos (n, 2) m are far enough from taken places, walls and pillars.
 
-    That is START_GAP (0.55 m) from each point of the arrays in `taken`, and BODY_RADIUS (0.2 m) from the others.
+    That is START_GAP (0.55 m) from each point of the arrays in `taken`, and BODY_RADIUS (0.2 m) from walls and pillars.
     """
     if taken and length(pos[:, None] - np.concatenate(taken)[None]).min() < START_GAP:
         return False

@@ -55,7 +55,7 @@ def move_edges(box: Array, move: Array) -> Array:
     """Returns boxes (R, 4), left, top, width, height in px, whose edges are moved by move (R, 4) px.
 
     Columns of move: left edge, top edge, right edge, lower edge; positive is to the right or downwards. Width and
-    height keep at least 1 px, or their former value if that was less; then the right or lower edge yields.
+    height keep at least 1 px, or their former value if that was less: the right or lower edge is moved less for this.
     """
     edges = np.concatenate([box[:, :2], box[:, :2] + box[:, 2:]], axis=1) + move
     size = np.maximum(edges[:, 2:] - edges[:, :2], np.minimum(box[:, 2:], 1.0))

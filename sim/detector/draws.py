@@ -100,9 +100,9 @@ class Readings:
 def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> list[Detections]:
     """Returns one Detections for each of the frames 1 to truth.length: true detections and false alarms together.
 
-    They are in the order of `order`. A frame without any has empty Detections. The plane is "ground" (positions in m)
-    if the truth has positions, else "image" (px). Boxes are None unless `true` and `false` both have boxes. Velocities
-    are None. Readings outside frames 1 to truth.length are dropped.
+    Those of a frame are sorted by `order`, which is random. A frame without any has empty Detections. The plane is
+    "ground" (positions in m) if the truth has positions, else "image" (px). Boxes are None unless `true` and `false`
+    both have boxes. Velocities are None. Readings outside frames 1 to truth.length are dropped.
     """
     frame = np.concatenate([true.frame, false.frame])
     order = np.lexsort((np.concatenate([true.order, false.order]), frame))

@@ -177,7 +177,7 @@ class Renderer:
     def draw(self, index: int, *, right: bool = False, pixels: bool = False, disparity: bool = False) -> RenderedFrame:
         """Returns the left image of frame `index` (from 1), and the parts asked for.
 
-        right: also the right image. pixels: also the pixel truth. disparity: with disparities in it.
+        right: also the right image. pixels: also the pixel truth. disparity: the pixel truth gets disparities.
         """
         image, truth = self._draw(self.left_view, index, shade=True, label=pixels, disparity=disparity and pixels)
         return RenderedFrame(image, self.right(index) if right else None, truth)

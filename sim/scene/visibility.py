@@ -74,8 +74,8 @@ BOXES = 100  # boxes that the first frames must hold together
 def scale_of_first_boxes(frame: Ints, height: Array) -> tuple[float, int]:
     """Returns the image scale, px per m, and the last frame from which it was taken.
 
-    It is the median box height over 1.7 m, of the least number of first frames that hold 100 boxes. frame, height (R,):
-    of each box, in any order; height in px, nan is ignored. (nan, 0) without boxes.
+    It is the median box height over 1.7 m, of the first frames that together hold 100 boxes (else all). frame, height
+    (R,): of each box, in any order; height in px, nan is ignored. (nan, 0) without boxes.
     """
     known = np.isfinite(height)
     frame, height = frame[known], height[known]

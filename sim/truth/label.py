@@ -65,7 +65,7 @@ def _means(values: Array, cuts: Ints) -> Array:
 
 
 def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
-    """Returns the convex hull (V, 2) px of each of G groups. cuts (G + 1,): row where each begins, then the end."""
+    """Returns the convex hull (V, 2) px of each of G groups. cuts (G + 1,): its first row in `ellipses`, then N."""
     from sim.geometry import hull_kernels
 
     edge = contour(ellipses, POINTS)[: cuts[-1]]

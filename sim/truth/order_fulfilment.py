@@ -39,7 +39,7 @@ WORDS = {
 
 
 def check_orders(motion: Motion, truth: Truth) -> None:
-    """Raises OrderError for the first order of `truth` that no event fulfils. motion: of the truth."""
+    """Raises OrderError for the first order of `truth` that no event fulfils. motion: for the message."""
     for order in truth.orders:
         if order.event is None:
             raise _unfulfilled(order, motion)

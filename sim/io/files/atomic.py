@@ -175,7 +175,7 @@ def replace_sealed(target: Path, files: Mapping[str, bytes], seal: str, names: I
 
 
 def remove_partials(*folders: Path, of: str = "") -> None:
-    """Deletes what lies directly in the folders and has a temporary name. of: only those of the target of this name."""
+    """Deletes the files and folders with temporary names in `folders`. of: only those for a target of this name."""
     for path in [p for folder in folders for p in folder.glob(f"{PARTIAL}*")]:
         found = OURS.fullmatch(path.name)
         if found and of in ("", found[1]):

@@ -187,7 +187,7 @@ def number_or_nan(text: str | None) -> float:
 def bounded_number(
     path: Path, place: str, text: str | None, low: float, high: float, whole: bool = False, remedy: str = "correct it"
 ) -> float:
-    """Returns the number that a text states; raises InputError unless it is from `low` to `high` (whole: and whole)."""
+    """Returns the number that a text states; InputError unless from `low` to `high` and, if `whole`, a whole number."""
     value = number_or_nan(text)
     if not low <= value <= high or (whole and value % 1):
         got = "nothing" if text is None else repr(text)

@@ -104,7 +104,7 @@ class StoredTable:
         return validated(self.file, self.facts, kind, REDO, "schema")
 
     def cuts(self, first: int, count: int) -> Ints:
-        """Returns the index of the first row of each of `count` frames from `first` on, then R; (count + 1,)."""
+        """Returns the index of the first row of each of `count` frames from `first` on, then R, (count + 1,)."""
         frame = self.ints("frame")
         wrong = bool(len(frame)) and (frame.min() < first or frame.max() >= first + count or (np.diff(frame) < 0).any())
         self.reject(bool(wrong), "frame", "other frames", f"frames {first} to {first + count - 1}, in order")

@@ -26,7 +26,7 @@ class BoxOptions:
     min_score: float | None = None  # least score of detections, as it stands there
 
     def given(self) -> dict[str, Any]:
-        """Returns the values of the options that are given, by their names on the command line."""
+        """Returns the values of the options that are given, by name: "class", "box_scale", "min_score"."""
         return {key.removeprefix("person_"): value for key, value in vars(self).items() if value is not None}
 
 

@@ -41,7 +41,7 @@ def write_sequence(
         scenario: TOML text of the resolved scenario.
         seed: Seed of the simulation.
         repeat: Number of the suite entry's copy, 0 without copies.
-        streams: Pictures to store: "left", "right", "disparity", "ids"; "background" comes with left and right.
+        streams: Pictures to store: "left", "right", "disparity", "ids"; "left" and "right" add "background".
         images: File type of the pictures, "jpg", "png" or "mp4".
         keep: Called before an existing folder is replaced; if it returns True, that folder stays.
 

@@ -228,7 +228,7 @@ def read_track_text(
 ) -> list[Tracks]:
     """Returns the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`, sorted by id.
 
-    length: None: to the last frame in the file. person_class: only rows of these classes are read; None: of people.
+    length: None: to the last frame in the file. person_class: only rows of these classes are read; None: people.
     box_scale: factors of x and y that make the boxes pixels.
     """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
@@ -292,7 +292,7 @@ def write_tracks(
         folder: Folder to write. Files of an earlier run in it are replaced; other files stay.
         tracks: One Tracks per frame, all of one plane and unit.
         fps: Frames per second.
-        camera: Gives boxes of upright people in the texts to people on the ground or in space without boxes.
+        camera: If no track has a box, people on the ground or in space get boxes of upright people in the texts.
         scene: Gives the height of the ground under 2-D positions; None: 0.
         info: Content of run.json, to which "format", "boxes", "files" and "sha256" are added.
         pairs: Content of pairs.parquet (`pair_table`); None: no such file.
