@@ -50,7 +50,7 @@ def coding(streams: Iterable[str], images: str) -> str | None:
 
 
 def suffix(stream: str, images: str) -> str:
-    """Returns the file type of a stream, without dot."""
+    """Returns the file type of a stream, without dot: "png" for disparity and ids, `images` for the others."""
     return "png" if stream in EXACT else images
 
 

@@ -156,7 +156,7 @@ class Stairs(Frozen):
 class Scene(Frozen):
     """The static world, in m: size (2,) x, y, from the origin on; walls (W, 2, 2): segments [x1, y1], [x2, y2]; pillars
     (P, 3): x, y, radius; doors (D, 2, 2): segments, openings that `walls` leave free; service (S, 2): service points x,
-    y; stairs; heights of walls and pillars. Empty arrays and () by default."""
+    y; stairs; wall_height, pillar_height. By default there are no walls, pillars, doors, service points and stairs."""
 
     size: Array
     walls: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))

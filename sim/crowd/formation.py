@@ -76,8 +76,8 @@ def assign(pos: Array, points: Array) -> Ints:
 def meeting_point(middles: Array, speeds: Array, goal: Array | None) -> Array:
     """Returns the point (2,) at which groups that walk to each other meet at about the same time.
 
-    middles (G, 2): m. speeds (G,): m/s. goal (2,) m: where they walk together afterwards; None if
-    they stay. With a goal the point lies further towards it, so that groups do not walk into each other.
+    middles (G, 2): m. speeds (G,): m/s. goal (2,) m: where they walk together afterwards; None if they
+    stay. With a goal the point lies further towards it, so that groups side by side do not walk into each other.
     """
     weights = (1 / speeds) / np.sum(1 / speeds)
     # Further on the slower ones, and towards the common goal: groups side by side do not walk into each other.
@@ -110,8 +110,8 @@ def divide(offsets: Array, ways: Array, sizes: list[int]) -> Ints:
     """Returns the index of the part that each of n members joins when a group divides, (n,).
 
     offsets (n, 2) m: each member's position less the group's middle. ways (K, 2) m: each part's goal less the group's
-    middle. sizes: the number of people in each of the K parts. The members' distances from
-    the middle towards their parts' goals have the greatest possible sum.
+    middle. sizes: the number of people in each of the K parts. The members' distances from the middle towards their
+    parts' goals have the greatest possible sum.
     """
     from scipy.optimize import linear_sum_assignment
 

@@ -234,8 +234,8 @@ FLAT = 1e-9  # rad: a narrower cone is a rounding error, and its vertex lies on 
 def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
     """Returns the hull (V, 2) of the footprints of each group, counter-clockwise.
 
-    pos (R, 2) m: the members of group 0, then those of group 1, …; count (G,): how many each has.
-    No position may be nan. A group without members gets a hull with V = 0.
+    pos (R, 2) m: the members of group 0, then those of group 1, …; count (G,): how many each has. No position may be
+    nan. A group without members gets a hull with V = 0.
     """
     hulls: list[Array] = [np.zeros((0, 2))] * len(count)
     first = np.cumsum(count) - count

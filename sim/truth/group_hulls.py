@@ -20,7 +20,7 @@ __all__ = ["box_groups", "groups_over_time", "member_rows"]
 def groups_over_time(
     frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, first: int, length: int, px_per_m: float = 1.0
 ) -> list[Groups]:
-    """Returns the Groups, of two or more people, of each of the frames first … first + length - 1, by ascending id.
+    """Returns the Groups of each of the frames first … first + length - 1: groups of two or more, sorted by id.
 
     frame, id, group (R,): one row per person and frame, in any order; group -1 = alone. pos, vel (R, D): on the ground
     m and m/s. In the image they are px and px/s, and px_per_m is the scale by which the discs round the members are

@@ -100,8 +100,8 @@ def _names(units: Iterable[int]) -> tuple[int, ...]:
 class Identities:
     """Gives groups ids that last through time: a new object for each sequence, then one `step` for each partition.
 
-    State: next_id: from 1. groups: members of each present group, by id. born: when each id began, of ended groups,
-    too. people: all people present at the last time.
+    State: next_id: the next new id, from 1. groups: members of each present group, by id. born: time at which each id
+    began, also for ended groups. people: all people present at the last step.
     """
 
     next_id: int = 1

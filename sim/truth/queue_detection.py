@@ -37,9 +37,9 @@ def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[tuple[Ints, Ints, Arr
 
     pos (N, 2): m. i, j (K,): pairs of people (rows of pos) who stand close to each other; such pairs connect a crowd.
     The line is the whole crowd if it passes the tests. Else it is the longest line of at least three people and two
-    thirds of the crowd; of equally long lines the straightest. A table of M lines is a tuple: rows of pos in order
-    along the line (M, n), the number of people in the line (M,), of which the other columns mean nothing, unit vectors
-    (M, 2) from the first person towards the last, and mean positions (M, 2), m.
+    thirds of the crowd; of equally long lines the straightest. A table of M lines is a tuple of four arrays: the
+    people in order along the line (M, n), as rows of pos; how many people are in the line (M,), further columns mean
+    nothing; unit vectors (M, 2) from the first person towards the last; mean positions (M, 2), m.
     """
     for crowd in _crowds(len(pos), i, j):
         portion = max(1, MAX_CELLS // (crowd.shape[1] * crowd.shape[1] * crowd.shape[1]))

@@ -252,8 +252,8 @@ FEW = 0.02  # share of scores outside [0, 1] up to which they count as outliers 
 def unit_scores(score: Array) -> tuple[Array, str]:
     """Returns scores (N,), finite numbers, mapped into [0, 1], and words that say how; "" if nothing was changed.
 
-    A few outliers are clipped. Other scores s become 1 / (1 + exp(-(s - c) / d)), c the lower quartile and d such that
-    the median becomes about 0.75.
+    If only a few scores are outside [0, 1], these are clipped. If many are, each score s becomes 1 / (1 + exp(-(s - c)
+    / d)), with c the lower quartile and d such that the median becomes about 0.75. Equal scores outside become 1.
     """
     outside = (score < 0) | (score > 1)
     count = int(outside.sum())

@@ -204,7 +204,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def is_run(folder: Path) -> bool:
-    """Returns True if the folder holds a run of ours, perhaps an unfinished or damaged one."""
+    """Returns True if the folder holds a run that flockscope wrote, perhaps an unfinished or damaged one."""
     paths = [folder / name for name in (RUN, EXACT) if (folder / name).is_file()]
     # A file that cannot be parsed may be ours.
     return any(is_ours(path, RUN_MARKS) is not False for path in paths)
