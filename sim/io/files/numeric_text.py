@@ -56,8 +56,7 @@ class NumericTable:
         return v.astype(np.int64)
 
     def require_bounds(self, frame: Ints, length: int | None = None) -> None:
-        """Raises InputError if a frame is not in 1 to `length` or has more than 5,000 rows, or if a number is too
-        large.
+        """Raises InputError if a frame is not in 1 to `length`, has over 5,000 rows, or a number is too large.
 
         frame (N,): of each row. length: None: any number of frames up to 1,000,000.
         """
