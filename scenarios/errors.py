@@ -44,7 +44,7 @@ class FlockscopeError(Exception):
         return f"{where}got {got}; expected {expected}; {remedy}"
 
     def replaced(self, **parts: object) -> Self:
-        """Returns the same error with other parts, as with the file that a check of values did not know."""
+        """Returns a copy of the error with the given parts replaced, such as `file`."""
         return type(self)(**{**self.as_dict(), **parts})  # type: ignore[arg-type]
 
     def as_dict(self) -> dict[str, str]:
@@ -75,7 +75,7 @@ CONTROL = ("Cc", "Cf", "Cs", "Zl", "Zp")
 
 
 def printable(text: str, keep: str = "") -> str:
-    """Returns the text with each control character, but those of `keep`, as an escape that a terminal shows."""
+    """Returns the text with each control character, except those in `keep`, replaced by an escape such as "\\x1b"."""
     if text.isprintable():
         return text
     hidden = {c for c in text if not c.isprintable() and c not in keep and is_control(c)}
@@ -83,17 +83,17 @@ def printable(text: str, keep: str = "") -> str:
 
 
 def is_control(character: str) -> bool:
-    """Returns True for a character that is never printed."""
+    """Returns True if the character is of a category that is never printed (CONTROL)."""
     return unicodedata.category(character) in CONTROL
 
 
 def counted(number: int, noun: str) -> str:
-    """Returns a number with its noun: "1 frame", "2 frames"."""
+    """Returns a number with its noun, to which it adds "s" unless the number is 1: "1 frame", "2 frames"."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def shortened(text: str, longest: int) -> str:
-    """Returns the text if it has at most `longest` characters, else its beginning and end around a "…"."""
+    """Returns the text if it has at most `longest` characters, else as many: its beginning, "…" and its end."""
     if len(text) <= longest:
         return text
     end = longest // 3

@@ -36,11 +36,11 @@ PEOPLE = 5000  # people in one scenario
 
 
 def is_number(value: object, low: float = -math.inf, high: float = math.inf) -> TypeGuard[float]:
-    """Returns True for a finite real number, of Python or numpy, from `low` to `high`; a bool is none."""
+    """Returns True for a finite real number of Python or numpy from `low` to `high`, but False for a bool."""
     number: Any = value
     return isinstance(value, Real) and not isinstance(value, bool) and low <= number <= high and abs(number) < math.inf
 
 
 def fits_picture(width: float, height: float) -> bool:
-    """Returns True for a picture size in px that is read and drawn."""
+    """Returns True if a width and height in px are within the bounds PICTURE_SIDE and PICTURE_PIXELS."""
     return 1 <= width <= PICTURE_SIDE and 1 <= height <= PICTURE_SIDE and width * height <= PICTURE_PIXELS

@@ -23,14 +23,14 @@ FAR = "whole numbers within 64 bits"
 
 
 def parse_toml(text: str, file: object = "") -> dict[str, Any]:
-    """Returns the table that a TOML text stands for."""
+    """Returns the table in a TOML text; raises InputError, which names `file`, if the text is not valid."""
     remedy = "correct the line; strings need quotes, tables inside a line need { }"
     table: dict[str, Any] = _parsed(tomllib.loads, text, file, "TOML", remedy)
     return table
 
 
 def parse_json(text: str, file: object = "", remedy: str = "correct the file") -> Any:
-    """Returns the value that a JSON text stands for."""
+    """Returns the value in a JSON text; raises InputError, which names `file` and `remedy`, if it is not valid."""
     return _parsed(partial(json.loads, parse_constant=_constant), text, file, "JSON", remedy)
 
 
@@ -75,7 +75,8 @@ def _require_plain(value: Any, file: object) -> None:
 def require_regular(path: Path, remedy: str = "check the path", missing: bool = False) -> int:
     """Returns the size in bytes of the regular file `path`, which is not opened; links are followed.
 
-    missing: True returns -1 for a missing file or a link to one.
+    Raises InputError if it is no regular file. missing: True returns -1 if the file or the target of the link is
+    missing.
     """
     try:
         found = os.stat(path)
@@ -91,12 +92,12 @@ def require_regular(path: Path, remedy: str = "check the path", missing: bool = 
 
 
 def is_present(path: Path) -> bool:
-    """Returns True if the regular file exists; raises InputError for something else, as a FIFO."""
+    """Returns True if `path` is a regular file, False if nothing is there; raises InputError for anything else."""
     return require_regular(path, missing=True) >= 0
 
 
 def read_regular(path: Path, limit: int, remedy: str = "check the path") -> bytes:
-    """Returns the bytes of the regular file `path`, at most `limit`."""
+    """Returns the bytes of the regular file `path`; raises InputError if it has more than `limit` or cannot be read."""
     size = require_regular(path, remedy)
     if size > limit:
         got, expected = f"a file of {size:,} bytes", f"at most {limit:,} bytes"

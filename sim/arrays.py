@@ -21,10 +21,11 @@ Image = NDArray[np.uint8]
 
 
 class Frozen:
-    """Base of frozen dataclasses whose array fields become read-only and get the declared number type.
+    """Base class of frozen dataclasses: makes array fields read-only and converts them to the declared number type.
 
-    An array that has the type already is not copied: the field is a read-only view. An array of another kind of number,
-    as floats where ids are declared, keeps its type, so that the check of a tracker's answer can report it.
+    An array that has the declared type already is not copied: the field is a read-only view of it. An array whose
+    conversion would change the kind of number, such as floats where integer ids are declared, keeps its type. The check
+    of a tracker's answer can then report it.
     """
 
     def __post_init__(self) -> None:
@@ -41,7 +42,7 @@ class Frozen:
         return replace(self, **changes)  # type: ignore[type-var]
 
     def copy(self) -> Self:
-        """Returns a copy whose arrays are its own, read-only."""
+        """Returns a copy that shares no array with this object; the arrays of the copy are read-only."""
         made = object.__new__(type(self))
         for name in _names(type(self)):  # type: ignore[arg-type]
             object.__setattr__(made, name, _own(getattr(self, name)))
@@ -87,12 +88,15 @@ def _own(value: Any) -> Any:
 
 
 def no_ids() -> Ints:
-    """Returns an empty array of ids."""
+    """Returns an empty array of ids, (0,) int64."""
     return np.zeros(0, np.int64)
 
 
 def repeated_ids(frame: Ints, id: Ints) -> Bools:
-    """Returns which rows have both the frame and the id of an earlier row (N,). Rows need no order."""
+    """Returns flags (N,): True for each row whose frame and id both equal those of a row with a smaller index.
+
+    frame, id (N,): in any order.
+    """
     order = np.lexsort((id, frame))  # stable: equal rows keep their order
     again = np.zeros(len(order), bool)
     again[order[1:]] = (np.diff(frame[order]) == 0) & (np.diff(id[order]) == 0)

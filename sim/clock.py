@@ -23,7 +23,7 @@ EXACT = 1e-6  # of a step: a frame as near to a step is on it
 
 @dataclass(frozen=True)
 class FrameTimes:
-    """Where the T frames of a camera lie on the clocks: frame f (from 0) at time f / fps."""
+    """The position of a camera's T frames on the clocks of script and physics; frame f, from 0, is at f / fps s."""
 
     fps: float
     tick: Ints  # (T,) last tick of the script at or before the frame, from 0
@@ -40,22 +40,31 @@ class FrameTimes:
         return cls(fps, steps // STEPS, steps % STEPS, np.where(share < EXACT, 0.0, share))
 
     def frame_of(self, tick: int) -> int:
-        """Returns the number (from 1) of the frame nearest to a tick; the later one of two."""
+        """Returns the number, from 1 to T, of the frame nearest in time to a tick (from 0).
+
+        Of two equally near frames it is the later one.
+        """
         return min(int(np.floor(tick * self.fps / SCRIPT_RATE + 0.5)) + 1, len(self.tick))
 
     def within(self, tick: int) -> slice:
-        """Returns the frames from a tick on and before the next one."""
+        """Returns the slice of the frames (from 0) that lie at or after a tick (from 0) and before the next tick."""
         return slice(*np.searchsorted(self.tick, (tick, tick + 1)))
 
     def states(self, tick: int, steps: Array) -> Array:
-        """Returns the states (K, P, D) in the K frames within a tick, given those of its steps (STEPS + 1, P, D)."""
+        """Returns the states (K, P, D) in the K frames of `within(tick)`, linear between two physics steps.
+
+        steps (STEPS + 1, P, D): the states at this tick and after each physics step up to the next tick.
+        """
         frames = self.within(tick)
         k, share = self.step[frames], self.share[frames, None, None]
         low, high = steps[k], steps[k + 1]
         return np.where(share == 0.0, low, (1.0 - share) * low + share * high)
 
     def between_ticks(self, values: Array, present: Bools) -> Array:
-        """Returns values (C, P, D) of the ticks at the frames, (T, P, D), linear between two ticks."""
+        """Returns the values (T, P, D) at the frames, linear between the values (C, P, D) at the ticks.
+
+        present (C, P): where a person is absent at the next tick, the value of the last tick is kept.
+        """
         # The value of the last tick stays where a person is absent at the next one.
         k = np.minimum(self.tick, len(values) - 1)
         after = np.minimum(k + 1, len(values) - 1)
@@ -66,16 +75,20 @@ class FrameTimes:
 
 @dataclass(frozen=True)
 class FrameTicks:
-    """Which tick's groups each of T frames shows; converts ticks to frames, both from 0. tick (T,): ascending.
+    """For each of T frames the tick whose groups the frame shows; frames and ticks count from 0.
 
-    A frame shows the last tick whose nearest frame it is, or before, with the same people present.
+    tick (T,): that tick, ascending. It is the last tick whose nearest frame is this frame or an earlier one. But it is
+    always before the next tick, after the time of the frame, at which people come or go.
     """
 
     tick: Ints
 
     @classmethod
     def of(cls, length: int, fps: float, rate: float, present: Bools) -> FrameTicks:
-        """Returns it for `length` frames at fps, and ticks at `rate` per s with people present (C, P)."""
+        """Returns the FrameTicks of `length` frames at fps frames/s.
+
+        rate: ticks per s. present (C, P): who is present at each of the C ticks.
+        """
         frame, ticks = np.arange(length), np.arange(len(present))
         if fps == rate:
             return cls(np.minimum(frame, len(ticks) - 1))
@@ -95,7 +108,10 @@ class FrameTicks:
 
 
 def check_stride(stride: object, fps: float) -> None:
-    """Raises InputError if `stride` is no whole number from 1, or leaves less than 0.01 frames/s."""
+    """Raises InputError unless `stride` is an int of at least 1 that leaves at least 0.01 frames/s.
+
+    fps: frames/s before every `stride`-th frame is taken.
+    """
     most = int(fps / FRAME_RATES[0])
     if not isinstance(stride, int) or not 1 <= stride <= most:
         expected = f"a whole number from 1 to {most} at {fps:g} frames/s"
@@ -103,7 +119,10 @@ def check_stride(stride: object, fps: float) -> None:
 
 
 def every_nth(motion: Motion, n: int) -> Motion:
-    """Returns the motion in frames 1, 1 + n, … of a camera, numbered from 1, measured at the same ticks."""
+    """Returns the motion in the frames 1, 1 + n, 1 + 2 n, … only, numbered from 1 again, at fps / n frames/s.
+
+    The states from which groups and events are measured stay the same. If n is 1, `motion` itself is returned.
+    """
     if n == 1:
         return motion
     kept = {name: getattr(motion, name)[::n] for name in ("pos", "vel", "heading", "present", "intent")}

@@ -65,7 +65,7 @@ FAR_BELOW = (
 
 
 def exp(x: Any) -> Any:
-    """Returns e to the power x, x cut to -744 … 709; x must not be nan."""
+    """Returns e to the power x; x below -744 counts as -744, x above 709 as 709. x must not be nan."""
     x = np.minimum(np.maximum(x, LEAST), GREATEST)
     k = np.floor(x * PER_LN2 + 0.5)
     r = (x - k * LN2_HIGH) - k * LN2_LOW
@@ -141,7 +141,7 @@ def atan2(y: Any, x: Any) -> Any:
 
 
 def power(x: Any, exponent: float) -> Any:
-    """Returns x to the power `exponent` for x >= 0; 0 to the power 0 is 1."""
+    """Returns x to the power `exponent`, for x >= 0. 0 to the power 0 is 1, 0 to any other power is 0."""
     if exponent == 0.0:
         return np.ones_like(x, dtype=float)
     return np.where(x > 0.0, exp(exponent * log(np.where(x > 0.0, x, 1.0))), np.where(x == 0.0, 0.0, np.nan))

@@ -50,8 +50,8 @@ def file_hash(content: bytes | Path) -> str:
 def scenario_hash(text: str) -> str:
     """Returns the SHA-256 (64 hex digits) that names a scenario.
 
-    text: TOML of the resolved scenario as `dump` of scenarios.loading writes it; other text of equal meaning has
-    another hash.
+    text: TOML of the resolved scenario as `dump` of scenarios.loading writes it. Another text with the same meaning
+    has another hash.
     """
     return canonical_hash(("scenario", text))
 
@@ -60,8 +60,8 @@ def truth_hash(scenario: str, seed: int, repeat: int, truth: Truth | None) -> st
     """Returns the SHA-256 (64 hex digits) of a scenario, seed, repeat and truth; what is rendered does not matter.
 
     scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies. All fields
-    of the truth count except its name, camera and scene, and what is left out of the scores. truth None (a sequence
-    without truth) has a hash of its own.
+    of the truth count except its name, camera, scene, and `unscored`, the rows left out of the scores. truth: None for
+    a sequence without truth, which has a different hash from any truth.
     """
     counted = [f.name for f in fields(Truth) if f.name not in ("name", "unscored", "camera", "scene")]
     named = None if truth is None else {name: getattr(truth, name) for name in counted}
@@ -72,16 +72,15 @@ def labels_hash(truth: Truth) -> str:
     """Returns the SHA-256 (64 hex digits) of a recording's labels as read: frame rate, length, and of each row frame,
     id, group, position and box.
 
-    All else is left out, as the name, the image scale (an option), visibility, events, and what is computed from the
-    rest (velocities, hulls).
+    Nothing else counts: not the name, the image scale (an option), visibility or events, nor what is computed from the
+    labels (velocities, hulls).
     """
     read = (truth.frame, truth.id, truth.group, truth.pos, truth.box)
     return canonical_hash(("labels", truth.fps, truth.length, *read))
 
 
 def content_hash(truth: str, detections: Any, pixels: Mapping[str, str] | None = None) -> str:
-    """Returns the SHA-256 (64 hex digits) of a whole sequence: its truth, its detections, and the raw pixels of its
-    streams.
+    """Returns the SHA-256 (64 hex digits) of a sequence: its truth, detections and raw pixels.
 
     truth: the sequence's truth_hash. detections: list of Detections, one per frame, empty without a detector. pixels:
     hash of the pictures before encoding, by stream name; None or empty without pictures. The hash is therefore the same
@@ -109,15 +108,17 @@ class PixelHash:
         self._h = hashlib.sha256()
 
     def add(self, picture: NDArray[Any]) -> None:
-        """Add the next picture, an array of numbers or bools of any shape. Raises TypeError for other arrays, which
-        still count.
+        """Adds the next picture, an array of numbers or bools of any shape.
+
+        Raises TypeError for an array of another type; `count` is increased even then.
         """
         self.count += 1
         _array(self._h, picture)
 
     def hex(self) -> str:
-        """Returns the SHA-256 (64 hex digits) of all pictures added so far, in their order; without pictures that of no
-        bytes.
+        """Returns the SHA-256 (64 hex digits) of all pictures added so far, in the order of adding.
+
+        If no picture was added, it is the SHA-256 of no bytes.
         """
         return self._h.hexdigest()
 
@@ -175,13 +176,16 @@ DISTRIBUTION, PACKAGES = "flockscope", ("scenarios", "sim", "tracking")
 
 @lru_cache(maxsize=2)
 def versions(drawn: bool) -> dict[str, str]:
-    """Returns the versions of Python, flockscope and libraries, by name; `drawn` adds those that pictures depend on."""
+    """Returns the versions of Python, flockscope and the libraries, by name.
+
+    drawn: True adds the libraries that only pictures depend on.
+    """
     names = (DISTRIBUTION, *LIBRARIES, *(PICTURE_LIBRARIES if drawn else ()))
     return {"python": platform.python_version(), **installed(names)}
 
 
 def installed(names: Iterable[str]) -> dict[str, str]:
-    """Returns the versions of installed distributions by name, "unknown" of others."""
+    """Returns the version of each named distribution, by name; "unknown" for one that is not installed."""
     found = {}
     for name in names:
         try:
@@ -193,13 +197,16 @@ def installed(names: Iterable[str]) -> dict[str, str]:
 
 @cache
 def runtime() -> dict[str, str]:
-    """Returns everything that two machines must share to produce the same bytes, by name."""
+    """Returns by name what must be equal on two machines so that they produce the same bytes.
+
+    These are the versions of Python, flockscope and all libraries, and under "sources" the `source_hash`.
+    """
     root = Path(__file__).resolve().parents[1]
     return {**versions(drawn=True), "sources": source_hash(root)}
 
 
 def source_hash(root: Path) -> str:
-    """Returns 12 hex digits of the SHA-256 over the source files of our packages in the folder `root`."""
+    """Returns 12 hex digits of the SHA-256 over the .py and .toml files of our packages below the folder `root`."""
     h = hashlib.sha256()
     for package in PACKAGES:
         for path in sorted((root / package).rglob("*")):

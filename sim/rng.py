@@ -26,27 +26,30 @@ ROLE = {name: number for number, name in enumerate(ROLES)}
 
 
 def rng(seed: int, role: str, *keys: int, repeat: int = 0) -> np.random.Generator:
-    """Returns the generator over `SeedSequence(seed, spawn_key=(ROLE[role], *keys))`; the same arguments, the same
-    numbers.
+    """Returns a new generator over `SeedSequence(seed, spawn_key=(ROLE[role], *keys))`.
 
-    repeat: number of the suite entry's copy, 0 without copies; it is a further key.
+    The same arguments give a generator of the same numbers. repeat: number of the suite entry's copy, which is a
+    further key; 0 without copies, which adds no key.
     """
     spawn_key = (ROLE[role], *keys) if repeat == 0 else (ROLE[role], *keys, 1_000_000 + repeat)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=spawn_key))
 
 
 def uniforms(r: np.random.Generator, shape: int | tuple[int, ...]) -> Array:
-    """Returns uniforms above 0 and at most 1 of this shape."""
+    """Returns uniform random numbers of this shape, each above 0 and at most 1."""
     return np.asarray(r.random(shape) + 2.0**-54)
 
 
 def normals(u: Array) -> Array:
-    """Returns the standard normal quantiles at u, any shape, 0 < u <= 1; always finite."""
+    """Returns the standard normal quantiles at u, of any shape, 0 < u <= 1. At u = 1 the result is finite, too."""
     return np.asarray(normal_quantile(np.minimum(u, 1.0 - 2.0**-53)))
 
 
 def autoregression(e: Array, keep: Any) -> Array:
-    """Returns x (K, D) with x_0 = e_0 and x_k = keep x_(k-1) + sqrt(1 - keep²) e_k, for e (K, D)."""
+    """Returns x (K, D) with x_0 = e_0 and x_k = keep x_(k-1) + sqrt(1 - keep²) e_k.
+
+    e (K, D): one row per time. keep: the correlation of neighbouring rows, one number or (D,).
+    """
     x = e.copy()
     x[1:] *= np.sqrt(1.0 - keep * keep)
     step = 1
@@ -58,7 +61,7 @@ def autoregression(e: Array, keep: Any) -> Array:
 
 
 def poisson_quantiles(mean: float, u: Array) -> Ints:
-    """Returns the quantiles (N,) of a Poisson distribution at u (N,), 0 < u <= 1."""
+    """Returns the quantiles (N,) of the Poisson distribution with this mean (0 or more) at u (N,), 0 < u <= 1."""
     if not mean >= 0:
         raise ValueError(f"a Poisson distribution of mean {mean}")
     k = np.arange(1, int(mean + 12 * np.sqrt(mean) + 20))
@@ -70,7 +73,10 @@ def poisson_quantiles(mean: float, u: Array) -> Ints:
 
 
 def draw(value: Value, r: np.random.Generator) -> float:
-    """Returns the number itself, or one draw of the distribution; draws outside its `clip` are drawn again."""
+    """Returns `value` as a float if it is a number, else one random draw of the distribution.
+
+    A draw outside the distribution's `clip` is drawn again.
+    """
     if isinstance(value, (int, float)):
         return float(value)
     while True:

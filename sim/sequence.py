@@ -42,15 +42,17 @@ def simulate(
         scenario: As `scenarios.load` returns it.
         seed: 0 or more.
         repeat: Number of the suite entry's copy, 0 without copies.
-        streams: Some of "left", "right", "disparity", "ids", "background". "left" and "right" give frames with
-            pictures; each of the five gives `background()` and exact pixels (`load_pixels`). () draws nothing.
-        stride: Of the camera's frames only 1, 1 + stride, … are in the sequence.
+        streams: Some of "left", "right", "disparity", "ids", "background". "left" and "right" give frames their
+            pictures. With any of the five names the sequence has `background()` and `load_pixels`. () gives no
+            pictures.
+        stride: Only the camera's frames 1, 1 + stride, 1 + 2 stride, … are in the sequence, numbered from 1 again.
 
     Returns:
         The sequence.
 
     Raises:
-        InputError: The scenario is impossible (no room for its people, people out of view) or a stream is.
+        InputError: The scenario is impossible (no room for its people, people out of view), or a stream or the
+            stride is invalid.
         ValueError: The seed is negative.
         WorkError: A position is not finite. When the truth is read: an order of the script was not fulfilled.
     """
@@ -63,10 +65,11 @@ def observe(
     scenario: Scenario | ObservationSpec, motion: Motion, *, people: Mapping[str, tuple[int, ...]] | None = None,
     check: bool = True, streams: Iterable[str] = (), stride: int = 1,
 ) -> Sequence:  # fmt: skip
-    """Returns the sequence that a scenario's camera and sensor make of a motion. See `simulate`.
+    """Returns the sequence in which the camera and sensor of `scenario` observe the given motion.
 
-    people: person ids of each group that `sensor.hide` may name; None: those of the scenario that the motion was
-    simulated from. check: reading the truth raises WorkError if an order of the script was not fulfilled.
+    people: person ids of each group that `sensor.hide` may name, by the group's name; None: the groups of `scenario`,
+    from which the motion was simulated. check: True makes reading the truth raise WorkError if an order of the script
+    was not fulfilled. streams, stride: as for `simulate`.
     """
     check_stride(stride, motion.fps)
     camera = place_camera(scenario.camera, motion)

@@ -28,7 +28,10 @@ Codes = NDArray[np.uint16]
 
 
 def check_streams(streams: Iterable[str], images: str) -> tuple[str, ...]:
-    """Returns the streams in the order of STREAMS; "background" comes with left and right."""
+    """Returns the given streams in the order of STREAMS; "left" and "right" each add "background".
+
+    Raises InputError for an unknown stream, or if `images` is none of the file types "jpg", "png" and "mp4".
+    """
     wanted = set(streams)
     unknown = sorted(wanted - set(STREAMS))
     if unknown:
@@ -42,19 +45,20 @@ def check_streams(streams: Iterable[str], images: str) -> tuple[str, ...]:
 
 
 def coding(streams: Iterable[str], images: str) -> str | None:
-    """Returns `images`, the file type, if it affects any of the streams; else None."""
+    """Returns the file type `images`, or None if no stream uses it (disparity and ids are always PNG)."""
     return images if set(streams) - set(EXACT) else None
 
 
 def suffix(stream: str, images: str) -> str:
-    """Returns the file type of a stream, without dot."""
+    """Returns the file type of a stream, without dot: "png" for disparity and ids, `images` for the others."""
     return "png" if stream in EXACT else images
 
 
 def file_name(stream: str, images: str, index: int) -> str:
-    """Returns the name of a picture's file in the sequence folder: "img1/000001.jpg", or "left.mp4" for all.
+    """Returns the name of a picture's file, relative to the sequence folder, such as "img1/000001.jpg".
 
-    index: the frame, or the number of the background picture, from 1.
+    For mp4 one file holds all pictures of the stream, such as "left.mp4". index: number of the frame, or of the
+    background picture, from 1.
     """
     kind = suffix(stream, images)
     return f"{stream}.mp4" if kind == "mp4" else f"{FOLDERS[stream]}/{index:06d}.{kind}"
@@ -66,7 +70,10 @@ def is_picture(name: str) -> bool:
 
 
 def encode_ids(ids: Ints) -> Codes:
-    """Returns ids (H, W) as uint16 in the style of MOTS: 2000 + id for people, 3000 for walls and pillars, else 0."""
+    """Returns ids (H, W) as uint16 as in MOTS: 2000 + id for people, 3000 for walls and pillars, 0 elsewhere.
+
+    ids: as in `PixelTruth`. Raises WorkError for a person id above 999.
+    """
     if ids.max(initial=0) > PEOPLE:
         raise WorkError(
             place="--streams ids", got=f"person {int(ids.max())}", expected=f"{PEOPLE} people at most",
@@ -76,13 +83,16 @@ def encode_ids(ids: Ints) -> Codes:
 
 
 def decode_ids(codes: Codes) -> Ints:
-    """Returns the ids (H, W) of MOTS codes; -2 for walls and pillars."""
+    """Returns the ids (H, W) of the codes (H, W) of `encode_ids`: person ids, -2 for walls and pillars, else 0."""
     wide = codes.astype(np.int64)
     return np.where(wide == STATIC, -2, np.where(wide > PERSON, wide - PERSON, 0))
 
 
 def encode_disparity(disparity: Array, camera: Camera | None = None) -> Codes:
-    """Returns disparities (H, W) px as uint16 as in KITTI: round(256 d), at least 1; 0 for unknown."""
+    """Returns disparities d (H, W) px as uint16 as in KITTI: round(256 d), at least 1; 0 where d is not finite.
+
+    camera: for the error message only. Raises WorkError if a disparity does not fit, that is, from 256 px on.
+    """
     known = np.isfinite(disparity)
     steps = np.maximum(np.rint(np.where(known, disparity, 0.0) * STEPS), 1)
     if steps.max(initial=0) > LARGEST:
@@ -95,5 +105,5 @@ def encode_disparity(disparity: Array, camera: Camera | None = None) -> Codes:
 
 
 def decode_disparity(codes: Codes) -> Array:
-    """Returns the disparities (H, W) px of codes, nan for unknown."""
+    """Returns the disparities (H, W) px of the codes of `encode_disparity`; nan where the code is 0."""
     return np.where(codes > 0, codes / STEPS, np.nan)

@@ -61,7 +61,8 @@ class Groups(Frozen):
     around it. id (G,). members: person ids of each group, () if the method knows groups only. pos (G, D): the centre;
     vel (G, D): its velocity, unit per s. extent (G, 2, 2): covariance of the members' x and y (divided by their
     number), unit squared, nan if unknown. size (G,): number of people, nan if unknown. hull: a polygon (V, 2) for each
-    group, x, y counter-clockwise; V = 0 if unknown, () if all are. In the truth ids ascend, pos and vel are means."""
+    group, x, y counter-clockwise; V = 0 if unknown, () if all are unknown. In the truth ids ascend,
+    and pos and vel are means over the members."""
 
     id: Ints
     members: tuple[Ints, ...]
@@ -82,9 +83,10 @@ class Groups(Frozen):
 class GroupEvent:
     """One event of groups, from frame `start` to frame `end` (from 1, both inclusive). kind: merge, split, cross,
     queue, form, dissolve, enter or leave. emitted: frame in which the tracker reported the event, which may be later
-    than `start`; None in the truth. `step` may return None as end or emitted for its own frame. before, after: sorted
-    ids of the groups concerned, before and after it, with -1 once for each person alone. members: ids of all people
-    concerned, sorted, () if unknown. pos: the place (x, y) in the unit of the plane (m or px), nan if unknown."""
+    than `start`; None in the truth. Where a tracker's `step` returns None as end or emitted, it means the frame of the
+    step. before, after: sorted ids of the groups concerned before and after it; -1 stands for one person alone.
+    members: ids of all people concerned, sorted, () if unknown. pos: the place (x, y) in the unit of the plane (m or
+    px), nan if unknown."""
 
     kind: str
     start: int
@@ -101,12 +103,12 @@ class Tracks(Frozen):
     """What one tracker reports for frame `index` (from 1) at time t (s): N people or groups, one row each.
 
     plane: "ground", "space" (m) or "image" (px). unit "person": rows are people, group (N,) is the id of each person's
-    group, -1 for alone. unit "group": rows are groups, group == id. pos, vel (N, D): plane's unit, and per s; in the
-    image, pos is the middle of a person's box. cov (N,
-    2D, 2D): covariance of x, y, (z), vx, vy, (vz). box (N, 4): left, top, width, height in px, or None. score (N,): in
-    [0, 1], or empty. groups, events: None and () if the tracker of people leaves them to the grouping, which fills them
-    in and sets `derived`. own_events: kinds of events that the tracker reports itself; they are never filled in.
-    seen (N,): False for people who were not measured in this frame, only predicted; empty: all were measured."""
+    group, -1 for alone. unit "group": rows are groups, group == id. pos, vel (N, D): position in the unit of the plane,
+    velocity in that unit per s; in the image, pos is the middle of a person's box. cov (N, 2D, 2D): covariance of x, y,
+    (z), vx, vy, (vz). box (N, 4): left, top, width, height in px, or None. score (N,): in [0, 1], or empty. A tracker
+    of people may return groups None and events (): the grouping then fills both in and sets `derived` True. own_events:
+    kinds of events that the tracker reports itself, which the grouping does not add. seen (N,): False for a person who
+    was only predicted in this frame, not measured; empty: all were measured."""
 
     index: int
     t: float
@@ -127,7 +129,7 @@ class Tracks(Frozen):
 
     @property
     def measured(self) -> Bools:
-        """Flags (N,): `seen`, or all True if it is empty."""
+        """Flags (N,), True for each row measured in this frame: `seen`, or all True if `seen` is empty."""
         return self.seen if len(self.seen) else np.ones(len(self.id), bool)
 
 
@@ -146,7 +148,7 @@ class Stairs(Frozen):
 
     @classmethod
     def of(cls, s: Any) -> Stairs:
-        """Returns the stairs of a table with these fields."""
+        """Returns Stairs with the values of an object `s` that has attributes of the same names."""
         return cls(np.array(s.foot, float), np.array(s.head, float), s.width, s.rise, int(s.steps), s.landing)
 
 
@@ -154,7 +156,7 @@ class Stairs(Frozen):
 class Scene(Frozen):
     """The static world, in m: size (2,) x, y, from the origin on; walls (W, 2, 2): segments [x1, y1], [x2, y2]; pillars
     (P, 3): x, y, radius; doors (D, 2, 2): segments, openings that `walls` leave free; service (S, 2): service points x,
-    y; stairs; heights of walls and pillars. Empty arrays and () by default."""
+    y; stairs; wall_height, pillar_height. By default there are no walls, pillars, doors, service points and stairs."""
 
     size: Array
     walls: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
@@ -167,7 +169,10 @@ class Scene(Frozen):
 
     @classmethod
     def of(cls, world: Any, walls: Any, doors: Any) -> Scene:
-        """Returns the scene of a table `world` with these fields; walls and doors (W, 2, 2) are given apart."""
+        """Returns the Scene of a scenario's world, with these walls and doors in place of the world's own.
+
+        walls, doors: segments x1, y1, x2, y2 in m, one each.
+        """
         return cls(
             np.array(world.size, float), np.array(walls, float).reshape(-1, 2, 2),
             np.array(world.pillars, float).reshape(-1, 3), np.array(doors, float).reshape(-1, 2, 2),
@@ -215,8 +220,8 @@ class Context(Frozen):
 class Order:
     """One order of a scenario's script, as recorded in gt/script.json; measured events never depend on it. kind:
     "merge", "split" or "queue". fired: frame (from 1) in which it took effect, None if it never did. before, after:
-    person ids of each group concerned, as the script plans them before and after the order. time: of firing, s. event:
-    index among the truth's events of the one that fulfilled it. None: unknown, or none."""
+    person ids of each group concerned, as the script plans them before and after the order. time: of firing, s, None if
+    it never fired. event: index in the truth's events of the event that fulfilled it; None if unknown or none did."""
 
     id: str
     kind: str
@@ -307,7 +312,8 @@ class FrameTruth(Frozen):
     """The truth of frame `index` (from 1) at time t (s), one row for each of N people. It never reaches a tracker. id
     (N,): persons. group (N,): id of the person's group, -1 for alone. pos (N, 2): x, y in m. vel (N, 2): m/s. box (N,
     4): left, top, width, height in px, of the whole body, unclipped. visibility (N,): visible share of the whole body,
-    0 to 1. groups: on the ground, in m; groups_px: in the image, in px. pixels: who is in each pixel. None: unknown."""
+    0 to 1. groups: on the ground, in m; groups_px: in the image, in px. pixels: who is in
+    each pixel. A field that is None is unknown."""
 
     index: int
     t: float
@@ -326,9 +332,10 @@ class FrameTruth(Frozen):
 class PixelTruth(Frozen):
     """The truth of one frame's pixels; its N people are the frame's people, sorted by id. ids (H, W): person id (from
     1), -2 for walls and pillars, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the point;
-    None if not computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number inside the
-    image that would without occlusion. box (N, 4): left, top, width, height in px of the visible pixels, nan without
-    any. blob (N,): number, from 0, of the region of people who touch each other in the image, -1 if hidden."""
+    None if not computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number of pixels
+    inside the image that would show the person without occlusion. box (N, 4): left, top, width, height in px of the
+    visible pixels, nan without any. blob (N,): number, from 0, of the region of people who touch each other in the
+    image, -1 if hidden."""
 
     ids: Ints
     disparity: Array | None
@@ -339,7 +346,10 @@ class PixelTruth(Frozen):
 
     @property
     def visibility(self) -> Array:
-        """The visible share of each person's part in the image, visible_px / amodal_px, (N,); 0 without such a part."""
+        """The share (N,) of each person's pixels that is not occluded: visible_px / amodal_px.
+
+        Parts outside the image do not count. 0 for a person without pixels in the image.
+        """
         return np.asarray(self.visible_px / np.maximum(self.amodal_px, 1.0))
 
 
@@ -352,9 +362,9 @@ class Truth(Frozen):
     and outside the image. z (R,): height of the ground, m. heading (R,): rad. height (R,): of the person, m. groups,
     groups_px: T Groups, on the ground (m) and in the image (px). labelled (T,): True for frames with group labels.
     events, near (strangers who walk like a group): measured from the motion. orders: of the script, () without.
-    px_per_m: image scale, nan if unknown. fps: frames/s. unscored: rows beside the people, None without
-    distractors. camera, scene: of the sequence, by which boxes are compared on the ground. Fields that may be None are
-    None if unknown."""
+    px_per_m: image scale, nan if unknown. fps: frames/s. unscored: labelled rows that are not scored; None without such
+    labels. camera, scene: of the sequence, by which boxes are compared on the ground. Fields that may be None are None
+    if unknown."""
 
     name: str
     fps: float
@@ -405,8 +415,9 @@ class Truth(Frozen):
 class Sequence:
     """A sequence of frames, simulated, stored or recorded; it can be iterated any number of times, from frame 1. fps:
     frames/s. length: number of frames, None if unknown before reading. frames(): a new iterator over Frame, with the
-    detections. bare(): the same without pictures, None if that is not quicker. has_images, has_right, has_detections:
-    what the frames hold. image_size: (width, height) px, camera, scene: None if unknown. px_per_m: nan if unknown.
+    detections. bare(): a new iterator over the same frames without pictures; bare is None if this would not be
+    quicker. has_images, has_right, has_detections: what the frames hold. image_size: (width, height) px. image_size,
+    camera and scene are None if unknown, px_per_m is nan.
     Fields that load are functions, or None if there is nothing to load: load_truth() gives the Truth; load_background()
     pictures (K, H, W, 3) of a scene to train a background model; load_people() the person ids of each group that the
     script names; load_pixels(index) the PixelTruth of frame `index`; load_light() the factor of brightness of each
@@ -435,11 +446,14 @@ class Sequence:
         return self.frames()
 
     def without_pictures(self) -> Iterator[Frame]:
-        """Returns a new iterator over Frame, without pictures if `bare` is given."""
+        """Returns a new iterator over the frames: without pictures if `bare` is given, else the same as `frames()`."""
         return self.frames() if self.bare is None else self.bare()
 
     def frame_truth(self, index: int) -> FrameTruth | None:
-        """Returns the truth of frame `index` (from 1), with its pixels if they are known."""
+        """Returns the truth of frame `index` (from 1), None if the sequence has no truth.
+
+        Its `pixels` are given if the sequence has `load_pixels`.
+        """
         if self.truth is None:
             return None
         here = self.truth.at(index)
@@ -462,17 +476,20 @@ class Sequence:
 
 
 class Tracker(Protocol):
-    """The interface of a tracker. needs: the inputs it accepts, any one suffices: "pixels" (pictures), "stereo" (left
-    and right pictures), "boxes" or "points" (detections)."""
+    """The interface of a tracker.
+
+    needs: one or more of "pixels" (pictures), "stereo" (left and right pictures), "boxes" and "points" (detections).
+    The tracker can work with each of these inputs alone.
+    """
 
     needs: tuple[str, ...]
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forgets all state and starts a new sequence. seed: for the tracker's random numbers."""
+        """Forgets all state and prepares for a new sequence. seed: for the tracker's random numbers."""
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns this tracker's tracks of `frame`, from this and earlier frames only.
 
-        detections: of the frame, perhaps none; None if the tracker is given pictures only.
+        detections: those of the frame, possibly with zero rows; None if the tracker is given pictures only.
         """
         ...

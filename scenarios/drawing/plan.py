@@ -38,7 +38,7 @@ class OrderMark(NamedTuple):
 
 
 def middle(value: Value) -> float:
-    """Returns the mean of a value, moved into its `clip`."""
+    """Returns a number itself, or the mean of a distribution; a mean outside `clip` becomes the nearer bound."""
     if not isinstance(value, Distribution):
         return float(value)
     drawn = value.normal[:1] if value.normal is not None else value.uniform or value.choice
@@ -48,7 +48,7 @@ def middle(value: Value) -> float:
 
 
 def spread(value: Value) -> float:
-    """Returns half the width of the range in which nearly all draws of a value lie; 0 for a number."""
+    """Returns half the width of the range in which most draws of a value lie, for normal 2 sd; 0 for a number."""
     if not isinstance(value, Distribution):
         return 0.0
     low, high = bounds(value)

@@ -31,7 +31,7 @@ def place(point: Point) -> str:
 
 
 def count(n: Value, one: str, many: str) -> str:
-    """Returns a number or distribution with its noun: `1 person`, `3 people`."""
+    """Returns a value in words with its noun, `one` for 1, else `many`: `1 person`, `3 people`."""
     return f"{number(n)} {one if n == 1 else many}"
 
 
@@ -56,7 +56,7 @@ def setting(scenario: Scenario) -> list[str]:
 
 
 def people(group: GroupSpec) -> str:
-    """Returns an entry of `group` in words."""
+    """Returns in words who a `group` entry of a scenario is: size, start, stops, goal, speed, time of entry."""
     words = [count(group.size, "person", "people")]
     words[0] = f"{group.repeat} groups of {words[0]}" if group.repeat > 1 else words[0]
     words.append(f"from {place(group.start)}")
@@ -78,7 +78,7 @@ def _stop(stop: Stop) -> str:
 
 
 def trigger(when: When) -> str:
-    """Returns when an order fires, in words."""
+    """Returns in words when an order fires, such as `at 5 s`."""
     if when.time is not None:
         text = f"at {number(when.time, 's')}"
     elif when.reach is not None:
@@ -92,7 +92,7 @@ def trigger(when: When) -> str:
 
 
 def order(event: ScriptOrder) -> str:
-    """Returns what an order does, in words."""
+    """Returns in words what an order does, such as `merge a + b → c, to meet and stand`."""
     if isinstance(event, MergeOrder):
         goal = "to meet and stand" if isinstance(event.goal, str) else f"to {place(event.goal)}"
         return f"merge {' + '.join(event.groups)} → {event.into}, {goal}"
@@ -104,7 +104,7 @@ def order(event: ScriptOrder) -> str:
 
 
 def sensor(scenario: Scenario) -> list[str]:
-    """Returns lines about the scenario's sensor: how often it detects, and the keys that differ from the defaults."""
+    """Returns lines of text about the sensor: its rates, each other key that differs from the default, `hide`."""
     s = scenario.sensor
     changed = s.model_dump(exclude_defaults=True, exclude={"detect_prob", "clutter_rate", "hide"})
     rate = f"{s.clutter_rate:g} false alarms per frame"
@@ -116,7 +116,7 @@ def sensor(scenario: Scenario) -> list[str]:
 
 
 def text(scenario: Scenario) -> str:
-    """Returns a description of a scenario for people, as lines of text: setting, people, orders, sensor."""
+    """Returns a description of a scenario in words, a text of several lines: setting, people, orders, sensor."""
     lines = [scenario.name, *([scenario.about] if scenario.about else []), "", *setting(scenario), "", "People"]
     wide = max(len(group.id) for group in scenario.group)
     lines += [f"  {group.id:<{wide}}  {people(group)}" for group in scenario.group]
@@ -127,5 +127,5 @@ def text(scenario: Scenario) -> str:
 
 
 def cut(words: str, length: int) -> str:
-    """Returns the words, cut to a length at their end."""
+    """Returns the text if it has at most `length` characters, else its beginning with "…", `length` characters."""
     return words if len(words) <= length else words[: length - 1] + "…"

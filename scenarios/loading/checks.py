@@ -49,7 +49,7 @@ def _check_amounts(scenario: Scenario) -> None:
 
 
 def most_people(scenario: Scenario) -> float:
-    """Returns how many people there can be."""
+    """Returns the greatest number of people that a scenario can have; inf if a size is unbounded."""
     return sum(group.repeat * bounds(group.size)[1] for group in scenario.group)
 
 
@@ -104,7 +104,7 @@ def _check_points(scenario: Scenario) -> None:
 
 
 def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
-    """Yields (key, point in m) for every place where people start, pass, are sent, or trigger an order."""
+    """Yields (key, point in m) of each start, stop, via, goal, `reach` trigger and of the first places in queues."""
     for group in scenario.group:
         yield f"group.{group.id}.start", group.start
         yield from ((f"group.{group.id}.stops.{k}.at", stop.at) for k, stop in enumerate(group.stops))
@@ -134,7 +134,7 @@ QUEUE_PEOPLE = 3  # least number of people in a queue; sim.truth.queue_detection
 
 
 def fail(place: str, got: str, expected: str, remedy: str) -> NoReturn:
-    """Always raises an InputError with these texts; `check` adds the file."""
+    """Raises, in every case, an InputError with these parts; `check` adds the file."""
     raise InputError(place=place, got=got, expected=expected, remedy=remedy)
 
 

@@ -32,7 +32,7 @@ from scenarios.schema.values import Model, Name
 
 
 class SensorFile(Model):
-    """The content of a profile file: `schema` (1, may be absent) and the required table `[sensor]`."""
+    """The content of a detector profile's file: `schema` (1, may be absent) and the required table `[sensor]`."""
 
     schema_: Literal[1] = Field(1, alias="schema")
     sensor: Sensor
@@ -54,7 +54,7 @@ def sensor_settings(path: str | Path) -> tuple[str, ...]:
 
 
 def sensor_table(path: str | Path) -> Table:
-    """Returns the keys given in the file's [sensor] table with their values, without defaults."""
+    """Returns the keys that are given in the file's [sensor] table, with their values; no defaults are added."""
     path = Path(path)
     table = toml_files.parse(path, "check the path, or make one with `flockscope fit sensor`")
     validate(table, path, model=SensorFile)
@@ -63,7 +63,7 @@ def sensor_table(path: str | Path) -> Table:
 
 
 def dump_sensor(sensor: Sensor, about: str = "") -> str:
-    """Returns the text of a profile file with all keys of a sensor; `about` becomes comment lines at the top."""
+    """Returns the text of a detector profile's file with all keys of `sensor`. about: comment lines at the top."""
     table = sensor.model_dump(mode="python", exclude_none=True)
     lines = [f"# {line}".rstrip() for line in about.splitlines()]
     rows = [f"{key} = {toml_files.toml_value(v)}" for key, v in table.items() if key != "hide" or v]
@@ -102,7 +102,7 @@ def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
 
 
 def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) -> ObservationSpec:
-    """Returns camera, sensor, light and picture of a TOML file (None: all defaults), with settings applied."""
+    """Returns camera, sensor, light and picture of a TOML file; path None: all defaults. set: settings "key=value"."""
     table = {} if path is None else toml_files.parse(Path(path), "check --camera: a TOML file with [camera]")
     table, places = toml_files.apply_settings(table, tuple(set), path or "")
     return validate(table, path or "", places, model=ObservationSpec)
@@ -118,7 +118,7 @@ class SuiteEntry(Model):
     repeat: Annotated[int, Field(ge=1, le=REPEATS)] = 0
 
     def expanded(self) -> list[SuiteEntry]:
-        """Returns the entries that this row of a file stands for."""
+        """Returns the entries for which this entry of a file stands: name-1 … name-n for `repeat` n, else one."""
         name = self.name or Path(self.scenario).stem
         copies = [(f"{name}-{k}", k) for k in range(1, self.repeat + 1)] or [(name, 0)]
         return [self.model_copy(update={"name": each, "repeat": k}) for each, k in copies]
@@ -132,7 +132,7 @@ class Suite(Model):
 
 
 def read_suite(path: Path) -> Suite:
-    """Returns the content of a suite file, with an entry of `repeat = n` expanded to name-1 … name-n."""
+    """Returns the content of a suite file with each entry expanded; raises InputError if two get the same name."""
     suite = validate(toml_files.parse(path), path, model=Suite)
     entries = tuple(each for entry in suite.entry for each in entry.expanded())
     counts = Counter(entry.name for entry in entries)
@@ -146,7 +146,7 @@ def read_suite(path: Path) -> Suite:
 def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
     """Returns the entries of a name in the catalogue, a *.toml file (scenario or suite), or `suite:NAME`.
 
-    Settings are applied to each entry, after the entry's own.
+    set: settings "key=value", applied to each entry after the settings that the suite gives it.
     """
     settings, suite = tuple(set), suite_file(name)
     if suite is not None:
@@ -156,9 +156,9 @@ def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
 
 
 def rows(name: str) -> list[SuiteEntry]:
-    """Returns the scenarios that a name stands for, as `resolve` takes it, with their settings; copies count once.
+    """Returns one SuiteEntry for each scenario for which a name, as `resolve` takes it, stands; copies count once.
 
-    The scenario of each can be given to `load`, whatever the working folder of the suite's file.
+    `scenario` of each can be given to `load` from any working folder.
     """
     suite = suite_file(name)
     if suite is None:
@@ -176,12 +176,12 @@ def rows(name: str) -> list[SuiteEntry]:
 
 
 def is_catalogued(name: str) -> bool:
-    """Returns True if `resolve` takes the name for a scenario or suite, and not for a folder of that name."""
+    """Returns True if a name is to be given to `resolve`: *.toml, suite:NAME, or a name of the catalogue."""
     return name.endswith(".toml") or name.startswith("suite:") or name in (*names(), *suite_names())
 
 
 def suite_file(name: str) -> Path | None:
-    """Returns the file of the suite that a name stands for, None for a scenario."""
+    """Returns the file of the suite that a name means, None if it means a scenario; InputError for an unknown name."""
     wanted = name.removeprefix("suite:")
     if wanted.endswith(".toml"):
         path = toml_files.find(wanted)

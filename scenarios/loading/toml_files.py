@@ -55,7 +55,7 @@ def suite_names() -> list[str]:
 
 
 def did_you_mean(word: str, known: list[str]) -> str:
-    """Returns the remedy of an error about an unknown name: known names that are like the word, else all."""
+    """Returns a remedy for an unknown name `word`: "did you mean …?" with similar `known` names, else all."""
     close = difflib.get_close_matches(word, known, n=3, cutoff=0.5)
     if close:
         return "did you mean " + " or ".join(repr(name) for name in close) + "?"
@@ -63,13 +63,16 @@ def did_you_mean(word: str, known: list[str]) -> str:
 
 
 def closest(word: str, known: Iterable[str]) -> str:
-    """Returns the known name most like a word, however unlike, in any case; "" without known names."""
+    """Returns the name in `known` that is most similar to `word`, ignoring upper and lower case; "" without names."""
     names = {name.casefold(): name for name in known}
     return names[difflib.get_close_matches(word.casefold(), names, 1, 0.0)[0]] if names else ""
 
 
 def find(name: str | Path, beside: Path | None = None) -> Path:
-    """Returns the file of a scenario by name or path; a path is sought in `beside`, then in the catalogue."""
+    """Returns the file of a scenario, by its name in the catalogue or its path.
+
+    A path is sought in the folder `beside` (None: the working folder), then in the catalogue. Else InputError.
+    """
     text = str(name)
     if not text.endswith(".toml"):
         path = CATALOGUE / f"{text}.toml"
@@ -85,7 +88,7 @@ def find(name: str | Path, beside: Path | None = None) -> Path:
 
 
 def parse(path: Path, remedy: str = "check the path and its permissions") -> Table:
-    """Returns the content of a TOML file, without applying `extends`. remedy: if it cannot be read."""
+    """Returns the content of a TOML file without applying `extends`. remedy: for the error if unreadable."""
     body = read_regular(path, TOML_BYTES, remedy)
     try:
         return parse_toml(body.decode("utf-8-sig"), path)
@@ -95,7 +98,7 @@ def parse(path: Path, remedy: str = "check the path and its permissions") -> Tab
 
 
 def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
-    """Returns the content of a TOML file merged over all files it extends. chain: the files that extend this one."""
+    """Returns the content of a TOML file merged over the files that it extends. chain: files that extend this one."""
     chain = (*chain, path.resolve())
     table = parse(path)
     base = table.pop("extends", None)
@@ -116,7 +119,7 @@ def read(path: Path, chain: tuple[Path, ...] = ()) -> Table:
 
 
 def merge(below: Table, above: Table) -> Table:
-    """Returns the table `above` merged over `below`, as the module says."""
+    """Returns the table `above` merged over `below` by the rules in the module's text; neither is changed."""
     return {**below, **{key: _merge_value(key, below.get(key), value) for key, value in above.items()}}
 
 
@@ -174,9 +177,9 @@ SHOWN = 120  # characters of a setting that messages show
 
 
 def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> tuple[Table, dict[KeyPath, str]]:
-    """Returns a copy of the table with each `key=value` applied, and the text of each by path of its key.
+    """Returns a copy of the table with each `key=value` applied, and the text of each setting by the path of its key.
 
-    A misspelt key is found by `validate`. file: for messages.
+    A misspelt key is not refused here but by `validate`. file: for messages.
     """
     table = copy.deepcopy(table)
     places: dict[KeyPath, str] = {}
@@ -187,12 +190,12 @@ def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> 
 
 
 def place_of(text: str) -> str:
-    """Returns the place of a setting for messages."""
+    """Returns a setting as `place` of an InputError: "--set key=value", cut in the middle if long."""
     return f"--set {shortened(text, SHOWN)}"
 
 
 def parse_setting(text: str) -> tuple[list[str], Any]:
-    """Returns the steps of the key and the TOML value of a setting `a.b=value`."""
+    """Returns the steps of the key, ["a", "b"], and the value of a setting `a.b=value`; else InputError."""
     key, equals, value = text.partition("=")
     steps = key.strip().split(".")
     if not equals or not all(steps):
@@ -205,7 +208,7 @@ def parse_setting(text: str) -> tuple[list[str], Any]:
 
 
 def parse_value(value: str, text: str) -> Any:
-    """Returns the value of a TOML text, or of a word without quotes; `text` is the whole setting, for messages."""
+    """Returns the value of a TOML text; a word without quotes is a string. text: the whole setting, for messages."""
     try:
         table = parse_toml(f"value = {value}")
     except InputError:

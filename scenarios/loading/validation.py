@@ -29,9 +29,9 @@ M = typing.TypeVar("M", bound=BaseModel)
 
 
 def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None = None, *, model: type[M]) -> M:
-    """Returns the table as a model; raises InputError for the first problem. Types are strict.
+    """Returns the table as a `model`; raises InputError for the first problem. Types are not converted.
 
-    places: texts of `--set` by path, as of `apply_settings`; an error at or below such a path names the setting.
+    places: texts of settings by path, from `apply_settings`; an error at or below such a path names the setting.
     """
 
     def wrong(path: KeyPath, got: object, expected: str, remedy: str) -> InputError:

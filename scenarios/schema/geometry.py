@@ -24,7 +24,7 @@ def wall_distance(wall: WallSegment, point: FixedPoint) -> float:
 
 
 def door_fits(door: DoorSpec, wall: WallSegment) -> bool:
-    """Returns True if the whole opening of a door lies on a wall."""
+    """Returns True if the whole opening of a door lies on the wall, within 5 cm across."""
     room = min(math.dist(wall[:2], door.at), math.dist(wall[2:], door.at))
     return wall_distance(wall, door.at) <= DOOR_TOLERANCE and door.width / 2 <= room + 1e-9
 
@@ -32,7 +32,7 @@ def door_fits(door: DoorSpec, wall: WallSegment) -> bool:
 def cut_walls(world: WorldSpec) -> tuple[list[WallSegment], list[WallSegment]]:
     """Returns the pieces of all walls, x1, y1, x2, y2 in m, without the openings of doors, and these openings.
 
-    A door is cut out of the wall nearest to it. The order and the last bits of the pieces decide the motion.
+    A door is cut out of the wall nearest to it. The motion depends on the order and the last bits of the pieces.
     """
     pieces, openings = list(world.walls), []
     for door in world.doors:
@@ -52,7 +52,7 @@ def cut_walls(world: WorldSpec) -> tuple[list[WallSegment], list[WallSegment]]:
 
 
 def clearance(point: FixedPoint, world: WorldSpec) -> tuple[float, str]:
-    """Returns the distance in m from a point to the nearest wall or pillar, and words for that obstacle."""
+    """Returns the distance in m from a point to the nearest wall or pillar, and words for it; inf if none."""
     best = (math.inf, "nothing")
     for wall in cut_walls(world)[0]:
         best = min(best, (wall_distance(wall, point), f"the wall {[round(v, 2) for v in wall]}"))

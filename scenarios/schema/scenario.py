@@ -29,7 +29,7 @@ Pixels = Annotated[float, within(0.0, 100.0, " px")]
 
 
 class LightSwitch(Model):
-    """A sudden change of brightness, as of a lamp or a cloud; those of several switches multiply.
+    """A sudden change of brightness, as of a lamp or a cloud; the factors of several switches are multiplied.
 
     Attributes:
         at: time of the change, s
@@ -335,7 +335,7 @@ class When(Model):
 
 
 class SplitPart(Model):
-    """One part of a group that splits; the first parts without size get one more of a rest.
+    """One part of a group that splits; of parts without size, the first ones get one more person if needed.
 
     Attributes:
         id: name of the new group
@@ -470,7 +470,7 @@ def group_names(group: GroupSpec) -> list[str]:
 
 
 def expand(pattern: str, names: list[str]) -> list[str]:
-    """Returns the names that a pattern means: for `g-*` those that begin with `g-`, else the pattern itself."""
+    """Returns for a pattern `g-*` those of `names` that begin with `g-`; for any other pattern the pattern itself."""
     return [n for n in names if n.startswith(pattern[:-1])] if pattern.endswith("*") else [pattern]
 
 

@@ -34,7 +34,7 @@ FixedPoint = tuple[float, float]
 
 
 class Model(BaseModel):
-    """Base class of all tables of scenario files: frozen, without unknown keys, infinite numbers and nan."""
+    """Base class of all tables of scenario files. It is frozen and refuses unknown keys, infinite numbers and nan."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
 
@@ -62,7 +62,7 @@ class Model(BaseModel):
 
 
 class Distribution(Model):
-    """One of five distributions of a number: exactly one of the keys besides `clip` is given."""
+    """A distribution of a number, of one of five kinds: exactly one of the keys other than `clip` is given."""
 
     normal: tuple[float, Annotated[float, Field(ge=0)]] | None = None
     uniform: tuple[float, float] | None = None
@@ -107,7 +107,7 @@ class Distribution(Model):
         return float(low <= a <= high) if a == b else max(min(b, high) - max(a, low), 0.0) / (b - a)
 
     def share_within(self, low: float, high: float) -> float:
-        """Returns the probability that a value drawn within `clip` lies between low and high."""
+        """Returns the probability that a draw, which always lies within `clip`, is from low to high."""
         a, b = (-math.inf, math.inf) if self.clip is None else self.clip
         return self._share(max(a, low), min(b, high)) / self._share(a, b)
 
@@ -128,7 +128,7 @@ Point = tuple[Value, Value]
 
 
 def problem(got: str, expected: str, remedy: str = "correct it") -> PydanticCustomError:
-    """Returns the error that a validator raises for a wrong value, with the words of an InputError."""
+    """Returns the error for a pydantic validator to raise; it becomes an InputError with these words."""
     return PydanticCustomError("problem", "problem", {"got": got, "expected": expected, "remedy": remedy})
 
 
@@ -136,7 +136,7 @@ SURE = 0.999  # least probability that a value lies in its range
 
 
 def within(low: float, high: float, unit: str = "") -> AfterValidator:
-    """Returns the validator of values of which nearly all draws lie from `low` to `high`."""
+    """Returns a validator that refuses a number outside `low` to `high`, or a distribution with over 0.1 % there."""
 
     def check(value: Value) -> Value:
         drawn, share = isinstance(value, Distribution), share_within(value, low, high)
@@ -150,12 +150,12 @@ def within(low: float, high: float, unit: str = "") -> AfterValidator:
 
 
 def share_within(value: Value, low: float, high: float) -> float:
-    """Returns the probability that a value lies between low and high; 0 or 1 for a number."""
+    """Returns the probability that a value is from low to high, both included; 0.0 or 1.0 for a number."""
     return value.share_within(low, high) if isinstance(value, Distribution) else float(low <= value <= high)
 
 
 def bounds(value: Value) -> tuple[float, float]:
-    """Returns the least and greatest number that a value can take, `clip` included; -inf or inf without one."""
+    """Returns the least and greatest number that a value can take, limited by `clip`; -inf or inf if unbounded."""
     if not isinstance(value, Distribution):
         return float(value), float(value)
     if value.uniform is not None:

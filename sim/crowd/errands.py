@@ -38,8 +38,8 @@ class _Errand:
 class Errands:
     """The stops of the groups of one running simulation; an order of the script ends the stops of its groups.
 
-    State: errands by group index, of groups with stops left; stray: when each member who stays behind walks on, by
-    column.
+    State: errands: the stops of each group that has stops left, by group index; stray: the time (s) at which a member
+    who stays behind at a stop walks on, by column (person id - 1).
     """
 
     def __init__(self, entering: Sequence[EnteringGroup], groups: GroupState, scene: Scene) -> None:
@@ -48,11 +48,11 @@ class Errands:
         self.stray: dict[int, float] = {}
 
     def advance(self, t: float, state: Array) -> bool:
-        """Lets groups stop and walk on at time t (s); returns True if something changed for `GroupState.fill`.
+        """Lets groups stop and walk on at time t (s); returns True if `GroupState.fill` must be called afterwards.
 
-        state (P, 4): x, y, vx, vy by column, nan while absent. A group that comes near a stop takes the free place
-        nearest to it and stands in a circle until its time is over. If only some members stop, these stay where they
-        are.
+        state (P, 4): x, y, vx, vy by column, nan while absent. A group that comes near a stop walks to the free place
+        nearest to the stop and stands there in a circle until the time of the stop is over. If only some members stop,
+        they stand still near the stop, and the group walks on without them.
         """
         if not self.errands and not self.stray:
             return False

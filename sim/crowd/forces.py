@@ -101,14 +101,14 @@ class GroupArrays(NamedTuple):
 
     @classmethod
     def empty(cls, g: int, w: int) -> GroupArrays:
-        """Returns arrays for g groups with room for w waypoints each."""
+        """Returns arrays for g groups with room for w waypoints each: headings (1, 0), all other values 0."""
         return cls(
             np.zeros((g, w, 2)), np.zeros((g, w), np.int64), np.zeros(g, np.int64), np.zeros(g, np.int64), np.zeros(g),
             np.tile([1.0, 0.0], (g, 1)), np.zeros(g, np.int64), np.zeros(g, np.bool_), np.zeros((g, 12)),
         )  # fmt: skip
 
     def with_room(self, w: int) -> GroupArrays:
-        """Returns the same arrays with room for at least w waypoints; route and kind are copied."""
+        """Returns arrays with room for at least w waypoints of each group; only route and kind are copies."""
         room = ((0, 0), (0, max(w - self.kind.shape[1], 0)))
         return self._replace(route=np.pad(self.route, (*room, (0, 0))), kind=np.pad(self.kind, room))
 
@@ -133,7 +133,7 @@ class PeopleArrays(NamedTuple):
 
     @classmethod
     def empty(cls, n: int) -> PeopleArrays:
-        """Returns arrays for n people."""
+        """Returns arrays for n people: paces 1, tags -1, all other values 0."""
         two, four = ([np.zeros((n, k)) for _ in range(3)] for k in (2, 4))
         tag = np.full((n, 4), -1, np.int64)
         return cls(two[0], two[1], np.ones(n), four[0], np.zeros((n, 5)), four[1], two[2], tag)

@@ -18,7 +18,10 @@ SIDEWAYS_LEAD = 0.6  # groups side by side meet this share of their distance fur
 
 
 def rows_of(n: int) -> list[int]:
-    """Returns the sizes of the rows of a walking group of n people, front first: rows of 3, then one or two of 2."""
+    """Returns the sizes of the rows of a walking group of n people, front row first.
+
+    Up to 3 people form one row. More people form rows of 3, followed by as few rows of 2 as possible.
+    """
     if n <= 3:
         return [n]
     triads = {0: n // 3, 1: (n - 4) // 3, 2: (n - 2) // 3}[n % 3]
@@ -26,7 +29,10 @@ def rows_of(n: int) -> list[int]:
 
 
 def walking(n: int, spacing: float) -> Array:
-    """Returns the places (n, 2) of a walking group: front row first, left to right, neighbours `spacing` m apart."""
+    """Returns the places (n, 2) of a walking group in m: forward and left of the group's middle.
+
+    They are listed front row first, from left to right. Neighbours in a row are `spacing` m apart.
+    """
     rows = []
     for k, size in enumerate(rows_of(n)):
         left = (np.arange(size)[::-1] - (size - 1) / 2) * spacing
@@ -40,7 +46,7 @@ def walking(n: int, spacing: float) -> Array:
 
 
 def standing(n: int, spacing: float) -> Array:
-    """Returns the places (n, 2) of a group in conversation: on a circle, neighbours `spacing` m apart."""
+    """Returns the places (n, 2) m of a standing group: on a circle, neighbours `spacing` m apart."""
     if n == 1:
         return np.zeros((1, 2))
     angle = 2 * np.pi * (np.arange(n) + 0.5) / n
@@ -48,13 +54,19 @@ def standing(n: int, spacing: float) -> Array:
 
 
 def to_world(places: Array, middle: Array, heading: Array) -> Array:
-    """Returns the world points (n, 2) of places (n, 2); middle (2,) m and heading (2,) are the group's."""
+    """Returns the world points (n, 2) m of places (n, 2), which are m forward and left of a group's middle.
+
+    middle (2,) m: the group's middle in the world. heading (2,): unit vector in which the group faces.
+    """
     left = np.array([-heading[1], heading[0]])
     return np.asarray(middle + places[:, :1] * heading + places[:, 1:] * left)
 
 
 def assign(pos: Array, points: Array) -> Ints:
-    """Returns the point that each of n people takes (n,), every point once; pos, points (n, 2)."""
+    """Returns the index of the point that each of n people takes, (n,); every point is taken once.
+
+    pos, points (n, 2), m. The sum of the squared distances is the least possible.
+    """
     from scipy.optimize import linear_sum_assignment
 
     apart = pos[:, None] - points[None]
@@ -64,7 +76,8 @@ def assign(pos: Array, points: Array) -> Ints:
 def meeting_point(middles: Array, speeds: Array, goal: Array | None) -> Array:
     """Returns the point (2,) at which groups that walk to each other meet at about the same time.
 
-    middles (G, 2): m. speeds (G,): m/s. goal (2,): where they go together afterwards; None if nowhere.
+    middles (G, 2): m. speeds (G,): m/s. goal (2,) m: where they walk together afterwards; None if they
+    stay. With a goal the point lies further towards it, so that groups side by side do not walk into each other.
     """
     weights = (1 / speeds) / np.sum(1 / speeds)
     # Further on the slower ones, and towards the common goal: groups side by side do not walk into each other.
@@ -81,7 +94,10 @@ def meeting_point(middles: Array, speeds: Array, goal: Array | None) -> Array:
 
 
 def part_sizes(sizes: list[int | None], total: int) -> list[int]:
-    """Returns the number of people in each part of a group of `total` that divides; None: an equal share."""
+    """Returns the number of people in each part of a group of `total` people that divides.
+
+    sizes: the number for each part. Parts with None share the rest equally; the first of them get one more if needed.
+    """
     open_parts = [k for k, s in enumerate(sizes) if s is None]
     rest = total - sum(s for s in sizes if s is not None)
     out = [s if s is not None else 0 for s in sizes]
@@ -91,9 +107,11 @@ def part_sizes(sizes: list[int | None], total: int) -> list[int]:
 
 
 def divide(offsets: Array, ways: Array, sizes: list[int]) -> Ints:
-    """Returns the part that each of n members joins when a group divides (n,).
+    """Returns the index of the part that each of n members joins when a group divides, (n,).
 
-    offsets (n, 2): from the group's middle. ways (K, 2): to each part's goal. sizes: of the K parts.
+    offsets (n, 2) m: each member's position less the group's middle. ways (K, 2) m: each part's goal less the group's
+    middle. sizes: the number of people in each of the K parts. The members' distances from the middle towards their
+    parts' goals have the greatest possible sum.
     """
     from scipy.optimize import linear_sum_assignment
 

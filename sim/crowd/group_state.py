@@ -25,14 +25,16 @@ MAX_QUEUE_SPEED = 1.4  # m/s, of people on the way to their place in a queue
 class GroupState:
     """The groups of a running simulation, by group index, and their people, by column (person id - 1).
 
-    State: alive: index of each existing group by name; arrays: their ways, as the kernels use them. By group index,
-    ended ones included: members, spacing (m), goals (point, "stand", "leave" or "walk"); settled: groups that stand in
-    a circle; next_group. By column: group_of, queue_of (order index, -1 in no queue), present, free_speed, places (P,
-    2) in the formation, targets (P, 2) in a queue or of people held, held, waypoint (the first not passed).
+    State: alive: index of each existing group by name; arrays: the ways of groups, as the kernels use them; next_group:
+    index of the next new group; settled: indices of groups that stand in a circle. By group index, also for groups that
+    ended: members (columns), spacing (m), goals (point and "stand", "leave" or "walk"). By column: group_of (group
+    index), queue_of (index of the queue order, -1 in no queue), present, free_speed (m/s), places (P, 2): place in the
+    formation, m; held: True for a person who stays behind at a stop; targets (P, 2): place in the queue, or where a
+    held person stands, m; waypoint: index of the first waypoint that the person has not passed.
     """
 
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, slowdown: float) -> None:
-        """Starts with nobody present; new: greatest number of groups that orders may still make."""
+        """Starts with nobody present. new: greatest number of groups that orders make. slowdown: m/s per member."""
         people = [m for g in entering for m in g.members]
         self.navigator, self.slowdown = navigator, slowdown
         self.arrays = GroupArrays.empty(len(entering) + new, WAY)
@@ -58,7 +60,7 @@ class GroupState:
         return bool(self.present[self.members[g]].all())
 
     def enter(self, group: EnteringGroup) -> None:
-        """Marks the group's members as present, starts its way and sets the members' places."""
+        """Records the group's members as present, starts its way and gives them places in the formation."""
         g = group.index
         self.go(g, group.start, *group.leg(group.stops), group.speed)
         columns = self.members[g]
@@ -70,7 +72,10 @@ class GroupState:
         self.places[columns] = places
 
     def remove_leaving(self, columns: Ints) -> list[int]:
-        """Returns the columns of people whose group has reached the end of its way and leaves; they are absent now."""
+        """Records as absent the people whose group leaves the scene and has reached the end of its way.
+
+        columns (N,): the people to examine; those in a queue stay. Returns the columns of the people who left.
+        """
         done = self.arrays.arrived & (self.arrays.finish == LEAVE)
         if not done.any():
             return []
@@ -85,7 +90,9 @@ class GroupState:
     ) -> None:  # fmt: skip
         """Sets the way of group g from start past the via points to goal, round walls and through doors.
 
-        finish: "stand", "leave" or "walk" on. gather: first waypoint, where the group waits for all members.
+        Points (2,) are in m, speed in m/s. finish: what the group does at the goal, "stand", "leave" the scene or
+        "walk" straight on. gather: an additional first waypoint, where the group waits for all members; None: no such
+        point.
         """
         way: list[tuple[Array, int]] = [] if gather is None else [(gather, GATHER)]
         here = start if gather is None else gather
@@ -102,7 +109,11 @@ class GroupState:
         self.write_way(g, way, finish, speed, start)
 
     def write_way(self, g: int, way: list[tuple[Array, int]], finish: str, speed: float, start: Array) -> None:
-        """Overwrites the way of group g: pairs of a point (2,) and a kind of waypoint, speed and finish."""
+        """Overwrites the waypoints, speed (m/s) and finish of group g; the group starts anew at the first waypoint.
+
+        way: pairs of a point (2,) m and a kind of waypoint (PASS, NARROW, GATHER, END). finish: as in `go`. start (2,):
+        the group's position in m, from which the group turns to its first waypoint.
+        """
         self.arrays = arrays = self.arrays.with_room(len(way))
         for k, (point, kind) in enumerate(way):
             arrays.route[g, k], arrays.kind[g, k] = point, kind
@@ -117,7 +128,7 @@ class GroupState:
         self.waypoint[self.members[g]] = 0
 
     def new_group(self, name: str, columns: list[int], spacing: float) -> int:
-        """Makes a group of the people in these columns, takes them out of queues, and returns its index."""
+        """Makes a group of the people in `columns`, takes them out of queues, and returns the new group's index."""
         g = self.next_group
         self.next_group += 1
         self.alive[name], self.members[g], self.spacing[g] = g, sorted(columns), spacing
@@ -126,16 +137,22 @@ class GroupState:
         return g
 
     def walking_speed(self, columns: list[int]) -> float:
-        """Returns the speed of a group of the people in these columns, m/s."""
+        """Returns the speed in m/s of a group of the people in `columns`; see `population.walking_speed`."""
         return walking_speed(list(self.free_speed[columns]), self.slowdown)
 
     def take_places(self, columns: list[int], places: Array, middle: Array, g: int, pos: Array) -> None:
-        """Gives each of these people one of the `places` (n, 2) of group g, so that they walk least."""
+        """Gives each of the people in `columns` one of the places (n, 2) of group g, so that they walk least together.
+
+        places: m forward and left of the group's middle (2,) m. pos (n, 2): the people's positions, m.
+        """
         points = to_world(places, middle, self.arrays.heading[g])
         self.places[columns] = places[assign(pos, points)]
 
     def settle_arrived(self, state: Array) -> bool:
-        """Gives groups that have just arrived and stand the places of a circle; returns True if one had."""
+        """Puts groups that have just arrived at a goal where they stand into a circle.
+
+        state (P, 4): x, y, vx, vy by column. Returns True if there was such a group.
+        """
         changed = False
         arrived = self.arrays.arrived & (self.arrays.finish == STAND)
         for g in self.alive.values():

@@ -18,8 +18,8 @@ TURN_TIME = 0.3  # s
 def facings(pos: Array, vel: Array, present: Bools, intent: Ints, rate: float) -> Array:
     """Returns the vector in which each person faces at each tick (C, P, 2), nan while absent.
 
-    pos, vel (C, P, 2), present (C, P), intent (C, P): group index. rate: ticks per s. In each tick the vector moves by
-    the share 1 / (rate TURN_TIME) towards the wanted unit vector.
+    pos, vel (C, P, 2): m, m/s. present (C, P). intent (C, P): group index, -1 while absent. rate: ticks per s. In each
+    tick the vector moves by the share 1 / (rate TURN_TIME) towards the wanted unit vector, so it may be shorter than 1.
     """
     out = np.full((*present.shape, 2), np.nan)
     facing = np.zeros((present.shape[1], 2))
@@ -40,7 +40,7 @@ def facings(pos: Array, vel: Array, present: Bools, intent: Ints, rate: float) -
 
 
 def headings(facing: Array) -> Array:
-    """Returns the directions (...) of vectors (..., 2), radians counter-clockwise from +x."""
+    """Returns the angles (...) of vectors (..., 2), radians counter-clockwise from +x."""
     return np.asarray(atan2(facing[..., 1], facing[..., 0]))
 
 

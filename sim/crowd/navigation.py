@@ -23,14 +23,17 @@ def scene_of(world: WorldSpec) -> Scene:
 
 
 def wall_distances(point: Array, wall: Array) -> Array:
-    """Returns the distances (...) m of points (..., 2) to a wall (2, 2)."""
+    """Returns the distances (...) m of points (..., 2) m from a wall with the two ends `wall` (2, 2) m."""
     along = wall[1] - wall[0]
     s = np.clip(dot(point - wall[0], along) / max(float(dot(along, along)), 1e-12), 0, 1)
     return length(point - wall[0] - s[..., None] * along)
 
 
 def blocked(a: Array, b: Array, walls: Array) -> Bools:
-    """Returns which segments from a to b (..., 2) cross a wall (W, 2, 2); touching it with an end is no crossing."""
+    """Returns flags (...): True where the segment from a to b, (..., 2) m, crosses one of the walls (W, 2, 2) m.
+
+    A segment that only touches a wall, or whose end lies on the wall, does not cross it.
+    """
     if not len(walls):
         return np.zeros(a.shape[:-1], dtype=np.bool_)
     p, q = walls[:, 0], walls[:, 1]
@@ -48,8 +51,9 @@ def blocked(a: Array, b: Array, walls: Array) -> Bools:
 class Navigator:
     """Finds the shortest ways round walls and through doors in one scene.
 
-    nodes (N, 2): middles of doors, then points beyond the ends of walls. edges (N, N): distances, inf where a wall or
-    door lies between. Doors block segments like walls, so every way through a door leads over its middle.
+    nodes (N, 2): middles of doors, then points beyond the ends of walls, m. edges (N, N): distance between two nodes in
+    m, inf if a wall or door lies between them. Doors block segments like walls, so every way through a door leads over
+    its middle.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -74,7 +78,10 @@ class Navigator:
         return np.asarray(np.where(hidden, np.inf, d))
 
     def way(self, start: Array, goal: Array) -> tuple[Array, Bools] | None:
-        """Returns the points (K, 2) to walk to, the goal last, and which belong to a door; None if there is no way."""
+        """Returns the points (K, 2) m to walk to, the goal last, and flags (K,): True for points at a door.
+
+        start, goal (2,): m. None if there is no way.
+        """
         ends = np.stack([start, goal])
         if not blocked(ends[:1], ends[1:], self.closed)[0]:
             return ends[1:], np.zeros(1, dtype=np.bool_)

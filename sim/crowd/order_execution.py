@@ -44,11 +44,11 @@ class ServiceQueue:
     busy_until: float | None = None
 
     def slot(self, k: int) -> Array:
-        """Returns the place (2,) with index k in the queue; 0 is the head's."""
+        """Returns the place (2,) m of the k-th person in the queue; k = 0 is the head."""
         return self.head + k * self.spacing * self.along
 
     def remove(self, g: int) -> None:
-        """Takes group g out of the queue, if it is in it, as when it merges; its service ends."""
+        """Takes group g out of the queue if the group is in it. If it is being served, its service is broken off."""
         if self.joined[:1] == [g]:
             self.busy_until = None
         self.joined = [other for other in self.joined if other != g]
@@ -57,8 +57,9 @@ class ServiceQueue:
     def advance(self, t: float, members: dict[int, list[int]], pos: Array) -> tuple[dict[int, Array], list[int]]:
         """Advances the queue to time t (s): ends and begins service, and lets groups join at the tail.
 
-        Returns the place of each person by column, and the group that was served, in a list. members: columns of each
-        group; those of a group still coming are sorted, nearest to the head first. pos (P, 2): m.
+        Returns the place (2,) m of each person by column, and a list with the index of the group whose service has
+        ended now, or an empty list. members: columns of each group, by group index; for a group that is still coming
+        this list is sorted in place, nearest to the head first. pos (P, 2): m, by column.
         """
         done = self._serve(t, members, pos)
 
@@ -96,7 +97,7 @@ EPS = 1e-9  # s
 
 @dataclass
 class PendingOrder:
-    """One order of the script and what became of it. Times count from the first recorded frame, s."""
+    """One order of the script and its progress. Times are in s after the first recorded frame."""
 
     order: MergeOrder | SplitOrder | QueueOrder
     index: int  # in the file, from 0;
@@ -116,9 +117,9 @@ class PendingOrder:
     after: tuple[tuple[int, ...], ...] = ()
 
     def is_due(self, t: float, state: Array, groups: GroupState, come_true: set[str]) -> bool:
-        """Returns True if the order fires at time t (s): `delay` after its trigger was first met.
+        """Returns True if the order fires at time t (s): its groups are present, and its trigger was met `delay` s ago.
 
-        state (P, 4): x, y, vx, vy by column. come_true: ids of the orders that have come true.
+        state (P, 4): x, y, vx, vy by column. come_true: ids of the orders whose rule has held long enough.
         """
         names = concerned(self.order, list(groups.alive))
         # An order waits until every group that it concerns exists and is wholly in the scene.
@@ -146,14 +147,20 @@ class PendingOrder:
         return bool(length(middle - at) < when.reach.radius)
 
     def watch(self, t: float, holds: bool) -> None:
-        """Notes whether the order's rule `holds` at this tick; sets true_at once it has held for its time."""
+        """Updates `held_for` at a tick of time t (s). holds: whether the order's rule holds at this tick.
+
+        Sets `true_at` to t if the rule has held without a break for the time that this kind of order requires.
+        """
         self.held_for = self.held_for + 1 / SCRIPT_RATE if holds else 0.0
         if self.held_for >= RULE_TIME[self.order.type] - EPS:
             self.true_at = t
 
 
 def concerned(order: MergeOrder | SplitOrder | QueueOrder, alive: list[str]) -> list[str]:
-    """Returns the names of the groups that an order concerns; `g-*` stands for all existing names with `g-`."""
+    """Returns the names of the groups that an order concerns, each once.
+
+    alive: names of the existing groups. `g-*` in the order stands for all of them that begin with `g-`.
+    """
     if isinstance(order, SplitOrder):
         return [order.group]
     return list(dict.fromkeys(n for pattern in order.groups for n in expand(pattern, alive)))
@@ -162,7 +169,7 @@ def concerned(order: MergeOrder | SplitOrder | QueueOrder, alive: list[str]) -> 
 def rule_holds(pending: PendingOrder, state: Array, targets: Array) -> bool:
     """Returns True if the rule of an order that has fired holds at this tick.
 
-    state (P, 4): x, y, vx, vy by column, nan while absent. targets (P, 2): places in the queue.
+    state (P, 4): x, y, vx, vy by column, nan while absent. targets (P, 2): places in the queue by column, m.
     """
     order = pending.order
     if isinstance(order, QueueOrder):
@@ -215,9 +222,10 @@ class OrderExecution:
         return PendingOrder(order, k, draw(when.delay, self._rng("event", k, 0)), time, at)
 
     def advance(self, tick: int, t: float, state: Array) -> bool:
-        """Fires orders that are due at tick and time t (s), serves queues, and lets arrived groups settle.
+        """Fires the orders that are due at this tick of time t (s), and serves queues.
 
-        state (P, 4): x, y, vx, vy by column, nan while absent. Returns True if something changed for `GroupState.fill`.
+        state (P, 4): x, y, vx, vy by column, nan while absent. Groups that have arrived to stand form a circle. Returns
+        True if `GroupState.fill` must be called afterwards.
         """
         changed = bool(self.queues)
         for pending in self.pending:
@@ -327,7 +335,7 @@ class OrderExecution:
             groups.places[columns] = walking(len(columns), groups.spacing[g])
 
     def record(self, frames: FrameTimes) -> tuple[Order, ...]:
-        """Returns all orders of the script with the frame at which each fired, and its people before and after."""
+        """Returns all orders of the script with the frame (from 1) of firing, and the people before and after."""
 
         def ids(parts: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, ...], ...]:
             return tuple(tuple(c + 1 for c in part) for part in parts)

@@ -23,7 +23,7 @@ from sim.types import Array, Order, Scene
 
 @dataclass(frozen=True)
 class PlannedStop:
-    """One stop of one group, drawn."""
+    """One stop of one group, with all random values drawn."""
 
     at: Array  # (2,) place in the world, m
     stay: float  # s
@@ -32,14 +32,17 @@ class PlannedStop:
     whole: bool  # True if all members stop
 
     def end(self, t: float) -> float:
-        """Returns when people who arrive at time t walk on, s; inf if never."""
+        """Returns the time (s) at which people who arrive at time t (s) walk on; inf if never."""
         return next((u for u in self.until if u >= t), np.inf) + self.stay if self.until else t + self.stay
 
 
 def draw_stops(
     stops: tuple[Stop, ...], size: int, place: Callable[[Point], Array], r: np.random.Generator
 ) -> list[PlannedStop]:
-    """Returns the stops of a group of `size` people; place: gives a point of the script in the world."""
+    """Returns the drawn stops of a group of `size` people; a stop without members or without time is left out.
+
+    place: a function that draws a point of the script and returns where it lies in the world.
+    """
     planned = []
     for stop in stops:
         at, stay = place(stop.at), max(0.0, draw(stop.stay, r))
@@ -61,7 +64,7 @@ PLACE_TIME = 10.0  # s, correlation time of the fluctuation of the place in the 
 
 @dataclass(frozen=True)
 class ScriptPlacement:
-    """How a seed places a whole script in the world."""
+    """How the script is mirrored, turned and advanced in the world; drawn with the seed."""
 
     middle: Array  # (2,) middle of the world, m, about which the script is turned
     turn: float  # angle in radians, counter-clockwise
@@ -112,11 +115,14 @@ class EnteringGroup:
 
     @property
     def walks(self) -> bool:
-        """True if the first stop, else the goal, is more than STANDING_DISTANCE from the start."""
+        """True if the group's first stop, or its goal if it has no stops, is more than 0.3 m from its start."""
         return bool(length(self.leg(self.stops)[1] - self.start) > STANDING_DISTANCE)
 
     def leg(self, stops: Sequence[PlannedStop]) -> tuple[list[Array], Array, str]:
-        """Returns points to pass, end and finish of the way to the first of the stops, else to the goal."""
+        """Returns the points to pass, the end point and the finish of the group's next way.
+
+        It leads to the first of `stops`, where finish is "stand"; without stops past `via` to the goal.
+        """
         return ([], stops[0].at, "stand") if stops else (self.via, self.goal, self.finish)
 
 
@@ -191,7 +197,7 @@ def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int],
 
 
 def walking_speed(free: list[float], slowdown: float) -> float:
-    """Returns the speed of a group, m/s: its members' mean free speed less `slowdown` for each after the first."""
+    """Returns a group's speed in m/s: the mean free speed less `slowdown` times (members - 1), at least 0.3."""
     return max(MIN_SPEED, float(np.mean(free)) - slowdown * (len(free) - 1))
 
 
@@ -225,7 +231,7 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
 
 
 def scattered(n: int, scatter: Value, r: np.random.Generator) -> Array:
-    """Returns how far n people start from their places, (n, 2)."""
+    """Returns the displacements (n, 2) m of n people from their places at the start; scatter: their length in m."""
     far = np.array([draw(scatter, r) for _ in range(n)])
     return np.asarray(far[:, None] * unit(2 * np.pi * r.random(n)))
 
@@ -237,7 +243,10 @@ def _apart(pos: Array) -> bool:
 
 
 def is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
-    """Returns True if pos (n, 2) are START_GAP clear of the taken places and BODY_RADIUS clear of walls and pillars."""
+    """Returns True if all points pos (n, 2) m are far enough from taken places, walls and pillars.
+
+    That is START_GAP (0.55 m) from each point of the arrays in `taken`, and BODY_RADIUS (0.2 m) from walls and pillars.
+    """
     if taken and length(pos[:, None] - np.concatenate(taken)[None]).min() < START_GAP:
         return False
     if any(wall_distances(pos, wall).min() < BODY_RADIUS for wall in scene.walls):
@@ -250,7 +259,8 @@ def fluctuations(crowd: CrowdSpec, people: Sequence[Person], frames: int, fps: f
     """Returns how wanted velocities and places fluctuate, (frames, P, 4): columns of `PeopleArrays.noise`.
 
     An Ornstein-Uhlenbeck process per column, stationary from the first frame: u_k = a u_(k-1) + sqrt(1 - a²) s n_k,
-    with a = exp(-1 / (fps T)), standard normal n_k and u_0 = s n_0. The standard deviations s are those of `crowd`.
+    with a = exp(-1 / (fps T)), T = 1 s for velocities and 10 s for places, standard normal n_k and u_0 = s n_0. The
+    standard deviations s are those of `crowd`.
     """
     keep = exp(-1 / (fps * np.array([WANDER_TIME, WANDER_TIME, PLACE_TIME, PLACE_TIME])))
     out = np.empty((frames, len(people), 4))
@@ -263,7 +273,10 @@ def fluctuations(crowd: CrowdSpec, people: Sequence[Person], frames: int, fps: f
 def named_people(
     scenario: Scenario, scene: Scene, seed: int, repeat: int, orders: Iterable[Order]
 ) -> dict[str, tuple[int, ...]]:
-    """Returns the person ids of each group that the script names, also those that its orders made."""
+    """Returns the person ids of each group of the script, by the group's name.
+
+    orders: the orders as carried out; groups that merge and split orders made are included.
+    """
     parties = draw_population(scenario, scene, seed, repeat)
     names = {party.name: tuple(m.column + 1 for m in party.members) for party in parties}
     after = {order.id: order.after for order in orders if order.fired is not None}

@@ -52,8 +52,8 @@ def accelerate(
 ) -> bool:  # fmt: skip
     """Overwrites out (N, 2) with the accelerations of all people, and advances ways and strides by dt (s).
 
-    state (N, 4): x, y, vx, vy. push (G, 2): scratch. Returns False, with nothing written, if a state is not below
-    1e9.
+    state (N, 4): x, y, vx, vy, m and m/s. out is in m/s². push (G, 2): working memory, overwritten. Returns True;
+    False, with nothing written, if a state is nan or the sum of its absolute values reaches 1e9.
     """
     from sim.crowd.forces_avoidance_kernels import avoid
     from sim.crowd.forces_goal_kernels import drive, sway
@@ -105,7 +105,10 @@ class World:
         self._read_buffer, self._write_buffer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
 
     def run(self) -> Motion:
-        """Returns the Motion after the warm-up; raises WorkError if a position or velocity is not finite."""
+        """Runs the simulation and returns its Motion without the warm-up.
+
+        Raises WorkError if a position or velocity is not finite.
+        """
         fps, duration = self.scenario.camera.fps, self.scenario.duration
         count = max(1, math.ceil(duration * SCRIPT_RATE - 1e-9))
         frames = FrameTimes.of(max(1, round(duration * fps)), fps)
@@ -119,8 +122,9 @@ class World:
         return self._motion(states[:count], intents[:count], shown, intents[frames.tick], frames)
 
     def ticks(self, length: int) -> Iterator[tuple[Array, Ints]]:
-        """Yields the states (P, 4) and group indices (P,) at `length` ticks after the warm-up; the next overwrites
-        both.
+        """Yields the states (P, 4) and group indices (P,) at each of the `length` ticks after the warm-up.
+
+        Rows are columns of the Motion; absent people have nan and -1. Each tick overwrites both arrays.
         """
         warm = round(self.scenario.warmup * SCRIPT_RATE)
         noise = fluctuations(self.scenario.crowd, self.members, warm + length, SCRIPT_RATE, self.seed, self.repeat)

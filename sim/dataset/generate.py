@@ -64,7 +64,10 @@ class JobOutcome:
 
 
 def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
-    """Returns the manifest in the job's folder, None without one; raises InputError if it is another sequence's."""
+    """Returns the manifest in the job's folder; None if there is no folder, or no manifest in it.
+
+    Raises InputError if the folder holds another sequence, or files that flockscope did not write.
+    """
     folder = job.folder
     if not folder.exists():
         return None
@@ -92,13 +95,16 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
 
 
 def is_stored(job: SequenceJob) -> bool:
-    """Returns True if the folder holds the job's sequence, and every file has the hash of its manifest."""
+    """Returns True if the job's folder holds its sequence and each file has the hash that the manifest states.
+
+    Raises InputError if the folder holds something else.
+    """
     manifest = stored_manifest(job)
     return manifest is not None and next(damaged_files(job.folder, manifest["files"]), None) is None
 
 
 def store(job: SequenceJob, sequence: Sequence) -> None:
-    """Writes the job's folder, unless it holds the sequence undamaged."""
+    """Writes `sequence` into the job's folder, unless the folder holds it already, undamaged."""
     if not is_stored(job):
         sequence_folder.write_sequence(
             job.folder, replace(sequence, name=job.name), scenario=dump(job.entry.scenario), seed=job.seed,
@@ -107,7 +113,7 @@ def store(job: SequenceJob, sequence: Sequence) -> None:
 
 
 def simulate_and_store(job: SequenceJob) -> None:
-    """Simulates the job's scenario and writes its folder, replacing a damaged one."""
+    """Simulates the job's scenario and writes its folder, which replaces a damaged one; raises FlockscopeError."""
     from sim.sequence import simulate
 
     entry = job.entry
@@ -124,7 +130,7 @@ def simulate_and_store(job: SequenceJob) -> None:
 
 
 def run_job(job: SequenceJob) -> JobOutcome:
-    """Makes the job's sequence unless it is stored undamaged; errors are in the outcome, not raised."""
+    """Makes the job's sequence unless it is stored undamaged; a FlockscopeError is in the outcome, not raised."""
     try:
         if job.marker is not None:
             _wait_for(job.marker)
@@ -139,7 +145,7 @@ def run_job(job: SequenceJob) -> JobOutcome:
 
 
 def lost_job(job: SequenceJob, error: WorkError) -> JobOutcome:
-    """Returns the outcome of a job that killed too many workers."""
+    """Returns the outcome of a job that killed too many workers: `error` with the job's name as its file."""
     return JobOutcome(error.replaced(file=job.name))
 
 
@@ -161,7 +167,10 @@ Progress = Callable[[int, int, str], None]  # called as progress(sequences done,
 
 
 class Folders(list[Path]):
-    """The folders of the sequences made; `left_out` has the error of each whose script did not come true, by name."""
+    """The list of the folders of the sequences made.
+
+    left_out: the error of each sequence that was left out because an order of its script did not come true, by name.
+    """
 
     def __init__(self, folders: Iterable[Path] = (), left_out: dict[str, OrderError] | None = None) -> None:
         super().__init__(folders)
@@ -195,8 +204,8 @@ def generate(
         **stored: Streams, images, stride (`Stored`); left jpg pictures of all frames by default.
 
     Returns:
-        The folders, in the order of entries, all seeds of an entry together. `left_out` has the errors of those whose
-        script did not come true.
+        The folders, in the order of entries, all seeds of an entry together. `left_out` has the errors of sequences
+        left out because an order of their script did not come true.
 
     Raises:
         InputError: An argument is wrong, a folder holds another sequence, or all failures are InputErrors.
@@ -257,7 +266,7 @@ def _run_jobs(jobs: list[SequenceJob], workers: WorkerOptions, progress: Progres
 
 
 def write_seqmap(root: Path, split: str) -> None:
-    """Writes ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of complete sequences."""
+    """Writes ROOT/seqmaps/flockscope-<split>.txt, TrackEval's list of complete sequences, unless there are none."""
     folder = root / f"flockscope-{split}"
     complete = sorted(p.parent.name for p in folder.glob(f"*/{MANIFEST}") if not p.parent.name.startswith("."))
     if complete:
@@ -293,10 +302,10 @@ class ReplayOptions:
 def store_replays(
     sources: Iterable[Sequence], options: ReplayOptions, seeds: range, out: str | Path, progress: Progress | None = None
 ) -> list[Path]:
-    """Stores a replay of every source with every seed, as `generate` does; returns the folders.
+    """Stores a replay of every source with every seed in folders named as by `generate`; returns the folders.
 
-    The first error ends the work; replays stored before it are kept. Recordings of real motion need seeds from 20,000
-    on.
+    The first error is raised and ends the work; replays stored before it are kept. Recordings of real motion need seeds
+    from 20,000 on, else InputError. progress: as for `generate`.
     """
     recordings, split, root = list(sources), split_of(seeds), Path(out)
     folder, cut = root / f"flockscope-{split}", options.cut

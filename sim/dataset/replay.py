@@ -61,7 +61,8 @@ def resample(frame: Ints, id: Ints, pos: Array, rate: float, fps: float, first: 
     """Returns the smoothed motion of labelled people at the times first, first + 1/fps, … last (s).
 
     frame (from 1), id (R,), pos (R, 2) m: labelled rows in any order, each id once in a frame. rate: label frames per
-    s. People are absent in gaps of more than 2 s, and before and after their labels.
+    s. fps: frames per s of the result. People are absent in gaps of more than 2 s, and before and after their labels. A
+    label without another one within 2 s is ignored.
     """
     t = first + np.arange(int(np.floor((last - first) * fps + 1e-6)) + 1) / fps
     for tau in TIMES:
@@ -103,7 +104,8 @@ def _segments(frame: Ints, id: Ints, pos: Array, one: int, rate: float, tau: flo
 
 
 def smoothing_spline(t: Array, y: Array, weight: float) -> Array:
-    """Returns the natural cubic spline f (N, 2) at its knots t (N,) that minimises Σ |y - f|² + weight ∫ |f''|².
+    """Returns the values f (N, 2) at its knots t (N,) of the natural cubic spline of least Σ |y - f|² + weight ∫
+    |f''|².
 
     Reinsch (1967): f = y - weight Q γ with (R + weight Qᵀ Q) γ = Qᵀ y. γ (N - 2,) is f'' at the inner knots. Qᵀ forms
     differences of slopes at the inner knots; R holds the integrals of products of hat functions there.
@@ -138,10 +140,10 @@ def _acceleration(segments: list[Segment], fps: float) -> float:
 
 
 def nearest_row(frame: Ints, id: Ints, people: Ints, rate: float, t: Array) -> Ints:
-    """Returns the label row that is nearest in time, for each time t (T,) s and person (P,): (T, P).
+    """Returns the index of the label row nearest in time, for each time and person, (T, P).
 
-    frame (from 1), id (R,): the label rows. rate: label frames per s. Of two equally near rows the earlier one is
-    taken.
+    frame (from 1), id (R,): the label rows. people (P,): person ids, of which each has a row. rate: label frames per s.
+    t (T,): s after frame 1. Of two equally near rows the earlier one is taken.
     """
     out = np.zeros((len(t), len(people)), np.int64)
     for column, one in enumerate(people):
@@ -241,7 +243,8 @@ def resolve_replay(
 ) -> tuple[Sequence, ReplaySpec]:  # fmt: skip
     """Returns the sequence that `replay` returns, and the ReplaySpec that describes it.
 
-    The latter, with all defaults, takes the place of the scenario in stored files and hashes.
+    The ReplaySpec, with all defaults, takes the place of the scenario in stored files and hashes. Arguments as for
+    `replay`.
     """
     truth = _labels(source)
     places = on_ground(truth, source, _calibrated(calibration, source))
@@ -277,8 +280,9 @@ def _wrong(source: Sequence, place: str, got: str, expected: str, remedy: str) -
 def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None) -> Array:
     """Returns the positions (R, 2) m of the rows of a truth, nan where unknown.
 
-    They are its own, or the feet of its boxes as seen by the calibration or the source's camera, or, of CAVIAR, the
-    boxes' centres over the image scale.
+    They are the truth's own positions if it has any; a calibration is then an InputError. Else they are the feet of the
+    boxes on the ground, by the calibration or the source's camera. CAVIAR without a calibration: the boxes' centres
+    divided by the image scale, y upwards. Raises InputError if there is none of these.
     """
     if truth.pos is not None:
         if calibration is not None:
@@ -367,7 +371,11 @@ def _heights(people: Ints, truth: Truth, seed: int) -> Array:
 
 
 def replay_name(name: str, cut: Cut) -> str:
-    """Returns the replay's name: that of the recording with harmless characters, and the start of the cut."""
+    """Returns the name of a replay, such as "hotel-t30" for a cut of the recording `name` that starts at 30 s.
+
+    Characters other than letters, digits, "_", "." and "-" become "-". A name that does not begin with a letter gets
+    "replay-" in front.
+    """
     clean = "".join(c if c.isalnum() or c in "_.-" else "-" for c in name)
     clean = clean if clean[:1].isalpha() else f"replay-{clean}"
     return f"{clean}-t{cut.start:g}" if cut.start else clean

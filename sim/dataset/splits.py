@@ -19,7 +19,10 @@ SIMULATED = ("simulated", "generated", "replayed")  # values of `Sequence.source
 
 
 def split_of(seeds: range) -> str:
-    """Returns the name of the split that holds all seeds; raises InputError if they are in two splits, or none."""
+    """Returns the name of the split that holds all seeds.
+
+    Raises InputError if there is no seed, a seed is negative, or the seeds are in two splits.
+    """
     if len(seeds) == 0 or min(seeds) < 0:
         got, expected = f"{seeds.start}:{seeds.stop}", "a:b with 0 <= a < b"
         raise InputError(place="seeds", got=got, expected=expected, remedy="correct --seeds")
@@ -33,6 +36,6 @@ def split_of(seeds: range) -> str:
 
 
 def is_real(sequence: Sequence) -> bool:
-    """Returns True if the sequence shows real motion: a recording, or a replay of a recording."""
+    """Returns True if the sequence shows the motion of real people: a recording, or a replay of a recording."""
     kind, origin = sequence.source.get("kind"), sequence.source.get("origin")
     return bool(origin["real"]) if origin is not None else kind is not None and kind not in SIMULATED

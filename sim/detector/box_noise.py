@@ -52,11 +52,10 @@ def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> A
 
 
 def move_edges(box: Array, move: Array) -> Array:
-    """Returns boxes (R, 4), left, top, width, height in px, whose edges are moved by move (R, 4) px; `box` is not
-    changed.
+    """Returns boxes (R, 4), left, top, width, height in px, whose edges are moved by move (R, 4) px.
 
     Columns of move: left edge, top edge, right edge, lower edge; positive is to the right or downwards. Width and
-    height keep at least 1 px, or their former value if that was less; then the right or lower edge yields.
+    height keep at least 1 px, or their former value if that was less: the right or lower edge is moved less for this.
     """
     edges = np.concatenate([box[:, :2], box[:, :2] + box[:, 2:]], axis=1) + move
     size = np.maximum(edges[:, 2:] - edges[:, :2], np.minimum(box[:, 2:], 1.0))
@@ -64,8 +63,9 @@ def move_edges(box: Array, move: Array) -> Array:
 
 
 def heavy_tailed(n: Array, excess_kurtosis: float) -> Array:
-    """Returns standard normals n, of any shape, mapped to Student's t of variance 1 and this excess kurtosis (0 or
-    more).
+    """Returns standard normals n, of any shape, mapped to numbers of Student's t distribution scaled to variance 1.
+
+    excess_kurtosis: that of the distribution, 0 or more.
 
     Quantiles are mapped to quantiles, with 4 + 6 / kurtosis degrees of freedom, to 0.1 % up to n = 5; n beyond 8.3
     counts as 8.3. If the excess kurtosis is 0, n itself is returned, not a copy.
@@ -124,11 +124,11 @@ def box_errors(box: Array, true: Array) -> Array:
 def seen_shift(box: Array, whole: Array, z: Array, camera: Camera) -> Array:
     """Returns by how many m (R, 2), along x and y, a person's foot point is displaced by what hides the person.
 
-    It is the foot point of the box of the visible part, box (R, 4), less that of the box of the whole body, whole (R,
-    4), both left, top, width, height in px; see `foot_points`, also for z (R,) m. A foot of a visible part above
-    `furthest_row`, where people become small, counts as one in this row, or as that of the whole body if that is higher
-    still. For a camera of kind "top" there is no such row. A row is 0 if both boxes are equal, and where the foot of
-    the whole body shows no ground.
+    It is the foot point of box (R, 4), the box of the visible part, less the foot point of whole (R, 4), the box of the
+    whole body; both left, top, width, height in px. z (R,) m: height of the ground, as for `foot_points`. A lower edge
+    of `box` above `furthest_row`, where people become small, is first moved down to this row, but not below the lower
+    edge of `whole`. For a camera of kind "top" it is not moved. A row is 0 if both boxes are equal, and where one of
+    the feet shows no ground.
     """
     lowest = -np.inf if camera.kind == "top" else furthest_row(camera)
     foot, true_foot = box[:, 1] + box[:, 3], whole[:, 1] + whole[:, 3]

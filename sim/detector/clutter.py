@@ -252,11 +252,10 @@ def false_alarms(
 
 
 def false_alarm_counts(rate: float, length: int, seed: int, repeat: int = 0) -> Ints:
-    """Returns the number of false alarms of each frame 1 to `length`, (length,) int64, Poisson with mean `rate` per
-    frame.
+    """Returns the numbers of false alarms in the frames 1 to `length`, (length,): Poisson with mean `rate`.
 
-    seed, repeat (number of the suite entry's copy, 0 without copies): name the random stream; for fixed ones a higher
-    rate never lowers a number. All are 0 if the rate is 0. Raises ValueError for a negative seed or rate.
+    seed, repeat (number of the suite entry's copy, 0 without copies): name the random stream; with the same stream, a
+    higher rate never gives a smaller number. All are 0 if the rate is 0. Raises ValueError for a negative seed or rate.
     """
     return poisson_quantiles(rate, uniforms(rng(seed, "clutter", 0, repeat=repeat), length))
 

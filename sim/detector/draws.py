@@ -35,21 +35,19 @@ HIGHEST_FALSE_SCORE = 0.7  # of a false alarm whose detector has no measured sco
 def frame_uniforms(generator: np.random.Generator, first: int, frames: int, per_frame: int) -> Array:
     """Returns uniforms, (frames, per_frame), for frames `first` to `first` + frames - 1 (frames from 1 on).
 
-    They are above 0 and at most 1; a value may round to 1. The generator must be new, and is advanced: past the numbers
-    of the frames before `first` and those returned. It spends `per_frame` numbers on each frame, so that a frame's
-    draws do not depend on `first`. Raises AttributeError if the generator's bit generator cannot be advanced; numpy's
-    default can.
+    They are above 0 and at most 1. The generator must be new. It first skips `per_frame` numbers for each frame before
+    `first`, so that the numbers of a frame do not depend on `first`. Raises AttributeError if the generator's bit
+    generator cannot be advanced; numpy's default can.
     """
     generator.bit_generator.advance((first - 1) * per_frame)  # type: ignore[attr-defined]
     return uniforms(generator, (frames, per_frame))
 
 
 def interpolated_quantiles(curve: tuple[float, ...], u: Array) -> Array:
-    """Returns the quantiles (N,) at u (N,), 0 to 1, of a distribution given by evenly spaced quantiles, linear between
-    them.
+    """Returns the quantiles (N,) at u (N,), 0 to 1, of a distribution given by some of its quantiles.
 
-    curve: the quantiles from u = 0 to u = 1, at least two numbers, in ascending order. u outside 0 to 1 gives the first
-    or last of them.
+    The result is linear between these. curve: evenly spaced quantiles from u = 0 to u = 1, at least two numbers, in
+    ascending order. u outside 0 to 1 gives the first or last of them.
     """
     values = np.array(curve)
     place = np.clip(u, 0.0, 1.0) * (len(values) - 1)
@@ -58,8 +56,7 @@ def interpolated_quantiles(curve: tuple[float, ...], u: Array) -> Array:
 
 
 def true_scores(u: Array, visibility: Array, sensor: Sensor) -> Array:
-    """Returns the scores (N,) in [0, 1] of N true detections at uniforms u (N,), 0 to 1, by their visibility (N,), 0 to
-    1.
+    """Returns the scores (N,) in [0, 1] of N true detections at uniforms u (N,) and visibility (N,), both 0 to 1.
 
     If `sensor.true_scores` is given, they are its quantiles at u, whatever the visibility. Else they are 1 for a
     detector without misses and false alarms (`sensor.detect_prob` 1, `sensor.clutter_rate` 0). Otherwise the score is
@@ -101,12 +98,11 @@ class Readings:
 
 
 def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> list[Detections]:
-    """Returns a list of truth.length Detections, for frames 1 on: true detections and false alarms mixed, in random
-    order.
+    """Returns one Detections for each of the frames 1 to truth.length: true detections and false alarms together.
 
-    A frame without any has empty Detections. The plane is "ground" (positions in m) if the truth has positions, else
-    "image" (px). Boxes are None unless `true` and `false` both have boxes. Velocities are None. Readings outside frames
-    1 to truth.length are dropped.
+    Those of a frame are sorted by `order`, which is random. A frame without any has empty Detections. The plane is
+    "ground" (positions in m) if the truth has positions, else "image" (px). Boxes are None unless `true` and `false`
+    both have boxes. Velocities are None. Readings outside frames 1 to truth.length are dropped.
     """
     frame = np.concatenate([true.frame, false.frame])
     order = np.lexsort((np.concatenate([true.order, false.order]), frame))
@@ -150,5 +146,5 @@ def correlated_normals(
 
 
 def ticks(frame: Ints, fps: float) -> Ints:
-    """Returns the ticks (F,) of the detector's clock, from 0 on, that are nearest to the times of frames (F,)."""
+    """Returns the ticks (F,), from 0, of the detector's clock (50 Hz) nearest to the times of frames (F,), from 1."""
     return np.asarray(np.floor((frame - 1) / fps * CLOCK + 0.5), np.int64)

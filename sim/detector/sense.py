@@ -42,8 +42,7 @@ def sense(
     truth: Truth, sensor: Sensor, seed: int, camera: Camera | None = None, image_size: tuple[int, int] | None = None,
     repeat: int = 0, people: Mapping[str, tuple[int, ...]] | None = None,
 ) -> list[Detections]:  # fmt: skip
-    """Returns a list of truth.length Detections, for frames 1 on: what the simulated detector reports, false alarms
-    included.
+    """Returns one Detections for each of the frames 1 to truth.length, with the false alarms of the detector.
 
     If the truth has positions, `pos` is the ground point (m), with the box beside it if boxes are known. Else `pos` is
     the centre of the box (px). A person whose box has a nan is not detected. Detections of a frame are in random order,
@@ -109,13 +108,15 @@ def _displaced(
 def person_draws(truth: Truth, seed: int, repeat: int, sensor: Sensor) -> tuple[Array, Array]:
     """Returns the random numbers of each of the R rows of the truth, keyed by the person and the frame.
 
-    Standard normals (R, 7): DETECT (a person is missed from the quantile of the detection probability on), four box
-    edges, two point coordinates. Uniforms (R, 2) in (0, 1]: SCORE, ORDER (place in the frame's list).
+    Returns standard normals (R, 7) and uniforms (R, 2) above 0 and at most 1. Columns of the normals: DETECT, the
+    errors of four box edges, the errors of two point coordinates. A person is detected if DETECT is below the standard
+    normal quantile of the detection probability. Columns of the uniforms: SCORE, and ORDER, which decides the position
+    in the frame's list.
 
-    What lasts is a process in time, whatever the frame rate. With `sensor.persistence` ρ, DETECT is kept for a random
-    time, so that the misses of one person 0.1 s apart have correlation ρ if the detection probability is constant.
-    `sensor.miss_memory` and `box_noise.memory` make DETECT and the edges sums of AR(1) processes. Frames in which a
-    person is absent are drawn, too. repeat: number of the suite entry's copy, 0 without copies.
+    With `sensor.persistence` ρ, DETECT is kept for a random time: the misses of one person 0.1 s apart have correlation
+    ρ if the detection probability is constant. `sensor.miss_memory` makes DETECT, and `box_noise.memory` the edges, a
+    sum of AR(1) processes. All of them run in s, whatever the frame rate. repeat: number of the suite entry's copy, 0
+    without copies.
 
     Raises ValueError for a negative seed or id.
     """

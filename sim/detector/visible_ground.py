@@ -51,10 +51,9 @@ class VisibleGround:
                 self.low, self.high = np.array([0.0, top]), np.array(size)
 
     def image_point(self, x: float, y: float) -> tuple[float, float]:
-        """Returns the image point (u, v) px at share x (0 to 1) of the width and share y of the height of the ground
-        part.
+        """Returns the image point (u, v) px at share x of the width and share y of the height of the ground part.
 
-        (0, 0) is its upper left corner. Shares outside 0 to 1 give points outside the part.
+        Shares run from 0 to 1, (0, 0) is the upper left corner. Other shares give points outside the part.
         """
         u, v = self.low + np.array([x, y]) * (self.high - self.low)
         return float(u), float(v)
@@ -79,9 +78,9 @@ class VisibleGround:
     def ground_points(self, u: Array, v: Array, otherwise: Array) -> Array:
         """Returns the ground points (L, 2), x and y in m, seen at image points u, v (L,) px.
 
-        Walls and stairs are ignored. Points from `otherwise` (L, 2) replace those where no ground is seen. `otherwise`
-        itself is returned if there is no camera. Image points above the ground part are moved down to its upper edge;
-        not those of a camera of kind "top", which has ground on all sides.
+        Walls and stairs are ignored. Where no ground is seen, the point is that of the same row of `otherwise` (L, 2).
+        `otherwise` itself is returned if there is no camera. Image points above the ground part are first moved down to
+        its upper edge, except for a camera of kind "top", which has ground everywhere.
         """
         if self.camera is None:
             return otherwise
@@ -103,12 +102,11 @@ def labelled_points(truth: Truth, shares: Array) -> Array:
 
 
 def furthest_row(camera: Camera) -> float:
-    """Returns the uppermost image row (px, from 0 at the top) at which people have at least 0.25 of their height in the
-    middle.
+    """Returns the uppermost image row, px from the top, where people are 0.25 as tall as in the middle row, or taller.
 
-    For pinhole cameras. A person is 1.7 m tall, and the height is that seen in px. 241 rows from the top to the bottom
-    are tested, along the column through the image centre. If the middle row shows no ground, heights are compared with
-    the greatest height at any row. 0 if no row shows ground or no row qualifies.
+    For pinhole cameras. A person is 1.7 m tall; heights in the image are compared, in px. 241 rows from the top to the
+    bottom are tested, along the column through the image centre. If the middle row shows no ground, heights are
+    compared with the greatest height at any row. 0 if no row shows ground or no row qualifies.
     """
     v = np.linspace(0.0, camera.image[1], 241)
     ground = to_ground(camera, np.column_stack([np.full_like(v, camera.centre_px[0]), v]))
@@ -121,8 +119,9 @@ def furthest_row(camera: Camera) -> float:
 
 
 def height_line(foot: Array, height: Array) -> Array:
-    """Returns (a, b) of the least-squares line height = a + b foot through box heights (N,) and rows of the feet (N,),
-    px.
+    """Returns (a, b) of the least-squares line height = a + b foot.
+
+    foot (N,): image rows of the feet, px. height (N,): box heights, px.
 
     If all feet are in one row, b is 0 and a the mean height. Without boxes (N = 0) the result is (nan, 0), with a numpy
     warning.
@@ -136,7 +135,7 @@ def height_line(foot: Array, height: Array) -> Array:
 def clip_boxes(box: Array, image_size: tuple[int, int]) -> Array:
     """Returns the parts (N, 4) of boxes (N, 4) that lie in the image, both left, top, width, height in px.
 
-    image_size: width, height in px. A box outside has width or height 0. A nan box stays nan.
+    image_size: width, height in px. A box outside the image gets width or height 0. A nan box stays nan.
     """
     limit = np.array(image_size, dtype=float)
     low, high = np.clip(box[:, :2], 0, limit), np.clip(box[:, :2] + box[:, 2:], 0, limit)

@@ -40,7 +40,10 @@ class PackedPolygons:
 
 
 def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
-    """Returns N polygons (V, 2) in arrays of equal width, at least `width`; one without vertices becomes nan."""
+    """Returns N polygons, (V, 2) each with its own V, in arrays of equal width, the greatest V but at least `width`.
+
+    The vertices of a polygon with V = 0 become nan.
+    """
     count = np.array([len(p) for p in polygons], np.int64)
     flat = np.concatenate([*(np.asarray(p, float).reshape(-1, 2) for p in polygons), [[np.nan, np.nan]]])
     first = np.cumsum(count) - count
@@ -50,7 +53,7 @@ def pack(polygons: Sequence[Array], width: int = 1) -> PackedPolygons:
 
 
 def pack_padded(vertex: Array) -> PackedPolygons:
-    """Returns the polygons of vertices (N, V, 2) padded by repeating the last of each."""
+    """Returns the PackedPolygons of vertices (N, V, 2), where shorter polygons repeat their last vertex up to V."""
     box = np.concatenate([vertex.min(axis=1), vertex.max(axis=1)], axis=1)
     return PackedPolygons(vertex, box, np.nan_to_num(_shoelace(vertex)))
 
@@ -62,13 +65,16 @@ def _shoelace(vertex: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Returns the cross products (…) of vectors (…, 2)."""
+    """Returns the cross products a_x b_y - a_y b_x, (…), of vectors a and b, (…, 2)."""
     product: Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return product
 
 
 def convex_hull(points: Array) -> Array:
-    """Returns the convex hull (V, 2) of points (N, 2), counter-clockwise from the leftmost, without points on edges."""
+    """Returns the convex hull (V, 2) of points (N, 2), counter-clockwise from the leftmost, without points on edges.
+
+    V is 2 if all points lie on a line, 1 if all are equal, 0 without points.
+    """
     rows = sorted(set(map(tuple, np.asarray(points, float).tolist())))
     if len(rows) < 3:
         return np.array(rows, float).reshape(-1, 2)
@@ -90,7 +96,7 @@ def _chain(rows: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
 
 
 def intersection_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Returns the area (K,) that convex polygons a[i[k]] and b[j[k]] have in common; 0 for one without area."""
+    """Returns the area (K,) that convex polygons a[i[k]] and b[j[k]] have in common; 0 if either has no area."""
     common = np.zeros(len(i))
     near = (a.box[i, :2] < b.box[j, 2:]).all(axis=1) & (b.box[j, :2] < a.box[i, 2:]).all(axis=1)
     possible = np.flatnonzero(near & (a.area[i] > 0) & (b.area[j] > 0))
@@ -162,7 +168,10 @@ def _area_by_angle(points: Array, valid: Bools) -> Array:
 
 
 def iou_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Returns the intersection over union (K,) of a[i[k]] and b[j[k]]; exactly 1 for equal polygons of equal width."""
+    """Returns the intersection over union (K,) of convex polygons a[i[k]] and b[j[k]]; 0 if one of the two has no area.
+
+    It is exactly 1 for equal polygons if a and b are packed in the same width.
+    """
     common = intersection_pairs(a, b, i, j)
     union = a.area[i] + b.area[j] - common
     iou = np.where(common > 0, np.minimum(common / np.where(union > 0, union, 1.0), 1.0), 0.0)
@@ -172,17 +181,18 @@ def iou_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
 
 
 def gap_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Returns the distance (K,) between convex polygons a[i[k]] and b[j[k]], of which one has area; nan for an empty
-    one.
+    """Returns the distance (K,) between convex polygons a[i[k]] and b[j[k]]; 0 if they overlap.
+
+    At least one of the two must have area. nan if one of the two has no vertices.
     """
     return _in_chunks(_gap, a, b, i, j)
 
 
 def edge_distance_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
-    """Returns the least distance (K,) from a vertex of either polygon to an edge of the other.
+    """Returns the least distance (K,) from a vertex of a[i[k]] or b[j[k]] to an edge of the other polygon.
 
-    It is the distance unless they overlap; nan where one has no vertices. Cheaper than `gap_pairs`; polygons need no
-    area.
+    This is the distance between the two polygons unless they overlap. nan if one of the two has no vertices. Polygons
+    need no area. This is cheaper than `gap_pairs`.
     """
     return _in_chunks(_edge_distance, a, b, i, j)
 
@@ -224,7 +234,8 @@ FLAT = 1e-9  # rad: a narrower cone is a rounding error, and its vertex lies on 
 def footprint_hulls(pos: Array, count: Ints) -> list[Array]:
     """Returns the hull (V, 2) of the footprints of each group, counter-clockwise.
 
-    pos (R, 2) m: the members of group 0, then those of group 1, …; count (G,): how many each has. None may be nan.
+    pos (R, 2) m: the members of group 0, then those of group 1, …; count (G,): how many each has. No position may be
+    nan. A group without members gets a hull with V = 0.
     """
     hulls: list[Array] = [np.zeros((0, 2))] * len(count)
     first = np.cumsum(count) - count

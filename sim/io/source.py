@@ -119,12 +119,15 @@ def _distinct(sequences: list[Sequence]) -> list[Sequence]:
 
 
 def holds_sequences(folder: Path) -> bool:
-    """Returns True if `open_source` finds a sequence or recording in the folder."""
+    """Returns True if `open_source` finds a sequence or recording in the folder, at most 3 levels down."""
     return bool(_find(folder, DEPTH))
 
 
 def sequence_folders(path: Path, kind: str) -> list[Path]:
-    """Returns the sequence folders at a path or at most 3 levels below it, sorted; all must be of `kind`."""
+    """Returns the sequence folders at a path or at most 3 levels below it, sorted.
+
+    kind: "generated", "mot" or "biwi". Raises InputError if there are none, or a sequence is of another kind.
+    """
     found = _find(path, DEPTH) if path.is_dir() else []
     other = next((p for p in found if p.is_file() or _kind(p) != kind), None)
     if not found or other is not None:

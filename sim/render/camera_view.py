@@ -59,7 +59,7 @@ class PixelGeometry:
 
 @dataclass(frozen=True)
 class EmptyScene:
-    """The painted empty scene, float32; per pixel the mean of `picture.samples` rays each way, at least 2 at edges."""
+    """The painted empty scene, float32; each pixel is a mean of samples x samples rays, at least 2 x 2 at edges."""
 
     colour: Floats  # (H, W, 3) BGR in grey levels, 0 or more, not clipped at 255; lit, without plants' sway and noise
     # (H, W) share of direct sun in the pixel's light, 0 to 1; 0 for sky and where a solid thing hides the sun
@@ -88,7 +88,7 @@ def _normals() -> NDArray[np.float32]:
 
 
 def noise_pool(sd: float, unit: float) -> NDArray[np.int16]:
-    """Returns the pool (POOL + LONGEST,) of normal numbers of `sd` grey levels, times `unit`, rounded to int16."""
+    """Returns (POOL + LONGEST,) int16: normal numbers of standard deviation `sd` grey levels, times `unit`, rounded."""
     return np.asarray(np.clip(np.rint(_normals() * np.float32(sd * unit)), -32768, 32767), np.int16)
 
 
@@ -98,7 +98,7 @@ def _offsets_of_frames(rows: int, seed: int, side: int, draw: int, repeat: int) 
 
 
 def noise_offsets(rows: int, seed: int, side: int, frame: int, repeat: int = 0) -> Ints:
-    """Returns where in the pool the noise of each image row begins: (rows,).
+    """Returns the index in the noise pool at which the noise of each image row begins, (rows,).
 
     side: 0 the left camera, 1 the right one. frame: number from 1 plus BACKGROUNDS; background images have 1 to 50.
     """
@@ -127,7 +127,7 @@ class CameraView:
         self._spare: list[FrameCanvas] = []
 
     def take_canvas(self) -> FrameCanvas:
-        """Returns a canvas of the empty scene to draw on, all tiles clean; give it back with `return_canvas`."""
+        """Returns a canvas that shows the empty scene, to draw on; give it back with `return_canvas`."""
         if self._spare:
             return self._spare.pop()
         size = self.height, self.width
@@ -135,7 +135,7 @@ class CameraView:
         return FrameCanvas(self.empty_canvas.copy(), self.geometry.depth.copy(), np.zeros(size, np.uint8), dirty)
 
     def return_canvas(self, canvas: FrameCanvas) -> None:
-        """Restores a canvas of this view to the empty scene, and keeps it for a later `take_canvas`."""
+        """Takes back a canvas of `take_canvas`: restores it to the empty scene and keeps it for the next call."""
         from sim.render.canvas_kernels import restore
 
         flat = self.height, 3 * self.width
@@ -200,7 +200,7 @@ class CameraView:
 
     @cached_property
     def level(self) -> bool:
-        """Returns True if the image shows nothing but level ground and sky, so that shadows fall only on z = 0."""
+        """True if the image shows only level ground and sky, so that shadows fall only on z = 0."""
         return bool(((self.geometry.kind == GROUND) | (self.geometry.kind == NOTHING)).all())
 
     @cached_property
@@ -225,7 +225,7 @@ class CameraView:
         return self.light.clouds.sampled(*self._nodes)
 
     def brightness(self, t: float, key: int) -> NDArray[np.float32]:
-        """Returns the brightness at time t (s) at the nodes (J, I), or (1, 1) if it is the same everywhere.
+        """Returns the factor of brightness at time t (s) at every 16th pixel, (J, I); (1, 1) if equal everywhere.
 
         key: frame number from 1 plus BACKGROUNDS; it names the random stream of the flicker.
         """
@@ -241,7 +241,7 @@ class CameraView:
         return [waves.sampled(places, np.zeros(len(places))) for waves in self.plants.sway]
 
     def wind(self, t: float) -> NDArray[np.float32]:
-        """Returns the sway of plants at time t (s) at the nodes, (2, J, I): px across, px down."""
+        """Returns how far plants are displaced at time t (s) at the nodes, (2, J, I): px to the right, px down."""
         assert self.plants is not None
         strength = self.plants.strength(t)
         return np.stack([self._grid(strength * field(t)) for field in self._sway])

@@ -41,7 +41,7 @@ CUT_SHARES = (0.45, 0.06, 0.05, 0.1, 0.24, 0.1)  # of the cuts PLAIN … DRESS i
 
 
 def clothing_atlas(people: int, seed: int, repeat: int = 0) -> NDArray[np.uint8]:
-    """Returns the texture pages (P, 2, texels) of people 1 … P: body, head.
+    """Returns the texture pages (P, 2, texels) uint8 of people 1 … P; the second axis is body, head.
 
     A page has UP rows from the ground upwards, ROUND + 1 columns round the body (the first repeated), and B, G, R.
     """
@@ -97,7 +97,7 @@ class PeopleInView(NamedTuple):
 def people_in_view(
     motion: Motion, people: RecordedBodies, camera: Camera, rays: PixelRays, solids: Solids, sun: Array
 ) -> PeopleInView:
-    """Returns N people as this camera, with its own rays, sees them in the light of the sun (3,)."""
+    """Returns N people as a camera sees them. rays: those of the camera. sun (3,): unit vector to the sun."""
     t, p, centre = people.frame - 1, people.id - 1, people.shapes.centre
     heading = motion.heading[t, p]
     c, s = np.cos(heading), np.sin(heading)
@@ -116,14 +116,17 @@ def people_in_view(
 
 
 def image_outlines(camera: Camera, ellipses: Outlines) -> ImageOutlines:
-    """Returns the outlines of N people, with the pixel bounds of body and head together."""
+    """Returns N people's ellipses in the image, each with the pixel bounds of body and head together."""
     half = np.sqrt(np.diagonal(ellipses.shape, axis1=2, axis2=3))
     bounds = pixel_bounds(camera, (ellipses.centre - half).min(axis=1), (ellipses.centre + half).max(axis=1))
     return ImageOutlines(ellipses.centre, packed_inverse(ellipses.shape), bounds)
 
 
 def pixel_bounds(camera: Camera, low: Array, high: Array) -> Ints:
-    """Returns the bounds (N, 4) of the pixels touched by boxes from low (N, 2) to high (N, 2) px; empty for nan."""
+    """Returns the bounds (N, 4) of the pixels inside the image that N boxes touch; no pixel for a nan box.
+
+    Columns: first row, last row + 1, first column, last column + 1. low, high (N, 2): corners u, v of the boxes, px.
+    """
     size = np.array(camera.image, dtype=float)
     low, high = (np.clip(np.nan_to_num(edge), 0, size) for edge in (low, high))
     edges = np.stack([np.floor(low[:, 1]), np.ceil(high[:, 1]), np.floor(low[:, 0]), np.ceil(high[:, 0])], axis=1)
@@ -149,7 +152,7 @@ def people_shadows(
 
     An ellipsoid with centre c and shape S casts on the plane at height z an ellipse with centre c - s (c_z - z)/s_z and
     shape P S Pᵀ. Here s is the unit vector to the sun, e_z the upward unit vector, and P = I - s e_zᵀ/s_z.
-    level: True if shadows can fall on level ground only.
+    level: True if shadows can fall only on level ground, that is, on z = 0.
     """
     sun = light.sun
     along = np.eye(3) - np.outer(sun / sun[2], [0.0, 0.0, 1.0])
@@ -183,7 +186,10 @@ def _bounds_up_to_head(camera: Camera, people: RecordedBodies, height: Array, su
 
 
 def sunlit_shares(solids: Solids, pos3: Array, height: Array, sun: Array) -> Array:
-    """Returns (N, 3): 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing hides it."""
+    """Returns (N, 3): 1 if the sun reaches a person's feet, waist and head (columns), 0 if a solid thing hides it.
+
+    pos3 (N, 3): feet x, y, z in m. height (N,): m. sun (3,): unit vector to the sun.
+    """
     lit = np.ones((len(pos3), 3))
     if not any(len(part) for part in solids if isinstance(part, np.ndarray)):
         return lit

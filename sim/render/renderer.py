@@ -37,9 +37,10 @@ Seen = tuple[PeopleInView, PeopleShadows | None]  # None if the light casts no s
 
 
 def pixel_truth(ids: Ints, rows: Ints, seen: PeopleInView, amodal: Ints, disparity: Array | None) -> PixelTruth:
-    """Returns the PixelTruth of an id map (H, W): visible pixels, box and connected region of the people of these rows.
+    """Returns the PixelTruth of one frame, measured in its id map `ids` (H, W).
 
-    amodal (N,): pixels of the whole silhouettes of all people of the batch.
+    seen: the N people of the batch. rows: indices of the people of this frame in it. amodal (N,): for each person of
+    the batch, the number of pixels in the image of the whole silhouette. disparity (H, W) px or None: taken as it is.
     """
     from sim.render.pixel_truth_kernels import count_pixels
 
@@ -55,7 +56,7 @@ def pixel_truth(ids: Ints, rows: Ints, seen: PeopleInView, amodal: Ints, dispari
 
 @dataclass(frozen=True, eq=False)
 class RenderedFrame:
-    """The parts of one frame that were asked for; the others are None."""
+    """The parts of one frame that were asked for: left image, right image, pixel truth; the other parts are None."""
 
     image: Image | None = None
     right: Image | None = None
@@ -87,17 +88,17 @@ class Renderer:
 
     @cached_property
     def illumination(self) -> Illumination:
-        """The light of this seed."""
+        """The light that the seed of the motion gives."""
         return draw_illumination(self.light, self.motion.seed, self.motion.repeat)
 
     @cached_property
     def left_view(self) -> CameraView:
-        """The empty scene as the camera sees it."""
+        """The empty scene as the left (or only) camera sees it."""
         return self._view(self.camera, 0)
 
     @cached_property
     def right_view(self) -> CameraView:
-        """The empty scene as the right camera sees it, as calibrated."""
+        """The empty scene as the right camera sees it, without the errors right_… of `Picture`."""
         self.check_pair()
         return self._view(cameras.right_camera(self.camera), 1)
 
@@ -160,7 +161,7 @@ class Renderer:
         return out
 
     def frame(self, index: int) -> Image:
-        """Returns the image (H, W, 3) of frame `index`, from 1."""
+        """Returns the left image (H, W, 3) of frame `index`, from 1."""
         return self._draw(self.left_view, index, shade=True, label=False)[0]
 
     def right(self, index: int) -> Image:
@@ -168,18 +169,21 @@ class Renderer:
         return self._draw(self._shown_right_view, index, shade=True, label=False)[0]
 
     def pixels(self, index: int, *, disparity: bool = False) -> PixelTruth:
-        """Returns the PixelTruth of frame `index`, from 1, with disparities if asked for."""
+        """Returns the PixelTruth of frame `index`, from 1. disparity: True adds the disparities, else they are None."""
         truth = self._draw(self.left_view, index, shade=False, label=True, disparity=disparity)[1]
         assert truth is not None
         return truth
 
     def draw(self, index: int, *, right: bool = False, pixels: bool = False, disparity: bool = False) -> RenderedFrame:
-        """Returns the left image of frame `index` (from 1) and the parts asked for."""
+        """Returns the left image of frame `index` (from 1), and the parts asked for.
+
+        right: also the right image. pixels: also the pixel truth. disparity: the pixel truth gets disparities.
+        """
         image, truth = self._draw(self.left_view, index, shade=True, label=pixels, disparity=disparity and pixels)
         return RenderedFrame(image, self.right(index) if right else None, truth)
 
     def background(self, k: int) -> Image:
-        """Returns image k = 0 … 49 (H, W, 3) of the scene without people, before frame 1."""
+        """Returns the image (H, W, 3) of the scene without people in frame k - 49; k from 0 to 49."""
         view, index = self.left_view, k - BACKGROUNDS + 1
         canvas = self._moved_canvas(view, index)
         image = self._finish(view, canvas, index)

@@ -44,9 +44,9 @@ class PlaneWaves:
         return float(self.amplitude * np.sin(self.omega * t + self.phase).sum()) if self.amplitude > 0 else 0.0
 
     def sampled(self, places: Array, spread: Array) -> Callable[[float], Array]:
-        """Returns the field at places (N, 2) m as a function of the time in s.
+        """Returns a function that gives the field's values (N,) at places (N, 2) m at a time in s.
 
-        Each place is smoothed by a Gaussian of standard deviation spread (N,) m.
+        Around each place the field is averaged by a Gaussian of standard deviation spread (N,) m.
         """
         amplitude = self.amplitude * np.exp(-0.5 * (self.k**2).sum(axis=1) * spread[:, None] ** 2)
         at = places @ self.k.T + self.phase
@@ -59,21 +59,27 @@ def _with_random_phases(source: np.random.Generator, sd: float, k: Array, omega:
 
 
 def uniform_drift(source: np.random.Generator, sd: float, time: float) -> PlaneWaves:
-    """Returns a field that is the same everywhere, with correlation exp(-|lag| / time); time in s."""
+    """Returns a field of standard deviation sd, the same everywhere, with correlation exp(-|lag| / time); time in s."""
     # A Cauchy distribution of frequencies has this correlation.
     omega = np.tan(np.pi * (source.uniform(size=WAVES) - 0.5)) / time
     return _with_random_phases(source, sd, np.zeros((WAVES, 2)), omega)
 
 
 def moving_pattern(source: np.random.Generator, sd: float, length: float, speed: float) -> PlaneWaves:
-    """Returns a pattern that moves unchanged over the ground at `speed` (m/s) in a random direction."""
+    """Returns a pattern of standard deviation sd that moves unchanged over the ground in a random direction.
+
+    length: m; the correlation at distance r is exp(-r² / 2 length²). speed: m/s.
+    """
     angle = source.uniform(0, 2 * np.pi)
     k = source.normal(size=(WAVES, 2)) / length
     return _with_random_phases(source, sd, k, -speed * k @ np.array([np.cos(angle), np.sin(angle)]))
 
 
 def oscillation(source: np.random.Generator, sd: float, length: float, time: float) -> PlaneWaves:
-    """Returns a random field with standard deviation sd and correlation exp(-r² / 2 length²) exp(-lag² / 2 time²)."""
+    """Returns a field of standard deviation sd and correlation exp(-r² / 2 length²) exp(-lag² / 2 time²).
+
+    r and length are in m, lag and time in s.
+    """
     return _with_random_phases(source, sd, source.normal(size=(WAVES, 2)) / length, source.normal(size=WAVES) / time)
 
 
@@ -111,7 +117,7 @@ class Illumination:
 
 
 def draw_illumination(light: Light, seed: int, repeat: int = 0) -> Illumination:
-    """Returns the light that a scenario's settings and this seed give."""
+    """Returns the light for a scenario's settings and a seed. repeat: number of the suite entry's copy, 0 without."""
     source = rng(seed, "light", SUN, repeat=repeat)
     azimuth, elevation = (np.deg2rad(draw(v, source)) for v in (light.sun_azimuth_deg, light.sun_elevation_deg))
     elevation = np.clip(elevation, np.deg2rad(0.1), np.pi / 2)  # one draw in a thousand may be beyond
@@ -128,7 +134,7 @@ def draw_illumination(light: Light, seed: int, repeat: int = 0) -> Illumination:
 
 
 def brightness(light: Light, seed: int, repeat: int, fps: float, length: int) -> Array:
-    """Returns the factor of brightness of the frames 1 … length, (length,), clouds and flicker left out."""
+    """Returns the factor of brightness in each of the frames 1 … length, (length,), without clouds and flicker."""
     steady = replace(draw_illumination(light, seed, repeat), flicker=0.0)
     return np.array([steady.gain(k / fps, 0) for k in range(length)])
 
@@ -155,7 +161,7 @@ class Foliage:
 
 
 def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repeat: int = 0) -> Foliage | None:
-    """Returns the plants of this seed; None if their share is 0, or no ground in view is near enough."""
+    """Returns the plants for a seed; None if their share is 0, or if no ground in view is near enough for plants."""
     source = rng(seed, "wind", PLACE, repeat=repeat)
     share = min(draw(picture.foliage, source), 1.0)
     if share <= 0:

@@ -28,7 +28,7 @@ XX, XY, YY = 0, 1, 2  # entries of a symmetric 2 x 2 matrix packed by `packed_in
 
 @dataclass(frozen=True)
 class BodyPart:
-    """One ellipsoid (body or head) of a person of height 1; all numbers are shares without unit."""
+    """The shape of one ellipsoid, body or head, of every person; all numbers are shares without unit."""
 
     centre: float  # height of its centre above the ground, share of the person's height
     across: float  # half axis to the right; share of the height for HEAD, of the person's width for BODY
@@ -52,7 +52,8 @@ class Ellipsoids:
 class Outlines:
     """Silhouettes of N people in an image, as ellipses (u - centre)ᵀ shape⁻¹ (u - centre) <= 1, two each.
 
-    An ellipse is nan if its ellipsoid is not wholly in front of the camera.
+    centre (N, 2, 2) px and shape (N, 2, 2, 2) px²; the second axis is body, head. An ellipse is nan if its ellipsoid is
+    not wholly in front of the camera.
     """
 
     centre: Array
@@ -70,7 +71,7 @@ class RecordedBodies:
 
 
 def half_axes(height: Array, width: Array | None = None, depth: Array | None = None) -> Array:
-    """Returns the half axes (N, 2, 3) m of N people: body, head; across, along the heading, up.
+    """Returns the half axes (N, 2, 3) m of N people. Second axis: body, head; third: across, along the heading, up.
 
     height, width, depth (N,): m; None: of the usual proportions. Width and depth change the body only.
     """
@@ -85,7 +86,10 @@ def half_axes(height: Array, width: Array | None = None, depth: Array | None = N
 def ellipsoids(
     pos3: Array, heading: Array, height: Array, width: Array | None = None, depth: Array | None = None
 ) -> Ellipsoids:
-    """Returns body and head of N upright people. pos3 (N, 3): feet. heading (N,). Others: as of `half_axes`."""
+    """Returns body and head of N upright people.
+
+    pos3 (N, 3): feet x, y, z in m. heading (N,): rad. height, width, depth: as for `half_axes`.
+    """
     half = half_axes(height, width, depth)
     c, s = cos(heading), sin(heading)
     a = half * half
@@ -100,7 +104,10 @@ def ellipsoids(
 
 
 def recorded_bodies(motion: Motion, first: int = 1, end: int | None = None) -> RecordedBodies:
-    """Returns the bodies of all people present in frames first … end - 1 (None: to the last), on the ground."""
+    """Returns the bodies of all people present in frames first … end - 1, standing on the ground or on stairs.
+
+    first: from 1. end: None means up to the last frame.
+    """
     t, p = np.nonzero(motion.present[first - 1 : None if end is None else end - 1])
     t += first - 1
     xy = motion.pos[t, p]
@@ -110,7 +117,7 @@ def recorded_bodies(motion: Motion, first: int = 1, end: int | None = None) -> R
 
 
 def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
-    """Returns the exact ellipse in the image of each ellipsoid, without lens distortion."""
+    """Returns the exact ellipse in the image of each ellipsoid; lens distortion is ignored."""
     R = camera.rotation
     c = turned(R, people.centre - camera.position)
     S = product(product(R, people.shape), R.T)
@@ -127,7 +134,7 @@ def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
 
 
 def outline_boxes(ellipses: Outlines) -> Array:
-    """Returns the boxes (N, 4) px round body and head, hidden parts included, not clipped to the image."""
+    """Returns the boxes (N, 4), left, top, width, height in px, round body and head, not clipped to the image."""
     half = np.sqrt(np.diagonal(ellipses.shape, axis1=2, axis2=3))
     low, high = (ellipses.centre - half).min(axis=1), (ellipses.centre + half).max(axis=1)
     return np.concatenate([low, high - low], axis=1)
@@ -136,7 +143,10 @@ def outline_boxes(ellipses: Outlines) -> Array:
 def person_boxes(
     camera: Camera, pos3: Array, heading: Array, height: Array, width: Array | None = None, depth: Array | None = None
 ) -> Array:
-    """Returns the boxes (N, 4) px round N people in the camera's image. Arguments as of `ellipsoids`."""
+    """Returns the boxes (N, 4), left, top, width, height in px, round N people in the image.
+
+    They are not clipped to the image; nan for people not wholly in front of the camera. Arguments as for `ellipsoids`.
+    """
     return outline_boxes(outlines(camera, ellipsoids(pos3, heading, height, width, depth)))
 
 
@@ -147,7 +157,7 @@ def packed_inverse(shape: Array) -> Array:
 
 
 def contour(ellipses: Outlines, points: int = 16) -> Array:
-    """Returns points on the outlines of N people, (N, 2 * points, 2) px: first the body's, then the head's.
+    """Returns `points` points on each outline of N people, (N, 2 * points, 2) px: the body's, then the head's.
 
     An ellipse with centre m and shape E has the points m + L (cos, sin) with L Lᵀ = E.
     """
@@ -163,10 +173,10 @@ def contour(ellipses: Outlines, points: int = 16) -> Array:
 
 
 def occlusion_distance(camera: Camera, pos3: Array, height: Array) -> Array:
-    """Returns a distance (N,) m that orders people: of two on one line of sight, the nearer hides.
+    """Returns a distance (N,) m: of two people on one line of sight, the one with the smaller distance hides the other.
 
-    The horizontal distance from a pinhole camera: a ray meets upright bodies in this order, whatever the tilt. pos3 (N,
-    3): feet. height (N,).
+    For a pinhole camera it is the horizontal distance: a ray meets upright bodies in this order, whatever the tilt. For
+    kind "top" it is the distance from the head up to the camera. pos3 (N, 3): feet, m. height (N,): m.
     """
     if camera.kind == "top":
         return np.asarray(camera.position[2] - pos3[:, 2] - height)

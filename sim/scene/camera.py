@@ -32,14 +32,17 @@ from sim.types import Array, Bools, Camera
 
 
 def undistort(x: Array, k: float) -> Array:
-    """Returns the ideal points y = x (1 + k |x|²) of distorted points x (N, 2)."""
+    """Returns the ideal points y = x (1 + k |x|²) of distorted points x (N, 2), in units of the focal length."""
     if k == 0.0:
         return x
     return np.asarray(x * (1.0 + k * dot(x, x)[:, None]))
 
 
 def distort(y: Array, k: float) -> Array:
-    """Returns the distorted points x (N, 2) of ideal points y (N, 2); nan where the lens does not show the point."""
+    """Returns the distorted points x (N, 2) of ideal points y (N, 2), the inverse of `undistort`.
+
+    nan where the lens does not show the point.
+    """
     if k == 0.0:
         return y
     root = np.sqrt(3.0 * abs(k))
@@ -70,7 +73,10 @@ NEAREST_DEPTH = 0.05  # m: points at this depth or nearer are not projected
 
 
 def camera_rotation(tilt: float, yaw: float) -> Array:
-    """Returns the rotation (3, 3) from world to camera: rows right, down, forward. tilt, yaw: rad."""
+    """Returns the rotation (3, 3) from world to camera; its rows are right, down and forward in the world.
+
+    tilt: rad, downwards from level. yaw: rad; 0 looks along +y, positive turns left.
+    """
     (ct, st), (cy, sy) = unit(tilt), unit(yaw)
     return np.array([[cy, sy, 0.0], [st * sy, -st * cy, -ct], [-sy * ct, cy * ct, -st]])
 
@@ -89,7 +95,10 @@ def project(camera: Camera, xyz: Array) -> tuple[Array, Array]:
 
 
 def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
-    """Returns the lines of sight of image points uv (N, 2) px: origins and directions (N, 3) of depth 1."""
+    """Returns the lines of sight of image points uv (N, 2) px: origins (N, 3) m and directions (N, 3).
+
+    A direction has the length that leads 1 m deeper along the optical axis.
+    """
     uv = np.asarray(uv, dtype=float)
     if camera.kind == "top":
         across = (uv - camera.centre_px) / camera.px_per_m
@@ -101,7 +110,10 @@ def rays(camera: Camera, uv: Array) -> tuple[Array, Array]:
 
 
 def to_ground(camera: Camera, uv: Array, z: float | Array = 0.0) -> Array:
-    """Returns the points (N, 2) m of height z (m, or (N,)) that are seen at uv (N, 2) px; nan where none is."""
+    """Returns x, y (N, 2) m of the points at height z that are seen at image points uv (N, 2) px.
+
+    z: m, one number or (N,). nan where the line of sight meets no such point in front of the camera.
+    """
     origin, direction = rays(camera, uv)
     return np.asarray(origin[:, :2] + _reach(origin, direction, z)[:, None] * direction[:, :2])
 
@@ -114,17 +126,21 @@ def _reach(origin: Array, direction: Array, z: float | Array) -> Array:
 
 
 def foot_points(box: Array, z: Array, camera: Camera) -> Array:
-    """Returns the ground points (R, 2) m of people with boxes (R, 4) px, on ground of height z (R,) m."""
+    """Returns the ground points x, y (R, 2) m of people with boxes (R, 4) px; nan where none is seen.
+
+    box: left, top, width, height. z (R,): height of the ground, m. The point is the middle of the lower edge, for kind
+    "top" the middle of the box.
+    """
     return to_ground(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]), z)
 
 
 def standing_share(camera: Camera | None) -> float:
-    """Returns the share of a box's height, from its top, at which a person stands."""
+    """Returns where a person stands in the box, as share of its height from the top: 0.5 for kind "top", else 1."""
     return 0.5 if camera is not None and camera.kind == "top" else 1.0
 
 
 def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
-    """Returns the derivative of `to_ground` at image points uv (N, 2), d(x, y)/d(u, v), (N, 2, 2) m/px.
+    """Returns the derivative d(x, y)/d(u, v) of `to_ground` at image points uv (N, 2) px, (N, 2, 2) m/px.
 
     The ray X = O + s D meets the plane at s = (z - O_z)/D_z. Then dX = s dD + D ds and ds = -s dD_z/D_z.
     """
@@ -143,7 +159,7 @@ def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
 
 
 def right_camera(camera: Camera) -> Camera:
-    """Returns the right camera of a stereo pair, moved by its baseline along its own x axis."""
+    """Returns the right camera of a stereo pair: the left one, moved by its baseline along its own x axis."""
     return camera.replace(position=camera.position + camera.baseline * camera.rotation[0])
 
 
@@ -157,7 +173,7 @@ def misaligned(camera: Camera, roll: float, down: float) -> Camera:
 
 
 def disparity(camera: Camera, depth: Array) -> Array:
-    """Returns the disparity f B / z in px for depths z (m) of any shape."""
+    """Returns the disparity f B / z in px for depths z (m) of any shape; 0 for a camera of kind "top"."""
     if camera.kind == "top":
         return np.zeros_like(depth)
     return np.asarray(camera.focal_px[0] * camera.baseline / depth)
@@ -166,7 +182,8 @@ def disparity(camera: Camera, depth: Array) -> Array:
 def px_per_m_at_centre(camera: Camera) -> float:
     """Returns the scale of the image, px per m, at the ground point seen in the image centre.
 
-    For a pinhole camera that of an upright person there. Without ground in the centre, the point is lower in the image.
+    For a pinhole camera it is the height in px of a standard person there, divided by 1.7 m. If the camera is tilted by
+    more than 70°, it is the focal length over the depth. If the centre shows no ground, a point below it is taken.
     """
     if camera.kind == "top":
         return camera.px_per_m
@@ -182,7 +199,7 @@ def px_per_m_at_centre(camera: Camera) -> float:
 
 
 def shows_ground(camera: Camera, ground: Array) -> Bools:
-    """Returns which points on the ground (..., 2) are within 10 km of the camera."""
+    """Returns flags (...): True for ground points (..., 2) m within 10 km of the camera horizontally; False for nan."""
     return np.asarray(length(ground - camera.position[:2]) < FARTHEST)
 
 
@@ -208,7 +225,7 @@ DOWN = 0.99  # least downward part of the forward axis of a camera of kind "top"
 
 
 def require_camera(camera: Camera, file: object = "", place: str = "") -> Camera:
-    """Returns the camera unchanged if it can be used; raises InputError otherwise."""
+    """Returns the camera unchanged if it can be used, else raises InputError. file, place: for the error message."""
     for key, good, got, expected in _facts(camera):
         if not good:
             where = f"{place}: {key}" if place else key
@@ -254,7 +271,7 @@ def _lens(camera: Camera) -> Iterator[tuple[str, bool, str, str]]:
 
 
 def project_pair(camera: Camera, xyz: Array) -> Array:
-    """Returns u, v, d (N, 3) px of world points xyz (N, 3) m before the camera (eq. 6, with its pose)."""
+    """Returns u, v, d (N, 3) px of world points xyz (N, 3) m in front of the left camera `camera` (eq. 6)."""
     x = turned(camera.rotation, xyz - camera.position)
     (fx, fy), (u0, v0) = camera.focal_px, camera.centre_px
     z = x[:, 2]
@@ -262,7 +279,7 @@ def project_pair(camera: Camera, xyz: Array) -> Array:
 
 
 def back_project(camera: Camera, uvd: Array) -> Array:
-    """Returns the world points (N, 3) m that are measured as uvd (N, 3) px, d above 0."""
+    """Returns the world points (N, 3) m whose image is uvd (N, 3) px; the inverse of `project_pair`, for d above 0."""
     (fx, fy), (u0, v0) = camera.focal_px, camera.centre_px
     z = camera.baseline * fx / uvd[:, 2]
     x = np.column_stack([(uvd[:, 0] - u0) / fx * z, (uvd[:, 1] - v0) / fy * z, z])

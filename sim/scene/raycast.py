@@ -22,7 +22,10 @@ CENTRE_X, CENTRE_Y, RADIUS = range(3)  # columns of Solids.pillars
 
 
 class Solids(NamedTuple):
-    """The solid things of a scene, as the kernels take them; lengths in m. Columns of flights: see `terrain`."""
+    """The solid things of a scene for the kernels, in m.
+
+    walls (W, 4): x1, y1, x2, y2. pillars (P, 3): x, y, radius. flights (S, 9): stairs, as `terrain.flight_rows`.
+    """
 
     walls: Array
     wall_height: float
@@ -32,7 +35,10 @@ class Solids(NamedTuple):
 
 
 class PixelRays(NamedTuple):
-    """Lines of sight of a camera: image point (u, v) px looks from origin @ (u, v, 1) along direction @ (u, v, 1)."""
+    """Lines of sight of a camera, as two matrices (3, 3).
+
+    Image point (u, v) px looks from the world point origin @ (u, v, 1), in m, along direction @ (u, v, 1).
+    """
 
     origin: Array
     direction: Array
@@ -46,12 +52,12 @@ def solids_of(scene: Scene) -> Solids:
 
 
 def only_flights(flights: Array) -> Solids:
-    """Returns these flights of stairs (S, 9) without walls and pillars."""
+    """Returns the Solids that consist of these flights of stairs (S, 9), without walls and pillars."""
     return Solids(np.zeros((0, 4)), 0.0, np.zeros((0, 3)), 0.0, flights)
 
 
 def unprojection(camera: Camera) -> Array:
-    """Returns Rᵀ K⁻¹ (3, 3) of a pinhole camera, which maps (u, v, 1) px to the direction of sight, of depth 1."""
+    """Returns Rᵀ K⁻¹ (3, 3) of a pinhole camera: it maps (u, v, 1) px to the direction of sight in the world."""
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     inverse = np.array([[1 / fx, 0, -cx / fx], [0, 1 / fy, -cy / fy], [0, 0, 1]])
     return product(camera.rotation.T, inverse)
@@ -71,5 +77,5 @@ def pixel_rays(camera: Camera) -> PixelRays:
 
 
 def signed_scale(camera: Camera) -> float:
-    """Returns px per m at a depth of 1 m, or minus px per m for a camera from above."""
+    """Returns px per m: at a depth of 1 m for a pinhole camera; with a minus sign for a camera of kind "top"."""
     return float(camera.focal_px[0]) if camera.kind == "pinhole" else -camera.px_per_m

@@ -46,7 +46,8 @@ def measure_visibility(
 ) -> BodyVisibility:
     """Returns what the camera sees of R people in any number of frames, exact to about 1/300.
 
-    frame (R,): sorted; people of one frame hide each other. pos3 (R, 3): feet. height (R,). Lens distortion is ignored.
+    frame (R,): sorted; people of one frame hide each other. pos3 (R, 3): feet, m. height (R,): m. shapes: their bodies
+    and heads. Lens distortion is ignored.
     """
     from sim.scene.visibility_kernels import sample_visibility
 
@@ -63,7 +64,7 @@ def measure_visibility(
 
 
 def frame_starts(frame: Ints) -> Ints:
-    """Returns the first row of each frame in sorted frame numbers (R,), then R: (F + 1,)."""
+    """Returns the index of the first row of each of the F frames in frame (R,), which is sorted; then R. (F + 1,)."""
     return np.concatenate([[0], np.flatnonzero(np.diff(frame)) + 1, [len(frame)]]).astype(np.int64)
 
 
@@ -71,9 +72,10 @@ BOXES = 100  # boxes that the first frames must hold together
 
 
 def scale_of_first_boxes(frame: Ints, height: Array) -> tuple[float, int]:
-    """Returns the image scale, px per m, by the first 100 boxes, and the last frame that it was taken from.
+    """Returns the image scale, px per m, and the last frame from which it was taken.
 
-    frame, height (R,): of each box, in any order; height px.
+    It is the median box height over 1.7 m, of the first frames that together hold 100 boxes (else all). frame, height
+    (R,): of each box, in any order; height in px, nan is ignored. (nan, 0) without boxes.
     """
     known = np.isfinite(height)
     frame, height = frame[known], height[known]
@@ -84,14 +86,15 @@ def scale_of_first_boxes(frame: Ints, height: Array) -> tuple[float, int]:
 
 
 def scale_of_all_boxes(height: Array) -> float:
-    """Returns the image scale, px per m, by the heights (R,) px of all labelled boxes."""
+    """Returns the image scale, px per m: the median of box heights (R,) px over 1.7 m; nan without boxes."""
     return float(np.median(height)) / body.PERSON_HEIGHT if len(height) else float("nan")
 
 
 def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
     """Returns the truth with visibility, truncation and visible boxes estimated from its boxes.
 
-    image_size: (width, height) px; None: the image ends with the boxes. Visibilities that the labels state are kept.
+    image_size: (width, height) px; None: the smallest image that holds all boxes. If the labels state visibilities
+    (some below 1), these are kept. A truth without boxes, or with visible boxes, is returned unchanged.
     """
     if truth.box is None or truth.visible_box is not None or not len(truth.box):
         return truth
@@ -111,7 +114,7 @@ def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
 
 
 def inscribed_outlines(box: Array) -> Outlines:
-    """Returns body and head of N people that fill the boxes (N, 4) px."""
+    """Returns the outlines of body and head of N people who fill the boxes (N, 4), left, top, width, height in px."""
     left, top, width, height = box.T
     middle = left + width / 2
     centre, shape = np.empty((len(box), 2, 2)), np.zeros((len(box), 2, 2, 2))
@@ -125,7 +128,7 @@ def inscribed_outlines(box: Array) -> Outlines:
 
 
 def image_size_of_boxes(*boxes: Array) -> tuple[int, int]:
-    """Returns the (width, height) px of the smallest image from (0, 0) that holds all boxes (N, 4)."""
+    """Returns the (width, height) px of the smallest image that holds all boxes (N, 4); (1, 1) without boxes."""
     far = np.concatenate([box[:, :2] + box[:, 2:] for box in boxes]) if boxes else np.zeros((0, 2))
     width, height = np.ceil(far.max(axis=0, initial=1.0)) if len(far) else (1.0, 1.0)
     return int(width), int(height)

@@ -27,9 +27,9 @@ def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -
     """Returns a cross event for each crossing of two groups of two or more people, in order of time.
 
     pos, vel (T, P, 2): m, m/s. present (T, P). group (T, P): group ids, -1 = alone or absent. An encounter is a stretch
-    in which two groups' hulls are within 1.0 m, but for breaks of up to 0.5 s. It is a crossing if their mean relative
-    velocity is at least CROSS_VELOCITY long, they change sides, and both keep their members, but for those who leave
-    the scene, from SAME_BEFORE before it to SAME_BEFORE after it.
+    of time in which two groups' hulls are within 1.0 m; breaks of up to 0.5 s are ignored. It is a crossing if three
+    conditions hold. The mean relative velocity is at least CROSS_VELOCITY (0.6 m/s). The groups change sides. From 2 s
+    before to 2 s after the encounter both keep their members, except for members who leave the scene.
     """
     there = present & np.isfinite(pos).all(axis=2)
     places, speeds = np.where(there[..., None], pos, np.nan), np.where(there[..., None], vel, np.nan)
@@ -39,7 +39,7 @@ def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -
 
 
 def encounters(pos: Array, group: Ints, fps: float) -> list[tuple[int, int, int, int]]:
-    """Returns all encounters of two groups of two or more people, sorted: first and last frame (from 0), ids a < b.
+    """Returns (first frame, last frame, id a, id b) of each encounter of two groups; frames from 0, a < b, sorted.
 
     pos (T, P, 2): m, finite for all members. group (T, P): group ids, -1 = alone or absent.
     """
@@ -111,7 +111,7 @@ def _same_members(pos: Array, group: Ints, name: int, columns: Ints) -> bool:
 
 
 def net_crossings(a: Array, b: Array) -> int:
-    """Returns how often path b crosses path a from left to right, minus right to left.
+    """Returns how often path b crosses path a from left to right, minus how often from right to left.
 
     a, b (R, 2): points of both paths, m, nan where unknown. Let s and t be times on a and b. The difference b(t) - a(s)
     winds round zero once for each crossing as (s, t) goes round the square of all times. The turns along the four sides

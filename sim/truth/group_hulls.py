@@ -20,10 +20,11 @@ __all__ = ["box_groups", "groups_over_time", "member_rows"]
 def groups_over_time(
     frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, first: int, length: int, px_per_m: float = 1.0
 ) -> list[Groups]:
-    """Returns the Groups, of two or more people, of each of the frames first … first + length - 1, by ascending id.
+    """Returns the Groups of each of the frames first … first + length - 1: groups of two or more, sorted by id.
 
-    frame, id, group (R,): people in frames, in any order, group -1 = alone. pos, vel (R, D): m, m/s, or px with a
-    px_per_m, the scale of the footprints; results are in the same unit. extent is the covariance of x and y.
+    frame, id, group (R,): one row per person and frame, in any order; group -1 = alone. pos, vel (R, D): on the ground
+    m and m/s. In the image they are px and px/s, and px_per_m is the scale by which the discs round the members are
+    drawn. Results are in the same units. extent is the covariance of x and y.
     """
     order, starts = member_rows(frame, id, group)
     hulls = footprint_hulls(pos[order, :2] / px_per_m, np.diff(np.append(starts, len(order))))
@@ -36,7 +37,8 @@ def box_groups(
 ) -> list[Groups]:
     """Returns the Groups in the image of each of the frames first … first + length - 1; hulls are those of boxes.
 
-    As `groups_over_time`; pos, vel (R, 2): px, px/s. box (R, 4): left, top, width, height, px.
+    Like `groups_over_time`, but each hull encloses the members' boxes. pos, vel (R, 2): px, px/s. box (R, 4): left,
+    top, width, height, px.
     """
     order, starts = member_rows(frame, id, group)
     low, high = box[:, :2], box[:, :2] + box[:, 2:]
@@ -48,8 +50,10 @@ def box_groups(
 
 
 def member_rows(frame: Ints, id: Ints, group: Ints) -> tuple[Ints, Ints]:
-    """Returns the rows of people in groups of two or more in one frame, sorted by (frame, group, id), and the starts of
-    each group in each frame in them.
+    """Returns the indices (M,) of the rows of people who are in a group of two or more, and where each group begins.
+
+    The indices are sorted by frame, group, id. The second array has the position in them of each group's first member
+    in each frame. frame, id, group (R,): one row per person and frame; group -1 = alone.
     """
     rows = np.lexsort((id, group, frame))
     rows = rows[group[rows] >= 0]

@@ -32,9 +32,10 @@ class GroupChange:
 
 
 def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) -> dict[PersonSet, int | None]:
-    """Returns for each new group of two or more people the id that it keeps, or None if it needs a new id.
+    """Returns for each part of two or more people the old id that it keeps, or None if it needs a new id.
 
-    old: members before, by id. parts: the new partition, disjoint sets. born: when each id in `old` began.
+    old: members of each group before, by id. parts: the new partition, disjoint sets of people. born: time at which
+    each id in `old` began. The rules are in the module's text.
     """
     new = sorted((p for p in parts if len(p) > 1), key=min)
     same = {people: g for g, people in old.items()}  # mostly nothing has changed: no need to compare all with all
@@ -56,11 +57,11 @@ def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) 
 def lineage(
     old: Members, new: Members, before: PersonSet, now: PersonSet, entered: PersonSet = frozenset()
 ) -> list[GroupChange]:
-    """Returns what happened to the groups between two partitions: old groups first, each in order of group id.
+    """Returns what happened to the groups between two partitions: changes of old groups first, each in order of id.
 
-    old, new: members by id. before, now: all people present. entered: people who count as having just entered. Members
-    of a split or dissolve are the old group's people present now, of a leave all its old people, else those of the new
-    group.
+    old, new: members of each group, by id. before, now: all people present at the two times. entered: people who count
+    as having just entered, though they may be in `before`. `members` of a split or dissolve: the old group's people who
+    are present now; of a leave: all people of the old group; of the other kinds: the new group's people.
     """
     stay = (before & now) - entered
     was, is_ = _unit_of(old, before), _unit_of(new, now)
@@ -99,8 +100,8 @@ def _names(units: Iterable[int]) -> tuple[int, ...]:
 class Identities:
     """Gives groups ids that last through time: a new object for each sequence, then one `step` for each partition.
 
-    State: next_id: from 1. groups: members of each present group, by id. born: when each id began, of ended groups,
-    too. people: all people present at the last time.
+    State: next_id: the next new id, from 1. groups: members of each present group, by id. born: time at which each id
+    began, also for ended groups. people: all people present at the last step.
     """
 
     next_id: int = 1
@@ -110,7 +111,11 @@ class Identities:
     people: PersonSet = frozenset()  # all people present at the last time
 
     def name(self, t: int, parts: Iterable[PersonSet], known: Members) -> dict[int, PersonSet]:
-        """Returns the parts of time t by id: that of a present group or of one in `known`, or a new one."""
+        """Returns the parts of two or more people at time t, by id.
+
+        A part keeps the id of a present group, or of a group in `known` (members of ended groups, by id), as `identify`
+        says; otherwise it gets a new id.
+        """
         new: dict[int, PersonSet] = {}
         for part, kept in identify({**known, **self.groups}, parts, self.born).items():
             g = self.next_id if kept is None else kept
@@ -123,8 +128,9 @@ class Identities:
         self, t: int, people: PersonSet, parts: Iterable[PersonSet], entered: PersonSet = frozenset(),
         known: Members = NOBODY,
     ) -> list[GroupChange]:  # fmt: skip
-        """Takes the partition of time t, not before the last one, and returns what has changed since; at first all
-        enter. known: as for `name`.
+        """Takes the partition at time t and returns the changes since the last step; at first all groups enter.
+
+        people: all people present. parts: the partition. entered: as for `lineage`. known: as for `name`.
         """
         new = self.name(t, parts, known)
         changes = lineage(self.groups, new, self.people, people, entered)

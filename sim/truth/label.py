@@ -28,8 +28,9 @@ INSTANT = 0.02  # s: half the step by which ground velocities become image veloc
 def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shapes: Ellipsoids) -> tuple[Groups, ...]:
     """Returns the Groups of each frame as the camera sees them, with the ids, members and sizes of the ground groups.
 
-    shapes: ellipsoids of body and head, in the order of the truth's rows. pos and extent: of the boxes' middles, px.
-    hull: of the silhouettes, empty if a member is not wholly in front of the camera.
+    shapes: ellipsoids of body and head, one row for each row of the truth. Of the result, pos and extent are those of
+    the middles of the members' boxes, px; hull is the convex hull of their silhouettes, empty if a member is not wholly
+    in front of the camera.
     """
     assert truth.box is not None
     assert truth.vel is not None
@@ -64,7 +65,7 @@ def _means(values: Array, cuts: Ints) -> Array:
 
 
 def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
-    """Returns the convex hull (V, 2) px of each group of silhouettes. cuts (G + 1,): where each group begins."""
+    """Returns the convex hull (V, 2) px of each of G groups. cuts (G + 1,): its first row in `ellipses`, then N."""
     from sim.geometry import hull_kernels
 
     edge = contour(ellipses, POINTS)[: cuts[-1]]
@@ -81,7 +82,7 @@ def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
 def bodies(motion: Motion, camera: Camera | None, people: RecordedBodies | None = None) -> Truth:
     """Returns a Truth with positions, boxes and visibility of everybody in every frame, but without groups.
 
-    Without a camera, boxes are None and visibility is 1. people: None: `recorded_bodies(motion)`.
+    Without a camera, boxes are None and visibility is 1. people: the bodies of the motion; None: they are computed.
     """
     people = recorded_bodies(motion) if people is None else people
     t, p = people.frame - 1, people.id - 1
@@ -98,7 +99,7 @@ def bodies(motion: Motion, camera: Camera | None, people: RecordedBodies | None 
 
 
 def label(motion: Motion, camera: Camera | None) -> Truth:
-    """Returns the whole Truth: bodies, and groups, events and hard negatives measured from motion and intent."""
+    """Returns the whole Truth of a motion: that of `bodies`, with groups, events and hard negatives added."""
     from sim.truth.group_hulls import groups_over_time
     from sim.truth.merge_split_events import groups_and_events
 

@@ -177,7 +177,7 @@ def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps:
     pos, vel (T, P, 2): m, m/s, nan while absent. present (T, P). intent (T, P): the group a person is meant to belong
     to, -1 while absent. Frames of events count from 1, a person's id is the column + 1. A merge, split, form or
     dissolve starts in the first frame in which its rule holds, and ends when it has held for HOLD_TIME. An enter lies
-    in the group's first frame, a leave in the last frame before the change.
+    in the group's first frame, a leave in the last frame before the group is gone.
     """
     group = np.full(present.shape, -1, np.int64)
     identities, events = Identities(), []

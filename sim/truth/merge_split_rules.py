@@ -24,13 +24,13 @@ HOLD_TIME = 2.0  # s for which either rule must hold
 
 
 def frames_of(seconds: float, fps: float) -> int:
-    """Returns the number of frames that last `seconds`, rounded up, at least 1."""
+    """Returns the number of frames that last `seconds` s at fps frames/s, rounded up, at least 1."""
     # Rounding errors of a whole number of frames do not count.
     return max(1, math.ceil(seconds * fps - 1e-9))
 
 
 def holds_for(holds: Bools, frames: int) -> Bools:
-    """Returns for each frame whether `holds` (T, ...) is True in it and in the next frames - 1 frames."""
+    """Returns flags (T, ...): True where `holds` (T, ...) is True in this frame and the next `frames` - 1."""
     if len(holds) < frames:
         return np.zeros_like(holds)
     total = np.concatenate([np.zeros_like(holds[:1], np.int64), np.cumsum(holds, axis=0)])
@@ -49,17 +49,17 @@ class Separation:
     velocity_difference: Array
 
     def merge_rule(self) -> Bools:
-        """Returns the frames in which the merge rule holds (T,)."""
+        """Returns flags (T,): True in the frames in which the merge rule holds."""
         return (self.distance < MERGE_DISTANCE) & (self.velocity_difference < MERGE_VELOCITY)
 
     def split_rule(self) -> Bools:
-        """Returns the frames in which the split rule holds (T,)."""
+        """Returns flags (T,): True in the frames in which the split rule holds; False if a part is absent."""
         leaving = (self.distance > MERGE_DISTANCE) & (self.velocity_difference > SPLIT_VELOCITY)
         return np.isfinite(self.distance) & ((self.distance > SPLIT_DISTANCE) | leaving)
 
 
 def separation(pos: Array, vel: Array, a: Ints, b: Ints) -> Separation:
-    """Returns how far apart the people in columns a and those in columns b are in each frame.
+    """Returns the Separation of two parts of a crowd, the people in columns a and those in columns b, in each frame.
 
     pos, vel (T, P, 2): m, m/s, nan while absent.
     """
@@ -71,7 +71,7 @@ def separation(pos: Array, vel: Array, a: Ints, b: Ints) -> Separation:
 
 
 def mean_of_present(values: Array) -> Array:
-    """Returns the mean (T, 2) of values (T, K, 2) over the people with finite values; nan if none has."""
+    """Returns the mean (T, 2) of values (T, K, 2) over those of K people whose values are finite; nan without any."""
     there = np.isfinite(values.sum(axis=-1))
     total = np.where(there[..., None], values, 0.0).sum(axis=1)
     with np.errstate(invalid="ignore"):
@@ -82,9 +82,9 @@ CHUNK = 200_000  # rows handled together: bounds memory
 
 
 def close_pairs(frame: Ints, pos: Array, reach: float) -> tuple[Ints, Ints]:
-    """Returns all pairs of rows i < j of the same frame that are less than `reach` apart, sorted, (K,) each.
+    """Returns the indices i and j, (K,) each, of all pairs of rows in the same frame that are less than `reach` apart.
 
-    frame (R,): ascending. pos (R, 2): finite.
+    i < j, and pairs are sorted by i, then j. frame (R,): ascending. pos (R, 2): finite, in the unit of `reach`.
     """
     found = [_pairs_of(frame, pos, low, high, reach) for low, high in _portions(frame)]
     i, j = (np.concatenate([np.zeros(0, np.int64), *(f[k] for f in found)]) for k in (0, 1))
@@ -128,9 +128,10 @@ def runs(first: Ints, end: Ints) -> tuple[Ints, Ints]:
 
 
 def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Ints, Ints, Ints]:
-    """Returns (pair, first frame, last frame) of each stretch of at least `least` frames, (S,) each, sorted.
+    """Returns pair, first frame and last frame, (S,) each, of all stretches of at least `least` frames.
 
-    pair, frame (K,): rows sorted by (pair, frame). Frames of a stretch are at most `bridge` apart.
+    pair, frame (K,): rows sorted by pair, then frame. A stretch has rows of one pair; the difference of one frame to
+    the next is at most `bridge`. The result is sorted by pair, then frame.
     """
     if not len(pair):
         return pair, frame, frame
@@ -142,9 +143,10 @@ def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Int
 
 
 def strangers(pos: Array, vel: Array, present: Bools, intent: Ints, group: Ints, fps: float) -> Near:
-    """Returns the stretches in which two people satisfy the merge rule but do not belong together.
+    """Returns the stretches of time in which two people satisfy the merge rule but do not belong together.
 
-    pos, vel (T, P, 2): m, m/s. present (T, P). intent (T, P): must differ. group (T, P): measured, -1 = alone.
+    They do not belong together where their intents differ and they are not in one group. pos, vel (T, P, 2): m, m/s.
+    present, intent (T, P): as in `States`. group (T, P): the measured group ids, -1 = alone.
     """
     t, p = np.nonzero(present)
     i, j = close_pairs(t, pos[t, p], MERGE_DISTANCE)

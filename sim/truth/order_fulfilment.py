@@ -39,7 +39,7 @@ WORDS = {
 
 
 def check_orders(motion: Motion, truth: Truth) -> None:
-    """Raises OrderError for the first order that no event fulfils."""
+    """Raises OrderError for the first order of `truth` that no event fulfils. motion: for the message."""
     for order in truth.orders:
         if order.event is None:
             raise _unfulfilled(order, motion)
@@ -53,7 +53,7 @@ def _fired(order: Order, s: States) -> int:
 def fulfilment(order: Order, events: Sequence[GroupEvent], group: Ints, s: States) -> int | None:
     """Returns the index of the first event that fulfils an order, None if no event does.
 
-    events: at the ticks of the states, from 1. group (C, P): group ids at each tick, -1 = alone or absent.
+    events: with ticks of the states (from 1) in place of frames. group (C, P): ids at each tick, -1 = alone or absent.
     """
     if order.time is None:
         return None
@@ -110,7 +110,7 @@ def _unfulfilled(order: Order, motion: Motion) -> OrderError:
 
 
 def closest(order: Order, s: States, window: slice) -> str:
-    """Returns in words how close the people came to an order's rule within a window of ticks."""
+    """Returns a phrase for messages: how nearly an order's rule was met within `window`, a slice of ticks."""
     pos, vel = s.pos[window], s.vel[window]
     if order.kind == "queue":
         people = [p - 1 for part in order.before for p in part]

@@ -33,12 +33,13 @@ MAX_CELLS = 2_000_000  # numbers handled together: bounds memory
 
 
 def queue_shapes(pos: Array, i: Ints, j: Ints) -> Iterator[tuple[Ints, Ints, Array, Array]]:
-    """Yields tables of the lines of all crowds, at most one for each crowd; a table holds crowds of equal size.
+    """Yields tables of lines of people, at most one line for each crowd; the crowds of a table have the same size n.
 
-    pos (N, 2): m. i, j (K,): rows that stand close to each other; a crowd is connected by such pairs. The line is the
-    whole crowd, else the longest line of three people and two thirds of the crowd; of several, the straightest. A table
-    of M lines holds: rows (M, n) of the people in order, of which the first `number` (M,) are valid, unit vectors (M,
-    2) from the first person towards the last, and mean positions (M, 2), m.
+    pos (N, 2): m. i, j (K,): pairs of people (rows of pos) who stand close to each other; such pairs connect a crowd.
+    The line is the whole crowd if it passes the tests. Else it is the longest line of at least three people and two
+    thirds of the crowd; of equally long lines the straightest. A table of M lines is a tuple of four arrays: the
+    people in order along the line (M, n), as rows of pos; how many people are in the line (M,), further columns mean
+    nothing; unit vectors (M, 2) from the first person towards the last; mean positions (M, 2), m.
     """
     for crowd in _crowds(len(pos), i, j):
         portion = max(1, MAX_CELLS // (crowd.shape[1] * crowd.shape[1] * crowd.shape[1]))
@@ -193,10 +194,10 @@ def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> l
     """Returns a queue event for each queue, in order of first and last frame.
 
     pos, vel (T, P, 2): m, m/s. present (T, P). group (T, P): group ids, -1 = alone. A queue is a line (see
-    `queue_shapes`) of people who wait, that has QUEUE_PEOPLE for QUEUE_TIME and may be lost for BRIDGE_TIME. A line
-    that moves sideways is none. The event starts in the first frame with 3 people and ends in the last with two in
-    line. About MAX_RATE frames per second are examined. Its members are all who were in line for MEMBER_TIME. Its
-    position is the middle of the line when it was first followed.
+    `queue_shapes`) of waiting people that has at least 3 people for 3 s; it may be lost for up to 1.5 s. A line that
+    moves sideways is no queue. The event starts in the first frame with 3 people and ends in the last frame with 2 in
+    line. Its members are all people who were in the line for at least 1 s. Its position is the middle of the line when
+    it was first found. About 10 frames per s are examined.
     """
     there = present & np.isfinite(pos).all(axis=2)
     stride = max(1, round(fps / MAX_RATE))
@@ -226,7 +227,11 @@ def _groups_of(label: Ints) -> tuple[int, ...]:
 
 
 def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
-    """Returns who waits in each frame (T, P): slow people, and those who advance for up to ADVANCE_TIME between."""
+    """Returns flags (T, P): True where a person is present and waits.
+
+    These are people slower than 0.4 m/s, and people who move for at most 3 s between two such waits. vel (T, P, 2):
+    m/s. there (T, P): True for people present.
+    """
     with np.errstate(invalid="ignore"):
         slow = there & (length(vel) < WAITING_SPEED)
     p, t = np.nonzero(slow.T)

@@ -40,7 +40,7 @@ PROFILE_SAFE = (3, 11, 9)
 def cluster_workers(address: str, workers: int = 1) -> Iterator[RunItems]:
     """Yields the RunItems of the dask cluster at `address` ("tcp://HOST:PORT"); the cluster keeps running.
 
-    As many items are under way as the cluster has threads, at least `workers`, and the `ahead` of the call.
+    The number of items under way is that of the cluster's threads, at least `workers`, plus the `ahead` of the call.
     """
     client = _connect(address)
 
@@ -125,7 +125,7 @@ def _submit(client: Any, function: Callable[[Any], Any], item: Any) -> Any:
 
 @dataclass(frozen=True)
 class ClusterCall:
-    """A call whose unpickling runs it, and gives a pickled WorkResult."""
+    """A call that runs when it is unpickled: unpickling gives the pickled WorkResult."""
 
     call: bytes
     required: tuple[tuple[str, str], ...]

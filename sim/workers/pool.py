@@ -99,7 +99,7 @@ class WorkerProcess:
         self._pipe: Any = None
 
     def send(self, function: Callable[[Any], Any], item: Any) -> Any:
-        """Sends the call function(item); returns the connection that is readable at its end or the process's."""
+        """Sends the call function(item); returns a connection that is readable when the call or process has ended."""
         call = pickle.dumps((function, item))
         if self._process is None or not self._process.is_alive():
             self._start()
@@ -108,7 +108,7 @@ class WorkerProcess:
         return self._pipe
 
     def receive(self) -> WorkResult | None:
-        """Returns the outcome of the call that was sent last; None if the process died, and then sets `ended`."""
+        """Returns the outcome of the call that was sent last; if the process died, sets `ended` and returns None."""
         try:
             body = self._pipe.recv_bytes()
         except (EOFError, OSError):
@@ -158,7 +158,7 @@ def _serve(pipe: Any) -> None:
 
 
 def run_pickled(call: bytes) -> bytes:
-    """Runs a pickled (function, item) and returns the pickled WorkResult; never raises, not even SystemExit."""
+    """Runs a pickled (function, item) and returns the pickled WorkResult; exceptions are put in it, never raised."""
     try:
         function, item = pickle.loads(call)
         return pickle.dumps(WorkResult(function(item)))
@@ -187,7 +187,7 @@ def _exit_with_parent() -> None:
 
 @contextmanager
 def process_pool(workers: int) -> Iterator[RunItems]:
-    """Yields the RunItems of `workers` spawned processes; the end of the block terminates them, also in a call."""
+    """Yields the RunItems of `workers` spawned processes; the end of the block terminates them, even during a call."""
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     # The processes inherit the variables.
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
@@ -265,7 +265,7 @@ class WorkerOptions:
 
 
 def start_workers(workers: int = 1, cluster: str | None = None) -> AbstractContextManager[RunItems]:
-    """Starts workers, yields a function that runs a function over items (RunItems), and ends them.
+    """Returns a context manager that starts workers, gives their RunItems, and ends them (a cluster keeps running).
 
     Args:
         workers: Number of processes; 1 is this process. With a cluster the least number of items under way.
@@ -291,7 +291,7 @@ def _run_here(
 
 
 def results_in_order(run: RunItems, function: Callable[[T], R], items: Sequence[T]) -> Generator[R, None, None]:
-    """Yields function(item) in the order of `items`, which are distinct objects."""
+    """Yields function(item), run by `run`, in the order of `items`, which must be distinct objects."""
     wanted, found = True, dict[int, R]()
     arriving = run(function, (item for item in items if wanted))
     try:

@@ -140,7 +140,7 @@ def _inside(box: Array, size: tuple[int, ...]) -> tuple[float, ...]:
 
 
 def run_lengths(ids: Ints) -> dict[int, list[int]]:
-    """Returns the mask of each person in an image of ids (H, W) as COCO's uncompressed run lengths, by id."""
+    """Returns by person id the mask of the person in an id map (H, W), as COCO's uncompressed run lengths."""
     # COCO counts pixels down the columns; numbers outside and inside the mask alternate.
     flat = ids.ravel(order="F")
     starts = np.concatenate([[0], np.flatnonzero(np.diff(flat)) + 1]) if len(flat) else np.zeros(0, np.int64)

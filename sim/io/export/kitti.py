@@ -51,7 +51,7 @@ def kitti(source: str | Path, out: str | Path) -> list[Path]:
 
 
 def calibration(camera: Camera) -> str:
-    """Returns the text of calib.txt for the camera of a rectified pair."""
+    """Returns the text of calib.txt for a rectified pair. camera: the left camera, with its baseline."""
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     left = np.array([[fx, 0, cx - 0.5, 0], [0, fy, cy - 0.5, 0], [0, 0, 1, 0]])  # KITTI: a pixel's centre is a whole px
     right = left.copy()

@@ -61,7 +61,7 @@ class TidyTable:
     """One tidy table; `to_arrow` and `to_pandas` give it to other libraries.
 
     Attributes:
-        columns: By name one value for each row: an array with nan for unknown, or a list of texts or of lists of ids.
+        columns: The values of all rows by name of the column: an array, nan if unknown, or a list of texts or id lists.
     """
 
     columns: Mapping[str, Any]
@@ -125,7 +125,7 @@ class _Rows:
 
 
 def run_tables(tracks: Series[Tracks], fps: float, places: Places = NOWHERE) -> TidyTables:
-    """Returns the tidy tables of a run: one `Tracks` per frame. Of a tracker of whole groups, people are empty.
+    """Returns the tidy tables of a run. tracks: one Tracks per frame. For tracks of groups the people tables are empty.
 
     places: lines and zones by name; `counts` gets columns for each.
     """
@@ -170,10 +170,10 @@ def truth_tables(truth: Truth, places: Places = NOWHERE) -> TidyTables:
 
 
 def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[str, Any]) -> list[Path]:
-    """Writes each table as folder/NAME.csv or .parquet, or the people as a text, and returns the paths.
+    """Writes each table as folder/NAME.csv or .parquet, or the people alone as one text; returns the paths.
 
-    facts: "fps" and others, the metadata of Parquet files. Raises InputError if a file of another program is in the
-    way, or a text is wanted of people in the image.
+    form: "csv", "parquet" or a form of text. facts: "fps" and more, the metadata of Parquet files. Raises InputError if
+    a foreign file would be replaced, or if a text is asked for but positions are in px.
     """
     if form in TEXTS:
         name, beginning = TEXTS[form]
@@ -383,9 +383,10 @@ def _per(minute: Ints, minutes: Ints) -> Ints:
 
 
 def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
-    """Returns the places of texts such as "door=2,5,4,5", of two corners, and "hall=0,0,9,0,9,6", of three or more.
+    """Returns the corners (K, 2) of each place, by name.
 
-    Raises InputError if a text is none.
+    lines: texts of two corners, such as "door=2,5,4,5". zones: texts of three or more corners, such as
+    "hall=0,0,9,0,9,6". Raises InputError if a text has another form, or a name is repeated.
     """
     found: dict[str, Array] = {}
     forms = {"--line": "NAME=x1,y1,x2,y2", "--zone": "NAME=x1,y1,x2,y2,x3,y3,…"}
@@ -402,9 +403,10 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
 
 
 def crossings(frame: Ints, id: Ints, pos: Array, line: Array, downwards: bool) -> tuple[Ints, Ints]:
-    """Returns the frames (C,) in which people cross a line to its left, and those to its right.
+    """Returns the frames of crossings to the left side of a line, and of crossings to the right side, one each.
 
-    frame, id (N,), pos (N, 2) of people; downwards: y points down, as in the image.
+    frame, id (N,), pos (N, 2): people, in any order. line (2, 2): its corners; left and right are those of
+    somebody who looks from the first corner to the second. downwards: True if y points down, as in the image.
     """
     order = np.lexsort((frame, id))
     frame, pos = frame[order], pos[order, :2]
@@ -419,7 +421,7 @@ def crossings(frame: Ints, id: Ints, pos: Array, line: Array, downwards: bool) -
 
 
 def inside(pos: Array, zone: Array) -> Bools:
-    """Returns which points (N, 2) are in a zone: to their right they have an odd number of its edges."""
+    """Returns flags (N,): True for points pos (N, 2) inside the polygon `zone` (K, 2)."""
     x, y = pos[:, 0, None], pos[:, 1, None]
     a, b = zone, np.roll(zone, -1, axis=0)
     level = (a[:, 1] > y) != (b[:, 1] > y)

@@ -38,7 +38,7 @@ def webdataset(
 
     Args:
         source: A generated sequence or dataset.
-        out: The folder, which holds nothing, or the same export.
+        out: The folder; it must be missing, empty, or hold the same export.
         shard_size: Bytes that a shard may have. A sequence is never divided, so a shard of one sequence may be larger.
         progress: Called as progress(shards done, shards in all, name of the last one) after each shard.
 
@@ -76,7 +76,7 @@ def _reject_others(root: Path, content: str, count: int) -> bool:
 
 
 def size_of(text: str) -> int:
-    """Returns the bytes that a text such as `500MB`, `1.5 GB` or `3 kB` names; units are powers of 1000."""
+    """Returns the number of bytes that a text such as `500MB`, `1.5 GB` or `3 kB` means; units are powers of 1000."""
     found = re.fullmatch(r"([0-9]{1,12}(?:\.[0-9]{1,6})?)\s*(?:([kMG])?B)?", text.strip())
     size = 0 if found is None else round(float(found[1]) * UNITS[found[2] or ""])
     if size < 1:

@@ -27,9 +27,10 @@ _held: ContextVar[frozenset[Path]] = ContextVar("held", default=frozenset())
 
 @contextmanager
 def lock_folder(root: Path, held: bool = False) -> Iterator[None]:
-    """Creates the folder `root` and holds its lock for the block; InputError at once if somebody else holds it.
+    """Creates the folder `root` and locks it while the block runs.
 
-    held: True does nothing inside another block of this thread for the same folder.
+    Raises InputError at once if another command or thread holds the lock. held: True allows the block to stand inside
+    another block of the same thread for the same folder; the inner block then changes nothing.
     """
     if held and root.resolve() in _held.get():
         yield
@@ -86,7 +87,7 @@ DISK_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 # A full disk is no fault of the call, so it is a WorkError (exit 1) and not an InputError (exit 2).
 def write_error(path: Path, error: OSError) -> FlockscopeError:
-    """Returns the user's error for an OSError while writing `path`."""
+    """Returns the error to show for an OSError while writing `path`: WorkError if the disk is full, else InputError."""
     reason = error.strerror or type(error).__name__
     if error.errno in DISK_FULL:
         remedy = "free some; what was complete is kept"
@@ -96,7 +97,7 @@ def write_error(path: Path, error: OSError) -> FlockscopeError:
 
 @contextmanager
 def staged_path(target: Path) -> Iterator[Path]:
-    """Yields a random temporary path beside the target, for the block to rename; what is left there is deleted."""
+    """Yields a temporary path beside the target for the block to write to and rename; else it is deleted at the end."""
     # Two machines that share a disk may have the same process id, so the name is random.
     partial = target.parent / f"{PARTIAL}{target.name}-{uuid4().hex[:12]}"
     made = _absent(target.parent)
@@ -126,7 +127,10 @@ def new_file(target: Path) -> Iterator[Path]:
 
 @contextmanager
 def new_folder(target: Path, keep: Callable[[], bool]) -> Iterator[Path]:
-    """Yields a temporary folder that becomes `target` when the block ends, unless `keep()` saves an existing target."""
+    """Yields a temporary folder that becomes `target` when the block ends.
+
+    If `target` exists then, `keep()` decides: True keeps it and drops the new folder, False replaces it.
+    """
     with staged_path(target) as partial:
         partial.mkdir()
         yield partial
@@ -143,16 +147,16 @@ def new_folder(target: Path, keep: Callable[[], bool]) -> Iterator[Path]:
 
 
 def write_inside(path: Path, content: bytes) -> None:
-    """Writes a file into a folder that is still temporary, and makes the folders between."""
+    """Writes a file directly, without a temporary name, and makes missing folders above it; for temporary folders."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content)
 
 
 def replace_sealed(target: Path, files: Mapping[str, bytes], seal: str, names: Iterable[str] = ()) -> None:
-    """Replaces `files` (content by name) in the folder `target`, and deletes `names`; `seal` comes last.
+    """Writes `files` (content by name) into the folder `target`, and deletes the files `names` that are not in `files`.
 
-    The file `seal` marks a complete folder: it is deleted before any other file changes, so a killed run leaves the old
-    files whole, or a folder without a seal.
+    seal: name of the one of `files` that marks a complete folder. It is deleted first and written last, so a killed run
+    leaves either all old files, or a folder without a seal.
     """
     # The first file appears first, so that it marks even a folder that never had a seal.
     first, *others = (name for name in files if name != seal)
@@ -171,7 +175,7 @@ def replace_sealed(target: Path, files: Mapping[str, bytes], seal: str, names: I
 
 
 def remove_partials(*folders: Path, of: str = "") -> None:
-    """Deletes the files and folders with temporary names, if given those of one target, directly in the folders."""
+    """Deletes the files and folders with temporary names in `folders`. of: only those for a target of this name."""
     for path in [p for folder in folders for p in folder.glob(f"{PARTIAL}*")]:
         found = OURS.fullmatch(path.name)
         if found and of in ("", found[1]):

@@ -37,7 +37,7 @@ class NumericTable:
     classes: tuple[str, ...] = ()  # words that the numbers from 0 in the column of classes stand for; (): none
 
     def reject(self, wrong: Bools | np.bool_, expected: str, remedy: str, most: str | None = None) -> None:
-        """Raises InputError about the first row where `wrong` (N,) is True; `most` is the remedy if most rows are."""
+        """Raises InputError about the first row where `wrong` (N,) is True. most: the remedy if most rows are wrong."""
         if np.any(wrong):
             k, count, total = int(np.argmax(wrong)), int(np.sum(wrong)), len(self.values)
             got = ",".join(f"{v:g}" for v in self.values[k])
@@ -49,14 +49,17 @@ class NumericTable:
             raise InputError(file=self.file, place=place, got=got, expected=expected, remedy=remedy)
 
     def integers(self, column: int, name: str) -> Ints:
-        """Returns column number `column` (from 0) as integers (N,)."""
+        """Returns column `column` (from 0) as integers (N,); InputError for others. name: for the message."""
         v = self.values[:, column]
         wrong = (v != np.round(v)) | (np.abs(v) > LARGEST)
         self.reject(wrong, f"a whole number within {LARGEST} as {name}", f"correct the {name}")
         return v.astype(np.int64)
 
     def require_bounds(self, frame: Ints, length: int | None = None) -> None:
-        """Raises InputError for frames (N,) beyond 1 to `length`, with too many rows, or with numbers too large."""
+        """Raises InputError if a frame is not in 1 to `length`, has over 5,000 rows, or a number is too large.
+
+        frame (N,): of each row. length: None: any number of frames up to 1,000,000.
+        """
         span, remedy, most = f"frames from 1 to {length or FRAMES}", "correct the frame", None
         if length is not None:
             remedy = "correct the frame, or seqLength"
@@ -82,7 +85,7 @@ def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
 
 @dataclass(frozen=True)
 class TextRows:
-    """The rows of a text: its lines that are neither blank nor comments. Cells are apart by commas or blanks."""
+    """The rows of a text: its lines that are neither blank nor comments. Commas or blanks separate the cells."""
 
     file: Path
     text: tuple[str, ...]  # of each row
@@ -90,16 +93,16 @@ class TextRows:
 
     @property
     def separator(self) -> str | None:
-        """A comma if the first row has one; None: blanks."""
+        """The separator of cells: a comma if the first row has one, else None, which means blanks."""
         return "," if self.text and "," in self.text[0] else None
 
     def cells(self) -> Iterator[list[str]]:
-        """Yields the cells of each row."""
+        """Yields the cells of each row as a list of texts."""
         separator = self.separator
         return (line.split(separator) for line in self.text)
 
     def words(self, column: int, first: int = 0) -> list[str]:
-        """Returns the cells of a column (from 0) of the rows from `first` on, without quotes."""
+        """Returns the cells of column number `column` in the rows from `first` on, both from 0; quotes are removed."""
         return [row[column].strip().strip('"') for row in self._below(first).cells() if len(row) > column]
 
     def _below(self, first: int) -> TextRows:
@@ -110,8 +113,8 @@ class TextRows:
     ) -> NumericTable:
         """Returns the numbers of the rows from `first` on.
 
-        columns: the allowed numbers of columns. use: the columns to read, from 0, of which only these must hold
-        numbers; None: all.
+        columns: how many columns are allowed. use: indices (from 0) of the columns to read; the others need not hold
+        numbers; None: all. layout: words for the columns, for messages. Raises InputError for the first wrong row.
         """
         rows = self._below(first)
         if not rows.text:
@@ -148,14 +151,14 @@ class TextRows:
 
 
 def read_rows(path: Path, comments: bool = False) -> TextRows:
-    """Returns the rows of a text. comments: True leaves out the lines that begin with #."""
+    """Returns the rows of the text file `path`. comments: True leaves out lines that begin with #."""
     numbered = enumerate(read_text(path).splitlines(), 1)
     found = [(k, line) for k, line in numbered if line.strip() and not (comments and line[:1] == "#")]
     return TextRows(path, tuple(line for _, line in found), np.array([k for k, _ in found], np.int64))
 
 
 def is_number_text(cell: str) -> bool:
-    """Returns True if `read_number` reads the cell."""
+    """Returns True if `read_number` accepts the text."""
     try:
         read_number(cell)
     except ValueError:
@@ -164,27 +167,27 @@ def is_number_text(cell: str) -> bool:
 
 
 def read_number(text: str) -> float:
-    """Returns the number of a text as numpy reads it: unlike float(), no underscore and ASCII digits only."""
+    """Returns the number that a text states; unlike float() it refuses underscores and non-ASCII (ValueError)."""
     if "_" in text or not text.strip().isascii():
         raise ValueError(f"{text!r} is no number")
     return float(text)
 
 
 def whole_or_number(text: str) -> int | float | str:
-    """Returns the whole or other number that a cell stands for, else the text itself."""
+    """Returns an int for a whole number of up to 18 digits, a float for another number, else the text itself."""
     whole = re.fullmatch("[-+]?[0-9]{1,18}", text.strip())  # more digits may not fit into 64 bits
     return int(text) if whole else read_number(text) if is_number_text(text) else text
 
 
 def number_or_nan(text: str | None) -> float:
-    """Returns the number of a text, nan for another text and for None."""
+    """Returns the number that a text states; nan for None and for a text that is no number."""
     return read_number(text) if text is not None and is_number_text(text) else float("nan")
 
 
 def bounded_number(
     path: Path, place: str, text: str | None, low: float, high: float, whole: bool = False, remedy: str = "correct it"
 ) -> float:
-    """Returns the number of a text; raises InputError if it is none from `low` to `high`."""
+    """Returns the number that a text states; InputError unless from `low` to `high` and, if `whole`, a whole number."""
     value = number_or_nan(text)
     if not low <= value <= high or (whole and value % 1):
         got = "nothing" if text is None else repr(text)
@@ -194,7 +197,7 @@ def bounded_number(
 
 
 def person_ids(path: Path, place: str, text: str) -> set[int]:
-    """Returns the ids that a text lists, apart by blanks or commas: whole numbers from 0 on."""
+    """Returns the ids, whole numbers from 0, that a text lists with blanks or commas between; else InputError."""
     values = [number_or_nan(word) for word in text.replace(",", " ").split()]
     if not all(0 <= v <= LARGEST and v == round(v) for v in values):
         expected = "ids of people, whole numbers from 0 on"
@@ -203,7 +206,7 @@ def person_ids(path: Path, place: str, text: str) -> set[int]:
 
 
 def xml_root(path: Path, expected: str, remedy: str) -> ElementTree.Element:
-    """Returns the root of an XML file."""
+    """Returns the root of an XML file; raises InputError for broken XML. expected, remedy: for the message."""
     try:
         return ElementTree.fromstring(read_regular(path, XML_BYTES))
     except (ElementTree.ParseError, ValueError, LookupError) as error:  # the last two: an encoding that Python lacks

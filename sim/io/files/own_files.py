@@ -28,7 +28,7 @@ APPLE_DOUBLE = "._"  # beginning of the files in which macOS keeps attributes on
 
 
 def is_side_file(name: str | PurePath) -> bool:
-    """Returns True if a part of a relative path is the name of a side file or folder."""
+    """Returns True if any part of a relative path is the name of a side file or folder of an operating system."""
     return any(part.startswith(APPLE_DOUBLE) or part.lower() in NAMES for part in PurePath(name).parts)
 
 
@@ -53,7 +53,7 @@ SOFTWARE = _chunk(b"tEXt", b"Software\0" + GENERATOR.encode())  # the second chu
 
 
 def marked_png(picture: bytes) -> bytes:
-    """Returns a PNG file's bytes with the name of our program in it."""
+    """Returns the bytes of a PNG file, `picture`, with the name of flockscope added, by which `is_ours` knows it."""
     return picture[:IHDR_END] + SOFTWARE + picture[IHDR_END:]
 
 
@@ -64,7 +64,7 @@ Marks = Mapping[str, type]
 def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
     """Returns True if flockscope wrote the file, False if not, None if it is missing or cannot be parsed.
 
-    marks: of a .json file; without them none is ours.
+    marks: keys that each of our .json files of this kind has, with the types of their values; None: no .json is ours.
     """
     if not path.is_file():
         return None
@@ -82,7 +82,7 @@ def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
 
 
 def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
-    """Raises InputError if there is a file at `path` that is not ours: only our own files are replaced unasked."""
+    """Raises InputError if something is at `path` that flockscope did not write. marks: as for `is_ours`."""
     if path.exists() and not is_ours(path, marks):
         got, expected = "a file that flockscope did not write", "its own file, or none"
         raise InputError(file=path, got=got, expected=expected, remedy="move it away, or choose another --out")
@@ -102,7 +102,7 @@ RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECA
 
 
 def file_name(label: str) -> str:
-    """Returns the file name for a label: the label itself if it is harmless on all usual systems, else a changed one.
+    """Returns the file name for a label: the label itself if usual systems allow it as a file name, else a changed one.
 
     Different labels may give one name.
     """
@@ -122,7 +122,7 @@ def output_path(folder: str | Path, label: str, ending: str = "") -> Path:
 
 
 def output_paths(folder: str | Path, labels: Iterable[str], ending: str = "", source: object = "") -> list[Path]:
-    """Returns the `output_path` of each label; InputError, about `source`, if two labels give one path."""
+    """Returns the `output_path` of each label; raises InputError, which names `source`, if two labels give one path."""
     paths, seen = [], dict[str, str]()
     for label in labels:
         path = output_path(folder, label, ending)

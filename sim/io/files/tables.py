@@ -36,7 +36,7 @@ Triple = tuple[Number, Number, Number]
 
 
 def validated(path: Path, value: Any, kind: type[M], remedy: str, place: str = "") -> M:
-    """Returns a value read from JSON as a model; InputError names the first place in it that is wrong."""
+    """Returns a value read from JSON as the model `kind`; raises InputError for the first wrong place in it."""
     try:
         return kind.model_validate(value)
     except ValidationError as error:
@@ -64,7 +64,7 @@ class Column:
 
 
 def columns_of(names: Iterable[str], values: Array | None, unit: str) -> list[Column]:
-    """Returns the columns of an array (R, n) by n names; none if the array is None."""
+    """Returns one Column for each of n names, from the columns of values (R, n); [] if values is None."""
     return [] if values is None else [Column(name, values[:, k], unit) for k, name in enumerate(names)]
 
 
@@ -86,7 +86,7 @@ class StoredTable:
         return np.asarray(self._numbers(name, "i", "whole numbers"), np.int64)
 
     def lists(self, name: str, kind: type) -> list[NDArray[Any]]:
-        """Returns column `name`, a column of lists, as R arrays of number type `kind`; no rows give []."""
+        """Returns column `name`, whose cells are lists, as R arrays of number type `kind`."""
         column, wanted = self._numbers(name, "O", "lists of numbers"), np.dtype(kind).kind
         other = any(not isinstance(v, np.ndarray) or v.dtype.kind != wanted for v in column)
         self.reject(other, name, "another column", "lists of numbers")
@@ -100,11 +100,11 @@ class StoredTable:
         return column
 
     def facts_as(self, kind: type[M]) -> M:
-        """Returns the table's metadata as a model."""
+        """Returns the table's metadata as the model `kind`; raises InputError for wrong values."""
         return validated(self.file, self.facts, kind, REDO, "schema")
 
     def cuts(self, first: int, count: int) -> Ints:
-        """Returns the first row of each of `count` frames from `first` on, and the end of the last: (count + 1,)."""
+        """Returns the index of the first row of each of `count` frames from `first` on, then R, (count + 1,)."""
         frame = self.ints("frame")
         wrong = bool(len(frame)) and (frame.min() < first or frame.max() >= first + count or (np.diff(frame) < 0).any())
         self.reject(bool(wrong), "frame", "other frames", f"frames {first} to {first + count - 1}, in order")
@@ -126,7 +126,7 @@ def table_bytes(columns: Iterable[Column], facts: dict[str, Any]) -> bytes:
 
 
 def parquet_bytes(table: Any, facts: Mapping[str, Any]) -> bytes:
-    """Returns a pyarrow.Table as the bytes of a Parquet file that is marked as ours; `facts`: its metadata."""
+    """Returns a pyarrow.Table as the bytes of a Parquet file that `is_own_table` recognises. facts: its metadata."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -148,7 +148,7 @@ def _arrow(column: Column) -> Any:
 
 
 def read_table(path: Path) -> StoredTable:
-    """Reads a Parquet table that `table_bytes` wrote; raises InputError for another or a damaged one."""
+    """Reads a Parquet table that `table_bytes` wrote; raises InputError for any other file and for a damaged one."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -170,7 +170,7 @@ def read_table(path: Path) -> StoredTable:
 
 
 def is_own_table(path: Path) -> bool:
-    """Returns True if `table_bytes` wrote the Parquet table `path`; only its schema is read."""
+    """Returns True if flockscope wrote the Parquet table `path`; only its schema is read. No Parquet: InputError."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -202,19 +202,19 @@ def _storable(text: str) -> str:
 
 
 def json_document(value: dict[str, Any]) -> bytes:
-    """Returns a JSON file, indented by two blanks, as UTF-8 bytes."""
+    """Returns the content of a JSON file, UTF-8 bytes indented by two blanks, for a dict."""
     return (_storable(json.dumps(value, ensure_ascii=False, allow_nan=False, indent=2)) + "\n").encode()
 
 
 def json_list(name: str, items: Iterable[dict[str, Any]]) -> bytes:
-    """Returns the JSON file {"format": 1, name: [items]} as UTF-8 bytes, one item per line."""
+    """Returns the content of a JSON file {"format": 1, name: [items]} as UTF-8 bytes, one item per line."""
     lines = ",\n".join(json_text(item) for item in items)
     body = f"[\n{lines}\n]" if lines else "[]"
     return f'{{"format": {FORMAT}, "{name}": {body}}}\n'.encode()
 
 
 def read_json(path: Path, remedy: str = REDO) -> dict[str, Any]:
-    """Reads the file `path`, which holds one JSON object, as a dict."""
+    """Returns the JSON object in the file `path` as a dict; raises InputError if there is none."""
     from sim.io.files.numeric_text import read_text
 
     value = parse_json(read_text(path, JSON_BYTES), path, remedy)
@@ -224,7 +224,7 @@ def read_json(path: Path, remedy: str = REDO) -> dict[str, Any]:
 
 
 def read_document(path: Path, remedy: str = REDO) -> dict[str, Any]:
-    """Reads a JSON object of our format number; a file without "format" is accepted."""
+    """Returns the JSON object in a file of ours; InputError for another "format" than 1, which may be missing."""
     value = read_json(path, remedy)
     found = value.get("format", FORMAT)
     if found != FORMAT or isinstance(found, bool):
@@ -233,5 +233,5 @@ def read_document(path: Path, remedy: str = REDO) -> dict[str, Any]:
 
 
 def none_to_nan(value: float | None) -> float:
-    """Returns the number as read from JSON: nan for None, else a float."""
+    """Returns a number of a JSON file as float; None, which stands for nan there, as nan."""
     return float("nan") if value is None else float(value)

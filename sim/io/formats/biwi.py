@@ -26,10 +26,10 @@ FPS = 2.5
 
 
 def frame_numbers(raw: Ints, id: Ints | None = None) -> Ints:
-    """Returns our frames from 1, round((raw - first) / step) + 1, halves up, of raw video frames (N,).
+    """Returns the frames, from 1, of raw video frame numbers (N,): round((raw - first) / step) + 1, halves up.
 
-    step: the most frequent difference between successive distinct raw numbers. id (N,): the person of each row; None:
-    unknown. Frames that would share a number and a person are parted.
+    first: the lowest number. step: the most frequent difference of neighbouring distinct numbers. id (N,): the person
+    of each row; None: unknown. If a person would have two rows in one frame, these rows get different frames.
     """
     distinct, row = np.unique(raw, return_inverse=True)
     steps = np.diff(distinct)
@@ -59,7 +59,7 @@ def _parted(slot: Ints, people: list[set[int]]) -> Ints:
 
 
 def read_groups(path: Path) -> dict[int, int]:
-    """Returns the group label of each person in a groups.txt, by person id; people alone have no entry."""
+    """Returns by person id the group label that a groups.txt gives each person; people alone have no entry."""
     label: dict[int, int] = {}
     for number, line in enumerate(read_text(path).splitlines(), 1):
         members = person_ids(path, f"line {number}", line)
@@ -77,7 +77,7 @@ def read_groups(path: Path) -> dict[int, int]:
 
 
 def labels_of(path: Path, id: Ints) -> Ints:
-    """Returns the group labels (N,) of people by the file of groups `path`, -1 for alone; warns if it groups nobody."""
+    """Returns the group labels (N,) of people id (N,) by the groups in `path`; -1 = alone."""
     names = read_groups(path)
     known = [names[person] for person in set(id.tolist()) if person in names]
     if names and len(id) and len(known) == len(set(known)):

@@ -157,7 +157,10 @@ def read_calibration(path: Path) -> Camera:
 def scaled_to_image(
     camera: Camera, image: tuple[int, int] | None, path: Path, aspect: Fraction = Fraction(1)
 ) -> Camera:
-    """Returns the camera for pictures of `image` (width, height) px; `aspect` is that of the stored pixels."""
+    """Returns the camera scaled to pictures of `image` (width, height) px; unchanged for None or the same size.
+
+    aspect: width / height of a stored pixel. Raises InputError if the pictures have another shape than the calibration.
+    """
     if image is None or image == camera.image:
         return camera
     x, y = image[0] / camera.image[0], image[1] / camera.image[1]

@@ -51,7 +51,7 @@ class CaviarRecording:
 
 
 def read_xml(path: Path) -> CaviarRecording:
-    """Reads the people and groups of the CAVIAR file (CVML) `path`; our frame is the file's + 1."""
+    """Returns the people and groups in the CAVIAR file (CVML) `path`; our frame number is that of the file + 1."""
     root = xml_root(path, "a CAVIAR file (CVML)", "fetch the file again")
     if root.tag != "dataset" or root.find("frame") is None:
         got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
@@ -147,8 +147,8 @@ def _measured(found: CaviarRecording, vel: Array, fps: float, px_per_m: float) -
 def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns the CAVIAR file `path` as Sequence, without pictures and detections.
 
-    px_per_m: None: the median of the longer sides of the first 100 boxes / 1.7 m; `source["px_per_m_frames"]` is then
-    the last frame of these boxes.
+    `options.px_per_m` None: the scale is the median of the longer sides of the first 100 boxes / 1.7 m;
+    `source["px_per_m_frames"]` is then the last frame of these boxes.
     """
     found, px_per_m = read_xml(path), options.px_per_m
     rate = options.fps or FPS
@@ -169,6 +169,6 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
 
 def is_caviar(path: Path) -> bool:
-    """Returns True if the file begins as CVML does."""
+    """Returns True if "<dataset" is in the first 1000 bytes of the file, as in CVML."""
     with path.open("rb") as file:
         return b"<dataset" in file.read(1000)

@@ -33,7 +33,7 @@ OUTSIDE = 1.1  # Boxes that end farther right or lower than this share of the pi
 
 
 def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.box_options) -> Sequence:
-    """Returns the sequence with the boxes of a file as its detections.
+    """Returns the sequence with the boxes of a file as its detections, which replace those that it had.
 
     Raises InputError if the file cannot be read, has no boxes, or does not fit the sequence's frames and pictures.
     """

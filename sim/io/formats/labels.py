@@ -30,9 +30,9 @@ def centres(box: Array) -> Array:
 
 
 def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
-    """Returns rows (R, …) as an array (T, P, …), people by ascending id, nan where a person has no row.
+    """Returns values (R, …), one row per person and frame, as an array (T, P, …); nan where a person has no row.
 
-    frame (R,): from 1 to `length`. id (R,): each once in a frame.
+    frame (R,): from 1 to `length`, which is T. id (R,): each once in a frame. The P people are sorted by id.
     """
     out = np.full((length, len(np.unique(id)), *values.shape[1:]), np.nan)
     out[frame - 1, np.searchsorted(np.unique(id), id)] = values
@@ -40,7 +40,7 @@ def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
 
 
 def require_size(path: Path, length: int, id: Ints) -> None:
-    """Raises InputError if frames times people are too many for arrays of them. id (R,): of each row."""
+    """Raises InputError if `length` times the number of different ids in id (R,) exceeds 20 million."""
     people = len(np.unique(id))
     # One mistyped frame number must not fill the memory.
     if length * people > CELLS:
@@ -53,7 +53,7 @@ def labelled_sequence(
     kind: str, path: Path, name: str, fps: float, length: int, load_truth: Callable[[], Truth],
     px_per_m: float = float("nan"), **more: Any,
 ) -> Sequence:  # fmt: skip
-    """Returns a recording of labels alone, without pictures and detections. more: further entries of its source."""
+    """Returns a Sequence with a truth, but no pictures and detections. more: further entries of its `source`."""
 
     def frames() -> Iterator[Frame]:
         return (Frame(index, (index - 1) / fps) for index in range(1, length + 1))
@@ -67,11 +67,11 @@ def labelled_sequence(
 def labelled_truth_fields(
     frame: Ints, id: Ints, label: Ints, pos: Array, vel: Array, *, fps: float, length: int, px_per_m: float = 1.0
 ) -> dict[str, Any]:
-    """Returns the fields groups, events, near and labelled of a Truth, of a recording with group labels.
+    """Returns by name the fields groups, events, near and labelled of the Truth of a recording with group labels.
 
     frame (from 1), id, label (R,): rows sorted by (frame, id); label is the person's group, -1 for alone. pos, vel (R,
-    2): m and m/s, or px and px/s with a `px_per_m`; so are the results. Merges, splits and the like are those of the
-    groups that motion and labels give, crossings and queues those of the labelled groups.
+    2): m and m/s, or px and px/s if `px_per_m` is given; results have the same unit. Crossings and queues are those of
+    the labelled groups, other events those of the groups that are measured from motion and labels.
     """
     from sim.truth.crossing_events import crossings
     from sim.truth.group_hulls import groups_over_time
@@ -112,7 +112,7 @@ def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: flo
 
 
 def scale_groups(groups: Groups, factor: float) -> Groups:
-    """Returns groups with all lengths multiplied by `factor`: positions, velocities and hulls."""
+    """Returns groups with positions, velocities and hulls multiplied by `factor`, and extents by its square."""
     if factor == 1.0:
         return groups
     hull, extent = tuple(h * factor for h in groups.hull), groups.extent * factor**2
@@ -127,15 +127,16 @@ CHORD = 1.0
 def differentiate(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:
     """Returns the velocity of each row (R, D), in the unit of `pos` per s: a difference over a centred window.
 
-    frame, id (R,), pos (R, D): rows in any order, each id once in a frame. window: s. 0 where an id has one row there,
-    nan if one of the two positions is.
+    frame, id (R,), pos (R, D): rows in any order, each id once in a frame. window: s. The velocity is 0 if an id
+    has only one row in the window, nan if a position used is nan.
     """
     half = max(1, round(window * fps / 2))
     return _chords(frame, id, pos, fps, half, half, 0.0)
 
 
 def chords(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:
-    """Returns the velocity of each row (R, D): the chord from the id's earliest row of the last `window` s to the row.
+    """Returns the velocity of each row (R, D): displacement since the id's earliest row in the last `window` s, over
+    time.
 
     frame, id (R,), pos (R, D): rows in any order, each id once in a frame. nan without an earlier row within the
     window.

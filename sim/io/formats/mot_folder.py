@@ -41,7 +41,7 @@ class SeqInfo:
 
 
 def read_seqinfo(path: Path) -> SeqInfo:
-    """Reads the section [Sequence] of a seqinfo.ini; in an empty file every key counts as missing."""
+    """Returns the values in the section [Sequence] of a seqinfo.ini; default values for missing keys."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read_string(read_text(path))
@@ -69,7 +69,7 @@ def read_seqinfo(path: Path) -> SeqInfo:
 
 
 def frame_rate(given: float | None, found: float | None = None) -> float:
-    """Returns the frames per second: `given` (--fps), else `found` in the recording, else 25 with a warning."""
+    """Returns the first of `given` (--fps) and `found` (in the recording) that is not None; else 25, with a warning."""
     if given is None and found is None:
         # The text names no path, so that a command over many recordings prints it once.
         text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
@@ -155,7 +155,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
 
 def left_pictures(path: Path) -> PictureFolder:
-    """Returns the picture files of the left camera of a MOTChallenge folder, by frame."""
+    """Returns the PictureFolder of the left camera of the MOTChallenge folder `path`."""
     return _find_pictures(path, _info(path))
 
 
@@ -172,7 +172,7 @@ def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
 def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns a MOT text as Sequence without pictures: detections if every id is -1, else truth.
 
-    The camera is not scaled.
+    `options.camera` becomes its camera, unchanged.
     """
     rate, of_boxes = frame_rate(options.fps), options.box_options
     table = read_table(path, boxless=True, box_scale=of_boxes.box_scale)

@@ -38,7 +38,7 @@ NO_ID = "frame,left,top,width,height,score"
 
 
 def reject_missing_ids(rows: NumericTable) -> None:
-    """Raises InputError if column 2 is no id but the left edge of a box: column 6 then holds scores up to 1."""
+    """Raises InputError if the ids seem to be missing: column 2 is then the left edge, and column 6 a score up to 1."""
     values = rows.values
     if not len(values) or values.shape[1] < 6 or (values[:, 1] == -1).all():
         return
@@ -51,7 +51,7 @@ def reject_missing_ids(rows: NumericTable) -> None:
 
 
 def require_pixels(rows: NumericTable, box: Array) -> None:
-    """Raises InputError if no box (B, 4) is larger than a pixel, as boxes in shares of the picture are."""
+    """Raises InputError if all boxes (B, 4) seem to be shares of the picture: none is larger than one pixel."""
     if len(box) and (np.abs(box[:, :2]) <= MOST_SHARE).all() and (box[:, 2:] <= 1).all():
         raise InputError(
             file=rows.file, place="boxes", got=f"numbers up to {box.max():.3g} in all {len(box)} boxes",
@@ -61,7 +61,7 @@ def require_pixels(rows: NumericTable, box: Array) -> None:
 
 
 def corner_doubt(box: Array) -> str:
-    """Returns what speaks for corners x1,y1,x2,y2 in boxes (B, 4) read as left, top, width, height; "": nothing."""
+    """Returns a warning if boxes (B, 4), read as left, top, width, height, seem to be corners x1,y1,x2,y2; else ""."""
     x1, y1, x2, y2 = box.T
     # A width that varies along with the left edge is a right edge.
     if len(box) < ENOUGH or not ((x2 > x1) & (y2 > y1)).all() or not np.std(x2 - x1) < SMOOTH * np.std(x2):
@@ -73,7 +73,7 @@ def corner_doubt(box: Array) -> str:
 
 
 def size_doubt(box: Array, size: tuple[int, int]) -> str:
-    """Returns what speaks for boxes (B, 4) px of pictures of another size (width, height); "": nothing."""
+    """Returns a warning if boxes (B, 4) px seem not to belong to pictures of this size (width, height); else ""."""
     if not len(box):
         return ""
     beyond = (box[:, :2] >= size).any(axis=1).mean()
@@ -133,7 +133,7 @@ EXPECTED = (
 
 
 def column_names(text: TextRows) -> list[str] | None:
-    """Returns the names in the first line of a text, in lower case; None if a cell of it is a number."""
+    """Returns the column names in a text's first line, in lower case; None if it has a number, and so no names."""
     line = text.text[0] if text.text else ""
     if ";" in line:
         got, expected = line[:80], "columns apart by commas, blanks or tabs"
@@ -146,8 +146,9 @@ def column_names(text: TextRows) -> list[str] | None:
 def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> tuple[NumericTable, Ints | None]:
     """Reads a text with named columns as 8 or 10 columns of a MOTChallenge text, or as 4: frame, id, x, y in m.
 
-    frames_at: frames of times, if a column of times may stand in place of one of frames; rows of no frame are left out.
-    Returns the rows, and the labels of a column `group`, (N,), -1 for alone; None without that column.
+    frames_at: a function that gives the frames (0: none) of times (s), for a file with a column of times in place of
+    frames; rows without frame are left out. None: times are not read. Returns the rows, and the labels of a column
+    `group`, (N,), -1 for alone; None without that column.
     """
     found: dict[str, int] = {}
     word_column, words = _words_for_classes(text, names)
@@ -242,11 +243,11 @@ class MotTable:
 
     @property
     def on_ground(self) -> bool:
-        """True for a text of positions alone."""
+        """True if the text has ground positions and no boxes: 4 columns."""
         return bool(self.rows.values.shape[1] == GROUND_COLUMNS)
 
     def scores(self) -> Array:
-        """Returns column 7 (N,), a confidence or flag; 1 without it."""
+        """Returns column 7 (N,), a confidence or flag; ones if there is no such column."""
         return self.rest[:, 0] if self.rest.shape[1] else np.ones(len(self.frame))
 
     def boxes(self) -> Array:
@@ -262,7 +263,7 @@ def read_table(
     path: Path, *, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None,
     frames_at: FramesAt | None = None,
 ) -> MotTable:  # fmt: skip
-    """Reads a MOTChallenge text of 6 to 10 columns, or of 4: frame, id, x, y in m.
+    """Returns the MotTable of a MOTChallenge text of 6 to 10 columns, or of 4: frame, id, x, y in m.
 
     length: the last frame allowed. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors that make the
     boxes pixels. frames_at: as `read_named` takes it. Rows stay in the order of the file.
@@ -281,7 +282,7 @@ def table_of_rows(
     rows: NumericTable, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None,
     group: Ints | None = None,
 ) -> MotTable:  # fmt: skip
-    """Returns rows with the columns of a MOTChallenge text as its table. See `read_table`."""
+    """Returns the MotTable of rows in the columns of a MOTChallenge text. Arguments as for `read_table`."""
     frame, id, count = rows.integers(0, "frame"), rows.integers(1, "id"), len(rows.line)
     box, rest = rows.values[:, 2:6], rows.values[:, 6:]
     if rows.values.shape[1] == GROUND_COLUMNS:

@@ -53,7 +53,8 @@ FAST = 12.0  # m/s that nobody keeps up. Half of the steps above it are centimet
 def ground_positions(table: MotTable) -> Array | None:
     """Returns the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1); None if there are none.
 
-    Warns, and returns None, if people cannot move so and no file beside the text vouches for metres.
+    If people would move impossibly in metres, and no file beside the text says that it is in metres, the result is
+    None, with a warning.
     """
     known, doubt = _known(table)
     if doubt:
@@ -78,7 +79,7 @@ def _known(table: MotTable) -> tuple[Bools | None, str]:
 
 
 def require_metres(table: MotTable, fps: float) -> None:
-    """Raises InputError if a text of positions alone cannot be in metres: it has no boxes to use instead."""
+    """Raises InputError if a text has only positions, and people would move impossibly fast if these were metres."""
     if not table.on_ground or _vouched(table):
         return
     speed = _pace(table.rest[:, 1:3], table.frame, *_steps(table.frame, table.id)) * fps
@@ -151,7 +152,7 @@ CLASSES = range(1, 14)  # classes of MOTChallenge. A text with another class has
 
 
 def unscored_rows(table: MotTable, people: Bools, name: str, person_class: Classes | None) -> Unscored | None:
-    """Returns the labelled rows beside `people` (N,), sorted by frame; None without any."""
+    """Returns the labelled rows with a box where the flags people (N,) are False, sorted by frame; None without any."""
     found = classes_of(table, person_class is not None)
     usual = not table.rows.classes and table.rest.shape[1] <= LABEL_COLUMNS and person_class in (None, PEDESTRIANS)
     distractor = np.zeros_like(people)
@@ -177,7 +178,7 @@ SHOWN = 8  # most values that a message lists
 def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
     """Returns flags (N,) of rows that are people: an id from 0, another flag than 0, the right class.
 
-    person_class: the classes of people; None: 1, or PEOPLE of words, with a warning about rows of other classes.
+    person_class: the classes of people; None: 1, or PEOPLE if classes are words, with a warning about other classes.
     """
     keep, file = np.asarray(table.id >= 0), table.rows.file
     if len(keep) and not keep.any():
@@ -196,14 +197,14 @@ def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
 
 
 def require_classes(table: MotTable, person_class: Classes | None) -> None:
-    """Raises InputError if the user named the class of people, and the text has no classes."""
+    """Raises InputError if `person_class` is given but the text has no classes."""
     if person_class is not None and classes_of(table, True) is None:
         got, expected = "no classes", "a column class, or classes in column 8"
         raise InputError(file=table.rows.file, place="--class", got=got, expected=expected, remedy="leave --class out")
 
 
 def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bools:
-    """Returns `keep` (N,) without the rows of other classes than that of people."""
+    """Returns flags (N,): `keep`, but False for rows whose class is not that of people. See `labelled_people`."""
     found, file = classes_of(table, person_class is not None), table.rows.file
     if found is None or not keep.any():
         return keep
@@ -225,7 +226,7 @@ def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bool
 
 
 def classes_of(table: MotTable, named: bool) -> Array | None:
-    """Returns column 8 (N,) if it holds classes, else None. named: True if the user named one (--class)."""
+    """Returns column 8 (N,) if it holds classes, else None. named: True if the user gave --class."""
     if table.rest.shape[1] < 2 or table.on_ground or (table.rest[:, 1] == -1).all():
         return None
     column = table.rest[:, 1]
@@ -249,10 +250,10 @@ FEW = 0.02  # share of scores outside [0, 1] up to which they count as outliers 
 
 
 def unit_scores(score: Array) -> tuple[Array, str]:
-    """Returns the finite scores (N,) in [0, 1], and how they were mapped, "" if they were not.
+    """Returns scores (N,), finite numbers, mapped into [0, 1], and words that say how; "" if nothing was changed.
 
-    A few outliers are clipped. Other scores s become 1 / (1 + exp(-(s - c) / d)), c the lower quartile and d such that
-    the median becomes about 0.75.
+    If only a few scores are outside [0, 1], these are clipped. If many are, each score s becomes 1 / (1 + exp(-(s - c)
+    / d)), with c the lower quartile and d such that the median becomes about 0.75. Equal scores outside become 1.
     """
     outside = (score < 0) | (score > 1)
     count = int(outside.sum())
@@ -276,7 +277,7 @@ NO_ID = "check that column 2 is the id: name the columns in the first line, as f
 
 
 def reject_duplicate_ids(table: MotTable, keep: Bools) -> None:
-    """Raises InputError if an id from 0 stands twice in a frame. keep (N,): the rows that count."""
+    """Raises InputError if an id from 0 is in two rows of one frame. keep (N,): flags of the rows examined."""
     counted = np.flatnonzero(keep & (table.id >= 0))
     again = np.zeros(len(table.frame), bool)
     again[counted] = repeated_ids(table.frame[counted], table.id[counted])
@@ -302,7 +303,7 @@ class DetectionTable:
 
 
 def detections_of_table(table: MotTable, options: BoxOptions) -> DetectionTable:
-    """Returns a text's table as detections: points on the ground (m) if every row has one, else the boxes' centres."""
+    """Returns a table as detections: on the ground (m) if every row has a position, else the boxes' centres (px)."""
     ground, boxless = _places(table)
     path, rows = table.rows.file, np.argsort(table.frame, kind="stable")
     rows = rows[of_class(table, np.ones(len(rows), bool), options.person_class)[rows]]
@@ -340,8 +341,8 @@ def truth_of_table(
     """Returns the table of a gt.txt as truth of people, as MOTChallenge's own scoring counts them.
 
     length: None: up to the last frame kept. px_per_m: nan: the boxes' median height / 1.7 m. Boxes are None if a row
-    has none, positions (nan in rows without) and velocities if no row has one. Groups are those of a column `group`, or
-    of the file that `group_file` names.
+    has none. Positions and velocities are None if no row has a position, else nan in rows without. Groups are those of
+    a column `group`, or of the file that `group_file` names.
     """
     require_metres(table, fps)
     ground, boxless = _places(table)
@@ -379,7 +380,7 @@ def truth_of_table(
 
 
 def group_file(path: Path) -> Path:
-    """Returns where the groups of a text are: groups.txt beside gt.txt, NAME.groups.txt beside another NAME.txt."""
+    """Returns the path of a text's groups: groups.txt beside gt.txt, NAME.groups.txt beside any other NAME.txt."""
     return path.with_name("groups.txt" if path.name == LABELS else f"{path.stem}.groups.txt")
 
 

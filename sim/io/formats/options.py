@@ -19,20 +19,20 @@ BoxScale = tuple[float, float]  # factors of x and y that make the boxes of a te
 
 @dataclass(frozen=True)
 class BoxOptions:
-    """How the boxes of a MOTChallenge text are read; None: not given."""
+    """How the boxes of a MOTChallenge text are read; an option that is not given is None."""
 
     person_class: Classes | None = None  # the classes of people
     box_scale: BoxScale | None = None  # factors of x and y
     min_score: float | None = None  # least score of detections, as it stands there
 
     def given(self) -> dict[str, Any]:
-        """Returns the values of the options that are given, by their names on the command line."""
+        """Returns the values of the options that are given, by name: "class", "box_scale", "min_score"."""
         return {key.removeprefix("person_"): value for key, value in vars(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
 class RecordingOptions:
-    """The options of `open_source`, parsed; None: not given."""
+    """The options of `open_source`, parsed; an option that is not given is None."""
 
     fps: float | None = None  # frames per second
     px_per_m: float | None = None  # image scale
@@ -47,13 +47,13 @@ class RecordingOptions:
         return float("nan") if self.px_per_m is None else self.px_per_m
 
     def reject(self, path: Path, kind: str, why: str, names: str) -> None:
-        """Refuses the options `names`; "box_options" stands for all of BoxOptions. See `refuse_options`."""
+        """Calls `refuse_options` with these options; "box_options" in `names` stands for all fields of BoxOptions."""
         values = {**vars(self), **vars(self.box_options)}
         refuse_options(values, names.replace("box_options", " ".join(vars(self.box_options))), path, kind, why)
 
 
 def refuse_options(values: Mapping[str, Any], names: str, path: Path, kind: str, why: str) -> None:
-    """Raises InputError if any of the options `names` ("camera fps") is given: `why` says why it has no effect."""
+    """Raises InputError if an option in `names` ("camera fps") is given, because it has no effect on a `kind`."""
     found = [name for name in names.split() if values[name] is not None and values[name] is not False]
     given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
     if given:
@@ -65,7 +65,7 @@ NO_OPTIONS = RecordingOptions()
 
 
 def parse_box_scale(text: str) -> BoxScale:
-    """Returns the factors of x and y that a text such as "2" or "1920,1080" names."""
+    """Returns the factors of x and y in a text such as "2" (both) or "1920,1080"; raises InputError for other texts."""
     cells = text.split(",")
     factors = list(map(number_or_nan, cells))
     if len(cells) > 2 or not all(0 < f <= PICTURE_SIDE for f in factors):
@@ -76,7 +76,7 @@ def parse_box_scale(text: str) -> BoxScale:
 
 
 def parse_classes(given: int | str) -> Classes:
-    """Returns the classes that a number or a text such as "1,2" or "person" names, in lower case."""
+    """Returns the classes in a number or a text such as "1,2" or "person", as lower-case texts; else InputError."""
     classes = tuple(cell.strip().lower() for cell in str(given).split(","))
     if all(classes):
         return classes

@@ -50,7 +50,7 @@ People = tuple[NumericTable, float | None]
 
 
 def layout_of(path: Path) -> str | None:
-    """Returns which of LAYOUTS a text has, by its ending, comments, or the cells of its first line; None: none."""
+    """Returns the key of LAYOUTS for a text, by its ending, comments or first line; None if none fits."""
     if path.suffix.lower() == NDJSON:
         return "trajnet"
     lines = [line for line in islice(read_text(path).splitlines(), 1000) if line.strip()]
@@ -65,7 +65,7 @@ def layout_of(path: Path) -> str | None:
 
 
 def open_text(path: Path, layout: str, options: RecordingOptions) -> Sequence:
-    """Returns a text of a layout as Sequence with truth, without pictures and detections."""
+    """Returns a text as Sequence with truth, without pictures and detections. layout: as of `layout_of`."""
     rows, stated = LAYOUTS[layout](path, options.fps)
     if not len(rows.line):
         raise InputError(file=path, got="no row", expected="people with frame, id, x and y", remedy="restore it")

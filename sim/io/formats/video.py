@@ -71,7 +71,7 @@ def open_video(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
 
 def missing(index: video_files.PacketIndex) -> Iterator[str]:
-    """Yields a text for each part of a video that is missing: its end, or a gap in time."""
+    """Yields a warning text if the end of a video is missing, and one if there are gaps in time."""
     times, length = index.times(), len(index.stamps)
     step = np.diff(times)
     usual = float(np.median(step)) if len(step) else 0.0
@@ -89,7 +89,7 @@ def missing(index: video_files.PacketIndex) -> Iterator[str]:
 
 
 def frame_rate(name: str, given: float | None, index: video_files.PacketIndex) -> tuple[float, str]:
-    """Returns (frames per second, text that says where they come from), with a warning if they are a guess."""
+    """Returns the frames per second, and words for their source. Warns unless they are given or the container's."""
     if given is not None:
         return given, f"{given:g}, as given"
     header, timed, steady = index.rate, stamped_rate(index), is_steady(index.times())
@@ -116,7 +116,7 @@ def _is_gap(step: Array) -> Bools:
 
 
 def is_steady(times: Array) -> bool:
-    """Returns True if each frame is within half a step of its time at the mean rate. times: s, ascending."""
+    """Returns True if times (s, ascending) are within half a step of evenly spaced times from first to last."""
     if len(times) < 3:
         return True
     off = times - np.linspace(times[0], times[-1], len(times))

@@ -40,10 +40,10 @@ class BackgroundChoice:
         return f"{self.count} frames spread over the recording (not causal)"
 
     def of(self, length: int, path: Path, size: tuple[int, int] | None = None) -> BackgroundChoice:
-        """Returns the choice for a recording of `length` frames; a default is reduced to what there is and fits.
+        """Returns the choice for a recording of `length` frames, with as many frames as it has and 2 GB can hold.
 
-        size: (width, height) px. A sample is at most 2 GB. Raises InputError if the user asked for more, or for a
-        picture that cannot be used.
+        size: (width, height) px; None if unknown. Raises InputError if the user asked for more frames (`asked`), or if
+        the picture of the empty place cannot be used.
         """
         width, height = size or (1, 1)
         most = max(1, SAMPLE_BYTES // (3 * width * height))
@@ -60,7 +60,7 @@ class BackgroundChoice:
         return replace(self, count=min(self.count, length, most))
 
     def empty(self, size: tuple[int, int] | None) -> Image:
-        """Returns the picture of the empty place, which must be `size` (width, height) px; None: any."""
+        """Returns the picture of the empty place; InputError if it cannot be read or has another size than `size`."""
         assert self.picture is not None
         picture = read_picture(self.picture)
         if picture is not None and size in (None, size_of(picture)):
@@ -129,6 +129,5 @@ class BackgroundSample:
 
 
 def with_copies(sample: Image, empty: Image) -> Image:
-    """Returns a sample (K, H, W, 3) followed by K + 1 copies of a picture of the empty place, which then has the
-    majority at each pixel."""
+    """Returns a sample (K, H, W, 3) and K + 1 copies of `empty`, which is then the majority at each pixel."""
     return np.concatenate([sample, np.broadcast_to(empty, (len(sample) + 1, *empty.shape))])

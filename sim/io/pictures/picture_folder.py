@@ -30,7 +30,7 @@ from sim.types import Image, Ints
 
 
 def declared_size(body: bytes) -> tuple[int, int] | None:
-    """Returns (width, height) px by the header of a picture file; None for other or damaged bytes."""
+    """Returns the (width, height) px that the header of a picture file states; None if there is no such header."""
     from PIL import Image as Pictures
 
     try:
@@ -53,17 +53,18 @@ Key = tuple[tuple[str, ...], tuple[int, ...]]
 
 @dataclass(frozen=True)
 class Numbering:
-    """How picture numbers become frames: frame = (number - origin) / step + 1."""
+    """How the number of a picture becomes its frame (from 1): frame = (number - origin) / step + 1."""
 
     origin: int = 1  # the number of frame 1
     step: int = 1  # between the numbers of successive frames
 
 
 def numbering_of(folder: Path, files: list[Path], length: int | None, labelled: Labelled | None) -> Numbering | None:
-    """Returns how the files' numbers become frames; None if files are frames in the natural order of their names.
+    """Returns how numbers in file names become frames; None if files are frames in the natural order of their names.
 
-    length: number of frames, None if unknown. labelled: None without labels. Raises InputError if pictures and labels
-    can be matched in two ways or in none; warns if labelled pictures are not taken by their numbers.
+    length: number of frames, None if unknown. labelled: returns the labelled frames; None without labels. Raises
+    InputError if pictures and labels can be matched in two ways or in none. Warns if pictures with labels are not taken
+    by their numbers.
     """
     keys = [_key(path) for path in files]
     _refuse_odd_names(folder, files, keys)
@@ -174,9 +175,10 @@ Picture = TypeVar("Picture", bound=NDArray[Any])
 
 
 def fill_gaps(pairs: Iterable[tuple[int, Image]], length: int | None, place: str) -> Iterator[Image | None]:
-    """Yields the picture of each frame from 1 to `length`, None where the ascending `pairs` have none.
+    """Yields the picture of each frame from 1 to `length`, or None for a frame that is not in `pairs`.
 
-    length: None: up to the last pair. The first missing frame causes a warning about the recording `place`.
+    pairs: (frame, picture), ascending. length: None means up to the last pair. The first missing frame causes a
+    warning, which names the recording as `place`.
     """
     shown, warned = 0, False
     # The end is a last pair without a picture.
@@ -229,7 +231,7 @@ def read_picture(path: Path) -> Image | None:
 
 
 def is_complete(body: bytes) -> bool:
-    """Returns False if a picture file's bytes are empty, or a JPEG or PNG without its end mark."""
+    """Returns True unless a picture file's bytes are empty, or are a JPEG or PNG without the mark of its end."""
     if body.startswith(b"\xff\xd8"):
         return body.rfind(b"\xff\xd9") > body.rfind(b"\xff\xda") > 0
     return b"IEND" in body[-64:] if body.startswith(b"\x89PNG") else len(body) > 0
@@ -257,7 +259,7 @@ class PictureFolder:
         return next((size_of(picture) for picture in found if picture is not None), None)
 
     def read(self, frames: Iterable[int], size: tuple[int, int] | None) -> Iterator[tuple[int, Image]]:
-        """Yields (frame, picture) of those `frames` whose picture can be read, all of this size, in px."""
+        """Yields (frame, picture) of `frames` whose picture can be read; InputError if its size is another."""
         if size is None:
             got = f"{len(self.files)} pictures, none of which can be read"
             raise _wrong(self.folder, got, "JPG or PNG", "restore the files")
@@ -268,9 +270,10 @@ class PictureFolder:
 
 
 def find_pictures(folder: Path, length: int | None, labelled: Labelled | None) -> PictureFolder:
-    """Returns the picture files of a folder by frame; `picture_numbers` says which frame a file is.
+    """Returns the picture files of a folder by frame; `numbering_of` decides which frame a file is.
 
-    length: number of frames, None if unknown. labelled: returns the labelled frames, None without labels.
+    length: number of frames, None if unknown. labelled: a function that returns the labelled frames; None without
+    labels.
     """
     files = _picture_files(folder)
     numbering = numbering_of(folder, files, length, labelled)

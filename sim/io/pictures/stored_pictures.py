@@ -36,7 +36,7 @@ Facts = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class WrittenPictures:
-    """What `write_pictures` wrote; all empty if nothing was."""
+    """What `write_pictures` wrote; all fields are empty if it wrote nothing."""
 
     streams: tuple[str, ...] = ()  # names of the streams
     images: str | None = None  # file type ("jpg", "png" or "mp4"), None if the streams leave no choice
@@ -136,10 +136,10 @@ def _missing(sequence: Sequence, stream: str) -> InputError:
 
 
 def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
-    """Returns the table of visible pixels, a row per person and frame in the order of the truth's rows.
+    """Returns the content of gt/pixels.parquet: a row per person and frame, in the order of the truth's rows.
 
-    visible_px, amodal_px: pixels that show the person, and that would without occlusion; visibility_px: their ratio;
-    modal_…: box of the visible pixels; blob: region of people who touch in the image, from 0 in each frame.
+    known: the PixelTruth of each frame, which has the values. Columns: frame, id, visible_px, amodal_px, visibility_px
+    (visible_px / amodal_px), modal_… (box of the visible pixels), blob.
     """
 
     def joined(name: str) -> NDArray[Any]:
@@ -165,20 +165,20 @@ class StoredPictures:
 
     @property
     def streams(self) -> tuple[str, ...]:
-        """The stored streams."""
+        """The names of the stored streams."""
         return tuple(self.manifest["streams"])
 
     @property
     def images(self) -> str:
-        """File type of the pictures; "png" without pictures or with 16-bit streams only."""
+        """File type of the pictures; "png" if there are none, or only 16-bit streams (ids, disparity)."""
         return self.manifest.get("images") or "png"
 
     def body(self, name: str) -> bytes:
-        """Returns the bytes of a file; raises InputError if they are not those that the manifest names."""
+        """Returns the bytes of a file; raises InputError if they differ from the hash in the manifest."""
         return self.check(name, whole=True)
 
     def check(self, name: str, whole: bool = False) -> bytes:
-        """Raises InputError if a file is not the one that the manifest names. whole: True returns its bytes."""
+        """Raises InputError if a file differs from its hash in the manifest. Returns its bytes if `whole`, else b""."""
         path, files = self.folder / name, self.manifest["files"]
         if name not in files:
             got, expected = "a manifest that does not name it", "a file that manifest.json names"
@@ -186,7 +186,7 @@ class StoredPictures:
         return check_file(path, files[name], whole=whole)
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
-        """Returns picture `index` (from 1) of a stream of picture files: BGR, or codes of ids and disparity."""
+        """Returns picture `index` (from 1) of a stream of picture files: BGR, or uint16 codes of ids or disparity."""
         import cv2
 
         name = streams.file_name(stream, self.images, index)
@@ -204,7 +204,7 @@ class StoredPictures:
         return width, height
 
     def all(self, stream: str, count: int, wanted: list[int] | None = None) -> Iterator[NDArray[Any]]:
-        """Yields the pictures 1 to `count` of a stream, or only the numbers `wanted` (ascending, from 1)."""
+        """Yields pictures 1 to `count` of a stream; wanted: only those of these numbers (from 1, ascending)."""
         if streams.suffix(stream, self.images) != "mp4":
             yield from (self.one(stream, k) for k in wanted or range(1, count + 1))
             return
@@ -219,11 +219,11 @@ class StoredPictures:
             raise InputError(file=path, got=f"{found} pictures", expected=count, remedy=REDO)
 
     def sample(self, wanted: list[int]) -> Iterable[tuple[int, Image]]:
-        """Returns (frame, picture) of the left camera for the frames `wanted` (from 1, ascending)."""
+        """Yields (frame, picture) of the left camera for the frames `wanted` (from 1, ascending)."""
         return zip(wanted, self.all("left", self.manifest["sequence"]["length"], wanted), strict=True)
 
     def pixel_loader(self) -> Callable[[int], PixelTruth]:
-        """Returns a function that maps a frame (from 1) to its PixelTruth; the stream ids is stored."""
+        """Returns a function that gives the PixelTruth of a frame (from 1). The stream "ids" must be stored."""
 
         @cache
         def columns() -> tuple[Ints, Array, Array, Array, Ints]:

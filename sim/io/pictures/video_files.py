@@ -56,7 +56,7 @@ class PacketIndex:
         return np.array(sorted({s for s in self.stamps if s is not None}), float) * float(self.time_base)
 
     def ranks(self) -> dict[int, int] | None:
-        """Returns the frame (from 1) of each time stamp; None if the stamps cannot be trusted."""
+        """Returns the frame (from 1) of each time stamp, by stamp; None if the stamps cannot be trusted."""
         known = [s for s in self.stamps if s is not None]
         # Packets that may be reordered, and yet have ascending stamps: the container made them up.
         ascending = known == sorted(known)
@@ -104,7 +104,7 @@ def _reason(error: Exception) -> str:
 
 
 def index_packets(path: Path) -> PacketIndex:
-    """Returns the packet index of a video, read without decoding; a damaged one is indexed up to the damage."""
+    """Returns the packet index of a video without decoding it; of a damaged one, up to the damage."""
     import av
 
     found, broken = [], ""
@@ -131,7 +131,7 @@ def _aspect(stream: Any) -> Fraction:
 
 
 def square_size(width: int, height: int, aspect: Fraction) -> tuple[int, int]:
-    """Returns the (width, height) px that show a picture with square pixels of the shape `aspect`."""
+    """Returns the (width, height) that a picture gets when its pixels, of width / height `aspect`, are made square."""
     return (round(width * aspect), height) if aspect >= 1 else (width, round(height / aspect))
 
 
@@ -144,7 +144,7 @@ def _seconds(stream: Any) -> float:
 
 
 def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
-    """Yields (frame, picture) in the order in which frames are shown, of all frames or those `wanted`."""
+    """Yields (frame, picture) in the order of showing; frames count from 1. wanted: only these frames; None: all."""
     ranks, last, count = index.ranks(), max(wanted or [0]), 0
     some = None if wanted is None else set(wanted)
     groups = None if some is None else index.groups(some)

@@ -38,7 +38,7 @@ class _Camera(BaseModel):
 
 
 def read_camera(path: Path) -> Camera:
-    """Reads a camera.json; missing baseline and radial are 0, a missing px_per_m is nan."""
+    """Returns the Camera in a camera.json; missing baseline and radial are 0, a missing px_per_m is nan."""
     found = validated(path, tables.read_document(path, "give a camera.json"), _Camera, "correct it")
     if found.px_per_m is None and found.kind == "top":
         raise InputError(file=path, place="px_per_m", got="null", expected="a scale for kind top", remedy="add it")
@@ -76,6 +76,6 @@ class _Scene(BaseModel):
 
 
 def read_scene(path: Path) -> Scene:
-    """Reads a scene.json."""
+    """Returns the Scene in a scene.json."""
     found = validated(path, tables.read_document(path), _Scene, "correct it")
     return Scene.of(found, found.walls, found.doors)

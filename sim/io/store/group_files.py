@@ -54,7 +54,7 @@ class _Events(BaseModel):
 
 
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
-    """Reads an events.json as pairs (event, frame whose tracks reported it, None if not stored)."""
+    """Returns the events of an events.json as pairs: the event, and the frame whose tracks reported it or None."""
     found = validated(path, tables.read_document(path), _Events, "correct the event").events
     places = [(tables.none_to_nan(e.pos[0]), tables.none_to_nan(e.pos[1])) for e in found]
     fields = [e.model_dump(exclude={"frame", "pos"}) for e in found]
@@ -62,7 +62,7 @@ def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
 
 
 def read_near(path: Path) -> Near:
-    """Reads a near.csv."""
+    """Returns the hard negatives in a near.csv; raises InputError for a wrong line."""
     text = read_rows(path)
     header = "".join(text.text[:1])
     if header != NEAR_COLUMNS:
@@ -90,7 +90,7 @@ class _Orders(BaseModel):
 
 
 def read_script(path: Path) -> tuple[Order, ...]:
-    """Reads the orders of a script.json; a missing list gives none."""
+    """Returns the orders in a script.json; () if it has no list of orders."""
     found = validated(path, tables.read_document(path), _Orders, "restore it").orders
     return tuple(Order(**order.model_dump()) for order in found)
 
@@ -101,10 +101,10 @@ AXES = ("x", "y", "z")
 
 
 def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
-    """Returns groups.parquet, a row per frame and group, for consecutive frames from `first` on.
+    """Returns the content of groups.parquet, a row per frame and group, for consecutive frames from `first` on.
 
-    unit: "m" or "px". None (groups unknown) is stored apart from a frame without groups, and so are frames whose groups
-    have no members.
+    unit: "m" or "px". The file distinguishes three kinds of frames: groups unknown (None), no groups, and groups whose
+    members are unknown.
     """
     known = [g for g in frames if g is not None]
     axes = AXES[: known[0].pos.shape[1]] if known else AXES[:2]
@@ -144,7 +144,7 @@ class _GroupFacts(BaseModel):
 
 
 def read_groups(table: StoredTable) -> list[Groups | None]:
-    """Returns the groups of each frame stored in a groups.parquet; None where they are unknown."""
+    """Returns the Groups of each frame stored in a groups.parquet; None for a frame whose groups are unknown."""
     facts = table.facts_as(_GroupFacts)
     first, count = facts.first, facts.frames
     axes = AXES if "z" in table.columns else AXES[:2]
@@ -164,13 +164,13 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
 
 
 def wkt(hull: Array, digits: int) -> str:
-    """Returns a hull (V, 2) as text "POLYGON ((x y, …))", the first vertex repeated at the end."""
+    """Returns a hull (V, 2) as "POLYGON ((x y, …))" with this many decimals, the first vertex repeated at the end."""
     points = [f"{x:.{digits}f} {y:.{digits}f}" for x, y in hull]
     return f"POLYGON (({', '.join([*points, points[0]])}))" if points else "POLYGON EMPTY"
 
 
 def parse_wkt(text: str) -> list[list[float]]:
-    """Returns the vertices [x, y] of a WKT POLYGON of one ring, perhaps empty; raises ValueError for other texts."""
+    """Returns the vertices [x, y] of a WKT POLYGON of one ring, [] if it is EMPTY; ValueError for other texts."""
     body = re.fullmatch(r"\s*POLYGON\s*(?:EMPTY|\(\s*\(([^()]*)\)\s*\))\s*", text)
     points = [point.split() for point in (body[1] or "").split(",") if point.strip()] if body else [[]]
     if not all(len(xy) == 2 and all(map(is_number_text, xy)) for xy in points):
@@ -182,8 +182,8 @@ def parse_wkt(text: str) -> list[list[float]]:
 def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None] | None, first: int = 1) -> bytes:
     """Returns groups.csv for consecutive frames from `first` on; nan and unknown values are empty.
 
-    ground: groups of each frame in the plane of their tracks or truth. image: those in px, whose hull is hull_px; a
-    frame whose ground groups are unknown lists the image's groups, without place.
+    ground: groups of each frame, with positions and hulls. image: the same groups in px, which give the column hull_px;
+    None: no such column. For a frame whose ground groups are None, the groups of image are listed, without position.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -233,7 +233,7 @@ class _GroupRow(BaseModel):
 def read_groups_csv(path: Path, length: int) -> list[Groups]:
     """Reads a groups.csv, ours or another program's, as the Groups of each frame from 1 to `length`.
 
-    Velocities are 0, extents nan. Groups and members are sorted by id.
+    The file has no velocities and extents: they are 0 and nan. Groups and members are sorted by id.
     """
     reader = csv.DictReader(io.StringIO(read_text(path)))
     frames: dict[int, dict[int, _GroupRow]] = {k: {} for k in range(1, length + 1)}

@@ -109,13 +109,13 @@ class _Run(_Sealed):
 
 
 def file_facts(files: Mapping[str, bytes | Path]) -> dict[str, dict[str, Any]]:
-    """Returns what a seal states of each file, {"sha256", "bytes"} by name, sorted. files: contents or paths."""
+    """Returns {"sha256": …, "bytes": size} for each file, by name, sorted. files: content or path, by name."""
     sizes = {name: len(body) if isinstance(body, bytes) else body.stat().st_size for name, body in files.items()}
     return {name: {"sha256": hashing.file_hash(body), "bytes": sizes[name]} for name, body in sorted(files.items())}
 
 
 def with_hash(document: dict[str, Any]) -> dict[str, Any]:
-    """Returns a copy of the document with the key sha256, the hash of all others."""
+    """Returns a copy of the document in which the key sha256 holds the hash of all other keys and values."""
     body = {key: value for key, value in document.items() if key != "sha256"}
     return {**body, "sha256": hashing.canonical_hash(body)}
 
@@ -135,8 +135,8 @@ def damaged_files(
 ) -> Iterator[InputError]:
     """Yields an error for each file that is missing, unreadable or not as stated.
 
-    files: facts by name. seal: the name of the document that states them. size_only: names whose content is not
-    compared.
+    files: size and hash by name, as of `file_facts`. seal: name of the document that states them. size_only: names of
+    files of which only the size is compared.
     """
     for name, facts in files.items():
         try:
@@ -149,7 +149,10 @@ def check_file(
     path: Path, facts: Mapping[str, Any], seal: str = MANIFEST, remedy: str = REDO, size_only: bool = False,
     whole: bool = False,
 ) -> bytes:  # fmt: skip
-    """Raises InputError if a file is not as a seal states. whole: True returns its bytes, False reads it in parts."""
+    """Raises InputError if a file differs from the facts that a seal states of it.
+
+    size_only: True compares the size alone. Returns the bytes of the file if `whole`, else b"".
+    """
     size, body = None, b""
     try:
         if path.is_file():  # a FIFO would block its reader
@@ -167,12 +170,12 @@ def check_file(
 
 
 def is_sequence(folder: Path) -> bool:
-    """Returns True if the folder is a stored sequence, perhaps an incomplete one."""
+    """Returns True if the folder is a stored sequence, complete or not: it has manifest.json or scenario.toml."""
     return (folder / MANIFEST).is_file() or (folder / "scenario.toml").is_file()
 
 
 def is_own_sequence(folder: Path) -> bool:
-    """Returns True if flockscope wrote the sequence: its manifest or, without a readable one, a table is ours."""
+    """Returns True if flockscope wrote the manifest in the folder, or any Parquet table in or below it."""
     return any(is_ours(path, MARKS) for path in (folder / MANIFEST, *folder.rglob("*.parquet")))
 
 
@@ -189,7 +192,7 @@ def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (),
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Reads the manifest.json of a sequence folder, and checks its seal and values, but no other file."""
+    """Returns the manifest.json of a sequence folder; checks its own hash and its values, but no other file."""
     path = folder / MANIFEST
     if not path.is_file():
         raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
@@ -201,20 +204,20 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 
 def is_run(folder: Path) -> bool:
-    """Returns True if the folder holds a run of ours, perhaps an unfinished or damaged one."""
+    """Returns True if the folder holds a run that flockscope wrote, perhaps an unfinished or damaged one."""
     paths = [folder / name for name in (RUN, EXACT) if (folder / name).is_file()]
     # A file that cannot be parsed may be ours.
     return any(is_ours(path, RUN_MARKS) is not False for path in paths)
 
 
 def run_folder(path: Path) -> Path | None:
-    """Returns the folder of the run that a path (folder or file of ours) leads to; None if it is no run's."""
+    """Returns the run's folder, if `path` is this folder or a file of the run in it; else None."""
     folder = path if path.is_dir() else path.parent if path.name in NAMES else None
     return folder if folder is not None and is_run(folder) else None
 
 
 def reject_foreign(folder: Path) -> None:
-    """Raises InputError if a file that is not ours, or a stored sequence, would be changed by a run here."""
+    """Raises InputError if writing a run into `folder` would change a foreign file or a stored sequence."""
     expected, remedy = "a new folder, or one with a run", "choose another --out"
     for place in (folder.absolute(), *folder.absolute().parents):
         if is_ours(place / MANIFEST, MARKS):
@@ -227,7 +230,7 @@ def reject_foreign(folder: Path) -> None:
 
 
 def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
-    """Returns the run.json of a run: `info` with the facts of all its other files (content by name) and its hash."""
+    """Returns the content of run.json: `info`, size and hash of each of `files` (content by name), its own hash."""
     stated = {"format": tables.FORMAT, **info, "files": file_facts(files)}
     read = json.loads(tables.json_text(stated))  # hashed as it will be read
     validated(Path(RUN), read, _Run, "correct info")
@@ -235,7 +238,7 @@ def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
 
 
 def read_run(folder: Path) -> dict[str, Any]:
-    """Returns the run.json of a folder, whose seal must be intact to the last blank; no other file is read."""
+    """Returns the run.json of a folder, with its own hash checked; no other file is read."""
     if not (folder / RUN).is_file():
         got, expected = f"tracks without {RUN}", "a run that was finished"
         raise InputError(file=folder, got=got, expected=expected, remedy=f"incomplete: {AGAIN}")
@@ -243,7 +246,7 @@ def read_run(folder: Path) -> dict[str, Any]:
 
 
 def run_problems(folder: Path, run: dict[str, Any]) -> Iterator[InputError]:
-    """Yields an error for each file of a run that is missing, altered, or of another run."""
+    """Yields an error for each file of a run that is missing, altered, or not named in `run`, its run.json."""
     yield from damaged_files(folder, run["files"], RUN, AGAIN)
     got, expected = f"a file that {RUN} does not name", "the files of one run"
     for path in (folder / name for name in NAMES if name not in run["files"] and name != RUN):
@@ -252,7 +255,7 @@ def run_problems(folder: Path, run: dict[str, Any]) -> Iterator[InputError]:
 
 
 def check_run(folder: Path) -> dict[str, Any]:
-    """Returns the run.json of a folder whose run is whole; raises the first problem otherwise."""
+    """Returns the run.json of a folder; raises InputError for the first problem of `run_problems`."""
     run = read_run(folder)
     for problem in run_problems(folder, run):
         raise problem
@@ -260,6 +263,6 @@ def check_run(folder: Path) -> dict[str, Any]:
 
 
 def tracked_hash(sequence: Sequence) -> str | None:
-    """Returns the SHA-256 of the truth that was tracked; None for a sequence without labels."""
+    """Returns the SHA-256 of a sequence's truth: the stored truth_hash, else the labels_hash; None without a truth."""
     stated: str | None = sequence.source.get("truth_hash")
     return hashing.labels_hash(sequence.truth) if stated is None and sequence.truth is not None else stated

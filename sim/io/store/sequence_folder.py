@@ -36,20 +36,20 @@ def write_sequence(
     """Writes a sequence as a folder, complete or not at all.
 
     Args:
-        folder: Where; an existing sequence is replaced.
-        sequence: What.
+        folder: Folder to write; a sequence in it is replaced.
+        sequence: The sequence to write.
         scenario: TOML text of the resolved scenario.
-        seed: That of the simulation.
+        seed: Seed of the simulation.
         repeat: Number of the suite entry's copy, 0 without copies.
-        streams: Pictures to store: "left", "right", "disparity", "ids"; "background" comes with left and right.
-        images: Their file type, "jpg", "png" or "mp4".
+        streams: Pictures to store: "left", "right", "disparity", "ids"; "left" and "right" add "background".
+        images: File type of the pictures, "jpg", "png" or "mp4".
         keep: Called before an existing folder is replaced; if it returns True, that folder stays.
 
     Returns:
         The folder.
 
     Raises:
-        InputError: A stream is unknown or missing, or a file of others in the folder would be lost.
+        InputError: A stream is unknown or missing, or a file that flockscope did not write would be lost.
         WorkError: The disk is full, an order of the script failed, or a stream cannot hold an id or disparity.
     """
     wanted, names = check_streams(streams, images), set[str]()
@@ -82,7 +82,7 @@ def sequence_files(
 ) -> dict[str, bytes]:
     """Returns the files of a sequence except its pictures: content by name, the manifest last.
 
-    pictures: what has been written of its pictures, for the manifest.
+    pictures: what `write_pictures` returned, for the manifest.
     """
     frames = list(sequence.without_pictures())
     found = [f.detections for f in frames if f.detections is not None]
@@ -128,8 +128,8 @@ def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> byte
 def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -> Sequence:
     """Returns the stored sequence in a folder, equal to the one written, except for its `source`.
 
-    background: frames for background models, in place of the stored empty ones. Pictures are checked when they are
-    read.
+    background: which frames `background()` gives for background models; None: the stored empty ones. Pictures are
+    compared with their hashes when they are read, all other files now (InputError).
     """
     manifest = read_manifest(folder)
     pictured = tuple(filter(is_picture, manifest["files"]))  # their hash is checked when they are read

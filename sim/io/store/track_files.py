@@ -60,7 +60,7 @@ class RunRows:
     seen: Any  # (R,) False for people who are predicted only
 
     def reject_faults(self, file: object, remedy: str) -> None:
-        """Raises InputError for the first fault, with its frame: a wrong id or group, or number."""
+        """Raises InputError for the first wrong id, group or number, with its frame. file, remedy: for the message."""
         for wrong, got, expected in self._checks():
             if wrong.any():
                 place = "frame {}, id {}".format(*(rows[np.argmax(wrong)] for rows in (self.frame, self.id)))
@@ -86,7 +86,7 @@ def _rows_with(wrong: Any) -> Any:
 
 
 def flatten(every: list[Tracks]) -> RunRows:
-    """Returns the rows of all frames of one tracker; without tracks none, in the plane "ground"."""
+    """Returns the rows of the Tracks of all frames of one tracker; for an empty list zero rows in plane "ground"."""
     kinds = {(t.plane, t.unit) for t in every}
     assert len(kinds) <= 1, f"a tracker stays in one plane and unit: {sorted(kinds)}"
     plane, unit = next(iter(kinds), ("ground", "person"))
@@ -113,7 +113,7 @@ def _state(plane: str) -> list[str]:
 
 
 def track_table(rows: RunRows, every: list[Tracks], fps: float) -> bytes:
-    """Returns tracks.parquet, a row per track and frame. rows: those of `every`, one Tracks per frame."""
+    """Returns the content of tracks.parquet, a row per track and frame. rows: `flatten(every)`. fps: frames/s."""
     unit, state = "px" if rows.plane == "image" else "m", _state(rows.plane)
     values = np.concatenate([rows.pos, rows.vel], axis=1)
     units = [f"{unit}/s" if name.startswith("v") else unit for name in state]
@@ -135,9 +135,9 @@ def track_table(rows: RunRows, every: list[Tracks], fps: float) -> bytes:
 
 
 def pair_table(frame: Ints, a: Ints, b: Ints, probability: Array) -> bytes:
-    """Returns pairs.parquet: how probable it is that two people belong together.
+    """Returns the content of pairs.parquet: the probability that two people belong together, a row per pair and frame.
 
-    frame (R,): from 1. a, b (R,): ids. probability (R,): 0 to 1.
+    frame (R,): from 1. a, b (R,): person ids. probability (R,): 0 to 1.
     """
     return table_bytes([Column("frame", frame), Column("a", a), Column("b", b), Column("probability", probability)], {})
 
@@ -153,7 +153,7 @@ class _TrackFacts(BaseModel):
 
 
 def read_track_table(folder: Path) -> list[Tracks]:
-    """Returns the tracks of tracks.parquet, with the groups of groups.parquet, without events."""
+    """Returns the tracks of tracks.parquet in `folder`, one Tracks per frame, with groups but without events."""
     table = tables.read_table(folder / EXACT)
     f = table.facts_as(_TrackFacts)
     state = _state(f.plane)
@@ -195,7 +195,10 @@ def _groups(path: Path, first: int, count: int) -> list[Groups | None]:
 
 
 def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["measured", "projected", "none"]:
-    """Returns where the boxes of stored tracks come from, the value `boxes` of run.json."""
+    """Returns the source of the boxes in stored tracks, as run.json names it under "boxes".
+
+    "measured": the tracker gives boxes. "projected": people get upright boxes by the camera. "none": neither.
+    """
     if any(t.box is not None and len(t.id) for t in tracks):
         return "measured"
     upright = not any(t.plane == "image" or t.unit == "group" for t in tracks)
@@ -203,9 +206,10 @@ def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["meas
 
 
 def upright_boxes(camera: Camera, pos: Array) -> Array:
-    """Returns the boxes (N, 4) px of people, 1.7 m high and 0.5 m across, at `pos` (N, 2 or 3) m.
+    """Returns the boxes (N, 4), left, top, width, height in px, of people at `pos` (N, 2 or 3) m.
 
-    Not clipped to the image; nan for somebody who is partly behind the camera, and for a nan position.
+    A person is 1.7 m tall and 0.5 m across. Not clipped to the image; nan for a person who is partly behind the camera,
+    and for a nan position.
     """
     from sim.scene.camera import project
 
@@ -224,7 +228,8 @@ def read_track_text(
 ) -> list[Tracks]:
     """Returns the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`, sorted by id.
 
-    length: None: to the last frame in the file. person_class, box_scale: as of `read_detections`.
+    length: None: to the last frame in the file. person_class: only rows of these classes are read; None: people.
+    box_scale: factors of x and y that make the boxes pixels.
     """
     table = read_table(path, length=length, boxless=True, box_scale=box_scale)
     require_pixels(table.rows, table.boxes())
@@ -264,9 +269,9 @@ def read_track_text(
 
 
 def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
-    """Returns the list, with the groups of a groups.csv in one tracker's tracks.
+    """Returns the tracks of `found` with the groups of the file `path` (groups.csv) filled in.
 
-    A person in two groups gets the one with the higher id. Members without a track stay in the groups.
+    A person listed in two groups of a frame gets the group with the higher id. Members without a track are kept.
     """
     made = list[Tracks]()
     for tracks, groups in zip(found, group_files.read_groups_csv(path, len(found)), strict=True):
@@ -284,10 +289,10 @@ def write_tracks(
     """Writes the tracks of consecutive frames of one tracker into a folder; run.json comes last.
 
     Args:
-        folder: Where. Files of an earlier run are replaced; others stay.
+        folder: Folder to write. Files of an earlier run in it are replaced; other files stay.
         tracks: One Tracks per frame, all of one plane and unit.
         fps: Frames per second.
-        camera: Gives boxes of upright people in the texts to people on the ground or in space without boxes.
+        camera: If no track has a box, people on the ground or in space get boxes of upright people in the texts.
         scene: Gives the height of the ground under 2-D positions; None: 0.
         info: Content of run.json, to which "format", "boxes", "files" and "sha256" are added.
         pairs: Content of pairs.parquet (`pair_table`); None: no such file.
@@ -296,7 +301,7 @@ def write_tracks(
         The folder.
 
     Raises:
-        InputError: Tracks or `info` are wrong, or a file of others, or a stored sequence, is in the way.
+        InputError: Tracks or `info` are wrong, or a foreign file or a stored sequence would be changed.
     """
     folder = Path(folder)
     files = tracks_files(tracks, fps=fps, camera=camera, scene=scene, info=info, pairs=pairs)
@@ -344,8 +349,8 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
         length: Frames of a text; None: to the last frame in the file.
 
     Returns:
-        One Tracks per frame, each with the events that the file puts there; without a frame, an event is in that of
-        its field `emitted`, else in its last frame.
+        One Tracks per frame, each with the events reported in this frame. An event stored without that frame is put
+        in the frame `emitted`, else in its last frame.
 
     Raises:
         InputError: There are no tracks, or they are unfinished, damaged, invalid or mixed with those of another run.
@@ -360,7 +365,7 @@ def read_checked_tracks(
     path: str | Path, *, fps: float | None = None, length: int | None = None, person_class: Classes | None = None,
     box_scale: BoxScale | None = None,
 ) -> list[Tracks]:  # fmt: skip
-    """Reads tracks as `read_tracks` does, but compares no hash of a run again."""
+    """Reads tracks as `read_tracks` does, but does not check the files of a run against their hashes."""
     path = Path(path)
     folder = path if path.is_dir() else path.parent
     whole = path.is_dir() or path.name in WHOLE

@@ -27,7 +27,7 @@ SINGLE = (("z", "m"), ("heading", "rad"), ("height", "m"), ("truncation", "1"))
 
 
 def truth_files(truth: Truth) -> dict[str, bytes]:
-    """Returns the files under gt/ of a truth, content by name: those for which it has values."""
+    """Returns the files under gt/ of a truth, content by name; a file for which the truth has no values is left out."""
     files = {"gt/truth.parquet": _table(truth), "gt/script.json": tables.json_list("orders", map(_order, truth.orders))}
     if truth.box is not None:
         seen = has_box(truth.box)
@@ -83,12 +83,12 @@ def _flags(table: StoredTable, spans: list[tuple[int, int]], length: int) -> Boo
 
 
 def has_box(box: Array) -> Bools:
-    """Returns which of the boxes (R, 4) are known and not empty, (R,)."""
+    """Returns flags (R,): True for boxes (R, 4) that are finite and have width and height above 0."""
     return np.asarray(np.isfinite(box).all(axis=1) & (box[:, 2:] > 0).all(axis=1))
 
 
 def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
-    """Returns MOTChallenge text: frame, id, box, and the cells `rest` of each row; an unknown box is four times -1."""
+    """Returns a MOTChallenge text: of each row frame, id, box and the cells `rest`; an unknown box is -1,-1,-1,-1."""
     lines = []
     rows = zip(frame.tolist(), id.tolist(), box.tolist(), has_box(box).tolist(), rest, strict=True)
     for f, i, (left, top, width, height), boxed, end in rows:
@@ -98,7 +98,7 @@ def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
 
 
 def score_and_place(score: Array, place: Array | None) -> list[str]:
-    """Returns the cells conf, x, y, z of MOT lines; place: (R, 3) m, with nan or None for unknown."""
+    """Returns the cells conf, x, y, z of R MOT lines. place (R, 3): positions in m, nan or None if unknown."""
     places = np.full((len(score), 3), np.nan) if place is None else place
     return [f"{s:.4f},{_cells(xyz)}" for s, xyz in zip(score.tolist(), places.tolist(), strict=True)]
 
@@ -119,7 +119,7 @@ class _TruthFacts(BaseModel):
 
 
 def read_truth(folder: Path) -> Truth:
-    """Reads the truth of a sequence folder; what is not stored becomes None."""
+    """Returns the truth in a sequence folder; fields that are not stored are None."""
     gt = folder / "gt"
     table = read_table(gt / "truth.parquet")
     facts = table.facts_as(_TruthFacts)
@@ -187,7 +187,7 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
 
 
 def scores_or_ones(score: Array, rows: int) -> Array:
-    """Returns `score` (N,) if it has `rows` items, else ones: no scores are given."""
+    """Returns `score` if it has `rows` items, else ones (rows,), as for a detector without scores."""
     return score if len(score) == rows else np.ones(rows)
 
 
@@ -206,7 +206,7 @@ class _DetectionFacts(BaseModel):
 
 
 def read_detections(path: Path) -> list[Detections]:
-    """Reads a det.parquet: one Detections per frame, from frame 1."""
+    """Returns the detections in a det.parquet, one Detections for each frame from 1."""
     table = read_table(path)
     axes = ("x", "y", "z") if "z" in table.columns else ("x", "y")
     pos, score, facts = table.floats(*axes), table.floats("score"), table.facts_as(_DetectionFacts)

@@ -30,8 +30,8 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
         folder: A sequence, a run, or a folder of some.
 
     Returns:
-        Leftovers of interrupted runs, faults of seqmaps/, then those of each sequence and run, sorted by path. If files
-        are damaged, nothing else is reported for their sequence or run.
+        Leftovers of interrupted runs, faults of seqmaps/, then faults of each sequence and run, sorted by path; [] if
+        all is well. If files are damaged, nothing else is reported for their sequence or run.
 
     Raises:
         InputError: There is nothing to check.
@@ -63,7 +63,7 @@ def _inside(root: Path, kind: Callable[[Path], bool]) -> list[Path]:
 
 
 def content_hash(folder: str | Path) -> str:
-    """Returns the SHA-256 of a generated dataset or sequence, by its manifests; exports contain the same."""
+    """Returns the SHA-256 of a generated dataset or sequence, from the hashes in its manifests."""
     folders = sequence_folders(Path(folder), "generated")
     return hashing.dataset_hash({split_and_name(p): seal.read_manifest(p)["content_hash"] for p in folders})
 
