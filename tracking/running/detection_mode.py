@@ -30,7 +30,11 @@ InputKind = Literal["points", "boxes", "pixels", "stereo"]
 
 
 def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: DetectionMode | None) -> DetectionMode:
-    """Returns the requested mode if it can work; without one the first of image, file, truth that can."""
+    """Returns the requested detection mode; for None the first of "image", "file" and "truth" that is possible.
+
+    A mode is possible if the sequence has what a tracker with these needs takes in it. Raises InputError if the
+    requested mode, or for None every mode, is impossible.
+    """
     able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
     if requested in able or (requested is None and able):
         return requested or able[0]  # type: ignore[return-value]
@@ -53,7 +57,10 @@ def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
 
 
 def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, frames: Iterable[Frame]) -> InputKind:
-    """Returns what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes" or "points"."""
+    """Returns what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes" or "points".
+
+    frames: with the detections that the tracker gets; not used if `mode` is "image".
+    """
     if mode == "image":
         return "pixels" if "pixels" in needs and sequence.has_images else "stereo"
     in_image = any(f.detections is not None and f.detections.plane == "image" for f in frames)
@@ -63,7 +70,11 @@ def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, 
 def frames_with_detections(
     needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int
 ) -> tuple[Frame, ...] | None:
-    """Returns the frames with the detections of `mode` and without pictures, or None if `mode` is "image"."""
+    """Returns the frames with the detections of `mode` and without pictures; None if `mode` is "image".
+
+    sensor, seed: degrade and shuffle the detections of "truth". Raises InputError if the detections are points only,
+    but the tracker needs boxes.
+    """
     if mode == "image":
         return None
     if mode == "file":
@@ -79,7 +90,7 @@ def frames_with_detections(
 
 
 def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
-    """Raises InputError if a frame's detections cannot be given to a tracker with these needs."""
+    """Raises InputError if a frame's detections are not finite, or are points while the needs lack "points"."""
     place = f"frame {detections.index}"
     for a in (detections.pos, detections.vel, detections.box, detections.score):
         if a is not None and not finite(a):
@@ -96,7 +107,10 @@ SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
 
 
 def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
-    """Returns an iterator over the detections of a labelled sequence, one for each frame in order, from frame 1."""
+    """Returns an iterator over detections made from the labels, one `Detections` for each frame in order, from 1.
+
+    sensor: settings that degrade them, by name; {} gives the labels in random order.
+    """
     truth = sequence.truth
     assert truth is not None, "the mode was chosen for a source with labels"
     if not sensor:
@@ -105,7 +119,7 @@ def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iter
 
 
 def shuffled(detections: Detections, seed: int) -> Detections:
-    """Returns the detections of a frame in an order that depends on the seed and the number of the frame alone."""
+    """Returns the detections of a frame in random order; the order follows from seed, frame number and row count."""
     d = detections  # the order of labels would tell who is who
     order: Ints = rng(seed, "delivery", d.index).permutation(len(d.pos))
     vel, box = (None if a is None else a[order] for a in (d.vel, d.box))
@@ -113,10 +127,10 @@ def shuffled(detections: Detections, seed: int) -> Detections:
 
 
 def perfect(truth: FrameTruth) -> Detections:
-    """Returns the labels of a frame as detections with score 1, a row per labelled person, hidden ones included.
+    """Returns the labels of a frame as detections with score 1, one row per labelled person, hidden or not.
 
-    They lie on the ground if positions are labelled, else at the centres of the boxes. Without a box, as behind the
-    camera, people in the image have no row.
+    Detections lie on the ground if positions are labelled, else at the centres of the boxes. If boxes are labelled, a
+    person without a finite box, such as one behind the camera, has no row.
     """
     seen = np.ones(len(truth.id), bool) if truth.box is None else np.isfinite(truth.box).all(axis=1)
     box, score = None if truth.box is None else truth.box[seen], np.ones(int(seen.sum()))

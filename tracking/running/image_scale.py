@@ -37,27 +37,34 @@ def required(px_per_m: float) -> float:
 
 
 def from_boxes(frames: Iterable[Detections | Tracks | None]) -> ImageScale:
-    """Returns the image scale by the heights of the boxes of the first frames ; nan without a box."""
+    """Returns the image scale, px per m, by the heights of the boxes of the first frames; nan if there is no box."""
     boxed = [(d.index, d.box[:, 3]) for d in frames if d is not None and d.box is not None]
     index = np.repeat(np.array([k for k, _ in boxed], np.int64), [len(h) for _, h in boxed])
     return ImageScale(*scale_of_first_boxes(index, np.concatenate([np.zeros(0), *(h for _, h in boxed)])))
 
 
 def from_tracks(given: ImageScale, learned: float, tracks: SequenceOf[Tracks]) -> ImageScale:
-    """Returns the image scale for deriving groups from tracks; nan if it is unknown."""
+    """Returns the image scale for deriving groups from tracks; px_per_m is nan if it is unknown.
+
+    It is `given` if that is known, else `learned` (the tracker's own scale, px per m), else that of the tracks' boxes.
+    """
     if np.isfinite(given.px_per_m):
         return given
     return ImageScale(learned) if np.isfinite(learned) else from_boxes(tracks)
 
 
 def learned_by(tracker: object) -> float:
-    """Returns the tracker's own attribute `px_per_m` (px per m), a number of Python or numpy."""
+    """Returns the tracker's own attribute `px_per_m` (px per m) as a float; nan if it is missing or no number."""
     value = getattr(tracker, "px_per_m", None)
     return float(value) if is_number(value) else float("nan")
 
 
 def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ...] | None) -> ImageScale:
-    """Returns the image scale that a tracker is given with a sequence; nan if it is unknown."""
+    """Returns the image scale that a tracker is given with a sequence; px_per_m is nan if it is unknown.
+
+    frames: the frames with the detections that the tracker gets; their boxes decide if the sequence has no scale and
+    `mode` is not "image". None takes the sequence's own frames.
+    """
     known = before_frames(sequence)
     if np.isfinite(known.px_per_m) or mode == "image":
         return known
@@ -65,7 +72,10 @@ def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ..
 
 
 def before_frames(sequence: Sequence) -> ImageScale:
-    """Returns the image scale that is known before a sequence is read, nan if there is none."""
+    """Returns the image scale that is known before the frames are read: by the camera, else as the sequence states.
+
+    px_per_m is nan if there is none.
+    """
     if sequence.camera is not None:
         from sim.scene.camera import px_per_m_at_centre
 

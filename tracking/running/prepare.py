@@ -46,19 +46,22 @@ class PreparedTracker:
     history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
 
     def frames(self) -> Iterator[Frame]:
-        """Returns a new iterator over the frames as the tracker gets them, in order; may be called again."""
+        """Returns a new iterator over the frames as the tracker gets them, in order. Each call starts at frame 1."""
         if self.frames_given is not None:
             return iter(self.frames_given)
         return (replace(f, detections=None) for f in self.sequence)
 
     def scale(self, tracks: SequenceOf[Tracks]) -> ImageScale:
-        """Returns the image scale for deriving groups from these tracks, from the first frame on; nan if unknown."""
+        """Returns the image scale for deriving groups from the tracks of frames 1 to now; nan if unknown.
+
+        It is the context's scale if that is known, else the tracker's own, else that of the tracks' boxes.
+        """
         with self._naming("px_per_m", self.sequence.name):
             learned = image_scale.learned_by(self.tracker)
         return image_scale.from_tracks(ImageScale(self.context.px_per_m, self.scale_frames), learned, tracks)
 
     def px_per_m(self, tracks: SequenceOf[Tracks]) -> float:
-        """Returns the image scale of `scale`, px per m; nan if unknown."""
+        """Returns the number of px per m that `scale` finds for these tracks; nan if unknown."""
         return self.scale(tracks).px_per_m
 
     def reset(self, seed: int) -> None:
@@ -68,7 +71,10 @@ class PreparedTracker:
             self.tracker.reset(self.context, seed)
 
     def step(self, frame: Frame) -> Tracks:
-        """Returns the tracker's checked tracks of the next frame; frames come in order, from `frames`."""
+        """Returns the tracker's tracks of the frame, checked; call it with the frames of `frames`, in order.
+
+        Raises InputError if detections are not finite, WorkError if the tracker fails or returns wrong tracks.
+        """
         detections = frame.detections
         if detections is not None:
             check_detections(detections, self.tracker.needs)
@@ -95,7 +101,10 @@ def prepare(
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
 ) -> PreparedTracker:
-    """Returns the tracker ready to be reset for the sequence."""
+    """Returns the tracker with all that it needs for the sequence; the arguments are as in `tracking.track`.
+
+    Raises InputError if an argument is wrong or tracker and sequence do not fit.
+    """
     if not isinstance(sequence, Sequence):
         remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"
         raise InputError(place="sequence", got=type(sequence).__name__, expected="a Sequence", remedy=remedy)
@@ -137,7 +146,10 @@ def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) 
 
 
 def config_of(kind: type[Config], params: Params) -> Config:
-    """Returns `params` as a config of the class `kind`; the default config if `params` is None."""
+    """Returns `params` as a config of the class `kind`; None gives the default config.
+
+    Raises InputError if values are wrong or `params` is a config of another class.
+    """
     if params is None:
         return kind()
     if isinstance(params, str | Path):

@@ -46,10 +46,11 @@ def run_info(
     ground: Ground,
     speeds: tuple[float, float],
 ) -> dict[str, Any]:
-    """Returns what run.json tells of a run, as a dictionary. Two equal runs differ only in their speeds.
+    """Returns the content of run.json for a run, as a dictionary. Two equal runs differ only in their speeds.
 
-    speeds: frames per second of the tracker's steps alone, with their checks; and with the reading of frames, without
-    the derivation of groups.
+    sensor, scale, ground: the sensor settings, the image scale and the ground that were used. speeds: two numbers of
+    frames per second, first of the tracker's checked steps alone, then also counting the reading of frames. Neither
+    counts the derivation of groups.
     """
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
@@ -93,7 +94,11 @@ def _facts(
 
 
 def causal_from(sequence: Sequence) -> int | None:
-    """Returns the first frame (from 1) whose background sample holds no later frame; None if there is no such frame."""
+    """Returns the first frame (from 1) from which on the background sample contains no later frame.
+
+    It is 1 if the sample does not come from the sequence's own pictures, and None if the sample contains frames from
+    all over the recording.
+    """
     from sim.io.pictures.background_sample import BackgroundSample
 
     sample = sequence.load_background
@@ -103,7 +108,10 @@ def causal_from(sequence: Sequence) -> int | None:
 
 
 def input_summary(info: Mapping[str, Any]) -> str:
-    """Returns one line on what a tracker was given, from the content of its run.json."""
+    """Returns one line with the detection mode, background and sensor settings of a run, from its run.json.
+
+    Example: "truth (noise_m = 0.1)". It is "" if run.json does not tell the mode.
+    """
     mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
     more = [f"background: {background}"] if background else []
     more += [f"{key} = {value}" for key, value in (sensor or {}).items()]
@@ -111,7 +119,10 @@ def input_summary(info: Mapping[str, Any]) -> str:
 
 
 def input_name(info: Mapping[str, Any]) -> str:
-    """Returns what a tracker worked on, from the content of its run.json, as "pixels" or "boxes (file)"."""
+    """Returns a short name of a tracker's input, from the content of its run.json; "" if it is unknown.
+
+    Examples: "pixels", "boxes (file)", "points (truth, noise_m = 0.1, seed 3)".
+    """
     kind, mode, sensor = (info.get(key) for key in ("input", "detections", "sensor"))
     if kind is None:
         return ""
@@ -125,11 +136,12 @@ OF_TRACKS = ("sequence", "plane", "fps", "px_per_m", "px_per_m_frames", "ground"
 
 @dataclass(frozen=True, eq=False)
 class TrackingRun(SequenceOf[Tracks]):
-    """The tracks of one run; as a sequence, one `Tracks` per frame in order: item 0 is frame 1.
+    """The tracks of one run: a Python sequence with one `Tracks` per frame in order, so that item 0 is frame 1.
 
     Attributes:
         tracks: The `Tracks` of every frame.
-        info: What run.json tells of the run (tracker, config, seed, detections, speed); `write` adds labels and files.
+        info: The content of run.json (tracker, config, seed, detections, speed, …); `write` adds further keys to the
+            file.
     """
 
     tracks: tuple[Tracks, ...]
@@ -146,13 +158,14 @@ class TrackingRun(SequenceOf[Tracks]):
         return len(self.tracks)
 
     def tables(self, places: Mapping[str, Any] | None = None) -> TidyTables:
-        """Returns people, people_summary, groups, members, events and counts as tidy tables.
+        """Returns the tables people, people_summary, groups, members, events and counts of the run.
 
         `run.tables().people.to_arrow()` gives a table of pyarrow, `to_pandas()` a data frame.
 
         Args:
-            places: By name the two ends of a line, or the corners (K, 2) of a zone, m or px: `counts` then has columns
-                of those who cross the line, or are in the zone.
+            places: Lines and zones by name: the two ends (2, 2) of a line, or the K > 2 corners (K, 2) of a zone, in
+                the unit of the tracks (m or px). `counts` gets columns with the number of people who cross the line or
+                are in the zone. None means neither.
         """
         from sim.io.export.tidy_tables import run_tables
 
@@ -160,7 +173,10 @@ class TrackingRun(SequenceOf[Tracks]):
         return run_tables(self.tracks, self.info["fps"], found)
 
     def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
-        """Stores the tracks in the folder as `flockscope track` does, and return the folder."""
+        """Writes the tracks to the folder as `flockscope track` does, and returns the folder.
+
+        sequence: what was tracked. pairs: a table of pair probabilities that is written, too; None writes none.
+        """
         from sim.io.store.seal import tracked_hash
         from sim.io.store.track_files import pair_table, write_tracks
 
@@ -181,27 +197,33 @@ def track(
     grouping: Grouping | str | Path | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> TrackingRun:
-    """Tracks every frame of a sequence, and derives groups and events if the tracker names none.
+    """Tracks every frame of a sequence, and derives groups and events if the tracker reports none.
 
-    A UserWarning says that `grouping` has no effect, that most detections score too low to start a track, or that
-    groups which the tracker began to name only later were replaced by derived ones.
+    Warns with a UserWarning if `grouping` has no effect because the tracker reports groups itself. Warns, too, if the
+    tracker reports groups only after its first frame with people; such groups are replaced by derived ones.
 
     Args:
         tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
             (tracking.running.time_limit), which stops a step that hangs.
-        sequence: As `sim.simulate` returns it, or one of those that `sim.io.source.open_source` returns.
-        params: A config, values by name, the name of a preset, or a TOML file; None for the tracker's defaults.
-        detections: "image", "file" or "truth"; None for the first of them that can work.
-        sensor: Settings as in a scenario's [sensor] that degrade "truth"; None: perfect.
-        seed: Of the tracker's and the sensor's random numbers.
-        grouping: "belief", "rule", a TOML file of either, or the grouping itself; None: the belief.
-        progress: Called with each frame's number, from 1, when the frame is done.
+        sequence: A `Sequence`, as `sim.simulate` and `sim.io.source.open_source` return.
+        params: A config, values by name, the name of a preset, or the path of a TOML file. None takes the tracker's
+            defaults; it must be None if `tracker` is an instance.
+        detections: "image" (the tracker detects in pictures), "file" (stored detections) or "truth" (detections made
+            from labels). None takes the first of these, in this order, that tracker and sequence allow.
+        sensor: Settings as in a scenario's [sensor] that degrade the detections of "truth"; None degrades nothing.
+        seed: Seed of the random numbers of tracker and sensor.
+        grouping: How groups are derived: "belief", "rule", a TOML file of either, or a `Belief` or `LinkRule`. None
+            takes the belief.
+        progress: Called after each frame with the frame's number, from 1.
+
+    Returns:
+        `TrackingRun`, the tracks of every frame and the content of run.json.
 
     Raises:
         InputError: The arguments are wrong, tracker and sequence do not fit, a picture cannot be read, detections are
             not finite, or tracks in the image have a scale of 0 or below.
-        WorkError: The tracker raises an exception or returns wrong tracks, or an order of a simulated script was not
-            fulfilled (mode "truth").
+        WorkError: The tracker raises an exception or returns wrong tracks, or a simulated person did not carry out an
+            order of the scenario's script (mode "truth").
     """
     from sim.compiler import clock
     from tracking.grouping.foot_points import completed
@@ -245,15 +267,20 @@ def group(
 ) -> TrackingRun:
     """Finds the groups and events of people whose ids are known, from their motion.
 
+    Warns with a UserWarning if frame numbers, frame rate or unit of length are hardly right.
+
     Args:
-        sequence: Labelled people, if `run` is None; their group labels are not used.
-        run: Tracks of people; groups and events in them are replaced.
-        grouping: As of `track`.
+        sequence: The sequence. If `run` is None, its labelled people are grouped; their group labels are not used.
+        run: Tracks of people of this sequence that are grouped instead; groups and events in them are replaced.
+        grouping: As in `track`.
+
+    Returns:
+        `TrackingRun`, the people of every frame with groups and events, and the content of run.json.
 
     Raises:
         InputError: There are no people with ids, the tracks are of whole groups, people lie in the image and its scale
             is unknown or not above 0, or labels or the file of the grouping cannot be read.
-        WorkError: An order of a simulated script was not fulfilled.
+        WorkError: A simulated person did not carry out an order of the scenario's script.
     """
     from tracking.grouping.foot_points import completed
     from tracking.grouping.grouped_tracks import without_groups
@@ -289,7 +316,10 @@ def group(
 
 
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
-    """Returns stored tracks of a sequence with groups and events filled in where they are empty."""
+    """Returns stored tracks of a sequence, one `Tracks` per frame, with groups and events derived where they lack.
+
+    The default grouping is used.
+    """
     from tracking.grouping.foot_points import completed
 
     known = image_scale.before_frames(sequence)

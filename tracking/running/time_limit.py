@@ -27,14 +27,14 @@ LONGEST = 1_000_000
 
 
 class TimeLimited:
-    """A tracker whose every `reset` and `step` must end within `seconds`, for `tracking.track`. A context manager.
+    """A tracker that runs in another process, where each `reset` and each `step` must end within a time limit.
 
-    State: the process, which runs one tracker at a time; started with the first tracker that is made, and again after
-    its end.
+    It is given to `tracking.track` as the tracker, and is a context manager that ends the process. State: the process,
+    which holds one tracker at a time. It is started when the first tracker is made, and again if it has ended.
 
     Args:
         tracker: A registered name, "file.py:Class" or "module:Class".
-        seconds: Up to 1,000,000.
+        seconds: The time limit of each call, s, above 0, at most 1,000,000.
 
     Raises:
         InputError: The tracker is not given by name, or the limit is out of range.
@@ -63,20 +63,25 @@ class TimeLimited:
         return tuple(tracker_registry.find(self.tracker).needs)
 
     def close(self) -> None:
-        """Ends the process; a tracker that is made later starts another."""
+        """Ends the process; if a tracker is made later, a new process is started."""
         self._process.terminate()
         self._process.join()
 
     def make(self, config: Config | None) -> RemoteTracker:
-        """Returns a tracker made in the process, with this config; None for a tracker without parameters."""
+        """Makes the tracker in the process with this config, and returns a `RemoteTracker` that calls it.
+
+        config: None for a tracker without parameters.
+        """
         made = RemoteTracker(self, next(self._numbers), config)
         made.create()
         return made
 
     def call(self, number: int, method: str, *arguments: Any) -> Any:
-        """Returns what a method of a tracker ("create", "reset" or "step") returns in the process.
+        """Calls "create", "reset" or "step" of the tracker with this number in the process; returns the result.
 
-        "create" has no time limit.
+        "create" has no time limit and returns None. "reset" and "step" return the method's result and the tracker's
+        px_per_m. Raises TimeoutError if the limit is exceeded, ChildProcessError if the process has ended, or what the
+        tracker raised.
         """
         pipe = self._process.send(_call, (number, method, arguments, self.seconds + GRACE))
         if method != "create" and not pipe.poll(self.seconds):
@@ -91,7 +96,7 @@ class TimeLimited:
 
 
 class RemoteTracker:
-    """A tracker that works in the process of a TimeLimited, with the attributes of the tracker itself."""
+    """Stands for a tracker in the process of a TimeLimited, with its attributes needs, config and px_per_m."""
 
     def __init__(self, host: TimeLimited, number: int, config: Config | None) -> None:
         self.needs, self.config = host.needs, config
@@ -99,17 +104,17 @@ class RemoteTracker:
         self._host, self._number = host, number
 
     def create(self) -> None:
-        """Makes the tracker in the process, unless it is there."""
+        """Makes the tracker in the process, unless the process holds it already."""
         values = None if self.config is None else self.config.as_dict()
         self._host.call(self._number, "create", self._host.tracker, values)
 
     def reset(self, context: Context, seed: int) -> None:
-        """Resets the tracker; one whose process has ended is made again."""
+        """Resets the tracker; if its process has ended, the tracker is made again before."""
         self.create()
         _, self.px_per_m = self._host.call(self._number, "reset", context, seed)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Returns the tracker's tracks of the frame, which holds the detections."""
+        """Returns the tracker's tracks of the frame, with these detections."""
         tracks, self.px_per_m = self._host.call(self._number, "step", frame, detections)
         return tracks  # type: ignore[no-any-return]
 

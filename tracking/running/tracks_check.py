@@ -33,7 +33,11 @@ class ReportHistory:
 
 
 def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory | None = None) -> Tracks:
-    """Returns a copy of the tracks of frame `index` with optional fields filled in."""
+    """Returns a copy of the tracks of frame `index`, checked, with optional fields filled in.
+
+    tracker: its name, for messages. history: what it reported in earlier frames, which is updated; None means nothing.
+    Raises WorkError, with the first fault, if the tracks are wrong.
+    """
     if isinstance(tracks, Tracks):
         tracks = _filled(tracks)
     fault = next(filter(None, _faults(tracks, index, ReportHistory() if history is None else history)), None)

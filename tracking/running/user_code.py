@@ -25,7 +25,11 @@ _received = threading.Event()
 
 @contextmanager
 def recorded_interrupts() -> Iterator[None]:
-    """While the block runs, records SIGINT (Ctrl-C) and raises KeyboardInterrupt for it, as Python does."""
+    """Records SIGINT (Ctrl-C) while the block runs, and raises KeyboardInterrupt for it, as Python does.
+
+    It has no effect outside the main thread, or if SIGINT has another handler than Python's default, such as inside
+    another such block.
+    """
     own = threading.current_thread() is threading.main_thread()
     if not own or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
@@ -45,13 +49,16 @@ def _record(number: int, frame: FrameType | None) -> None:
 
 
 def raise_if_interrupted() -> None:
-    """Raises KeyboardInterrupt if SIGINT was recorded in the present block of `recorded_interrupts`."""
+    """Raises KeyboardInterrupt if SIGINT was recorded since the current `recorded_interrupts` block began."""
     if _received.is_set():
         raise KeyboardInterrupt
 
 
 def is_interruption(error: BaseException) -> bool:
-    """Returns True if the exception comes from Ctrl-C, False if the code that raised it did so on its own."""
+    """Returns True if an exception comes from Ctrl-C, False if the code that raised it did so on its own.
+
+    It is True for every exception if SIGINT was recorded in the current block.
+    """
     if _received.is_set():
         return True
     return isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) not in (_record, signal.SIG_IGN)
@@ -61,7 +68,10 @@ def is_interruption(error: BaseException) -> bool:
 def user_code(
     failed: Callable[[BaseException], FlockscopeError], passing: type[Exception] | tuple[()] = FlockscopeError
 ) -> Iterator[None]:
-    """While the block runs, replaces any exception, SystemExit included, by the error `failed(it)`."""
+    """Replaces an exception that the block raises, SystemExit included, by the error that `failed` returns for it.
+
+    Exceptions of the class `passing` are raised unchanged. Ctrl-C becomes KeyboardInterrupt.
+    """
     try:
         yield
     except BaseException as error:
@@ -73,7 +83,7 @@ def user_code(
 
 
 def what_was_raised(error: BaseException) -> str:
-    """Returns the type of an exception and the first line of its message, as "SystemExit: 0"."""
+    """Returns the type of an exception and the first line of its message, such as "SystemExit: 0"."""
     try:
         text = str(error)
     except BaseException as failed:
@@ -82,6 +92,9 @@ def what_was_raised(error: BaseException) -> str:
 
 
 def tracker_failed(tracker: str, method: str, place: str, error: BaseException) -> WorkError:
-    """Returns the WorkError for an exception raised by a tracker's own code, with the first line of its message."""
+    """Returns the WorkError for an exception that a tracker's own code raised, with the first line of its message.
+
+    tracker: its name; method: the method that failed; place: where in the input, such as "frame 3".
+    """
     remedy = f"correct the tracker's {method}; FLOCKSCOPE_DEBUG=1 shows where"
     return WorkError(file=tracker, place=place, got=what_was_raised(error), expected="no exception", remedy=remedy)

@@ -36,7 +36,11 @@ class AnnotatedFrames:
 
 
 def annotated_frames(truth: Truth) -> AnnotatedFrames:
-    """Returns the annotated frames of a truth: all, or those with labels if these are clearly sparse."""
+    """Returns the annotated frames of a truth: all frames, unless the labels are clearly sparse.
+
+    Sparse labels that are evenly spaced make every step-th frame annotated, with or without labels; other sparse labels
+    only the frames that have labels.
+    """
     every = np.ones(truth.length + 1, bool)
     every[0] = False
     labelled = _labelled_frames(truth)
@@ -74,7 +78,10 @@ def widest_step(inside: Bools) -> int:
 
 
 def first_seen(events: Iterable[GroupEvent], inside: Bools) -> list[GroupEvent]:
-    """Returns the events, each starting in the first scored frame from its start on."""
+    """Returns the events with each start moved to the first scored frame at or after it.
+
+    An event that starts before the first scored frame or after the last one is not changed.
+    """
     frames = np.flatnonzero(inside).tolist()
 
     def moved(event: GroupEvent) -> GroupEvent:
@@ -85,7 +92,10 @@ def first_seen(events: Iterable[GroupEvent], inside: Bools) -> list[GroupEvent]:
 
 
 def seen_in(tracks: Sequence[Tracks], inside: Bools) -> list[Tracks]:
-    """Returns the tracks of the scored frames, each with the events reported since the scored frame before."""
+    """Returns the `Tracks` of the scored frames, each with all events reported since the previous scored frame.
+
+    Events reported before the first scored frame are dropped.
+    """
     first = int(np.argmax(inside))
     if inside[first:].all():
         return [t for t in tracks if inside[t.index]]

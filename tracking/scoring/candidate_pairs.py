@@ -58,20 +58,20 @@ class Pairs:
 
     @cached_property
     def true_ids(self) -> tuple[Ints, Ints]:
-        """Returns the N distinct true ids, ascending (N,), and the index of each true row's id among them (R,)."""
+        """The N distinct true ids, ascending (N,), and the index of each true row's id among them (R,)."""
         return numbered(self.true.id)
 
     @cached_property
     def est_ids(self) -> tuple[Ints, Ints]:
-        """Returns the M distinct estimated ids, ascending (M,), and the index of each row's id among them (S,)."""
+        """The M distinct estimated ids, ascending (M,), and the index of each estimated row's id among them (S,)."""
         return numbered(self.est.id)
 
     @cached_property
     def links(self) -> tuple[Ints, Ints, Ints]:
-        """The U distinct combinations of a true and an estimated id, sorted, as three arrays.
+        """The U distinct combinations of a true and an estimated id that occur in pairs, sorted, as three arrays.
 
-        They are the index of the true id in `true_ids[0]` (U,), of the estimated id in `est_ids[0]` (U,), and the
-        combination of each pair (K,).
+        They are the index of the combination's true id in `true_ids[0]` (U,), the index of its estimated id in
+        `est_ids[0]` (U,), and the index 0 … U - 1 of the combination of each pair (K,).
         """
         width = max(len(self.est_ids[0]), 1)
         key = self.true_ids[1][self.i] * width + self.est_ids[1][self.j]
@@ -96,10 +96,11 @@ PairSimilarity = Callable[[Ints, Ints], tuple[Ints, Array]]
 def compare(
     true: FrameRows, est: FrameRows, similarity: PairSimilarity, within: tuple[Array, Array, Array] | None = None
 ) -> Pairs:
-    """Returns the pairs of rows of one frame that a similarity function keeps; both sides are sorted by frame.
+    """Returns the pairs of a true and an estimated row of one frame that a similarity function keeps.
 
-    within = (low, high, at) limits the pairs that the function is called for to those with low[i] <= at[j] <= high[i],
-    and a few more: low, high (R,) of the true rows, at (S,) of the estimated ones. A row with a nan there has no pair.
+    Both sides are sorted by frame. within = (low, high, at) saves calls of the function: it is called for the pairs
+    with low[i] <= at[j] <= high[i], and for a few others. low, high (R,) belong to the true rows, at (S,) to the
+    estimated rows. A row with nan in these arrays has no pair. None calls the function for all pairs of a frame.
     """
     found = [(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0))]
     for i, j in same_frame(true.frame, est.frame) if within is None else _near(true, est, *within):
@@ -109,7 +110,10 @@ def compare(
 
 
 def same_frame(a: Ints, b: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """Yields all pairs (index in a, index in b) with equal frame, in portions; b is sorted."""
+    """Yields all pairs of equal frame numbers in a and b, in portions: arrays of indices in a and in b, (P,) each.
+
+    a, b: frame numbers; b is sorted.
+    """
     first = np.searchsorted(b, a, side="left")
     return _portions(first, np.searchsorted(b, a, side="right") - first)
 
@@ -144,7 +148,10 @@ def _near(a: FrameRows, b: FrameRows, low: Array, high: Array, at: Array) -> Ite
 
 
 def box_pairs(true: FrameRows, est: FrameRows, true_box: Array, est_box: Array) -> Pairs:
-    """Returns the pairs of boxes (R, 4), (S, 4) of one frame that overlap, with their IoU; a nan box has no pairs."""
+    """Returns the pairs of a true and an estimated box of one frame that overlap, with their IoU.
+
+    true_box (R, 4), est_box (S, 4): left, top, width, height in px. A box with nan has no pairs.
+    """
     (la, ta, ra, ba), (lb, tb, rb, bb) = _edges(true_box), _edges(est_box)
     area_a, area_b = (np.maximum(box[:, 2], 0) * np.maximum(box[:, 3], 0) for box in (true_box, est_box))
     widest = float(est_box[np.isfinite(est_box[:, 2]), 2].max(initial=0.0))
@@ -166,7 +173,10 @@ def _edges(box: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def point_pairs(true: FrameRows, est: FrameRows, true_pos: Array, est_pos: Array, reach: float) -> Pairs:
-    """Returns the pairs of positions (R, 2), (S, 2) of one frame closer than `reach`: 1 - distance / reach."""
+    """Returns the pairs of a true and an estimated position of one frame that are closer than `reach`.
+
+    Their similarity is 1 - distance / reach. true_pos (R, 2), est_pos (S, 2) and reach have one unit.
+    """
     ax, ay, bx, by = (np.ascontiguousarray(pos[:, k]) for pos in (true_pos, est_pos) for k in (0, 1))
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:

@@ -56,7 +56,7 @@ PORTION = 100  # Draws that are computed together: bounds memory.
 
 
 def without_distractors(truth: Truth, unscored: Unscored, tracked: PersonRows) -> PersonRows:
-    """Returns the tracked people without those on distractors; all of them if they have no boxes."""
+    """Returns the tracked people except those whose box is matched to a distractor; all if tracks have no boxes."""
     if tracked.box is None:
         return tracked
     assert truth.box is not None
@@ -78,7 +78,7 @@ class Scores(Mapping[str, float]):
     Printed, it shows one line per score that is not nan.
 
     Attributes:
-        by_key: the scores. nan: not labelled, not comparable, or a denominator of 0.
+        by_key: the scores. nan means not labelled, not comparable, or a denominator of 0.
         similarity: how people were compared, by "boxes" (IoU) or by positions on the "ground" or in the "image".
         surface: where groups were compared, "ground" or "image".
         group_match: how groups were matched, by "hull" or by "members".
@@ -128,8 +128,9 @@ class MatchedSides:
     def weighted_scores(self, group_match: GroupMatch) -> Callable[[Array], Array]:
         """Returns a function from weights of frames to scores; group_match as of `evaluate`.
 
-        The function takes D draws (D, length) of weights of the frames 1 … length, of mean 1, as counts are their sums.
-        It returns all scores (D, K) in the order of `CATALOGUE`, nan where the frames of a denominator have no weight.
+        The function takes D draws of weights (D, length), one weight for each of the frames 1 … length. The weights of
+        a draw should have the mean 1, because scores that are counts are sums of weights. The function returns the K
+        scores of `CATALOGUE` in its order, (D, K). A score is nan where its denominator is 0 under the weights.
         """
         scores = self._weighted(group_match)
 
@@ -169,18 +170,19 @@ def evaluate(
 
     Args:
         truth: the labels of a sequence. If they are clearly sparse, only annotated frames are scored.
-        tracks: the tracker's `Tracks`, one per frame, in any order; a frame without tracks counts as empty. Groups and
-            events that they lack are derived by the default grouping, in the image only if `truth.px_per_m` is known.
+        tracks: the tracker's `Tracks`, one per frame, in any order. A frame without `Tracks` counts as a frame without
+            tracked people. If the tracks have no groups, groups and events are derived by the default grouping; in the
+            image, this needs a known `truth.px_per_m`.
         similarity: compares people by IoU ("boxes") or by max(0, 1 - d / 2 m) of their distance d ("ground", "image").
-            None follows the data: the ground if both sides can be there, else boxes, else the image.
+            None chooses by the data: the ground if both sides have or can get positions there, else boxes if everybody
+            has one and no camera is known, else the image.
         group_match: matches groups by IoU of their hulls ("hull") or Jaccard index of their members ("members").
             group_F1, group_precision and group_recall are by members in both cases.
-        frames: a number n scores frames 1 … n, a range only its frames, None all frames.
+        frames: the frames to score. A number n means frames 1 … n, a range its frames, None all frames.
 
     Returns:
-        `Scores`, a mapping from key to value. A score is nan if it cannot be computed: scores of people for a tracker
-        of
-        whole groups, scores of groups and events if no scored frame has group labels.
+        `Scores`, a mapping from key to value. A score is nan if it cannot be computed. So scores of people are nan for
+        a tracker of whole groups, and scores of groups and events are nan if no scored frame has group labels.
 
     Raises:
         IncomparableError: boxes or positions to be compared are missing.
@@ -194,8 +196,9 @@ def evaluate(
 class Scorer:
     """Scores any number of trackers against one truth, which must not change meanwhile.
 
-    State: truth, on the ground if its boxes can be; annotated, its frames that can be scored; labelled (length + 1,),
-    bool by frame number: annotated with groups; the true people and groups as rows, built at first use and kept.
+    State: truth, with positions on the ground if it has positions there, or boxes and a camera; annotated, the frames
+    that can be scored; labelled (length + 1,), bool by frame number, the annotated frames with labelled groups; the
+    true people and groups as rows, built at first use and kept.
     """
 
     def __init__(self, truth: Truth) -> None:
@@ -206,7 +209,7 @@ class Scorer:
 
     @cached_property
     def of_feet(self) -> Scorer:
-        """The scorer of tracks that were moved to the ground by their boxes: true people stand where their boxes do."""
+        """The scorer for tracks that were moved from boxes to the ground; true people are moved in the same way."""
         return Scorer(on_feet(self.truth))
 
     @cached_property
@@ -215,7 +218,10 @@ class Scorer:
         return true_people(self.truth, chosen_frames(None, self.truth.length))
 
     def scored(self, frames: int | range | None) -> Bools:
-        """Returns which of the frame numbers 0 … length are scored, (length + 1,) bool: chosen and annotated ones."""
+        """Returns which of the frame numbers 0 … length are scored, (length + 1,) bool: those chosen and annotated.
+
+        frames: a number n chooses 1 … n, a range its frames, None all frames.
+        """
         return chosen_frames(frames, self.truth.length) & self.annotated.frames
 
     def groups(self, surface: Surface) -> TrueGroups:
@@ -225,7 +231,10 @@ class Scorer:
         return self._groups[surface]
 
     def sides(self, tracks: Sequence[Tracks], frames: Bools) -> ComparedSides:
-        """Returns both sides' data in the frames f where frames[f] is true, nobody mapped yet, distractors left out."""
+        """Returns the data of truth and tracks in the frames f where frames[f] is true.
+
+        Tracked people on distractors are left out. No tracked person is mapped to a true person yet.
+        """
         kept = frames[self.people.rows.frame]
         true = self.people if kept.all() else self.people.keep(kept)
         est, plane = tracked_people(tracks), plane_of(self.truth, tracks)
@@ -237,14 +246,17 @@ class Scorer:
     def evaluate(
         self, tracks: Iterable[Tracks], *, similarity: Similarity | None = None, frames: int | range | None = None
     ) -> Scores:
-        """Returns the scores of one tracker against this truth, as the function `evaluate` does."""
+        """Returns the scores of one tracker against this truth, as the function `evaluate` with "hull" does."""
         (compared,) = self.compare([tracks], similarity, frames)
         return compared.scores("hull")
 
     def compare(
         self, runs: Sequence[Iterable[Tracks]], similarity: Similarity | None = None, frames: int | range | None = None
     ) -> list[MatchedSides]:
-        """Returns this truth and each run with people mapped, all in one plane and by one similarity, as `evaluate`."""
+        """Returns for each run this truth and the run's tracks, compared, with tracked people mapped to true people.
+
+        All runs are compared in one plane and by one similarity; the arguments are as in `evaluate`.
+        """
         inside = self.scored(frames)
         ordered = [_in_order(run, inside) for run in runs]
         moved, chosen = in_one_plane(self.truth, ordered, [from_pixels(run) for run in runs], similarity)
@@ -252,7 +264,10 @@ class Scorer:
         return [judge._matched(run, chosen, inside) for judge, run in zip(judges, moved, strict=True)]
 
     def judge(self, given: Sequence[Tracks], moved: Sequence[Tracks]) -> Scorer:
-        """Returns the scorer for a run that was `given`, and is compared as `moved`: this one, or that of feet."""
+        """Returns the scorer for one run: `of_feet` if its tracks were moved to the ground, else this scorer.
+
+        given, moved: the run's tracks before and after `in_one_plane`, the same object if they were not moved.
+        """
         return self.of_feet if moved is not given and plane_of(self.truth, moved) == "ground" else self
 
     def _matched(self, given: Sequence[Tracks], similarity: Similarity, inside: Bools) -> MatchedSides:
@@ -269,7 +284,10 @@ class Scorer:
 
 
 def chosen_frames(frames: int | range | None, length: int) -> Bools:
-    """Returns which of the frame numbers 0 … length are chosen (length + 1,): 1 … n, those of a range, or None: all."""
+    """Returns which of the frame numbers 0 … length are chosen, (length + 1,) bool; frame 0 never is.
+
+    frames: a number n chooses 1 … n, a range its frames, None all frames.
+    """
     inside = np.zeros(length + 1, bool)
     if isinstance(frames, range):
         inside[[f for f in frames if 1 <= f <= length]] = True
@@ -279,7 +297,7 @@ def chosen_frames(frames: int | range | None, length: int) -> Bools:
 
 
 def labelled_frames(truth: Truth) -> Bools:
-    """Returns which of the frame numbers 0 … length have labelled groups, (length + 1,)."""
+    """Returns which of the frame numbers 0 … length have labelled groups, (length + 1,) bool."""
     if truth.groups is None and truth.groups_px is None:
         return np.zeros(truth.length + 1, bool)
     labelled = np.ones(truth.length, bool) if truth.labelled is None else truth.labelled
@@ -294,9 +312,9 @@ def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
 
 
 def weighted_people(pairs: Pairs, size: int) -> WeightedScores:
-    """Returns the weighted scores of HOTA, CLEAR and Identity; size: number of frame numbers, from 0.
+    """Returns a function from weights (D, size) of frames to the scores of HOTA, CLEAR and identity, (D,) by key.
 
-    Raises ValueError if an id is twice in a frame.
+    size: length of the recording + 1. Raises ValueError if an id is twice in a frame.
     """
     pairs.require_unique_ids()
     parts = [scores(pairs, size) for scores in (weighted_hota, weighted_clear, weighted_identity)]

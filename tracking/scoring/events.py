@@ -33,7 +33,10 @@ class EventMembers:
     unmatched: int = 0  # number of further members that are mapped to no true person, or to one already in `people`
 
     def jaccard(self, other: EventMembers) -> float:
-        """Returns common people / all members of both, 0 if both are empty."""
+        """Returns the number of common people / the number of all members of both, 0 if both are empty.
+
+        Each unmatched member counts in the denominator only.
+        """
         common = len(self.people & other.people)
         whole = len(self.people | other.people) + self.unmatched + other.unmatched
         return common / whole if whole else 0.0
@@ -74,7 +77,10 @@ class MatchedEvents:
 def match_events(
     true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], fps: float, scale: float
 ) -> list[MatchedEvents]:
-    """Returns the matched events of each kind in the order of `KINDS`; scale: units of `pos` per metre."""
+    """Returns one `MatchedEvents` per kind, in the order of `KINDS`, also for kinds without events.
+
+    scale: units of `pos` per metre. Of several matchings, one with the most pairs is taken, then the most similar.
+    """
     found = []
     for kind in KINDS:
         a, b = ([e for e in side if COUNTS_AS.get(e.kind, e.kind) == kind] for side in (true, est))
@@ -112,7 +118,10 @@ def _one_to_one(
 
 
 def same_lineage(true: ComparableEvent, est: ComparableEvent) -> bool:
-    """Returns True if both events have equally many parents and children, and each true one has its like (J > 0.5)."""
+    """Returns True if both events have equally many parents and equally many children, and these agree.
+
+    They agree if each true part has an estimated part with a Jaccard index above 0.5. False if any lineage is unknown.
+    """
     if true.parents is None or true.children is None or est.parents is None or est.children is None:
         return False
     return _same_parts(true.parents, est.parents) and _same_parts(true.children, est.children)

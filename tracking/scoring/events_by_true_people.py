@@ -26,9 +26,10 @@ def true_events(
 ) -> list[ComparableEvent]:
     """Returns the truth's events of known kinds that start in a frame f where frames[f] is true.
 
-    positions (R, 2): of the true people on the surface of comparison; None if `GroupEvent.pos` is on it. Parents are
-    the groups of the members in the last of the `step` frames before the start in which each is there, children those
-    at the start. A member alone or absent is a part of its own.
+    positions (R, 2): of the true people on the surface where events are compared; None uses `GroupEvent.pos`. The
+    parents divide the members by their groups before the start: each member's group in the last of the `step` frames
+    before the start in which the member is there. The children divide them by their groups at the start. A member who
+    is alone or absent is a part alone.
     """
     lookup, parts_of = RowLookup(people.rows), _parts_of(people)
 
@@ -92,11 +93,12 @@ def _mean_position(event: GroupEvent, lookup: RowLookup, positions: Array) -> tu
 def tracked_events(
     tracks: Sequence[Tracks], people: PersonRows, mapping: Ints, true: FrameRows, frames: Bools, reach: int
 ) -> list[ComparableEvent]:
-    """Returns a tracker's events with members that start in a frame f where frames[f] is true.
+    """Returns those of a tracker's events that name members and start in a frame f where frames[f] is true.
 
-    mapping (R,): the row of `true` of each tracked person, -1 none. A member becomes the person it is mapped to in the
-    frame nearest to the start, within `reach` frames. Parents are the groups of the members in the frame before the
-    report, or before the start if nothing changes there; children those in the frame of the report.
+    mapping (R,): the row of `true` that each row of `people` (the tracked people) is mapped to, -1 none. A member
+    becomes the true person that it is mapped to in the frame nearest to the start, at most `reach` frames away. Parents
+    divide the members by their groups before the report, or before the start if both divisions are the same; children
+    divide them by their groups at the report.
     """
     mapped, parts_of = RowLookup(people.rows, mapping >= 0), _parts_of(people)
     person = np.append(true.id, -1)[mapping].tolist()
@@ -120,10 +122,11 @@ def _true_members(members: Sequence[int], known: Mapping[int, int]) -> EventMemb
 def events_of_hulls(
     tracks: Sequence[Tracks], groups: GroupRows, true: FrameRows, frames: Bools, span: int, without_members: bool
 ) -> list[ComparableEvent]:
-    """Returns a tracker's events by who is inside the hulls of its groups, without `members`.
+    """Returns a tracker's events with parents and children by who is inside the hulls of its groups.
 
-    Members of `groups` are rows of `true`. Children are judged in `span` frames from the report on, parents in as many
-    before the start, or before the report if a parent group appears only at the start or later.
+    `members` of the results are None. Members of `groups` are row indices of `true`. Children are judged in `span`
+    frames from the report on. Parents are judged in `span` frames before the start, or before the report if a parent
+    group appears only at the start or later. without_members: if True, events that name members are left out.
     """
     person = true.id[groups.member]
 

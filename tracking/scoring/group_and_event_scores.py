@@ -69,8 +69,9 @@ class TrackedGroups:
 def tracked_groups(sides: ComparedSides) -> TrackedGroups:
     """Returns the tracker's groups in labelled frames, and which of them are scored.
 
-    If the tracker names members, groups of two or more are scored. Else the true people inside the hull or at most 0.3
-    m from it are the members; a hull with one is no group, a hull with nobody is a false one.
+    If the tracker names members, its groups of two or more members are scored. Otherwise the members of a group are the
+    true people inside its hull or at most 0.3 m outside. Then a hull with exactly one person is not scored; a hull with
+    nobody is scored, as a false group.
     """
     tracks = [t for t in sides.tracks if sides.frames[t.index]]
     frames = np.array([t.index for t in tracks], np.int64)
@@ -95,7 +96,10 @@ def _true_rows(groups: GroupRows, mapping: Ints) -> Ints:
 
 
 def near_changes(truth: Truth) -> Bools:
-    """Returns which frame numbers 0 … length are at most 1 s from the start of a true merge or split, (length + 1,)."""
+    """Returns which of the frame numbers 0 … length are at most 1 s from the start of a true merge or split.
+
+    The result is bool, (length + 1,). `form` counts as a merge and `dissolve` as a split.
+    """
     starts = np.array([e.start for e in truth.events or () if e.kind in CHANGES], float)
     frame = np.arange(truth.length + 1)
     away = np.abs(frame[:, None] - starts[None]).min(axis=1, initial=np.inf)
@@ -103,7 +107,7 @@ def near_changes(truth: Truth) -> Bools:
 
 
 def compared_events(sides: ComparedSides, tracked: TrackedGroups) -> list[MatchedEvents]:
-    """Returns the events of both sides that start in labelled frames, matched, one entry per kind."""
+    """Returns the events of the truth and of the tracker that start in labelled frames, matched, one entry per kind."""
     truth, rows, frames, fps = sides.truth, sides.true.rows, sides.frames, sides.truth.fps
     assert truth.events is not None
     step, happened = widest_step(sides.inside), first_seen(truth.events, sides.inside)
@@ -117,7 +121,10 @@ def compared_events(sides: ComparedSides, tracked: TrackedGroups) -> list[Matche
 
 
 def unknown_kinds(sides: ComparedSides) -> set[str]:
-    """Returns the kinds of events whose scores are unknown: those that a tracker of whole groups does not report."""
+    """Returns the kinds of events whose scores are unknown.
+
+    For a tracker of whole groups they are "cross" and "queue", unless it reports such an event. Else there are none.
+    """
     if not sides.groups_only:
         return set()
     return {"cross", "queue"} - {event.kind for t in sides.tracks for event in t.events}

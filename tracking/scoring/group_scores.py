@@ -45,7 +45,10 @@ class SharedMembers:
 
 
 def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -> SharedMembers:
-    """Returns the numbers of common members; person (K,): true person of each estimated membership, -1 none."""
+    """Returns the numbers of common members of true and estimated groups.
+
+    person (K,): row of the true person of each of the K memberships of `est`, -1 none. people: number of true rows.
+    """
     i = group_of_person(true, people)[person]  # -1 selects the last element, which is -1
     known = i >= 0
     key, count = np.unique(i[known] * len(est) + est.of[known], return_counts=True)
@@ -53,7 +56,7 @@ def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -
 
 
 def groups_found(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Bools:
-    """Returns which true groups are found, (G,): the Jaccard index with some estimated group is above 1/2."""
+    """Returns which true groups are found, (G,) bool: those with a Jaccard index above 1/2 with an estimated group."""
     i, j = np.divmod(shared.key, max(shared.width, 1))
     found = np.zeros(len(true), bool)
     # Above 1/2 no matching is needed: two true groups share nobody, so that at most one has most of an estimated group.
@@ -64,7 +67,10 @@ def groups_found(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Bool
 
 
 def group_of_person(groups: GroupRows, people: int) -> Ints:
-    """Returns the group of each row of people, -1 for none, and -1 as last element: (people + 1,)."""
+    """Returns the index of the group row of each person row, -1 for none; a last element of -1 is added.
+
+    people: number of person rows. The result has the shape (people + 1,), so that index -1 gives -1.
+    """
     group = np.full(people + 1, -1, np.int64)
     known = groups.member >= 0
     group[groups.member[known]] = groups.of[known]
@@ -72,7 +78,7 @@ def group_of_person(groups: GroupRows, people: int) -> Ints:
 
 
 def hull_pairs(true: GroupRows, est: GroupRows) -> Pairs:
-    """Returns the pairs of groups of one frame whose hulls overlap, with the IoU of the hulls."""
+    """Returns the pairs of a true and an estimated group of one frame with overlapping hulls, with the IoU of hulls."""
     width = max(map(len, (*true.hull, *est.hull)), default=1)
     a, b = pack(true.hull, width), pack(est.hull, width)
 
@@ -85,7 +91,7 @@ def hull_pairs(true: GroupRows, est: GroupRows) -> Pairs:
 
 
 def member_pairs(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Pairs:
-    """Returns the pairs of groups of one frame with common members, with the Jaccard index of the members."""
+    """Returns the pairs of a true and an estimated group of one frame with common members, with their Jaccard index."""
     n, m = true.count, est.count
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:
@@ -97,7 +103,11 @@ def member_pairs(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Pair
 
 
 def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float = 0.0) -> Pairs:
-    """Returns the one-to-one matching of each frame with the greatest total similarity, then nearest centres."""
+    """Returns the matched pairs: one to one in each frame, with the greatest total similarity.
+
+    Of equal matchings the one with nearer centres is taken. true_pos (G, 2), est_pos (H, 2): centres of the groups.
+    Pairs of similarity below `least` are not matched.
+    """
     near = pairs.keep(pairs.s >= least - EPS)
     apart = np.hypot(*(true_pos[near.i] - est_pos[near.j]).T)
     closeness = np.nan_to_num(1 / (1 + apart), nan=0.0)
@@ -106,7 +116,10 @@ def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float =
 
 
 def switch_frames(frame: Ints, true: Ints, est: Ints) -> Ints:
-    """Returns the frames in which a true id is matched with another estimated id than in its previous match."""
+    """Returns the frames in which a true id is matched with another estimated id than in its previous match.
+
+    frame, true, est (K,): frame, true id and estimated id of each match. A frame occurs once per switch.
+    """
     order = np.lexsort((frame, true))
     f, t, e = frame[order], true[order], est[order]
     return np.asarray(f[1:][(t[1:] == t[:-1]) & (e[1:] != e[:-1])])

@@ -28,9 +28,10 @@ WORTH = 0.2  # share of pairs that a pass must remove for another pass to be qui
 
 
 def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
-    """Returns which of K pairs are matched, (K,): one to one, with the greatest sum of weights in each frame.
+    """Returns which of K pairs are matched, (K,) bool: one to one, with the greatest sum of weights in each frame.
 
-    frame, i (K,): ascending; each row index i, j belongs to one frame; weight (K,): above 0.
+    frame (K,): frame number of each pair, ascending. i, j (K,): the pair's row index on each side, i ascending; a row
+    occurs in one frame only. weight (K,): above 0.
     """
     chosen, left = _settle(i, j, weight, strict=False)
     # Rows are sorted by frame: among those of the pairs that are left, those of a frame are neighbours.
@@ -44,7 +45,10 @@ def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
 
 
 def match_as_table(pairs: Pairs, weight: Array) -> Bools:
-    """Returns which of the pairs are matched, (K,), with ties broken as TrackEval does; weight (K,): above 0."""
+    """Returns which of the pairs are matched, (K,) bool: as `match`, but with ties broken as TrackEval does.
+
+    weight (K,): above 0.
+    """
     chosen, left = _settle(pairs.i, pairs.j, weight, strict=True)
     frame = pairs.frame
     tangled = np.unique(frame[left])
@@ -56,7 +60,10 @@ def match_as_table(pairs: Pairs, weight: Array) -> Bools:
 
 
 def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
-    """Returns which of the pairs start … end - 1, all pairs of one frame, scipy's linear_sum_assignment matches."""
+    """Returns which of the P pairs of one frame scipy's linear_sum_assignment matches, (P,) bool.
+
+    start, end: the pairs with indices start … end - 1 are all pairs of the frame. weight (P,): of these pairs.
+    """
     i, j = pairs.i[start:end], pairs.j[start:end]
     frame = pairs.true.frame[i[0]]
     (top, bottom), (first, last) = (np.searchsorted(r.frame, (frame, frame + 1)) for r in (pairs.true, pairs.est))
@@ -126,7 +133,10 @@ def _touched(i: Ints, j: Ints, chosen: Bools) -> Bools:
 
 
 def mapped_people(pairs: Pairs, least: float = FOUND) -> Ints:
-    """Returns for each row of pairs.est the row of pairs.true that it is mapped to, -1 none, (S,)."""
+    """Returns for each row of pairs.est the index of the row of pairs.true that it is matched with, -1 none, (S,).
+
+    Matching is one to one in each frame, among pairs of similarity `least` or more, with the greatest total similarity.
+    """
     near = pairs.keep(pairs.s >= least - EPS)
     chosen = match(near.true.frame[near.i], near.i, near.j, near.s)
     mapped = np.full(len(pairs.est), -1, np.int64)

@@ -40,7 +40,10 @@ class PersonRows:
         return PersonRows(self.rows.keep(mask), self.group[mask], pos, vel, box)
 
     def positions_on(self, surface: Surface, plane: str) -> Array | None:
-        """Returns the positions (R, 2) on a surface, m or px, None if unknown there; plane: of `pos`."""
+        """Returns the positions (R, 2) on a surface, in m on the "ground" or px in the "image"; None if unknown there.
+
+        plane: the plane of `pos`. In the image the centre of the box is preferred to `pos`.
+        """
         if surface == "image" and self.box is not None:
             return self.box[:, :2] + self.box[:, 2:] / 2
         own = "image" if plane == "image" else "ground"
@@ -84,7 +87,10 @@ def true_people(truth: Truth, frames: Bools) -> PersonRows:
 
 
 def tracked_people(tracks: Sequence[Tracks]) -> PersonRows:
-    """Returns one tracker's people as rows, `tracks` sorted by frame; box is None if a frame lacks boxes."""
+    """Returns one tracker's people as rows; `tracks` are sorted by frame.
+
+    `box` of the result is None if in any frame with people the boxes are missing.
+    """
     count = [len(t.id) for t in tracks]
     frame = np.repeat(np.array([t.index for t in tracks], np.int64), count)
     none = np.zeros(0, np.int64)
@@ -99,7 +105,10 @@ def tracked_people(tracks: Sequence[Tracks]) -> PersonRows:
 
 
 def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> GroupRows:
-    """Returns the groups of F frames as rows, and memberships as rows of `people`, -1 for a member without one."""
+    """Returns the groups of F frames as rows; frames (F,) gives the frame number of each element of `groups`.
+
+    The members become row indices of `people`, -1 for a member who has no row there.
+    """
     count = [len(g.id) for g in groups]
     none = np.zeros(0, np.int64)
     rows = FrameRows(np.repeat(frames, count), np.concatenate([none, *(g.id for g in groups)]))
@@ -125,14 +134,21 @@ class TrueGroups:
     comparable: bool
 
     def in_frames(self, frames: Bools, people: Bools) -> TrueGroups:
-        """Returns the groups of the frames f where frames[f] is true, members renumbered to the kept people (R,)."""
+        """Returns the groups of the frames f where frames[f] is true.
+
+        people (R,), bool: which true people are kept; members become row indices of the kept ones.
+        """
         groups = self.groups.keep(frames[self.groups.rows.frame])
         number = np.append(np.cumsum(people) - 1, -1)  # the last element keeps -1, an unknown member
         return TrueGroups(replace(groups, member=number[groups.member]), self.comparable)
 
 
 def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surface) -> TrueGroups:
-    """Returns the truth's groups of two or more; centres are nan if only the other surface has groups."""
+    """Returns the truth's groups of two or more members in the labelled frames, on a surface.
+
+    If the truth has groups on the other surface only, these are returned with centres of nan. labelled (length + 1,) is
+    bool by frame number; people are all true people, whose row indices become the members.
+    """
     wanted, other = truth.groups, truth.groups_px
     if surface == "image":
         wanted, other = other, wanted
@@ -147,7 +163,10 @@ def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surfa
 
 
 def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> GroupRows:
-    """Returns the groups with new members: the `people` at `positions` (R, 2) inside the hull or near it."""
+    """Returns the groups with new members: the people inside the hull or at most 0.3 m outside, in the same frame.
+
+    positions (R, 2): of the R people, in the unit of the hulls. scale: units per metre, as px_per_m in the image.
+    """
     hulls, points = pack(groups.hull), pack_padded(positions[:, None])
     low, high = hulls.box[:, :2] - INSIDE * scale, hulls.box[:, 2:] + INSIDE * scale
 

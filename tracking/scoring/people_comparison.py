@@ -34,13 +34,16 @@ class IncomparableError(ValueError):
 
 
 def plane_of(truth: Truth, tracks: Sequence[Tracks]) -> str:
-    """Returns the plane of one tracker's positions, or the truth's without tracks: "ground", "space" or "image"."""
+    """Returns the plane of one tracker's positions: "ground", "space" or "image"; without `Tracks`, the truth's."""
     own = "image" if truth.pos is None else "ground"
     return next((t.plane for t in tracks if len(t.id)), tracks[0].plane if tracks else own)
 
 
 def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
-    """Returns the candidate pairs of true and tracked people of one frame. Raises IncomparableError if data lack."""
+    """Returns the candidate pairs of a true and a tracked person of one frame, with their similarity.
+
+    Raises IncomparableError if the boxes, positions or image scale that the similarity needs are missing.
+    """
     true, est = sides.true, sides.est
     if similarity == "boxes":
         if true.box is None or est.box is None:
@@ -64,14 +67,20 @@ def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
 
 
 def grounded(truth: Truth) -> Truth:
-    """Returns the truth with people and groups on the ground if it has boxes and a camera only; else unchanged."""
+    """Returns the truth with people and groups on the ground, as `on_feet`, if it has boxes and a camera but no `pos`.
+
+    Any other truth is returned unchanged.
+    """
     if truth.pos is not None or truth.box is None or truth.camera is None:
         return truth
     return on_feet(truth)
 
 
 def on_feet(truth: Truth) -> Truth:
-    """Returns a truth with boxes and a camera with people and groups where the boxes stand on the ground."""
+    """Returns the truth with people at the ground points where their boxes stand, and groups derived there.
+
+    The truth must have boxes and a camera. `vel` becomes None. Groups are derived only if the truth has groups.
+    """
     assert truth.box is not None, "only boxes have feet"
     assert truth.camera is not None, "only boxes of a calibrated sequence have feet on the ground"
     pos = feet(truth.box, truth.camera, truth.scene)
@@ -87,9 +96,10 @@ def in_one_plane(
 ) -> tuple[list[Sequence[Tracks]], Similarity]:
     """Returns the tracks of all runs of one sequence in one plane, and the similarity of people to use for all.
 
-    truth: as `grounded` returns it. pixels: for each run, whether it comes from pixels. Tracks that were moved to the
-    ground are to be compared with `on_feet`. Raises IncomparableError if a run on the ground must be moved to the
-    image, and has no boxes of people.
+    truth: as `grounded` returns it. pixels: for each run, True if its tracker worked on pictures. similarity: returned
+    as it is unless None, which chooses it by the data. Tracks that were moved to the ground must be compared with the
+    truth that `on_feet` returns. Raises IncomparableError if a run on the ground must be moved to the image but has no
+    boxes of people.
     """
     ground = similarity == "ground"
     if similarity in (None, "boxes"):
@@ -108,7 +118,7 @@ def in_one_plane(
 
 
 def from_pixels(run: Iterable[Tracks]) -> bool:
-    """Returns True if the tracker of a run worked on pictures, as its `info` says. Other tracks have no `info`."""
+    """Returns True if the tracker of a run worked on pictures, by the run's `info`; False if it has no `info`."""
     return getattr(run, "info", {}).get("detections") == "image"
 
 

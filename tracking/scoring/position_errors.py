@@ -32,7 +32,11 @@ PARTS = ("GOSPA_localisation", "GOSPA_missed", "GOSPA_false")
 
 
 def weighted_positions(sides: ComparedSides) -> WeightedScores:
-    """Returns the weighted RMSE_pos, RMSE_vel, GOSPA and its parts; {} without positions or scale on the surface."""
+    """Returns a function from weights (D, size) of frames to RMSE_pos, RMSE_vel, GOSPA and its parts, (D,) by key.
+
+    The function returns {} if a side has no positions on the surface of comparison, or the image scale is unknown.
+    RMSE_vel is nan in the image, or without velocities.
+    """
     true, est = sides.true, sides.est
     true_pos, est_pos = true.positions_on(sides.surface, "ground"), est.positions_on(sides.surface, sides.plane)
     if true_pos is None or est_pos is None or not 0 < sides.scale < np.inf:
@@ -56,7 +60,10 @@ def weighted_positions(sides: ComparedSides) -> WeightedScores:
 
 
 def gospa_of(means: Mapping[str, Array], power: float = POWER) -> dict[str, Array]:
-    """Returns GOSPA and its parts by key, roots of means (D,) over frames of d^p and of `PARTS`, by name."""
+    """Returns GOSPA and its parts by key, (D,) each: the p-th roots of means over frames.
+
+    means: by the names of `PARTS`, the mean over frames of each part of d^p, (D,). power: p.
+    """
     localisation, missed, false = parts = [means[name] for name in PARTS]
     powers = {**dict(zip(PARTS, parts, strict=True)), "GOSPA": localisation + missed + false}
     # float by float: numpy takes another root of arrays, which differs in the last bit
@@ -64,7 +71,10 @@ def gospa_of(means: Mapping[str, Array], power: float = POWER) -> dict[str, Arra
 
 
 def gospa_parts(pairs: Pairs, cutoff: float, power: float = POWER) -> Array:
-    """Returns localisation, missed and false parts of d^p for each frame number 0 … last, (last + 1, 3)."""
+    """Returns the localisation, missed and false part of d^p for each frame number 0 … last, (last + 1, 3).
+
+    pairs: their similarity must be 1 - distance / cutoff. power: p.
+    """
     end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=-1)
     cost = (cutoff * (1 - pairs.s)) ** power
     frame = pairs.frame

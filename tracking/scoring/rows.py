@@ -30,7 +30,7 @@ class FrameRows:
         return FrameRows(self.frame[mask], self.id[mask])
 
     def require_unique_ids(self, side: str) -> None:
-        """Raises ValueError if an id occurs twice in one frame; side begins the message."""
+        """Raises ValueError if an id occurs twice in one frame; the message begins with `side`."""
         again = self.keep(repeated_ids(self.frame, self.id))
         if len(again):
             k = np.lexsort((again.id, again.frame))[0]
@@ -38,7 +38,11 @@ class FrameRows:
 
 
 def numbered(values: Ints) -> tuple[Ints, Ints]:
-    """Equals `numpy.unique(values, return_inverse=True)`, but counts instead of sorting where the range is small."""
+    """Returns the distinct values, ascending, and the index of each value among them.
+
+    The result is that of `numpy.unique(values, return_inverse=True)`. Where the range of values is small, counting
+    replaces sorting.
+    """
     if len(values) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     low, high = int(values.min()), int(values.max())
@@ -68,7 +72,8 @@ def find_rows(rows: FrameRows, wanted: FrameRows) -> Ints:
 class RowLookup:
     """Finds the row of one id that is nearest to a frame.
 
-    State: row, the row indices sorted by id and frame; frame, their frame numbers; span, by id the range in both lists.
+    `only`, a bool mask of the rows, limits the search; None searches all rows. State: row, the row indices sorted by id
+    and frame; frame, the frame number of each; span, by id, start and end of its part of both lists.
     """
 
     def __init__(self, rows: FrameRows, only: Bools | None = None) -> None:
@@ -82,7 +87,10 @@ class RowLookup:
         self.span = dict(zip(ids.tolist(), pairwise(cuts), strict=True))
 
     def nearest(self, id: int, frame: int, back: int, ahead: int) -> int:
-        """Returns the id's row nearest to `frame` in [frame - back, frame + ahead], of two the earlier; -1 if none."""
+        """Returns the index of the id's row nearest to `frame`, if it lies in [frame - back, frame + ahead], else -1.
+
+        Of two rows equally near, the earlier one is returned.
+        """
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_left(self.frame, frame, low, high)
         near = [k for k in (at - 1, at) if low <= k < high and -back <= self.frame[k] - frame <= ahead]

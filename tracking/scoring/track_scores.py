@@ -42,10 +42,11 @@ LEAST = 1e-10  # keeps LocA at 1 where nothing is matched
 
 
 def weighted_hota(pairs: Pairs, size: int, by_level: bool = True) -> WeightedScores:
-    """Returns the weighted HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, each the mean over `ALPHAS`.
+    """Returns a function from weights (D, size) to HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr, LocA, (D,) by key.
 
-    One matching serves all thresholds: in each frame the greatest sum of A(i, j) s(i, j). It is kept. by_level: at
-    weights of 1 similarities are added up by level, not by frame; the last bit of LocA depends on it."""
+    Each is the mean over `ALPHAS`. One matching serves all thresholds and all weights: in each frame the one with the
+    greatest sum of A(i, j) s(i, j). by_level: True adds similarities up by threshold first, False by frame first; only
+    the last bit of LocA depends on it."""
     true_id, est_id, link = pairs.links
     n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link
     m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
@@ -105,7 +106,10 @@ def _scores(together: Array, near: Array, n: Array, m: Array, true: Array, est: 
 
 
 def alignment(pairs: Pairs, frames: Ints) -> Array:
-    """Returns the alignment A in [0, 1] of each of U links (U,); frames (U,): rows of its two ids together."""
+    """Returns the alignment A in [0, 1] of each of the U combinations of ids in `pairs.links`, (U,).
+
+    frames (U,): number of rows of the true id plus number of rows of the estimated id.
+    """
     i, j, s = pairs.i, pairs.j, pairs.s
     of_i = np.bincount(i, weights=s, minlength=len(pairs.true))
     of_j = np.bincount(j, weights=s, minlength=len(pairs.est))
@@ -119,9 +123,10 @@ MOSTLY, LOST = 0.8, 0.2
 
 
 def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
-    """Returns the weighted MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag, with the matches kept.
+    """Returns a function from weights (D, size) to MOTA, MOTP, TP, FN, FP, IDSW, MT, PT, ML, Frag, (D,) by key.
 
-    MT, PT and ML are shares of the people of the whole recording: each person counts in its frames with equal parts.
+    The matches do not depend on the weights, nor does who is in MT, PT or ML. These three are numbers of people: a
+    person with n frames counts 1 / n times the weight in each of them.
     """
     near, turn = clear_matches(pairs), turns(pairs)
     who = near.true_ids[1][near.i]
@@ -146,7 +151,7 @@ def weighted_clear(pairs: Pairs, size: int) -> WeightedScores:
 
 
 def clear_matches(pairs: Pairs) -> Pairs:
-    """Returns the matches of CLEAR: pairs of similarity 0.5 or more; no id may be twice in a frame."""
+    """Returns the pairs that CLEAR matches, of similarity 0.5 or more; no id may be twice in a frame of a side."""
     near = pairs.keep(pairs.s >= FOUND - EPS)
     return near.keep(follow(near, turns(pairs)))
 
@@ -191,7 +196,10 @@ def _before(link: Ints, turn: Ints) -> Ints:
 
 
 def weighted_identity(pairs: Pairs, size: int) -> WeightedScores:
-    """Returns the weighted IDF1, IDP, IDR and IDTP; ids are assigned anew for each draw of weights."""
+    """Returns a function from weights (D, size) to IDF1, IDP, IDR and IDTP, (D,) by key.
+
+    True and estimated ids are assigned to each other anew for each of the D draws.
+    """
     near = pairs.s >= FOUND
     true_id, est_id, link = pairs.links
     common = bin_sums(pairs.frame[near], link[near], len(true_id), size)

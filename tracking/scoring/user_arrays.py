@@ -48,32 +48,33 @@ def score_arrays(
 ) -> Scores:
     """Returns every score of the catalogue for a truth and tracks given as tables of columns.
 
-    A table is a mapping from column names to arrays of R rows, one per person and frame, in any order: frame (R,),
-    whole numbers from 1; id (R,), whole numbers; pos (R, 2), x, y on the ground in m; box (R, 4): left, top, width,
-    height in px; group (R,), group id, -1 alone. frame, id and one of pos and box are required. The bounds are those of
-    files: ids from 0, coordinates within 1e6, boxes with an area, at most 5000 rows of one frame, 1,000,000 frames.
+    A table is a mapping from column names to arrays of R rows, one row per person and frame, in any order. The columns
+    are: frame (R,), whole numbers from 1; id (R,), whole numbers; pos (R, 2), x and y on the ground in m; box (R, 4),
+    left, top, width and height in px; group (R,), group id, -1 for a person alone. Required are frame, id, and pos or
+    box (or both). The bounds are those of files: ids from 0, coordinates from -1e6 to 1e6, width and height above 0, at
+    most 5000 rows per frame, frame numbers up to 1,000,000.
 
-    Groups are compared on the ground if both tables have pos, else in the image. Without a group column in the truth
-    only people are scored. Without one in the tracks they get groups by the default grouping. Events of both sides are
-    derived from groups and positions. Clearly sparse labels, as in every 10th frame, limit the scores to their frames.
-    Warns if hardly any tracked person matches a true one.
+    Groups are compared on the ground if both tables have pos, else in the image. If the truth has no group column, only
+    people are scored. If the tracks have none, the default grouping finds their groups. Events of both sides are
+    derived from groups and positions. If only some frames are labelled (every 10th, say), only these are scored. Warns
+    if hardly any tracked person matches a true one.
 
     Args:
         truth: the table of the labelled people.
         tracks: the table of the tracked people.
         fps: frames per second, 0.01 to 1000.
-        px_per_m: pixels per metre, for boxes only; None takes the median height of the true boxes for 1.7 m.
-        similarity: compares people by "boxes", "ground" or "image"; None: on the ground if both have `pos`,
-            else by boxes.
-        group_match: matches groups by "hull" or "members".
+        px_per_m: pixels per metre, used in the image only. None assumes that the median true box is 1.7 m high.
+        similarity: compares people by IoU of "boxes" or by distance on the "ground" or in the "image". None compares on
+            the ground if both tables have pos, else by boxes.
+        group_match: matches groups by IoU of their hulls ("hull") or Jaccard index of their members ("members").
 
     Returns:
         `Scores`, a mapping from key to value; a score that cannot be computed is nan.
 
     Raises:
-        ValueError: a column is unknown, missing, of a wrong shape, or holds a value out of bounds; the tables have no
-            kind of position in common; or an id occurs twice in one frame.
-        InputError: groups must be derived in the image, and px_per_m is not above 0 or unknown without true boxes.
+        ValueError: a column is unknown, missing, of a wrong shape, or holds a value out of bounds; one table has pos
+            only and the other box only; or an id occurs twice in one frame.
+        InputError: groups must be derived in the image, and px_per_m is 0 or less, or is None without any true box.
     """
     low, high = FRAME_RATES
     if not is_number(fps, low, high):

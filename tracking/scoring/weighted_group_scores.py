@@ -62,7 +62,7 @@ TOLERANCES = {"right_groups": (2, 3), "exact_groups": (1, 1)}
 
 
 def link_counts(sides: ComparedSides, true: GroupRows, est: GroupRows) -> Array:
-    """Returns the links of G-MITRE by frame number, (3, size): true, estimated, right ones."""
+    """Returns the numbers of links of G-MITRE by frame number, (3, size): true, estimated and right links in order."""
     size = len(sides.frames)
     group, found = (group_of_person(g, len(p.rows))[:-1] for g, p in ((true, sides.true), (est, sides.est)))
     mapped = np.flatnonzero(sides.mapping >= 0)
@@ -79,7 +79,10 @@ def _links(groups: GroupRows, people: PersonRows, group: Ints, size: int) -> Arr
 
 
 def groups_right(true: GroupRows, est: GroupRows, shared: SharedMembers, tolerance: tuple[int, int]) -> Bools:
-    """Returns which true groups are right, (G,): some estimated group holds T of the members, and few others."""
+    """Returns which true groups are right at T, (G,) bool, as the module defines it.
+
+    tolerance: numerator and denominator of T.
+    """
     part, whole = tolerance
     i, j = np.divmod(shared.key, max(shared.width, 1))
     n = true.count[i]
@@ -93,8 +96,8 @@ def groups_right(true: GroupRows, est: GroupRows, shared: SharedMembers, toleran
 def pair_counts(true: GroupRows, est: GroupRows, person: Ints) -> Ints:
     """Returns how many pairs of people are in one group in each frame, (last + 1, 3): true, estimated, right pairs.
 
-    person (K,): row of the true person of each membership of `est`, -1 none. An estimated pair is right if both are in
-    one true group; a pair inside several estimated groups counts once.
+    person (K,): row of the true person of each membership of `est`, -1 none. An estimated pair is right if its two
+    people are in one true group. A pair that is in several estimated groups counts once.
     """
     group = group_of_person(true, int(max(true.member.max(initial=-1), person.max(initial=-1))) + 1)
     order = np.argsort(est.of, kind="stable")
@@ -123,10 +126,11 @@ def _pairs_in(groups: GroupRows, size: int) -> Ints:
 
 
 def weighted_groups_and_events(sides: ComparedSides, true: TrueGroups, by: GroupMatch) -> list[WeightedScores]:
-    """Returns functions to the weighted scores of groups, membership, events and lineage, by key of the catalogue.
+    """Returns functions from weights (D, size) to the scores of groups, membership, events and lineage, (D,) by key.
 
-    by: matches groups by "hull" (IoU) or by "members" (Jaccard index). Core frames are more than 1 s away from every
-    true merge and split. Keys are missing where the truth or the tracker lacks data.
+    by: matches groups by "hull" (IoU) or by "members" (Jaccard index). The keys are those of the catalogue. Keys with
+    "_core" leave out frames up to 1 s from the start of a true merge or split. Keys are missing where the truth or the
+    tracker lacks data.
     """
     core = sides.frames & ~near_changes(sides.truth)
     tracked = tracked_groups(sides)

@@ -26,10 +26,11 @@ def unweighted(scores: WeightedScores, size: int) -> dict[str, float]:
 
 
 class FrameScores:
-    """Scores that are weighted sums over the frames, or ratios of two such sums; called with weights, as others are.
+    """Scores that are weighted sums over the frames, or ratios of two such sums; a call with weights returns them.
 
-    State: by key, columns (size,), the part of each frame in a sum, for ratios in order numerator and denominator, "KEY
-    of"; totals, where given; the values of ratios without a denominator; further, functions that make scores of others.
+    State: columns (size,) by key, what each frame adds to a sum; a ratio has its numerator under "KEY" and its
+    denominator under "KEY of". Also the totals that were given, the values of ratios whose denominator is 0, and the
+    functions that make further scores of these.
     """
 
     def __init__(self, size: int) -> None:
@@ -40,17 +41,18 @@ class FrameScores:
         self._further: list[MoreScores] = []
 
     def column(self, frame: Ints, values: Array | Ints | None = None, within: Bools | None = None) -> Array:
-        """Returns the sums of K items by frame (size,).
+        """Returns the sum of the values of K items in each frame, (size,).
 
-        frame (K,): their frame numbers; values (K,), 1 each by default; within (size,): the frames that count.
+        frame (K,): frame number of each item. values (K,): None means 1 each, so that items are counted. within
+        (size,), bool by frame number: frames where it is False get 0; None keeps all frames.
         """
         found = np.bincount(frame, weights=values, minlength=self._size).astype(float)
         return found if within is None else np.where(within, found, 0.0)
 
     def add(self, key: str, column: Array, total: float | None = None) -> None:
-        """Adds the sum of a column (size,).
+        """Adds a score, the weighted sum of a column (size,).
 
-        total: at weights of 1, where it is added up in another order; the last bit of a score depends on it.
+        total: the sum at weights of 1, if it was added up in another order, on which its last bit depends.
         """
         self._columns[key] = column
         if total is not None:
@@ -59,23 +61,32 @@ class FrameScores:
     def add_ratio(
         self, key: str, part: Array, whole: Array, empty: float = float("nan"), total: float | None = None
     ) -> None:
-        """Adds the ratio of the sums of two columns (size,), `empty` where the second is 0; total: of the first."""
+        """Adds a score, the weighted sum of `part` divided by that of `whole`; both are columns (size,).
+
+        empty: the score where the sum of `whole` is 0. total: the sum of `part` at weights of 1, as for `add`.
+        """
         self.add(key, part, total)
         self.add(f"{key} of", whole)
         self._empty[key] = empty
 
     def add_mean(self, key: str, frame: Ints, values: Array, total: float | None = None) -> None:
-        """Adds the mean of the finite values (K,) of items in the frames (K,), nan without one; total: their sum."""
+        """Adds a score, the weighted mean of the finite ones of K values; it is nan if there is none.
+
+        frame (K,): frame number of each value. total: the sum of the finite values at weights of 1, as for `add`.
+        """
         known = np.isfinite(values)
         self.add_ratio(key, self.column(frame[known], values[known]), self.column(frame[known]), total=total)
 
     def add_f1(self, name: str, true: Array, est: Array, hits: Array, end: str = "") -> None:
-        """Adds name_F1, name_precision and name_recall with an ending; columns (size,) of both sides and the hits."""
+        """Adds the scores name_F1, name_precision and name_recall, each with `end` appended to its key.
+
+        true, est, hits: columns (size,), the numbers of true, estimated and matched items in each frame.
+        """
         for key, part, whole in zip(F1_AND_PARTS, (2 * hits, hits, hits), (true + est, est, true), strict=True):
             self.add_ratio(f"{name}_{key}{end}", part, whole)
 
     def add_further(self, scores: MoreScores) -> None:
-        """Adds scores that a function makes of the others."""
+        """Adds a function that makes further scores of the scores and sums so far; it may also replace scores."""
         self._further.append(scores)
 
     def __call__(self, weights: Array) -> dict[str, Array]:
@@ -95,20 +106,20 @@ class FrameScores:
 
 
 def ratio(part: Array, whole: Array, empty: float = float("nan")) -> Array:
-    """Returns part / whole, `empty` where whole is 0; both of one shape."""
+    """Returns part / whole by elements, `empty` where whole is not above 0; both have one shape."""
     return np.asarray(np.divide(part, whole, out=np.full(np.shape(part), empty), where=np.asarray(whole) > 0))
 
 
 def mean_of_known(values: Array) -> Array:
-    """Returns the means (D,) of the columns of values (D, C) that are not nan; nan where all are."""
+    """Returns the mean (D,) of each row of values (D, C) over its elements that are not nan; nan if all are nan."""
     known = ~np.isnan(values)
     return ratio(np.where(known, values, 0.0).sum(axis=1), known.sum(axis=1).astype(float))
 
 
 def bin_sums(frame: Ints, bin: Ints, bins: int, size: int) -> Callable[[Array], Array]:
-    """Returns a function from weights (D, size) to the weighted numbers of items in bins, by id for example, (D, bins).
+    """Returns a function from weights (D, size) of frames to the weighted number of items in each bin, (D, bins).
 
-    frame, bin: of each item.
+    frame, bin: frame number and bin of each item. Bins stand for ids, for example.
     """
     from scipy.sparse import csr_array
 
