@@ -47,12 +47,13 @@ class ComparedRuns:
 
     Attributes:
         runs: Names, in the order given.
-        sequences: Names.
-        scores: For each run a list of `Scores`, one per sequence.
-        inputs: For each run, what it got, in words; several if it got different inputs on different sequences.
-        oracles: For each input the scores of its oracle on each sequence, None where no run got this input.
-        similarity: How people were compared in all of them.
-        blocks: For a single recording, by score, the ranking with intervals by weights of blocks of frames.
+        sequences: Names, in the order given.
+        scores: By run, a list of `Scores`, one per sequence.
+        inputs: By run, the tracker's inputs in words, such as "boxes (file)"; one unless they differ by sequence.
+        oracles: By input, the scores of its oracle on each sequence, None where no run got this input.
+        similarity: How people were compared in all sequences.
+        blocks: For a single recording, the ranking by each score (by key), with intervals by resampling of blocks of
+            frames; None if these were not computed.
     """
 
     runs: tuple[str, ...]
@@ -64,16 +65,18 @@ class ComparedRuns:
     blocks: Mapping[str, Ranking] | None = None
 
     def rows(self) -> dict[str, list[Scores | None]]:
-        """Returns the scores of the oracles, named "oracle from INPUT", then of the runs, one per sequence."""
+        """Returns lists of scores, one per sequence, by name: first the oracles ("oracle from INPUT"), then the runs. A
+        score is None where no run got the oracle's input."""
         oracles = {f"oracle from {name}": row for name, row in self.oracles.items()}
         return {**oracles, **{name: [*row] for name, row in self.scores.items()}}
 
     def values(self, key: str) -> Array:
-        """Returns a score of the catalogue (R, S) of the runs on the sequences; nan where unknown."""
+        """Returns the score `key` of the R runs on the S sequences, (R, S); nan where unknown."""
         return np.array([_values(self.scores[run], key) for run in self.runs])
 
     def ranking(self, key: str = "objective", sequences: SequenceOf[int] | None = None) -> Ranking:
-        """Returns the ranking of the runs by a score of the catalogue. sequences: indices of those that count."""
+        """Returns the ranking of the runs by the score `key`. sequences: indices of the sequences that count; None:
+        all. It has no effect if `blocks` is known."""
         if self.blocks is not None:
             return self.blocks[key]
         values = self.values(key)
@@ -82,8 +85,8 @@ class ComparedRuns:
     def to_arrow(self, key: str = "objective") -> pyarrow.Table:
         """Returns the ranking by a score as a table, one row per run, best first, after the oracles.
 
-        Columns: run; input; first, last: the range of ranks, null for oracles; mean, low, high: of the score, with its
-        95 % interval; then the mean of every score of the catalogue that is known for some run.
+        Columns: run; input; first and last, the range of ranks, null for oracles; mean, low and high, the mean of the
+        score and the ends of its 95 % interval; then the mean of every score of the catalogue that some row has.
         """
         import pyarrow as pa
 
@@ -125,14 +128,17 @@ def compare(
 ) -> ComparedRuns:
     """Scores several runs on the same labelled sequences, all by one similarity, and the oracle of each kind of input.
 
-    The oracle has the tracker's detections with the true ids.
+    The oracle's tracks are the tracker's detections with the true ids and groups.
 
     Args:
         sequences: Labelled sequences.
-        runs: By name, the tracks of each sequence in the order of `sequences`, as `track` returns them.
-        similarity: Of people, "boxes", "ground" or "image"; None: by the data (tracking.scoring.people_comparison).
-        group_match: Of groups, by "hull" or "members".
-        blocks: Number of draws of blocks of frames for the intervals of a single recording; 0: none.
+        runs: By name of the run, its tracks of each sequence, in the order of `sequences`, as `track` returns them.
+        similarity: How people are compared, by "boxes", "ground" or "image"; None chooses by the data, as `evaluate`.
+        group_match: How groups are matched, by "hull" or "members", as in `evaluate`.
+        blocks: Number of random draws of blocks of frames for intervals on a single recording; 0 computes none.
+
+    Returns:
+        `ComparedRuns`, the scores of all runs and oracles on all sequences.
 
     Raises:
         InputError: A run lacks a sequence, a sequence lacks labels, sequences or runs cannot be compared in one way, or
@@ -155,7 +161,7 @@ def compare(
 
 
 def check_blocks(blocks: int, sequences: int) -> None:
-    """Raises InputError if intervals by blocks of frames are asked for more than one sequence."""
+    """Raises InputError if `blocks` is not 0 and there is more than one sequence."""
     if blocks and sequences > 1:
         raise InputError(
             place="--blocks", got=f"{sequences} sequences", expected="a single recording",
@@ -164,7 +170,8 @@ def check_blocks(blocks: int, sequences: int) -> None:
 
 
 def joined(names: SequenceOf[str], sequences: SequenceOf[str], found: SequenceOf[ComparedSequence]) -> ComparedRuns:
-    """Returns the comparison of runs with these names; found: for each sequence, the result of `compare_one`."""
+    """Returns the comparison of runs with these names; found: for each sequence, the result of `compare_one`. Raises
+    InputError if people were compared in different ways on the sequences."""
     ways: dict[Similarity, str] = {}
     for sequence, one in zip(sequences, found, strict=True):
         ways.setdefault(one.scores[0].similarity, sequence)
@@ -193,7 +200,8 @@ def compare_one(
     blocks: int = 0,
     oracles: bool = True,
 ) -> ComparedSequence:
-    """Returns the scores of each run of one sequence, and of the oracles of their inputs, all compared alike."""
+    """Returns the scores of each run of one sequence, and of the oracles of their inputs, all by one similarity. The
+    arguments are as in `compare`; oracles: False leaves the oracles out."""
     infos = [run.info if isinstance(run, TrackingRun) else {} for run in runs]
     inputs = [input_name(info) for info in infos]
     with scorer_of(sequence) as scorer:
@@ -213,7 +221,8 @@ def compare_one(
 
 @contextmanager
 def scorer_of(sequence: Sequence) -> Iterator[Scorer]:
-    """Gives a scorer of the sequence's truth; what it cannot compare becomes an InputError that names the sequence."""
+    """Context manager that yields a `Scorer` of the sequence's truth; raises InputError if there is no truth. If the
+    block raises ValueError, it becomes an InputError that names the sequence."""
     if sequence.truth is None:
         raise InputError(
             file=sequence.source.get("path", sequence.name), got="no labels", expected="a sequence with truth",

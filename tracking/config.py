@@ -53,7 +53,8 @@ class Param:
         return f"{kind} from {self.low:g} to {self.high:g}"
 
     def check(self, value: object, file: object = "") -> Value:
-        """Returns the value in the type of the parameter: 3.0 is allowed where scale is "int"; raises InputError."""
+        """Returns the value converted to the parameter's type (for scale "int" 3.0 becomes 3). Raises InputError, about
+        `file`, if the value is not allowed."""
         if self.scale == "categorical":
             if any(type(value) is type(c) and value == c for c in self.choices):
                 return value  # type: ignore[return-value]
@@ -70,7 +71,7 @@ class Param:
         raise InputError(file=file, place=self.name, got=repr(value), expected=self.expected, remedy=remedy)
 
     def parse(self, text: str) -> Value:
-        """Returns the value that a text stands for; numbers of a vector are separated by commas."""
+        """Returns the value that a text stands for; commas separate numbers of a vector. Raises InputError if wrong."""
         for choice in self.choices:
             if text == str(choice) or (isinstance(choice, bool) and text.lower() == str(choice).lower()):
                 return choice
@@ -89,15 +90,16 @@ def param(
     """Declares a parameter as a field of a config.
 
     Args:
-        default: Checked only when a config is created.
-        values: (low, high), both allowed, or the choices if scale is "categorical".
-        unit: For the docs.
-        meaning: For the docs; the word "ours" marks a departure from the paper.
+        default: The default value. It is checked only when a config is created.
+        values: (low, high), both ends allowed, or all choices if scale is "categorical".
+        unit: The unit, shown in the docs.
+        meaning: A description for the docs; the word "ours" marks a departure from the paper.
         scale: How a search moves: "linear" or "log" for numbers, "int" for whole numbers, "categorical" for choices;
             "vector" for a tuple of numbers, which no search moves.
         online: Whether it may change between two frames.
         tunable: Whether searches may change it.
-        sees: With what alone it has an effect; searches over others leave it out.
+        sees: The only input with which the parameter has an effect, "pixels" or "points"; "": any. Searches with
+            another input leave the parameter out.
 
     Raises:
         ValueError: `values` are not two, though the scale is not "categorical".
@@ -142,12 +144,13 @@ class Config:
 
     @classmethod
     def space(cls, *, online: bool = False) -> tuple[Param, ...]:
-        """Returns the tunable parameters; with `online` only those that may change between two frames."""
+        """Returns the tunable parameters; if `online` is True, only those that may change between two frames."""
         return tuple(p for p in cls.params().values() if p.tunable and (p.online or not online))
 
     @classmethod
     def known(cls, name: str, file: object = "") -> Param:
-        """Returns the declared parameter of this name; raises InputError with the most similar one, about `file`."""
+        """Returns the declared parameter of this name. Raises InputError, about `file`, for an unknown name; it
+        suggests the most similar one."""
         declared = cls.params()
         if name in declared:
             return declared[name]
@@ -159,7 +162,8 @@ class Config:
         """Returns the config with these values by parameter name, and defaults for the others.
 
         Raises:
-            InputError: A name is unknown, a value is not allowed, or values contradict each other; it names `file`.
+            InputError: A name is unknown, a value is not allowed (the message names `file`), or values contradict each
+                other.
         """
         return cls(**{name: cls.known(name, file).check(value, file) for name, value in values.items()})
 
@@ -168,13 +172,13 @@ class Config:
         """Returns the config in a TOML file; parameters that it lacks have their defaults.
 
         Raises:
-            InputError: The file cannot be read, is of another tracker or has other keys, or as `from_dict`.
+            InputError: The file cannot be read, is of another tracker or has unknown keys, or values are not allowed.
         """
         return cls.from_dict(read_params(path, cls.tracker), path)
 
     @classmethod
     def preset(cls, name: str) -> Self:
-        """Returns the preset of this name; "paper" switches every departure from the tracker's paper off.
+        """Returns the preset of this name; the preset "paper" turns off every departure from the tracker's paper.
 
         Raises:
             InputError: The tracker has no such preset.
@@ -183,10 +187,8 @@ class Config:
 
     @classmethod
     def load(cls, source: str | Path) -> Self:
-        """Returns the preset of the name `source` if the tracker has one, else the config in the TOML file `source`.
-
-        A file that has the name of a preset is given with a folder, as ./paper.
-        """
+        """Returns the preset of the name `source` if the tracker has one, else the config in the TOML file `source`. To
+        load a file whose name is that of a preset, give it with a folder, such as ./paper."""
         return cls.from_toml(file_of(cls.tracker, source))
 
     def with_set(self, *assignments: str) -> Self:
@@ -195,7 +197,7 @@ class Config:
         Each value is checked in turn, their combination at the end.
 
         Raises:
-            InputError: An assignment has no "=", or as `from_dict`.
+            InputError: An assignment has no "=", a name is unknown, or values are wrong or contradict each other.
         """
         changes: dict[str, Any] = {}
         for assignment in assignments:
@@ -216,7 +218,8 @@ class Config:
 
 
 def read_params(path: str | Path, tracker: str) -> dict[str, object]:
-    """Returns the table [params] of a TOML file of this tracker, unchecked; {} if there is none."""
+    """Returns the table [params] of a TOML file, values unchecked; {} if the file has no such table. Raises InputError
+    if the file is of another tracker or has other keys."""
     content = parse(Path(path))
     name = content.pop("tracker", tracker)
     if name != tracker:
@@ -250,7 +253,8 @@ def preset_file(tracker: str, name: str) -> Path:
 
 
 def file_of(tracker: str, source: str | Path) -> Path:
-    """Returns the file of the preset that a text `source` names, else the path `source`."""
+    """Returns the file of the tracker's preset if `source` is a preset's name (str), else the path `source`. Raises
+    InputError if the tracker has presets and `source` is neither a preset nor an existing file."""
     known = presets(tracker)
     if isinstance(source, str) and source in known:
         return preset_file(tracker, source)

@@ -24,14 +24,14 @@ T = TypeVar("T")
 
 
 def option(help: str, default: Any = MISSING, **more: Any) -> Any:
-    """Declares an option as a field of a dataclass; without a default it is required, and a list starts empty.
+    """Declares an option as a field of a dataclass. An option without a default is required.
 
     Args:
-        help: Its meaning.
-        default: Its value if it is not given.
-        more: low: the least allowed value; high: the greatest; below: what it must be less than; metavar: what stands
-            for its value in the help of a command; flag: its name on the command line if it differs from that of the
-            field, "" for an argument without a name.
+        help: A description of the option.
+        default: The value if the option is not given; [] gives each instance a new empty list.
+        more: Any of: low and high, the least and greatest allowed value; below, a bound that the value must be less
+            than; metavar, the word that stands for the value in the help of a command; flag, the option's name on the
+            command line if it differs from the field's name, "" for a positional argument.
     """
     metadata = {"help": help, "low": None, "high": None, "below": None, "metavar": None, "flag": None, **more}
     return (
@@ -40,7 +40,8 @@ def option(help: str, default: Any = MISSING, **more: Any) -> Any:
 
 
 def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
-    """Returns an instance of the options dataclass `kind` with the given values by name and otherwise its defaults."""
+    """Returns an instance of the options dataclass `kind` with the given values by name, and defaults for the others.
+    Raises InputError if a name is unknown or a required option is missing; function: its name, for the message."""
     known = fields(kind)  # type: ignore[arg-type]
     names = [f.name for f in known]
     for name in given:
@@ -54,7 +55,8 @@ def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
 
 
 def check_ranges(options: Any) -> None:
-    """Raises InputError at the first number of an options dataclass that lies outside its declared range."""
+    """Raises InputError for the first option of an options dataclass that is less than `low`, or not less than `below`.
+    Options without `low` are not checked, and `high` is not checked here."""
     for f in fields(options):
         low, below, value = f.metadata["low"], f.metadata["below"], getattr(options, f.name)
         if low is None or (value >= low and (below is None or value < below)):
@@ -64,10 +66,8 @@ def check_ranges(options: Any) -> None:
 
 
 def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
-    """Returns a decorator that gives a function the signature and the list of options of a dataclass.
-
-    The first `positional` options may be given without their name. A first parameter `self` is kept.
-    """
+    """Returns a decorator that gives a function the signature and, in its docstring, the options of a dataclass. In the
+    signature the first `positional` options may be given by position. A first parameter `self` is kept."""
 
     def decorate(function: F) -> F:
         kinds = [inspect.Parameter.POSITIONAL_OR_KEYWORD] * positional + [inspect.Parameter.KEYWORD_ONLY] * 99
@@ -82,7 +82,7 @@ def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
 
 
 def options_text(kind: type) -> str:
-    """Returns the options of an options dataclass, one a line."""
+    """Returns the options of an options dataclass as text, one line per option: name, default and help."""
     return "\n".join(f"{f.name}{'' if required(f) else f'={f.default!r}'}: {f.metadata['help']}" for f in fields(kind))
 
 
@@ -92,6 +92,6 @@ def required(f: Field[Any]) -> bool:
 
 
 def signature_parameter(f: Field[Any], kind: Any, annotation: Any = None) -> inspect.Parameter:
-    """Returns an option as a parameter of a signature."""
+    """Returns an option as a parameter of a signature, of this kind; annotation: None takes the field's type."""
     default = inspect.Parameter.empty if required(f) else [] if f.default is MISSING else f.default
     return inspect.Parameter(f.name, kind, default=default, annotation=annotation or f.type)

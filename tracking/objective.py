@@ -47,10 +47,10 @@ class ObjectiveScorer:
     def scores(
         self, tracks: Sequence[Tracks], px_per_m: float, pixels: bool = False, similarity: Similarity | None = None
     ) -> dict[str, float]:
-        """Returns HOTA, group_F1 and objective of tracks sorted by frame, over the frames 1 … that of the last.
+        """Returns HOTA, group_F1 and objective, by key, of tracks sorted by frame.
 
-        px_per_m: scale for deriving groups in the image; nan takes the truth's. pixels: the tracker works on pictures.
-        A score is nan where that of `evaluate` is.
+        Scored are the frames from 1 to the last of the tracks. px_per_m: image scale for deriving groups; nan takes the
+        truth's. pixels: True if the tracker works on pictures. A score is nan where that of `evaluate` is.
         """
         (moved,), similarity = in_one_plane(self.scorer.truth, [tracks], [pixels], similarity)
         scorer, last = self.scorer.judge(tracks, moved), tracks[-1].index if tracks else 0

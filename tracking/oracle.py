@@ -66,7 +66,11 @@ def _tracks(
 
 
 def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None = None) -> TrackingRun:
-    """Returns the oracle's tracks of a sequence with truth."""
+    """Returns the oracle's tracks of a sequence with truth.
+
+    given: the content of a run's run.json, of which detections, input, sensor and seed say what input the oracle gets.
+    similarity: how detections are matched with true people; None: by the data.
+    """
     truth, mode = _truth(sequence), _mode(sequence, given)
     info = {"tracker": "oracle", "detections": mode, "sensor": given.get("sensor") or {}}
     people = [_rows(t, t.id >= 0) for t in named_detections(sequence, given, similarity)]
@@ -76,7 +80,8 @@ def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity 
 def named_detections(
     sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None = None
 ) -> list[Tracks]:
-    """Returns what the input shows of the true people, with their ids and groups; false alarms have ids below 0."""
+    """Returns a run's input as tracks with the ids and groups of the true people that it shows, one `Tracks` per frame.
+    The arguments are as in `oracle`. False alarms have ids below 0 and the group -1."""
     truth, mode = _truth(sequence), _mode(sequence, given)
     if mode == "image":
         return [_visible(truth, index, given.get("input") == "stereo") for index in range(1, truth.length + 1)]

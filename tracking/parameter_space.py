@@ -30,7 +30,11 @@ HALVINGS = 6  # Bisections on the line from an allowed config to one that is not
 
 
 def space_of(kind: type[Config], mode: DetectionMode | None = None, *, online: bool = False) -> Space:
-    """Returns the tunable parameters of a config class that have an effect in this detection mode."""
+    """Returns the tunable parameters of a config class that have an effect in this detection mode.
+
+    "image" leaves out parameters with an effect on points only, "file" and "truth" those on pixels only, None nothing.
+    online: True leaves out parameters that may not change between two frames.
+    """
     without_effect = {"image": "points", None: None}.get(mode, "pixels")
     return tuple(p for p in kind.space(online=online) if p.sees == "" or p.sees != without_effect)
 
@@ -41,14 +45,16 @@ def encode(space: Space, config: Config) -> Array:
 
 
 def decode(space: Space, action: ArrayLike, base: Config) -> Config:
-    """Returns the config at the vector `action` (P,), which is clipped to [-1, 1]."""
+    """Returns the config at the vector `action` (P,), clipped to [-1, 1]; parameters not in `space` are as in `base`.
+    If its values contradict each other, an allowed config between it and `base` is returned."""
     return decode_and_build(space, action, base, lambda config: config)
 
 
 def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Callable[[Config], T]) -> T:
-    """Returns the result of `build` for the config at the vector `action` (P,), which is clipped to [-1, 1].
+    """Returns build(config) for the config at the vector `action` (P,), which is clipped to [-1, 1].
 
-    If the values contradict each other or `build` refuses them, it is the nearest allowed config towards `base`.
+    If that config's values contradict each other, or `build` raises InputError, the config is moved towards `base` as
+    far as needed (found by 6 bisections).
     """
     point = _point(action, len(space))
 

@@ -45,7 +45,8 @@ class Ranking:
 
 
 def rank(values: Array, upwards: bool = True) -> Ranking:
-    """Returns the ranking of R runs by their scores on S sequences, values (R, S); nan where unknown."""
+    """Returns the ranking of R runs by their scores on S sequences, values (R, S). Sequences where a value is not
+    finite are left out. upwards: True if greater values are better."""
     scores = values[:, np.isfinite(values).all(axis=0)]
     runs, count = scores.shape
     less = (scores[:, None] - scores[None]).reshape(runs * runs, count)
@@ -57,7 +58,11 @@ def rank(values: Array, upwards: bool = True) -> Ranking:
 def ordered(
     own: tuple[Array, Array, Array], pairs: tuple[Array, Array, Array], upwards: bool, count: int, sure: bool = True
 ) -> Ranking:
-    """Returns the ranking of R runs by their means and intervals."""
+    """Returns the ranking of R runs by their means.
+
+    own: mean, low and high of each run, (R,) each. pairs: mean, low and high of run i minus run j, (R, R) each.
+    upwards: True if greater means are better. count: number of sequences. sure: False calls no run surely better.
+    """
     mean, own_low, own_high = own
     less, low, high = pairs
     runs = len(mean)
@@ -71,7 +76,7 @@ def ordered(
 
 
 def scale_of(score: Score) -> Scale:
-    """Returns on which scale the error of a score is nearly symmetric."""
+    """Returns the `Scale` on which the error of a score is nearly symmetric, as `tracking.stats` names it."""
     if score.unit == "count":
         return "count"
     if score.unit == "1":
@@ -85,7 +90,8 @@ SCALES = tuple(map(scale_of, ALL))  # The scale of every score, in the order of 
 def recording_rankings(
     truth: Truth, scores: Sequence[Callable[[Array], Array]], draws: int = DRAWS
 ) -> dict[str, Ranking]:
-    """Returns the ranking of R runs of one recording by each score of the catalogue."""
+    """Returns the ranking of R runs of one recording by each score of the catalogue, by key. scores: for each run a
+    function from weights (D, length) of frames to scores (D, K). draws: number of weights drawn."""
     runs, keys = len(scores), len(ALL)
     pairs = list(combinations(range(runs), 2))
 
@@ -110,12 +116,13 @@ def recording_rankings(
 
 
 def presence_in(truth: Truth) -> float:
-    """Returns the mean time for which a person is present, as a number of frames of the recording."""
+    """Returns the mean time of presence (`presence`), in frames of the recording even if labels are sparse."""
     return presence(truth.id) * truth.length / max(int(annotated_frames(truth).frames.sum()), 1)
 
 
 def presence(id: Ints) -> float:
-    """Returns the mean number of frames for which a person is present, 1 without people."""
+    """Returns the mean number of frames in which a person is present, 1 without people; id (R,): one per row. The mean
+    is over rows (sum n² / sum n for people with n rows), so that long presences count more."""
     if not len(id):
         return 1.0
     frames = np.bincount(numbered(id)[1])

@@ -41,7 +41,8 @@ def mean_of_finite(values: Array) -> float:
 
 
 def mean_interval(values: Array, level: float = LEVEL) -> tuple[Array, Array, Array]:
-    """Returns mean, low end and high end, (K,) each, of Student's intervals of the mean over S sequences; (S, K)."""
+    """Returns mean, low end and high end, (K,) each, of Student's interval of the mean of each column of values (S, K).
+    Values that are not finite are left out. Fewer than two values give an interval of nan. level: confidence level."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
     some, two = np.maximum(count, 1), np.maximum(count, 2)
@@ -53,14 +54,14 @@ def mean_interval(values: Array, level: float = LEVEL) -> tuple[Array, Array, Ar
 
 
 def student(degrees: Array | float, level: Array | float = LEVEL) -> Array:
-    """Returns the t with which Student's t, of so many degrees of freedom, lies within +- t at probability `level`."""
+    """Returns the number t such that a Student-t variable lies between -t and t with probability `level`."""
     from scipy.special import stdtrit
 
     return np.asarray(stdtrit(degrees, (1 + np.asarray(level)) / 2))
 
 
 def joint_level(count: int) -> float:
-    """Returns the level of each of `count` intervals that hold all together with probability LEVEL (Bonferroni)."""
+    """Returns the confidence level for each of `count` intervals so that all hold together at 95 % (Bonferroni)."""
     return 1 - (1 - LEVEL) / max(count, 1)
 
 
@@ -78,7 +79,12 @@ def block_intervals(
     scales: Sequence[Scale] | None = None,
     levels: Array | float = LEVEL,
 ) -> tuple[Array, Array, Array]:
-    """Returns the scores (K,) of one recording, and the low and the high ends (K,) of their intervals."""
+    """Returns the K scores of one recording, and the low and high ends of their intervals, (K,) each.
+
+    score: a function from weights of frames (D, frames) to scores (D, K). frames, fps: length and rate of the
+    recording. likeness: number of frames over which frames are alike. draws: number of weights drawn. scales: scale of
+    each score, None for "plain". levels: confidence levels. Ends are nan for a recording of fewer than two blocks.
+    """
     whole = np.asarray(score(np.ones((1, frames))), float)[0]
     ends = np.full((2, len(whole)), np.nan)
     block = block_length(frames, fps, likeness)
@@ -115,14 +121,15 @@ def _ends(x: float, half: float, scale: Scale) -> tuple[float, float]:
 
 
 def block_length(frames: int, fps: float, likeness: float = 1.0) -> int:
-    """Returns frames of a block: twice `likeness`, within a twentieth and a fifth of the recording."""
+    """Returns the number of frames of a block: 2 `likeness`, but 1/20 to 1/5 of the recording, and at least 1 s."""
     few, many = BLOCKS
     wanted = min(max(ceil(2 * likeness), ceil(frames / many)), ceil(frames / few))
     return min(frames, max(1, ceil(SHORTEST_BLOCK * fps), wanted))
 
 
 def block_weights(frames: int, block: int, draws: int, r: np.random.Generator) -> Array:
-    """Returns weights (draws, frames): how often each frame is drawn, in blocks of `block` consecutive frames."""
+    """Returns how often each frame is drawn in each draw, (draws, frames), as blocks of `block` frames in a row. The
+    sum of a draw is `frames`. The first frame follows the last one. r: source of the random numbers."""
     count = -(-frames // block)
     starts = r.integers(0, frames, (draws, count))
     length = np.full(count, block)

@@ -66,13 +66,13 @@ class Belief:
         return 0.0
 
     def as_dict(self) -> dict[str, object]:
-        """Returns what run.json tells of the belief: its numbers, and a hash of its file's text."""
+        """Returns the entries of run.json about the belief: kind, bias, its numbers, and a hash of `toml_text`."""
         text, numbers = self.toml_text().encode(), {name: getattr(self, name) for name in NUMBERS}
         return {"grouping": KIND, "bias": self.bias.tolist(), **numbers, "hash": sha256(text).hexdigest()}
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Belief:
-        """Returns the belief of a file that `toml_text` wrote. Raises InputError if it is none or values are wrong."""
+        """Returns the belief in a file that `toml_text` wrote. Raises InputError for another file or wrong values."""
         content = parse(Path(path))
         rows, keys = content.pop("table", None), {"bias", *NUMBERS}
         if content.pop("grouping", None) != KIND or not isinstance(rows, list) or not rows:
@@ -84,7 +84,7 @@ class Belief:
         return cls(tuple(_table(path, f"table {k}", row) for k, row in enumerate(rows, 1)), bias, **numbers)
 
     def toml_text(self, comment: str = "") -> str:
-        """Returns the file's text. comment: lines at its beginning."""
+        """Returns the belief as the text of a TOML file. comment: lines of text to begin it with, without "#"."""
         lines = [*(f"# {line}" for line in comment.splitlines()), f'grouping = "{KIND}"']
         lines += [f"bias = {toml_value(np.round(self.bias, 4).tolist())}"]
         lines += [f"{name} = {toml_value(round(float(getattr(self, name)), 4))}" for name in NUMBERS]
@@ -95,7 +95,7 @@ class Belief:
         return "\n".join([*lines, ""])
 
     def log_odds(self, values: Array) -> Array:
-        """Returns the beliefs (R, 2) for `DECISIONS` of rows of quantities (R, len(NAMES)), in log-odds."""
+        """Returns log-odds (R, 2), columns as `DECISIONS`, of R rows of quantities (R, len(NAMES)), nan if unknown."""
         from tracking.grouping.belief_kernels import table_sums
 
         column = np.array([NAMES.index(table.name) for table in self.tables])
@@ -107,7 +107,7 @@ class Belief:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairBeliefs:
-    """Log-odds that two people belong together, one row per pair and step in which both were seen within 4 m."""
+    """Log-odds that two people belong together, one row per pair and step in which they were seen within 4 m."""
 
     step: Ints  # (R,): from 0, ascending
     # a, b (R,): columns, a < b; log_odds (R, 2): for `DECISIONS`
@@ -117,7 +117,11 @@ class PairBeliefs:
 
 
 def pair_beliefs(pos: Array, time: Array, seconds: float, belief: Belief) -> PairBeliefs:
-    """Returns the beliefs of all pairs who come within 4 m; pos (S, P, 2), time (S, P): by step, nan where not seen."""
+    """Returns the beliefs of all pairs of P people in the steps in which the two are within 4 m of each other.
+
+    pos (S, P, 2), m, time (S, P), s: mean position and time of each person in each of S steps, nan if not seen.
+    seconds: length of a step, s.
+    """
     parts = [(rows.step, rows.a, rows.b, belief.log_odds(rows.values)) for rows in evidence(pos, time, seconds)]
     if not parts:
         nobody = np.zeros(0, np.int64)
@@ -126,7 +130,8 @@ def pair_beliefs(pos: Array, time: Array, seconds: float, belief: Belief) -> Pai
 
 
 def beliefs_of_tracks(frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief) -> PairBeliefs:
-    """Returns the beliefs of all pairs of a sequence; frame, column (R,), pos (R, 2): one row per person and frame."""
+    """Returns the beliefs of all pairs of people of a sequence of `length` frames. frame, column (R,), from 0, pos (R,
+    2), m: frame, index of the person, and position of each person and frame."""
     size = frames_per_step(fps)
     places, times = step_positions(frame, column, pos, length, int(column.max(initial=-1)) + 1, fps)
     return pair_beliefs(places, times, size / fps, belief)
@@ -172,9 +177,10 @@ class PairProbabilities:
 
 
 def pair_probabilities(tracks: Sequence[Tracks], fps: float, px_per_m: float, belief: Belief) -> PairProbabilities:
-    """Returns the probability that two people belong together, for all pairs less than 4 m apart, in each frame.
+    """Returns the probability that two people belong together now, for all pairs less than 4 m apart in each frame.
 
-    The belief changes once in a step of at most 0.4 s and holds until the next.
+    A pair's probability is computed once per step of at most 0.4 s and repeated in the frames of that step. px_per_m:
+    image scale, used only for tracks in the image.
     """
     table = tabulate(tracks, fps, px_per_m)
     found = beliefs_of_tracks(table.frame, table.column, table.pos, table.length, fps, belief)

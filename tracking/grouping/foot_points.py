@@ -26,17 +26,18 @@ CLIMB = 8  # Steps in which the height of the ground below a foot point is found
 
 
 def plane_of_run(tracks: Sequence[Tracks]) -> str | None:
-    """Returns the plane of the first `Tracks` with people, else of the first; None for no tracks."""
+    """Returns the plane of the first `Tracks` with people; without any, of the first `Tracks`; None for no `Tracks`."""
     return next((t.plane for t in tracks if len(t.id)), tracks[0].plane if tracks else None)
 
 
 def boxed(tracks: Sequence[Tracks]) -> bool:
-    """Returns True if all tracks are of people with boxes."""
+    """Returns True if all tracks follow people and have boxes; frames without tracks do not count."""
     return all(t.box is not None and t.unit == "person" for t in tracks if len(t.id))
 
 
 def can_stand(tracks: Sequence[Tracks], camera: Camera | None, pixels: bool) -> bool:
-    """Returns True if tracks in the image can be moved to the ground: boxes of people, a camera, not from pixels."""
+    """Returns True if tracks can be moved from the image to the ground: people with boxes, a camera, no pixels. pixels:
+    True if the tracker worked on pictures."""
     return plane_of_run(tracks) == "image" and camera is not None and boxed(tracks) and not pixels
 
 
@@ -44,9 +45,10 @@ def ground_below(
     tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, pixels: bool,
     image_size: tuple[int, int] | None = None,
 ) -> Ground:  # fmt: skip
-    """Returns the ground to which tracks in the image can be moved, by the camera, else by the first boxes.
+    """Returns the ground to which tracks in the image can be moved: by the camera if known, else by the first boxes.
 
-    Tracks of a tracker that names groups are moved by a camera only.
+    The boxes are used only if the tracker names no groups. The ground is unknown for tracks that are not in the image,
+    lack boxes, or come from pixels.
     """
     if plane_of_run(tracks) != "image" or pixels or not boxed(tracks):
         return Ground()
@@ -56,11 +58,11 @@ def ground_below(
 
 
 def as_measured(pos: Array, camera: Camera) -> Array:
-    """Returns ground points (N, 2), m, right and ahead of the camera, with depths shortened where they are uncertain.
+    """Returns ground points (N, 2), m, to the right and ahead of the camera, with depths shortened by uncertainty.
 
-    A foot that is misplaced by e m in the image of a pinhole camera of height C is misplaced by e y / C at the depth y.
-    So a length dy in depth becomes dy / sqrt(1 + (k y / C)^2): as it is seen from far above, and from far away as it is
-    seen in the picture.
+    A box foot that is e m too low or high at the person is wrong by e y / C in depth, at the depth y from a camera of
+    height C. So a length dy in depth becomes dy / sqrt(1 + (k y / C)^2). For a camera that looks straight down, `pos`
+    is returned unchanged.
     """
     level = float(np.hypot(*camera.rotation[2, :2]))
     if camera.kind == "top" or level < OVERHEAD:
@@ -82,10 +84,10 @@ def completed(
     pixels: bool,
     image_size: tuple[int, int] | None = None,
 ) -> tuple[tuple[Tracks, ...], Ground]:
-    """Returns the tracks with groups and events, as `with_groups`, or from where boxes stand on the ground; and the
-    ground that was used.
+    """Returns the tracks with groups and events filled in, and the ground that was used for them.
 
-    Without a camera the ground is that of the boxes, if they tell it. image_size: width, height, px; None: unknown.
+    If the ground under the boxes is known (`ground_below`), groups are derived from positions there, else as
+    `with_groups` does. pixels: True if the tracker worked on pictures. image_size: width, height, px; None: unknown.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks), Ground()
@@ -106,7 +108,8 @@ def _grouped_as(t: Tracks, grouped: Tracks, named: bool) -> Tracks:
 
 
 def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> list[Tracks]:
-    """Returns tracks of boxes in the image as tracks on the ground. Velocities are nan, groups those that they name."""
+    """Returns tracks of boxes in the image as tracks on the ground, at the points where the boxes stand. Velocities
+    become nan. Groups that the tracker named are kept, with new shapes; other `groups` become None."""
     boxes = [np.zeros((0, 4)) if t.box is None else t.box for t in tracks]
     ground = feet(np.concatenate([np.zeros((0, 4)), *boxes]), camera, scene)
     cuts = np.cumsum([0, *map(len, boxes)]).tolist()
@@ -122,7 +125,7 @@ def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> l
 
 
 def feet(box: Array, camera: Camera, scene: Scene | None) -> Array:
-    """Returns the ground points x, y (R, 2) in m below boxes (R, 4) px; nan where a box stands on no visible ground."""
+    """Returns the ground points x, y (R, 2), m, on which boxes (R, 4), px, stand; nan for a box that stands nowhere."""
     z = np.zeros(len(box))
     pos = foot_points(box, z, camera)
     if scene is not None and scene.stairs:
@@ -133,7 +136,8 @@ def feet(box: Array, camera: Camera, scene: Scene | None) -> Array:
 
 
 def moved_events(events: Sequence[GroupEvent], id: Ints, pos: Array) -> tuple[GroupEvent, ...]:
-    """Returns the events at the mean of their members' positions, nan without any; id (N,), pos (N, 2): of a frame."""
+    """Returns the events with each `pos` replaced by the mean position of its members in one frame, nan if none is. id
+    (N,), pos (N, 2): ids and positions of the people in that frame."""
     return tuple(replace(e, pos=_centre(pos, np.isin(id, e.members))) for e in events)
 
 

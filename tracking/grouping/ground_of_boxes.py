@@ -33,7 +33,8 @@ SURE = 2 / 3  # the mean deviation must be below that of ln h times this
 
 @dataclass(frozen=True)
 class Ground:
-    """The camera above the ground, None if unknown, and the last frame whose boxes decided that; 0: none did."""
+    """The camera above the ground, None if the ground is unknown, and the last frame whose boxes were used. The frame
+    is 0 if no boxes were used: the camera is then that of the sequence."""
 
     camera: Camera | None = None
     frames: int = 0
@@ -45,9 +46,10 @@ class Ground:
 
 
 def ground_of_boxes(tracks: Sequence[Tracks], px_per_m: float, image_size: tuple[int, int] | None = None) -> Ground:
-    """Returns the ground by the first 300 measured boxes. px_per_m: the scale of the image, px per m, at the median of
-    these boxes, so that H = median of h / px_per_m. image_size: width, height, px; None: the image ends with the
-    boxes."""
+    """Returns the ground that follows from the first 300 measured boxes (some more, to end a frame), or unknown.
+
+    px_per_m: image scale at the median height h of these boxes, so that a person's height is H = h / px_per_m.
+    image_size: width, height, px; None takes the right and bottom ends of the boxes."""
     box, last = np.zeros((0, 4)), 0
     for t in tracks:
         if len(box) >= BOXES:

@@ -26,7 +26,7 @@ from tracking.grouping.merge_split_events import LinkSwitch, Parts, TrackedMotio
 
 @dataclass
 class LinkedPeople:
-    """Who is present and linked to whom at one moment. People are numbers, as columns of arrays or ids of tracks."""
+    """Who is present and who is linked to whom at one moment. A person is a number, such as a column or a track id."""
 
     # dict by person: the frame since which the person has been present; the caller decides how long a person who is
     # missed stays present
@@ -37,7 +37,7 @@ class LinkedPeople:
     identities: Identities = field(default_factory=Identities)
 
     def components(self) -> list[PersonSet]:
-        """Returns the connected components of two or more present people, in order of the least person."""
+        """Returns the groups: connected components of two or more present, linked people, in order of lowest number."""
         found, seen = [], set[int]()
         for p in sorted(self.present.keys() & self.linked.keys()):
             part, new = {p}, [] if p in seen else [p]
@@ -50,9 +50,10 @@ class LinkedPeople:
         return found
 
     def step(self, t: int, switched: Sequence[LinkSwitch], arrival: int, known: Members) -> list[GroupChange]:
-        """Switches links in frame t and returns what changes in the groups; `present` is up to date before.
+        """Switches links in frame t and returns the changes of the groups; the caller updates `present` before.
 
-        known: groups by id whose ids new groups take over.
+        arrival: a person who is linked within this many frames of coming enters with the group. known: groups by id,
+        from which a new group takes over the id.
         """
         for a, b, on, _ in switched:
             self.switch(a, b, on)
@@ -60,7 +61,7 @@ class LinkedPeople:
         return self.identities.step(t, frozenset(self.present), self.components(), entered, known)
 
     def switch(self, a: int, b: int, on: bool) -> None:
-        """Set (`on` True) or remove the link between two people a and b; no effect if it is so already."""
+        """Sets (`on` True) or removes (False) the link between two people; no effect if it is already so."""
         for p, q in ((a, b), (b, a)):
             partners = self.linked.setdefault(p, set())
             (partners.add if on else partners.discard)(q)
@@ -69,10 +70,8 @@ class LinkedPeople:
 def label_people(
     frame: Ints, column: Ints, motion: TrackedMotion, found: FoundGroups, rule: LinkRule | Belief
 ) -> tuple[Ints, list[GroupEvent]]:
-    """Returns the group id of each row (R,), from 1, -1 alone, and the membership events in order of `emitted`.
-
-    frame, column (R,): from 0. In events members are columns + 1 and frames count from 1.
-    """
+    """Returns the group id of each row (R,), from 1, -1 alone, and the membership events in order of `emitted`. frame,
+    column (R,): frame and person of each row, from 0. In events members are columns + 1, frames count from 1."""
     length = len(motion.pos)
     spells = _spells(frame, column, frames_of(rule.memory, motion.fps), length)
     state, events = LinkedPeople(), []
@@ -129,13 +128,15 @@ def _dated(
 
 
 def parts_of_change(change: GroupChange, old: Members, state: LinkedPeople) -> Parts:
-    """Returns the groups and people alone that a change joined, or into which it divided a group."""
+    """Returns the parts that a change joined, or into which it divided a group, and since when all are present. old:
+    the groups by id before the change."""
     parts = part_sets(change, old, state.identities.groups, frozenset(state.present.keys() & set(change.members)))
     return Parts(parts, max((min(state.present[p] for p in part) for part in parts), default=0))
 
 
 def part_sets(change: GroupChange, old: Members, new: Members, people: PersonSet) -> list[PersonSet]:
-    """Returns the groups and people alone, of `people`, that a change joined, or into which it divided a group."""
+    """Returns the parts that a change joined, or divided a group into: groups, cut to `people`, then people alone. old,
+    new: the groups by id before and after the change."""
     groups, names = (new, change.after) if change.kind in ("split", "dissolve") else (old, change.before)
     parts = [part for g in names if g >= 0 and (part := groups[g] & people)]
     return parts + [frozenset([p]) for p in sorted(people.difference(*parts))]

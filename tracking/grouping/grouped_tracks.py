@@ -44,7 +44,8 @@ def with_groups(
 ) -> tuple[Tracks, ...]:
     """Returns the tracks of a sequence, one `Tracks` per frame, with groups, events and velocities filled in.
 
-    px_per_m: px per m, of tracks in the image; without it only velocities are filled in. rule: None: the default.
+    px_per_m: image scale of tracks in the image; if it is nan for these, only velocities are filled in. rule: how
+    people are grouped; None takes the default grouping.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks)
@@ -55,7 +56,7 @@ def with_groups(
 
 
 def with_velocities(tracks: Sequence[Tracks], fps: float) -> Sequence[Tracks]:
-    """Returns the tracks with unknown velocities replaced by chords of the positions over the last 0.5 s."""
+    """Returns the tracks with each unknown (nan) velocity replaced by the mean velocity over the last 0.5 s."""
     if not any(np.isnan(t.vel).any() for t in tracks):
         return tracks
     count = [len(t.id) for t in tracks]
@@ -67,13 +68,14 @@ def with_velocities(tracks: Sequence[Tracks], fps: float) -> Sequence[Tracks]:
 
 
 def names_groups(tracks: Sequence[Tracks]) -> bool:
-    """Returns True if the tracker reports groups itself: decided by the first frame that has people or groups."""
+    """Returns True if the tracker reports groups itself, that is, in the first frame with people or groups."""
     first = next((t for t in tracks if len(t.id) or t.groups is not None), None)
     return first is not None and _has_groups(first)
 
 
 def late_groups(tracks: Sequence[Tracks]) -> int | None:
-    """Returns the first frame with groups, which are replaced, of a tracker that reports none at first; else None."""
+    """Returns the first frame with groups if the tracker reported none at first (`names_groups` is False), else None.
+    Such late groups are replaced by derived ones."""
     return None if names_groups(tracks) else next((t.index for t in tracks if _has_groups(t)), None)
 
 
@@ -82,7 +84,7 @@ def _has_groups(tracks: Tracks) -> bool:
 
 
 def without_groups(tracks: Sequence[Tracks]) -> list[Tracks]:
-    """Returns the tracks of people without the groups and events that are in them, one `Tracks` per frame, in order."""
+    """Returns the tracks with groups and events removed; `Tracks` of whole groups are returned unchanged."""
     return [
         t if t.unit == "group" else t.replace(group=np.full(len(t.id), -1), groups=None, events=(), derived=False)
         for t in tracks
@@ -92,9 +94,9 @@ def without_groups(tracks: Sequence[Tracks]) -> list[Tracks]:
 def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Grouping | None = None) -> list[Tracks]:
     """Returns the tracks with `group`, `groups` and `events` filled in where the tracker left them empty.
 
-    tracks: of a whole sequence, in order, one per frame from frame 1. A tracker that names groups keeps them. Else the
-    grouping forms groups, and groups that the tracker reports later are left out. Events of a kind are derived up to
-    the frame from which on they are the tracker's own.
+    tracks: of a whole sequence, in order, one per frame from frame 1. If the tracker names groups in its first frame
+    with people, its groups are kept; otherwise the grouping forms all groups, and any that the tracker reports later
+    are removed. Events of a kind are derived for the frames before the tracker reports this kind itself.
     """
     given = list(tracks)
     if not given or any(t.unit == "group" for t in given):
@@ -172,8 +174,8 @@ def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
 
 
 def groups_in_frames(tracks: Sequence[Tracks], px_per_m: float = 1.0) -> list[Groups]:
-    """Returns the groups of each of several frames that follow from `group`: hulls round boxes in the image, else round
-    footprints, for which px_per_m is the scale of the image."""
+    """Returns the groups of each frame that follow from the group ids in `group`, one `Groups` per `Tracks`. Hulls
+    enclose the boxes of people in the image, else their footprints; px_per_m scales footprints in the image."""
     if not tracks:
         return []
     frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])

@@ -26,7 +26,7 @@ from tracking.grouping.tracks_table import TracksTable
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundGroups:
-    """Who belongs together in a sequence: links, for events, and who is together now."""
+    """Who belongs together in a sequence: the links between people, from which events follow, and the groups now."""
 
     links: Links | None  # None: not asked for
     # now (S, P): by step of `size` frames and person the least person of the group, -1 alone; None: as linked
@@ -44,10 +44,11 @@ def groups_of_steps(
     stay: float = 0.0,
     come: float = 0.0,
 ) -> Ints:
-    """Returns the least person of each person's group, shape (S, P), -1 for people alone.
+    """Returns for each step and person the lowest person number in the person's group, (S, P), -1 for people alone.
 
-    step, a, b, values (R,): one row per pair and step, step ascending; pairs without a row have the value `unseen`.
-    stay, come: added for pairs that were in one group in the step before, taken from all others.
+    step, a, b, values (R,): one row per pair (a, b) and step, step ascending; pairs without a row have the value
+    `unseen`. stay is added to the value of a pair that was in one group in the step before, come is subtracted from
+    the value of any other pair.
     """
     from tracking.grouping.belief_kernels import linked_groups
 
@@ -60,9 +61,11 @@ def belief_groups(
     frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief, measured: Bools | None = None,
     *, events: bool = True,
 ) -> FoundGroups:  # fmt: skip
-    """Returns the groups of a sequence of `length` frames; any two members of a group of events are linked.
+    """Returns the groups of a sequence of `length` frames by a belief.
 
-    measured (R,): False in rows of people who are predicted only; these are no evidence. None: all are measured.
+    frame, column (R,), from 0, pos (R, 2), m: one row per person and frame. measured (R,): False in rows of people who
+    are predicted only, which are no evidence; None: all are measured. events: False leaves `links` None. Any two
+    members of a group from which events follow are linked.
     """
     size = frames_per_step(fps)
     people = int(column.max(initial=0)) + 1
@@ -91,7 +94,8 @@ def belief_groups(
 
 
 def groups_now(table: TracksTable, fps: float, belief: Belief) -> Ints:
-    """Returns a label of each row of a table, (R,), equal for people of one frame who are together now, -1 alone."""
+    """Returns for each row of a table a number that people of one frame share if they are together now, -1 alone, (R,).
+    The numbers are person numbers, not group ids that last."""
     found = belief_groups(table.frame, table.column, table.pos, table.length, fps, belief, table.seen, events=False)
     assert found.now is not None
     return found.now[table.frame // found.size, table.column]

@@ -18,8 +18,8 @@ LOOK_AHEAD = ("mot", "mot text", "people text")
 def known_people(sequence: Sequence) -> list[Tracks]:
     """Returns the labelled people as causal tracks without groups, one `Tracks` per frame from 1.
 
-    Velocities that the source does not state are nan. People who have boxes only are on the ground if there is a
-    camera. Raises InputError without people with ids, or if only some have a position on the ground.
+    Velocities that the source does not state are nan. If labels have boxes only and there is a camera, people are
+    placed on the ground. Raises InputError if nobody has an id, or if some people have no position on the ground.
     """
     truth, file = sequence.truth, sequence.source.get("path", sequence.name)
     if truth is None:

@@ -67,11 +67,8 @@ class Links:
 
 
 def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, fps: float, rule: LinkRule) -> Links:
-    """Returns all switches of links in a sequence of `length` frames.
-
-    frame, column (R,), pos, vel (R, 2): one row per person and frame, frame sorted. A pair with an unknown (nan)
-    velocity counts as moving alike.
-    """
+    """Returns all switches of links in a sequence of `length` frames. frame, column (R,), from 0, pos, vel (R, 2), m,
+    m/s: one row per person and frame, frame sorted. A pair with an unknown (nan) velocity counts as moving alike."""
     i, j = close_pairs(frame, pos, max(rule.apart, rule.near))
     swap = column[i] > column[j]
     i, j = np.where(swap, j, i), np.where(swap, i, j)

@@ -35,7 +35,8 @@ class TrackedMotion:
     fps: float  # frames per second
 
     def onset(self, a: PersonSet, b: PersonSet, t: int, *, joins: bool) -> int:
-        """Returns the frame in which two parts (sets of columns) came together, or parted, as known in frame t."""
+        """Returns the frame in which two parts came together (joins True) or parted (False), as known in frame t. a, b:
+        the parts, sets of columns. Frames count from 0; only the 20 s before t are searched."""
         first = max(0, t + 1 - frames_of(SEARCHED, self.fps))
         found = separation(self.pos[first : t + 1], self.vel[first : t + 1], *(np.array(sorted(x)) for x in (a, b)))
         rules = [self._lasting(holds) for holds in (found.split_rule(), found.merge_rule())]
@@ -55,7 +56,7 @@ class TrackedMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """What a change joined, or divided into: sets of columns, groups and people alone."""
+    """The parts that a merge or enter joined, or that a split left: groups and people alone, as sets of columns."""
 
     sets: Sequence[PersonSet]
     since: int  # frame (from 0) from which on a person of each has been present
@@ -64,7 +65,8 @@ class Parts:
 def event_of_change(
     change: GroupChange, t: int, parts: Parts, motion: TrackedMotion, arrival: int
 ) -> GroupEvent | None:
-    """Returns the event of a change that became known in frame t, None for people who were together from the start."""
+    """Returns the event of a change that became known in frame t. It is None if people join, or enter, within `arrival`
+    frames of their first frame: they were together already."""
     # a group leaves when its last two people were seen, or its last one
     if change.kind == "leave":
         seen = np.isfinite(motion.pos[: t + 1, change.members, 0]).sum(axis=1)
@@ -81,7 +83,8 @@ def event_of_change(
 
 
 def events_of_labels(group: Ints, pos: Array) -> list[GroupEvent]:
-    """Returns the membership events, by time, of labels group (T, P), -1 alone, and pos (T, P, 2), nan absent."""
+    """Returns the events that follow from changes of the groups of P people in T frames, sorted by time. group (T, P):
+    group id, -1 alone. pos (T, P, 2): m, nan if absent."""
     there = np.isfinite(pos).all(axis=2)
     state = np.where(there, group, ABSENT)
     changed = np.flatnonzero((np.diff(state, axis=0) != 0).any(axis=1)) + 1

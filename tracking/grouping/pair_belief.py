@@ -27,12 +27,14 @@ PAIR = 2**31  # Numbers of people are below this.
 class PairBelief:
     """The log-odds that each pair of K people belongs together, for one of the belief's `DECISIONS`.
 
-    State: log_odds (K, K): of the last step, or, of new people, of their first frame; UNSEEN for pairs that are 4 m
-    apart or more, or of whom one was not seen in the last step. total (K, 3): sums of x, y, m, and of time, s, over the
-    frames of the current step in which each was seen; count (K,): of these frames. past: means of `total` in the last
-    steps, (K, 3), nan where there are none. number (K,): of each person, in the order of coming, never given twice.
-    means: of the evidence, of the R pairs that have been near each other; pair (R,), ascending: PAIR times the number
-    of the one plus that of the other. frames, steps: how many there were.
+    Evidence is averaged over steps of some frames. decision: "now" or "events".
+
+    State: log_odds (K, K), of the last step, or for a new person of the person's first frame; it is UNSEEN for pairs
+    4 m or more apart, and if one of the two was not seen in the last step. total (K, 3), sums of x, y, m, and of time,
+    s, over the frames of the current step in which a person was seen; count (K,), the number of these frames. past, for
+    each of the last steps the means of x, y and time, (K, 3), nan if not seen. number (K,), a number of each person
+    that is never used again. means, the averaged evidence of R pairs that have been near each other; pair (R,), the key
+    of each, PAIR times the one number plus the other. frames, steps: how many there were.
     """
 
     def __init__(self, fps: float, decision: str = NOW) -> None:
@@ -47,7 +49,8 @@ class PairBelief:
         self.means = ExponentialMeans(0, self.seconds)
 
     def add(self, state: Array) -> None:
-        """Adds people as the last rows; state (K, 4): x, y, m, vx, vy, m/s, of all people now, nan if not seen."""
+        """Adds new people after those known so far, in the rows of `state` that exceed the number of known people.
+        state (K, 4): x, y, m, vx, vy, m/s, of all people, known and new, now; nan if not seen."""
         old, n = len(self.count), len(state)
         self._reorder(np.concatenate([np.arange(old), np.full(n - old, -1)]))
         new = np.arange(n) >= old
@@ -61,11 +64,11 @@ class PairBelief:
             self._judge(i[fresh], j[fresh], means.add(np.zeros(len(fresh), np.int64), np.arange(len(fresh)), now))
 
     def keep(self, rows: Bools) -> None:
-        """Remove all people but those where `rows` (K,) is True."""
+        """Removes all people except those where `rows` (K,) is True."""
         self._reorder(np.flatnonzero(rows))
 
     def see(self, pos: Array) -> None:
-        """Go on by a frame, with the places (K, 2), m, nan for people who are not seen."""
+        """Adds the next frame; pos (K, 2): positions of all people, m, nan for people who are not seen."""
         seen = np.isfinite(pos[:, 0])
         self.total[seen] += np.column_stack([pos[seen], np.full(int(seen.sum()), self.frames / self.fps)])
         self.count += seen
@@ -74,7 +77,7 @@ class PairBelief:
         self.frames += 1
 
     def seen(self) -> Bools:
-        """Returns which people were seen in the last step, (K,); nobody before its end."""
+        """Returns which people were seen in the last complete step, (K,) bool; all False if there is none yet."""
         none = np.zeros(len(self.count), bool)
         return np.isfinite(self.past[-1][:, 0]) if self.past else none
 

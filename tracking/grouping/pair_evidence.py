@@ -57,15 +57,15 @@ class PairRows:
 
 
 def frames_per_step(fps: float) -> int:
-    """Returns the number of frames in a step: as many as last at most 0.4 s, at least one. fps: frames per second."""
+    """Returns the number of frames in a step: the greatest number that lasts at most 0.4 s, and at least 1."""
     return max(1, int(STEP * fps + 1e-9))
 
 
 def step_positions(frame: Ints, column: Ints, pos: Array, length: int, people: int, fps: float) -> tuple[Array, Array]:
     """Returns each person's mean position (S, people, 2), m, and time (S, people), s, in each step; nan if not seen.
 
-    Step s ends with the frame s `frames_per_step(fps)`: the first one is the first frame alone. Frames after the end of
-    the last step are left out.
+    frame, column (R,), from 0, pos (R, 2), m: one row per person and frame. With n = `frames_per_step(fps)`, step s
+    ends with frame n s, so that step 0 is frame 0 alone. Frames after the last complete step are left out.
     """
     size = frames_per_step(fps)
     steps, step = -(-length // size), -(-frame // size)
@@ -80,7 +80,8 @@ def step_positions(frame: Ints, column: Ints, pos: Array, length: int, people: i
 
 
 def in_steps(frame: Ints, column: Ints, steps: int, people: int, size: int) -> Bools:
-    """Returns flags (steps, people): True in steps of `size` frames, as of `step_positions`, with a row of a person."""
+    """Returns bool (steps, people): True where a person has a row in one of a step's frames; steps as `step_positions`.
+    frame, column (R,), from 0: of each row. size: frames per step."""
     step = -(-frame // size)
     out, whole = np.zeros((steps, people), bool), step < steps
     out[step[whole], column[whole]] = True
@@ -88,7 +89,8 @@ def in_steps(frame: Ints, column: Ints, steps: int, people: int, size: int) -> B
 
 
 def step_velocities(pos: Array, time: Array, seconds: float) -> Array:
-    """Returns velocities (S, P, 2), m/s: chords from a person's earliest position within the last 0.8 s; else nan."""
+    """Returns velocities (S, P, 2), m/s, from a person's earliest position in the last 0.8 s to the present one. They
+    are nan without such a position. pos (S, P, 2), m, time (S, P), s: from `step_positions`; seconds: per step."""
     vel = np.full_like(pos, np.nan)
     for steps in range(1, min(max(1, round(CHORD / seconds)), len(pos) - 1) + 1):
         chord = (pos[steps:] - pos[:-steps]) / (time[steps:] - time[:-steps])[..., None]
@@ -97,7 +99,8 @@ def step_velocities(pos: Array, time: Array, seconds: float) -> Array:
 
 
 def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
-    """Yields the rows of all pairs in portions of whole steps; pos (S, P, 2), time (S, P): from `step_positions`."""
+    """Yields the evidence of all pairs within 4 m, in portions of whole steps, steps ascending. pos (S, P, 2), m, time
+    (S, P), s: from `step_positions`. seconds: length of a step."""
     vel = step_velocities(pos, time, seconds)
     step, column = np.nonzero(np.isfinite(pos[..., 0]))
     place, motion = pos[step, column], vel[step, column]
@@ -112,9 +115,10 @@ def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
 
 
 def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints, *, others: bool = True) -> Array:
-    """Returns the `QUANTITIES` (R, 10) of all pairs of rows i, j (R,) within 4 m in their steps.
+    """Returns the `QUANTITIES` (R, 10) of R pairs, for one moment each.
 
-    pos, vel (N, 2): m, m/s, by person and step. others: False: `OTHERS`, which only beliefs about events need, are nan.
+    pos, vel (N, 2), m, m/s: of N rows, one per person and step. i, j (R,): the two rows of each pair; all pairs within
+    4 m must be given. others: False leaves the columns `OTHERS` nan, which only beliefs about events need.
     """
     apart, change, mean = pos[j] - pos[i], vel[j] - vel[i], (vel[i] + vel[j]) / 2
     distance, differ, pace = (np.hypot(*x.T) for x in (apart, change, mean))
@@ -184,7 +188,8 @@ class ExponentialMeans:
         self.last, self.rows = np.zeros(pairs, np.int64), np.zeros(pairs, np.int64)
 
     def add(self, step: Ints, pair: Ints, quantities: Array) -> Array:
-        """Adds rows, steps ascending, and returns the values (R, len(NAMES)) of their pairs after each."""
+        """Adds R rows, steps ascending, and returns the values (R, len(NAMES)) of each row's pair after this row. step,
+        pair (R,): step and number of the pair; quantities (R, 10): from `instant_evidence`."""
         from tracking.grouping.belief_kernels import add_to_means
 
         out, count = np.empty((*quantities.shape, len(self.times))), np.empty(len(step), np.int64)
@@ -193,7 +198,7 @@ class ExponentialMeans:
         return np.column_stack([out.reshape(len(step), -1), np.minimum(count * self.seconds, LONGEST)])
 
     def take(self, rows: Ints) -> None:
-        """Makes the pairs those of the rows (K',), -1 for a new one."""
+        """Renumbers the pairs: pair k becomes what was pair rows[k], or a new pair without past if rows[k] is -1."""
         new = rows < 0
         for name in ("total", "weight", "last", "rows"):
             table = getattr(self, name)

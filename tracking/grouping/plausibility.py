@@ -19,7 +19,8 @@ FAST = 3.0
 
 
 def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float) -> Iterator[str]:
-    """Yields a warning for each thing that is hardly right: frames without anybody at a fixed step, and speeds."""
+    """Yields a warning (text) if people occur only in every n-th frame, and one if half move faster than 3 m/s. name:
+    of the sequence; px_per_m: image scale, used only for people in the image."""
     present = [t for t in people if len(t.id)]
     step = math.gcd(*np.diff([t.index for t in present]).astype(int).tolist())
     if step > 1:
@@ -38,7 +39,7 @@ def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float
 
 
 def median_speed(people: Sequence[Tracks], fps: float, px_per_m: float) -> float:
-    """Returns the median speed of the motion over the last 0.5 s, m/s; nan if nobody moves for so long."""
+    """Returns the median, over all people and frames, of the speed over the last 0.5 s, m/s; nan if none is known."""
     present = [t for t in people if len(t.id)]
     if not present:
         return math.nan

@@ -33,7 +33,7 @@ class TracksTable:
         return self._dense(self.pos)
 
     def velocities(self) -> Array:
-        """Returns velocities (T, P, 2): x, y in m/s by frame (from 0) and column."""
+        """Returns velocities (T, P, 2): x, y in m/s by frame (from 0) and column; nan where absent or unknown."""
         return self._dense(self.vel)
 
     def labels(self) -> Ints:
@@ -51,8 +51,8 @@ class TracksTable:
 def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float) -> TracksTable:
     """Returns the table of a sequence's person tracks, one `Tracks` per frame, at least one.
 
-    Unknown velocities are replaced by chords over the last 0.5 s. Raises InputError if the tracks are in the image and
-    px_per_m is not a finite number above 0.
+    Unknown velocities are replaced by mean velocities over the last 0.5 s. Raises InputError if the tracks are in the
+    image and px_per_m is not a finite number above 0.
     """
     scale = px_per_m if tracks[0].plane == "image" else 1.0
     if not math.isfinite(scale) or scale <= 0:

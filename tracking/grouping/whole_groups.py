@@ -38,7 +38,8 @@ class WholeGroupEvent:
 
 
 def reported_event(event: WholeGroupEvent, index: int, t: float, fps: float, scale: float = 1.0) -> GroupEvent:
-    """Returns the event as it is reported in frame `index`, from 1, at time t, s."""
+    """Returns the `GroupEvent` that is reported in frame `index` (from 1) at time t, s, for a change of groups. Its
+    start is the frame of the onset; its position is multiplied by `scale`."""
     start = min(max(index - round((t - event.onset) * fps), 1), index)
     x, y = event.pos
     return GroupEvent(event.kind, start, index, index, event.before, event.after, (), (x * scale, y * scale))
@@ -48,8 +49,8 @@ def whole_group_tracks(
     frame: Frame, plane: Plane, fps: float, groups: Groups, cov: Array, events: Iterable[WholeGroupEvent],
     scale: float = 1.0,
 ) -> Tracks:  # fmt: skip
-    """Returns the Tracks of G groups of unknown members, and their events; cov (G, 4, 4) or (G, 6, 6); scale: units of
-    the plane per m."""
+    """Returns the `Tracks` of one frame for G groups whose members are unknown, with their events. cov (G, 4, 4), or
+    (G, 6, 6) in space: covariance of position and velocity. scale: factor on positions of events."""
     told = tuple(reported_event(e, frame.index, frame.t, fps, scale) for e in events)
     id = groups.id
     return Tracks(

@@ -57,10 +57,8 @@ def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
 
 
 def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, frames: Iterable[Frame]) -> InputKind:
-    """Returns what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes" or "points".
-
-    frames: with the detections that the tracker gets; not used if `mode` is "image".
-    """
+    """Returns what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes" or "points". frames:
+    with the detections that the tracker gets; not used if `mode` is "image"."""
     if mode == "image":
         return "pixels" if "pixels" in needs and sequence.has_images else "stereo"
     in_image = any(f.detections is not None and f.detections.plane == "image" for f in frames)
@@ -108,9 +106,7 @@ SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
 
 def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
     """Returns an iterator over detections made from the labels, one `Detections` for each frame in order, from 1.
-
-    sensor: settings that degrade them, by name; {} gives the labels in random order.
-    """
+    sensor: settings that degrade them, by name; {} gives the labels in random order."""
     truth = sequence.truth
     assert truth is not None, "the mode was chosen for a source with labels"
     if not sensor:

@@ -44,10 +44,8 @@ def from_boxes(frames: Iterable[Detections | Tracks | None]) -> ImageScale:
 
 
 def from_tracks(given: ImageScale, learned: float, tracks: SequenceOf[Tracks]) -> ImageScale:
-    """Returns the image scale for deriving groups from tracks; px_per_m is nan if it is unknown.
-
-    It is `given` if that is known, else `learned` (the tracker's own scale, px per m), else that of the tracks' boxes.
-    """
+    """Returns the image scale for deriving groups from tracks; px_per_m is nan if it is unknown. It is `given` if that
+    is known, else `learned` (the tracker's own scale, px per m), else that of the tracks' boxes."""
     if np.isfinite(given.px_per_m):
         return given
     return ImageScale(learned) if np.isfinite(learned) else from_boxes(tracks)
@@ -73,9 +71,7 @@ def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ..
 
 def before_frames(sequence: Sequence) -> ImageScale:
     """Returns the image scale that is known before the frames are read: by the camera, else as the sequence states.
-
-    px_per_m is nan if there is none.
-    """
+    px_per_m is nan if there is none."""
     if sequence.camera is not None:
         from sim.scene.camera import px_per_m_at_centre
 

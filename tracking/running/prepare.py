@@ -52,10 +52,8 @@ class PreparedTracker:
         return (replace(f, detections=None) for f in self.sequence)
 
     def scale(self, tracks: SequenceOf[Tracks]) -> ImageScale:
-        """Returns the image scale for deriving groups from the tracks of frames 1 to now; nan if unknown.
-
-        It is the context's scale if that is known, else the tracker's own, else that of the tracks' boxes.
-        """
+        """Returns the image scale for deriving groups from the tracks of frames 1 to now; nan if unknown. It is the
+        context's scale if that is known, else the tracker's own, else that of the tracks' boxes."""
         with self._naming("px_per_m", self.sequence.name):
             learned = image_scale.learned_by(self.tracker)
         return image_scale.from_tracks(ImageScale(self.context.px_per_m, self.scale_frames), learned, tracks)
@@ -71,10 +69,8 @@ class PreparedTracker:
             self.tracker.reset(self.context, seed)
 
     def step(self, frame: Frame) -> Tracks:
-        """Returns the tracker's tracks of the frame, checked; call it with the frames of `frames`, in order.
-
-        Raises InputError if detections are not finite, WorkError if the tracker fails or returns wrong tracks.
-        """
+        """Returns the tracker's tracks of the frame, checked; call it with the frames of `frames`, in order. Raises
+        InputError if detections are not finite, WorkError if the tracker fails or returns wrong tracks."""
         detections = frame.detections
         if detections is not None:
             check_detections(detections, self.tracker.needs)
@@ -101,10 +97,8 @@ def prepare(
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
 ) -> PreparedTracker:
-    """Returns the tracker with all that it needs for the sequence; the arguments are as in `tracking.track`.
-
-    Raises InputError if an argument is wrong or tracker and sequence do not fit.
-    """
+    """Returns the tracker with all that it needs for the sequence; the arguments are as in `tracking.track`. Raises
+    InputError if an argument is wrong or tracker and sequence do not fit."""
     if not isinstance(sequence, Sequence):
         remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"
         raise InputError(place="sequence", got=type(sequence).__name__, expected="a Sequence", remedy=remedy)
@@ -146,10 +140,8 @@ def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) 
 
 
 def config_of(kind: type[Config], params: Params) -> Config:
-    """Returns `params` as a config of the class `kind`; None gives the default config.
-
-    Raises InputError if values are wrong or `params` is a config of another class.
-    """
+    """Returns `params` as a config of the class `kind`; None gives the default config. Raises InputError if values are
+    wrong or `params` is a config of another class."""
     if params is None:
         return kind()
     if isinstance(params, str | Path):

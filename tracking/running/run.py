@@ -108,10 +108,8 @@ def causal_from(sequence: Sequence) -> int | None:
 
 
 def input_summary(info: Mapping[str, Any]) -> str:
-    """Returns one line with the detection mode, background and sensor settings of a run, from its run.json.
-
-    Example: "truth (noise_m = 0.1)". It is "" if run.json does not tell the mode.
-    """
+    """Returns one line with the detection mode, background and sensor settings of a run, from its run.json. Example:
+    "truth (noise_m = 0.1)". It is "" if run.json does not tell the mode."""
     mode, background, sensor = (info.get(key) for key in ("detections", "background", "sensor"))
     more = [f"background: {background}"] if background else []
     more += [f"{key} = {value}" for key, value in (sensor or {}).items()]
@@ -119,10 +117,8 @@ def input_summary(info: Mapping[str, Any]) -> str:
 
 
 def input_name(info: Mapping[str, Any]) -> str:
-    """Returns a short name of a tracker's input, from the content of its run.json; "" if it is unknown.
-
-    Examples: "pixels", "boxes (file)", "points (truth, noise_m = 0.1, seed 3)".
-    """
+    """Returns a short name of a tracker's input, from the content of its run.json; "" if it is unknown. Examples:
+    "pixels", "boxes (file)", "points (truth, noise_m = 0.1, seed 3)"."""
     kind, mode, sensor = (info.get(key) for key in ("input", "detections", "sensor"))
     if kind is None:
         return ""
@@ -173,10 +169,8 @@ class TrackingRun(SequenceOf[Tracks]):
         return run_tables(self.tracks, self.info["fps"], found)
 
     def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
-        """Writes the tracks to the folder as `flockscope track` does, and returns the folder.
-
-        sequence: what was tracked. pairs: a table of pair probabilities that is written, too; None writes none.
-        """
+        """Writes the tracks to the folder as `flockscope track` does, and returns the folder. sequence: what was
+        tracked. pairs: a table of pair probabilities that is written, too; None writes none."""
         from sim.io.store.seal import tracked_hash
         from sim.io.store.track_files import pair_table, write_tracks
 
@@ -316,10 +310,8 @@ def group(
 
 
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
-    """Returns stored tracks of a sequence, one `Tracks` per frame, with groups and events derived where they lack.
-
-    The default grouping is used.
-    """
+    """Returns stored tracks of a sequence, one `Tracks` per frame, with groups and events derived where they lack. The
+    default grouping is used."""
     from tracking.grouping.foot_points import completed
 
     known = image_scale.before_frames(sequence)

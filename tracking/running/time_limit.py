@@ -68,10 +68,8 @@ class TimeLimited:
         self._process.join()
 
     def make(self, config: Config | None) -> RemoteTracker:
-        """Makes the tracker in the process with this config, and returns a `RemoteTracker` that calls it.
-
-        config: None for a tracker without parameters.
-        """
+        """Makes the tracker in the process with this config, and returns a `RemoteTracker` that calls it. config: None
+        for a tracker without parameters."""
         made = RemoteTracker(self, next(self._numbers), config)
         made.create()
         return made

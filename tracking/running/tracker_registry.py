@@ -96,10 +96,8 @@ def located(spec: str) -> str:
 
 
 def checked(found: Any, spec: str) -> type[Tracker]:
-    """Returns `found` unchanged if it is a tracker class, else raises InputError.
-
-    spec: the name by which the user gave the class, for messages. Raises WorkError if the class's own code fails.
-    """
+    """Returns `found` unchanged if it is a tracker class, else raises InputError. spec: the name by which the user gave
+    the class, for messages. Raises WorkError if the class's own code fails."""
     with user_code(lambda error: tracker_failed(spec, "class", "before the first frame", error)):
         fault = _class_fault(found)
     if fault:
@@ -109,10 +107,8 @@ def checked(found: Any, spec: str) -> type[Tracker]:
 
 
 def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
-    """Returns the attribute `config_class` of a tracker class. Raises InputError if the class has none.
-
-    spec: the name by which the user gave the tracker, for the message.
-    """
+    """Returns the attribute `config_class` of a tracker class. Raises InputError if the class has none. spec: the name
+    by which the user gave the tracker, for the message."""
     kind = getattr(tracker, "config_class", None)
     if kind is None:
         remedy = "give the class a config_class that declares them (docs/guides/your-own-tracker.md)"

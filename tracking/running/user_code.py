@@ -55,10 +55,8 @@ def raise_if_interrupted() -> None:
 
 
 def is_interruption(error: BaseException) -> bool:
-    """Returns True if an exception comes from Ctrl-C, False if the code that raised it did so on its own.
-
-    It is True for every exception if SIGINT was recorded in the current block.
-    """
+    """Returns True if an exception comes from Ctrl-C, False if the code that raised it did so on its own. It is True
+    for every exception if SIGINT was recorded in the current block."""
     if _received.is_set():
         return True
     return isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) not in (_record, signal.SIG_IGN)
@@ -69,9 +67,7 @@ def user_code(
     failed: Callable[[BaseException], FlockscopeError], passing: type[Exception] | tuple[()] = FlockscopeError
 ) -> Iterator[None]:
     """Replaces an exception that the block raises, SystemExit included, by the error that `failed` returns for it.
-
-    Exceptions of the class `passing` are raised unchanged. Ctrl-C becomes KeyboardInterrupt.
-    """
+    Exceptions of the class `passing` are raised unchanged. Ctrl-C becomes KeyboardInterrupt."""
     try:
         yield
     except BaseException as error:
@@ -93,8 +89,6 @@ def what_was_raised(error: BaseException) -> str:
 
 def tracker_failed(tracker: str, method: str, place: str, error: BaseException) -> WorkError:
     """Returns the WorkError for an exception that a tracker's own code raised, with the first line of its message.
-
-    tracker: its name; method: the method that failed; place: where in the input, such as "frame 3".
-    """
+    tracker: its name; method: the method that failed; place: where in the input, such as "frame 3"."""
     remedy = f"correct the tracker's {method}; FLOCKSCOPE_DEBUG=1 shows where"
     return WorkError(file=tracker, place=place, got=what_was_raised(error), expected="no exception", remedy=remedy)

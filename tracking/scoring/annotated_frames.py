@@ -78,10 +78,8 @@ def widest_step(inside: Bools) -> int:
 
 
 def first_seen(events: Iterable[GroupEvent], inside: Bools) -> list[GroupEvent]:
-    """Returns the events with each start moved to the first scored frame at or after it.
-
-    An event that starts before the first scored frame or after the last one is not changed.
-    """
+    """Returns the events with each start moved to the first scored frame at or after it. An event that starts before
+    the first scored frame or after the last one is not changed."""
     frames = np.flatnonzero(inside).tolist()
 
     def moved(event: GroupEvent) -> GroupEvent:
@@ -92,10 +90,8 @@ def first_seen(events: Iterable[GroupEvent], inside: Bools) -> list[GroupEvent]:
 
 
 def seen_in(tracks: Sequence[Tracks], inside: Bools) -> list[Tracks]:
-    """Returns the `Tracks` of the scored frames, each with all events reported since the previous scored frame.
-
-    Events reported before the first scored frame are dropped.
-    """
+    """Returns the `Tracks` of the scored frames, each with all events reported since the previous scored frame. Events
+    reported before the first scored frame are dropped."""
     first = int(np.argmax(inside))
     if inside[first:].all():
         return [t for t in tracks if inside[t.index]]

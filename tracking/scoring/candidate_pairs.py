@@ -110,10 +110,8 @@ def compare(
 
 
 def same_frame(a: Ints, b: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """Yields all pairs of equal frame numbers in a and b, in portions: arrays of indices in a and in b, (P,) each.
-
-    a, b: frame numbers; b is sorted.
-    """
+    """Yields all pairs of equal frame numbers in a and b, in portions: arrays of indices in a and in b, (P,) each. a,
+    b: frame numbers; b is sorted."""
     first = np.searchsorted(b, a, side="left")
     return _portions(first, np.searchsorted(b, a, side="right") - first)
 
@@ -148,10 +146,8 @@ def _near(a: FrameRows, b: FrameRows, low: Array, high: Array, at: Array) -> Ite
 
 
 def box_pairs(true: FrameRows, est: FrameRows, true_box: Array, est_box: Array) -> Pairs:
-    """Returns the pairs of a true and an estimated box of one frame that overlap, with their IoU.
-
-    true_box (R, 4), est_box (S, 4): left, top, width, height in px. A box with nan has no pairs.
-    """
+    """Returns the pairs of a true and an estimated box of one frame that overlap, with their IoU. true_box (R, 4),
+    est_box (S, 4): left, top, width, height in px. A box with nan has no pairs."""
     (la, ta, ra, ba), (lb, tb, rb, bb) = _edges(true_box), _edges(est_box)
     area_a, area_b = (np.maximum(box[:, 2], 0) * np.maximum(box[:, 3], 0) for box in (true_box, est_box))
     widest = float(est_box[np.isfinite(est_box[:, 2]), 2].max(initial=0.0))
@@ -173,10 +169,8 @@ def _edges(box: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def point_pairs(true: FrameRows, est: FrameRows, true_pos: Array, est_pos: Array, reach: float) -> Pairs:
-    """Returns the pairs of a true and an estimated position of one frame that are closer than `reach`.
-
-    Their similarity is 1 - distance / reach. true_pos (R, 2), est_pos (S, 2) and reach have one unit.
-    """
+    """Returns the pairs of a true and an estimated position of one frame that are closer than `reach`. Their similarity
+    is 1 - distance / reach. true_pos (R, 2), est_pos (S, 2) and reach have one unit."""
     ax, ay, bx, by = (np.ascontiguousarray(pos[:, k]) for pos in (true_pos, est_pos) for k in (0, 1))
 
     def similarity(i: Ints, j: Ints) -> tuple[Ints, Array]:

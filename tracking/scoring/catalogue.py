@@ -34,10 +34,8 @@ class Score:
 
     @property
     def best(self) -> float:
-        """The value of a perfect tracker: `high` if higher is better, 0 if lower is better.
-
-        It is nan if neither is better, or if `high` is infinite.
-        """
+        """The value of a perfect tracker: `high` if higher is better, 0 if lower is better. It is nan if neither is
+        better, or if `high` is infinite."""
         value = {"higher": self.high, "lower": 0.0, "neither": inf}[self.better]
         return value if value < inf else float("nan")
 

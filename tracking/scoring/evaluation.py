@@ -219,9 +219,7 @@ class Scorer:
 
     def scored(self, frames: int | range | None) -> Bools:
         """Returns which of the frame numbers 0 … length are scored, (length + 1,) bool: those chosen and annotated.
-
-        frames: a number n chooses 1 … n, a range its frames, None all frames.
-        """
+        frames: a number n chooses 1 … n, a range its frames, None all frames."""
         return chosen_frames(frames, self.truth.length) & self.annotated.frames
 
     def groups(self, surface: Surface) -> TrueGroups:
@@ -231,10 +229,8 @@ class Scorer:
         return self._groups[surface]
 
     def sides(self, tracks: Sequence[Tracks], frames: Bools) -> ComparedSides:
-        """Returns the data of truth and tracks in the frames f where frames[f] is true.
-
-        Tracked people on distractors are left out. No tracked person is mapped to a true person yet.
-        """
+        """Returns the data of truth and tracks in the frames f where frames[f] is true. Tracked people on distractors
+        are left out. No tracked person is mapped to a true person yet."""
         kept = frames[self.people.rows.frame]
         true = self.people if kept.all() else self.people.keep(kept)
         est, plane = tracked_people(tracks), plane_of(self.truth, tracks)
@@ -254,9 +250,7 @@ class Scorer:
         self, runs: Sequence[Iterable[Tracks]], similarity: Similarity | None = None, frames: int | range | None = None
     ) -> list[MatchedSides]:
         """Returns for each run this truth and the run's tracks, compared, with tracked people mapped to true people.
-
-        All runs are compared in one plane and by one similarity; the arguments are as in `evaluate`.
-        """
+        All runs are compared in one plane and by one similarity; the arguments are as in `evaluate`."""
         inside = self.scored(frames)
         ordered = [_in_order(run, inside) for run in runs]
         moved, chosen = in_one_plane(self.truth, ordered, [from_pixels(run) for run in runs], similarity)
@@ -264,10 +258,8 @@ class Scorer:
         return [judge._matched(run, chosen, inside) for judge, run in zip(judges, moved, strict=True)]
 
     def judge(self, given: Sequence[Tracks], moved: Sequence[Tracks]) -> Scorer:
-        """Returns the scorer for one run: `of_feet` if its tracks were moved to the ground, else this scorer.
-
-        given, moved: the run's tracks before and after `in_one_plane`, the same object if they were not moved.
-        """
+        """Returns the scorer for one run: `of_feet` if its tracks were moved to the ground, else this scorer. given,
+        moved: the run's tracks before and after `in_one_plane`, the same object if they were not moved."""
         return self.of_feet if moved is not given and plane_of(self.truth, moved) == "ground" else self
 
     def _matched(self, given: Sequence[Tracks], similarity: Similarity, inside: Bools) -> MatchedSides:
@@ -284,10 +276,8 @@ class Scorer:
 
 
 def chosen_frames(frames: int | range | None, length: int) -> Bools:
-    """Returns which of the frame numbers 0 … length are chosen, (length + 1,) bool; frame 0 never is.
-
-    frames: a number n chooses 1 … n, a range its frames, None all frames.
-    """
+    """Returns which of the frame numbers 0 … length are chosen, (length + 1,) bool; frame 0 never is. frames: a number
+    n chooses 1 … n, a range its frames, None all frames."""
     inside = np.zeros(length + 1, bool)
     if isinstance(frames, range):
         inside[[f for f in frames if 1 <= f <= length]] = True
@@ -312,10 +302,8 @@ def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
 
 
 def weighted_people(pairs: Pairs, size: int) -> WeightedScores:
-    """Returns a function from weights (D, size) of frames to the scores of HOTA, CLEAR and identity, (D,) by key.
-
-    size: length of the recording + 1. Raises ValueError if an id is twice in a frame.
-    """
+    """Returns a function from weights (D, size) of frames to the scores of HOTA, CLEAR and identity, (D,) by key. size:
+    length of the recording + 1. Raises ValueError if an id is twice in a frame."""
     pairs.require_unique_ids()
     parts = [scores(pairs, size) for scores in (weighted_hota, weighted_clear, weighted_identity)]
     return lambda weights: {key: value for part in parts for key, value in part(weights).items()}

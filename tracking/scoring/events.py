@@ -33,10 +33,8 @@ class EventMembers:
     unmatched: int = 0  # number of further members that are mapped to no true person, or to one already in `people`
 
     def jaccard(self, other: EventMembers) -> float:
-        """Returns the number of common people / the number of all members of both, 0 if both are empty.
-
-        Each unmatched member counts in the denominator only.
-        """
+        """Returns the number of common people / the number of all members of both, 0 if both are empty. Each unmatched
+        member counts in the denominator only."""
         common = len(self.people & other.people)
         whole = len(self.people | other.people) + self.unmatched + other.unmatched
         return common / whole if whole else 0.0
@@ -77,10 +75,8 @@ class MatchedEvents:
 def match_events(
     true: Sequence[ComparableEvent], est: Sequence[ComparableEvent], fps: float, scale: float
 ) -> list[MatchedEvents]:
-    """Returns one `MatchedEvents` per kind, in the order of `KINDS`, also for kinds without events.
-
-    scale: units of `pos` per metre. Of several matchings, one with the most pairs is taken, then the most similar.
-    """
+    """Returns one `MatchedEvents` per kind, in the order of `KINDS`, also for kinds without events. scale: units of
+    `pos` per metre. Of several matchings, one with the most pairs is taken, then the most similar."""
     found = []
     for kind in KINDS:
         a, b = ([e for e in side if COUNTS_AS.get(e.kind, e.kind) == kind] for side in (true, est))
@@ -118,10 +114,8 @@ def _one_to_one(
 
 
 def same_lineage(true: ComparableEvent, est: ComparableEvent) -> bool:
-    """Returns True if both events have equally many parents and equally many children, and these agree.
-
-    They agree if each true part has an estimated part with a Jaccard index above 0.5. False if any lineage is unknown.
-    """
+    """Returns True if both events have equally many parents and equally many children, and these agree. They agree if
+    each true part has an estimated part with a Jaccard index above 0.5. False if any lineage is unknown."""
     if true.parents is None or true.children is None or est.parents is None or est.children is None:
         return False
     return _same_parts(true.parents, est.parents) and _same_parts(true.children, est.children)

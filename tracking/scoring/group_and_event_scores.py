@@ -96,10 +96,8 @@ def _true_rows(groups: GroupRows, mapping: Ints) -> Ints:
 
 
 def near_changes(truth: Truth) -> Bools:
-    """Returns which of the frame numbers 0 … length are at most 1 s from the start of a true merge or split.
-
-    The result is bool, (length + 1,). `form` counts as a merge and `dissolve` as a split.
-    """
+    """Returns which of the frame numbers 0 … length are at most 1 s from the start of a true merge or split. The result
+    is bool, (length + 1,). `form` counts as a merge and `dissolve` as a split."""
     starts = np.array([e.start for e in truth.events or () if e.kind in CHANGES], float)
     frame = np.arange(truth.length + 1)
     away = np.abs(frame[:, None] - starts[None]).min(axis=1, initial=np.inf)
@@ -121,10 +119,8 @@ def compared_events(sides: ComparedSides, tracked: TrackedGroups) -> list[Matche
 
 
 def unknown_kinds(sides: ComparedSides) -> set[str]:
-    """Returns the kinds of events whose scores are unknown.
-
-    For a tracker of whole groups they are "cross" and "queue", unless it reports such an event. Else there are none.
-    """
+    """Returns the kinds of events whose scores are unknown. For a tracker of whole groups they are "cross" and "queue",
+    unless it reports such an event. Else there are none."""
     if not sides.groups_only:
         return set()
     return {"cross", "queue"} - {event.kind for t in sides.tracks for event in t.events}

@@ -45,10 +45,8 @@ class SharedMembers:
 
 
 def shared_members(true: GroupRows, est: GroupRows, person: Ints, people: int) -> SharedMembers:
-    """Returns the numbers of common members of true and estimated groups.
-
-    person (K,): row of the true person of each of the K memberships of `est`, -1 none. people: number of true rows.
-    """
+    """Returns the numbers of common members of true and estimated groups. person (K,): row of the true person of each
+    of the K memberships of `est`, -1 none. people: number of true rows."""
     i = group_of_person(true, people)[person]  # -1 selects the last element, which is -1
     known = i >= 0
     key, count = np.unique(i[known] * len(est) + est.of[known], return_counts=True)
@@ -67,10 +65,8 @@ def groups_found(true: GroupRows, est: GroupRows, shared: SharedMembers) -> Bool
 
 
 def group_of_person(groups: GroupRows, people: int) -> Ints:
-    """Returns the index of the group row of each person row, -1 for none; a last element of -1 is added.
-
-    people: number of person rows. The result has the shape (people + 1,), so that index -1 gives -1.
-    """
+    """Returns the index of the group row of each person row, -1 for none; a last element of -1 is added. people: number
+    of person rows. The result has the shape (people + 1,), so that index -1 gives -1."""
     group = np.full(people + 1, -1, np.int64)
     known = groups.member >= 0
     group[groups.member[known]] = groups.of[known]
@@ -116,10 +112,8 @@ def matched_groups(true_pos: Array, est_pos: Array, pairs: Pairs, least: float =
 
 
 def switch_frames(frame: Ints, true: Ints, est: Ints) -> Ints:
-    """Returns the frames in which a true id is matched with another estimated id than in its previous match.
-
-    frame, true, est (K,): frame, true id and estimated id of each match. A frame occurs once per switch.
-    """
+    """Returns the frames in which a true id is matched with another estimated id than in its previous match. frame,
+    true, est (K,): frame, true id and estimated id of each match. A frame occurs once per switch."""
     order = np.lexsort((frame, true))
     f, t, e = frame[order], true[order], est[order]
     return np.asarray(f[1:][(t[1:] == t[:-1]) & (e[1:] != e[:-1])])

@@ -45,10 +45,8 @@ def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
 
 
 def match_as_table(pairs: Pairs, weight: Array) -> Bools:
-    """Returns which of the pairs are matched, (K,) bool: as `match`, but with ties broken as TrackEval does.
-
-    weight (K,): above 0.
-    """
+    """Returns which of the pairs are matched, (K,) bool: as `match`, but with ties broken as TrackEval does. weight
+    (K,): above 0."""
     chosen, left = _settle(pairs.i, pairs.j, weight, strict=True)
     frame = pairs.frame
     tangled = np.unique(frame[left])
@@ -60,10 +58,8 @@ def match_as_table(pairs: Pairs, weight: Array) -> Bools:
 
 
 def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
-    """Returns which of the P pairs of one frame scipy's linear_sum_assignment matches, (P,) bool.
-
-    start, end: the pairs with indices start … end - 1 are all pairs of the frame. weight (P,): of these pairs.
-    """
+    """Returns which of the P pairs of one frame scipy's linear_sum_assignment matches, (P,) bool. start, end: the pairs
+    with indices start … end - 1 are all pairs of the frame. weight (P,): of these pairs."""
     i, j = pairs.i[start:end], pairs.j[start:end]
     frame = pairs.true.frame[i[0]]
     (top, bottom), (first, last) = (np.searchsorted(r.frame, (frame, frame + 1)) for r in (pairs.true, pairs.est))

@@ -41,9 +41,7 @@ class PersonRows:
 
     def positions_on(self, surface: Surface, plane: str) -> Array | None:
         """Returns the positions (R, 2) on a surface, in m on the "ground" or px in the "image"; None if unknown there.
-
-        plane: the plane of `pos`. In the image the centre of the box is preferred to `pos`.
-        """
+        plane: the plane of `pos`. In the image the centre of the box is preferred to `pos`."""
         if surface == "image" and self.box is not None:
             return self.box[:, :2] + self.box[:, 2:] / 2
         own = "image" if plane == "image" else "ground"
@@ -87,10 +85,8 @@ def true_people(truth: Truth, frames: Bools) -> PersonRows:
 
 
 def tracked_people(tracks: Sequence[Tracks]) -> PersonRows:
-    """Returns one tracker's people as rows; `tracks` are sorted by frame.
-
-    `box` of the result is None if in any frame with people the boxes are missing.
-    """
+    """Returns one tracker's people as rows; `tracks` are sorted by frame. `box` of the result is None if in any frame
+    with people the boxes are missing."""
     count = [len(t.id) for t in tracks]
     frame = np.repeat(np.array([t.index for t in tracks], np.int64), count)
     none = np.zeros(0, np.int64)
@@ -105,10 +101,8 @@ def tracked_people(tracks: Sequence[Tracks]) -> PersonRows:
 
 
 def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> GroupRows:
-    """Returns the groups of F frames as rows; frames (F,) gives the frame number of each element of `groups`.
-
-    The members become row indices of `people`, -1 for a member who has no row there.
-    """
+    """Returns the groups of F frames as rows; frames (F,) gives the frame number of each element of `groups`. The
+    members become row indices of `people`, -1 for a member who has no row there."""
     count = [len(g.id) for g in groups]
     none = np.zeros(0, np.int64)
     rows = FrameRows(np.repeat(frames, count), np.concatenate([none, *(g.id for g in groups)]))
@@ -134,10 +128,8 @@ class TrueGroups:
     comparable: bool
 
     def in_frames(self, frames: Bools, people: Bools) -> TrueGroups:
-        """Returns the groups of the frames f where frames[f] is true.
-
-        people (R,), bool: which true people are kept; members become row indices of the kept ones.
-        """
+        """Returns the groups of the frames f where frames[f] is true. people (R,), bool: which true people are kept;
+        members become row indices of the kept ones."""
         groups = self.groups.keep(frames[self.groups.rows.frame])
         number = np.append(np.cumsum(people) - 1, -1)  # the last element keeps -1, an unknown member
         return TrueGroups(replace(groups, member=number[groups.member]), self.comparable)
@@ -164,9 +156,7 @@ def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surfa
 
 def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> GroupRows:
     """Returns the groups with new members: the people inside the hull or at most 0.3 m outside, in the same frame.
-
-    positions (R, 2): of the R people, in the unit of the hulls. scale: units per metre, as px_per_m in the image.
-    """
+    positions (R, 2): of the R people, in the unit of the hulls. scale: units per metre, as px_per_m in the image."""
     hulls, points = pack(groups.hull), pack_padded(positions[:, None])
     low, high = hulls.box[:, :2] - INSIDE * scale, hulls.box[:, 2:] + INSIDE * scale
 

@@ -40,10 +40,8 @@ def plane_of(truth: Truth, tracks: Sequence[Tracks]) -> str:
 
 
 def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
-    """Returns the candidate pairs of a true and a tracked person of one frame, with their similarity.
-
-    Raises IncomparableError if the boxes, positions or image scale that the similarity needs are missing.
-    """
+    """Returns the candidate pairs of a true and a tracked person of one frame, with their similarity. Raises
+    IncomparableError if the boxes, positions or image scale that the similarity needs are missing."""
     true, est = sides.true, sides.est
     if similarity == "boxes":
         if true.box is None or est.box is None:
@@ -68,19 +66,15 @@ def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
 
 def grounded(truth: Truth) -> Truth:
     """Returns the truth with people and groups on the ground, as `on_feet`, if it has boxes and a camera but no `pos`.
-
-    Any other truth is returned unchanged.
-    """
+    Any other truth is returned unchanged."""
     if truth.pos is not None or truth.box is None or truth.camera is None:
         return truth
     return on_feet(truth)
 
 
 def on_feet(truth: Truth) -> Truth:
-    """Returns the truth with people at the ground points where their boxes stand, and groups derived there.
-
-    The truth must have boxes and a camera. `vel` becomes None. Groups are derived only if the truth has groups.
-    """
+    """Returns the truth with people at the ground points where their boxes stand, and groups derived there. The truth
+    must have boxes and a camera. `vel` becomes None. Groups are derived only if the truth has groups."""
     assert truth.box is not None, "only boxes have feet"
     assert truth.camera is not None, "only boxes of a calibrated sequence have feet on the ground"
     pos = feet(truth.box, truth.camera, truth.scene)

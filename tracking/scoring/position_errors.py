@@ -60,10 +60,8 @@ def weighted_positions(sides: ComparedSides) -> WeightedScores:
 
 
 def gospa_of(means: Mapping[str, Array], power: float = POWER) -> dict[str, Array]:
-    """Returns GOSPA and its parts by key, (D,) each: the p-th roots of means over frames.
-
-    means: by the names of `PARTS`, the mean over frames of each part of d^p, (D,). power: p.
-    """
+    """Returns GOSPA and its parts by key, (D,) each: the p-th roots of means over frames. means: by the names of
+    `PARTS`, the mean over frames of each part of d^p, (D,). power: p."""
     localisation, missed, false = parts = [means[name] for name in PARTS]
     powers = {**dict(zip(PARTS, parts, strict=True)), "GOSPA": localisation + missed + false}
     # float by float: numpy takes another root of arrays, which differs in the last bit
@@ -71,10 +69,8 @@ def gospa_of(means: Mapping[str, Array], power: float = POWER) -> dict[str, Arra
 
 
 def gospa_parts(pairs: Pairs, cutoff: float, power: float = POWER) -> Array:
-    """Returns the localisation, missed and false part of d^p for each frame number 0 … last, (last + 1, 3).
-
-    pairs: their similarity must be 1 - distance / cutoff. power: p.
-    """
+    """Returns the localisation, missed and false part of d^p for each frame number 0 … last, (last + 1, 3). pairs:
+    their similarity must be 1 - distance / cutoff. power: p."""
     end = 1 + max((int(rows.frame[-1]) for rows in (pairs.true, pairs.est) if len(rows)), default=-1)
     cost = (cutoff * (1 - pairs.s)) ** power
     frame = pairs.frame

@@ -38,11 +38,8 @@ class FrameRows:
 
 
 def numbered(values: Ints) -> tuple[Ints, Ints]:
-    """Returns the distinct values, ascending, and the index of each value among them.
-
-    The result is that of `numpy.unique(values, return_inverse=True)`. Where the range of values is small, counting
-    replaces sorting.
-    """
+    """Returns the distinct values, ascending, and the index of each value among them. The result is that of
+    `numpy.unique(values, return_inverse=True)`. Where the range of values is small, counting replaces sorting."""
     if len(values) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     low, high = int(values.min()), int(values.max())
@@ -88,9 +85,7 @@ class RowLookup:
 
     def nearest(self, id: int, frame: int, back: int, ahead: int) -> int:
         """Returns the index of the id's row nearest to `frame`, if it lies in [frame - back, frame + ahead], else -1.
-
-        Of two rows equally near, the earlier one is returned.
-        """
+        Of two rows equally near, the earlier one is returned."""
         low, high = self.span.get(id, NO_ROWS)
         at = bisect_left(self.frame, frame, low, high)
         near = [k for k in (at - 1, at) if low <= k < high and -back <= self.frame[k] - frame <= ahead]

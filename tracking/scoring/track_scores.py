@@ -106,10 +106,8 @@ def _scores(together: Array, near: Array, n: Array, m: Array, true: Array, est: 
 
 
 def alignment(pairs: Pairs, frames: Ints) -> Array:
-    """Returns the alignment A in [0, 1] of each of the U combinations of ids in `pairs.links`, (U,).
-
-    frames (U,): number of rows of the true id plus number of rows of the estimated id.
-    """
+    """Returns the alignment A in [0, 1] of each of the U combinations of ids in `pairs.links`, (U,). frames (U,):
+    number of rows of the true id plus number of rows of the estimated id."""
     i, j, s = pairs.i, pairs.j, pairs.s
     of_i = np.bincount(i, weights=s, minlength=len(pairs.true))
     of_j = np.bincount(j, weights=s, minlength=len(pairs.est))
@@ -196,10 +194,8 @@ def _before(link: Ints, turn: Ints) -> Ints:
 
 
 def weighted_identity(pairs: Pairs, size: int) -> WeightedScores:
-    """Returns a function from weights (D, size) to IDF1, IDP, IDR and IDTP, (D,) by key.
-
-    True and estimated ids are assigned to each other anew for each of the D draws.
-    """
+    """Returns a function from weights (D, size) to IDF1, IDP, IDR and IDTP, (D,) by key. True and estimated ids are
+    assigned to each other anew for each of the D draws."""
     near = pairs.s >= FOUND
     true_id, est_id, link = pairs.links
     common = bin_sums(pairs.frame[near], link[near], len(true_id), size)

@@ -79,10 +79,8 @@ def _links(groups: GroupRows, people: PersonRows, group: Ints, size: int) -> Arr
 
 
 def groups_right(true: GroupRows, est: GroupRows, shared: SharedMembers, tolerance: tuple[int, int]) -> Bools:
-    """Returns which true groups are right at T, (G,) bool, as the module defines it.
-
-    tolerance: numerator and denominator of T.
-    """
+    """Returns which true groups are right at T, (G,) bool, as the module defines it. tolerance: numerator and
+    denominator of T."""
     part, whole = tolerance
     i, j = np.divmod(shared.key, max(shared.width, 1))
     n = true.count[i]

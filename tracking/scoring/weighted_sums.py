@@ -50,10 +50,8 @@ class FrameScores:
         return found if within is None else np.where(within, found, 0.0)
 
     def add(self, key: str, column: Array, total: float | None = None) -> None:
-        """Adds a score, the weighted sum of a column (size,).
-
-        total: the sum at weights of 1, if it was added up in another order, on which its last bit depends.
-        """
+        """Adds a score, the weighted sum of a column (size,). total: the sum at weights of 1, if it was added up in
+        another order, on which its last bit depends."""
         self._columns[key] = column
         if total is not None:
             self._totals[key] = total
@@ -61,27 +59,21 @@ class FrameScores:
     def add_ratio(
         self, key: str, part: Array, whole: Array, empty: float = float("nan"), total: float | None = None
     ) -> None:
-        """Adds a score, the weighted sum of `part` divided by that of `whole`; both are columns (size,).
-
-        empty: the score where the sum of `whole` is 0. total: the sum of `part` at weights of 1, as for `add`.
-        """
+        """Adds a score, the weighted sum of `part` divided by that of `whole`; both are columns (size,). empty: the
+        score where the sum of `whole` is 0. total: the sum of `part` at weights of 1, as for `add`."""
         self.add(key, part, total)
         self.add(f"{key} of", whole)
         self._empty[key] = empty
 
     def add_mean(self, key: str, frame: Ints, values: Array, total: float | None = None) -> None:
-        """Adds a score, the weighted mean of the finite ones of K values; it is nan if there is none.
-
-        frame (K,): frame number of each value. total: the sum of the finite values at weights of 1, as for `add`.
-        """
+        """Adds a score, the weighted mean of the finite ones of K values; it is nan if there is none. frame (K,): frame
+        number of each value. total: the sum of the finite values at weights of 1, as for `add`."""
         known = np.isfinite(values)
         self.add_ratio(key, self.column(frame[known], values[known]), self.column(frame[known]), total=total)
 
     def add_f1(self, name: str, true: Array, est: Array, hits: Array, end: str = "") -> None:
-        """Adds the scores name_F1, name_precision and name_recall, each with `end` appended to its key.
-
-        true, est, hits: columns (size,), the numbers of true, estimated and matched items in each frame.
-        """
+        """Adds the scores name_F1, name_precision and name_recall, each with `end` appended to its key. true, est,
+        hits: columns (size,), the numbers of true, estimated and matched items in each frame."""
         for key, part, whole in zip(F1_AND_PARTS, (2 * hits, hits, hits), (true + est, est, true), strict=True):
             self.add_ratio(f"{name}_{key}{end}", part, whole)
 
@@ -118,9 +110,7 @@ def mean_of_known(values: Array) -> Array:
 
 def bin_sums(frame: Ints, bin: Ints, bins: int, size: int) -> Callable[[Array], Array]:
     """Returns a function from weights (D, size) of frames to the weighted number of items in each bin, (D, bins).
-
-    frame, bin: frame number and bin of each item. Bins stand for ids, for example.
-    """
+    frame, bin: frame number and bin of each item. Bins stand for ids, for example."""
     from scipy.sparse import csr_array
 
     counts = csr_array((np.ones(len(frame)), (bin, frame)), shape=(bins, size))
