@@ -18,7 +18,7 @@ LIBRARY = "gymnasium"
 
 
 def register_when_imported() -> None:
-    """Registers the environment flockscope/Tuning-v0 now if Gymnasium is imported, else as soon as it is."""
+    """Registers the environment flockscope/Tuning-v0: now if Gymnasium is already imported, else when it is."""
     if hasattr(sys.modules.get(LIBRARY), "register"):
         _register()
     elif not any(isinstance(finder, _RegisteringFinder) for finder in sys.meta_path):

@@ -63,11 +63,13 @@ class TuningEnvOptions:
 
 
 class TuningEnv(gymnasium.Env[Floats, Floats]):
-    """One episode is one run of a tracker: an action sets its parameters, the reward is the gain in score.
+    """Gymnasium environment: an episode is one run of a tracker, an action sets parameters, the reward is gained score.
 
-    An action is float32 (P,) in [-1, 1], an observation float32 (K,): statistics in [0, 1].
+    An action is float32 (P,) in [-1, 1], one number for each of P parameters. An observation is float32 (K,): K
+    statistics of the run in [0, 1].
 
-    State: sources, cache; config, rollout (the run, None before it) and score of the episode.
+    State: sources and their cache; of the episode the config, the rollout (the run, None before it starts) and the
+    score so far.
     """
 
     @documented(TuningEnvOptions, positional=2)
@@ -100,18 +102,19 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         self.config, self.score, self.scores, self.refused = self.base, 0.0, dict[str, float](), ""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begins an episode on a source that the environment's generator draws.
+        """Begins an episode on a source that the environment's random generator draws.
 
-        The running episode goes on after an error.
+        If an error is raised, the previous episode stays the current one.
 
         Args:
-            seed: Reseeds the generator; None goes on with it.
-            options: "scenario" and "seed" restrict the draw to sources of this name and seed; "params" are the
-                parameters to begin with.
+            seed: Seeds the generator anew; None continues with its present state.
+            options: "scenario" and "seed" restrict the draw to sources of this name and this seed; "params" are the
+                tracker's parameters to begin with.
 
         Returns:
-            The observation, and a dict: scenario, seed, frame (number of frames tracked), objective (0 while unknown),
-            scores (by key), names (of the action's parameters), params (all, by name), refused ("" if nothing).
+            The observation, and a dict with scenario, seed, frame (number of frames tracked), objective (0 while
+            unknown), scores (by key), names (the action's parameters), params (all values by name), and refused (the
+            tracker's message about the last action's config, "" if it was accepted).
 
         Raises:
             InputError: An option is unknown, no source fits, the source cannot be opened or has no labels, or the
@@ -134,18 +137,18 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return self._observe(), self._info()
 
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
-        """Sets the parameters and tracks on, to the end or for `decision_every` frames.
+        """Sets the parameters and continues tracking, to the end or for `decision_every` frames.
 
         Parameters that contradict each other are moved towards those that the episode began with, until they are valid.
-        If the tracker refuses a config between two frames, it keeps the one before. A step after the end tracks the
-        sequence again with the new parameters if an episode has one action; with `decision_every` it does nothing.
+        If the tracker refuses a config between two frames, it keeps the previous one. After the end of the sequence, a
+        step tracks it again with the new parameters if `decision_every` is None; else it tracks nothing.
 
         Args:
-            action: (P,), clipped to [-1, 1].
+            action: One number for each parameter, (P,), clipped to [-1, 1].
 
         Returns:
-            Observation; reward, the objective of all frames so far less that before the step; whether the sequence has
-            ended; False; and the dict of `reset`.
+            The observation; the reward, which is the objective of all frames so far minus the objective before the
+            step; True if the sequence has ended; False (never truncated); and a dict as `reset` returns it.
 
         Raises:
             InputError: Before `reset`, for an action of another shape or not finite, or from the tracker.

@@ -46,7 +46,7 @@ class Source:
 
     @cached_property
     def key(self) -> tuple[object, ...]:
-        """A tuple that is equal for sources of the same sequence. It is computed once."""
+        """A tuple that is equal for two sources exactly if they are of the same sequence. It is computed once."""
         if self.entry is not None:
             content = self.entry.scenario.model_dump_json()
             return self.name, self.seed, self.entry.repeat, hashlib.sha256(content.encode()).hexdigest()
@@ -58,7 +58,9 @@ class Source:
         return self.entry is not None
 
     def open(self, streams: Iterable[str] = ()) -> Sequence:
-        """Returns the sequence: simulated, read from its path, or as it is if it is in memory."""
+        """Returns the sequence: simulated, read from its path, or the one in memory. streams: the pictures to draw or
+        read, some of "left", "right" and "background"; a stored sequence is read with pictures if "left" is among them.
+        """
         if self.sequence is not None:
             return self.sequence
         if self.entry is not None:
@@ -71,15 +73,15 @@ class Source:
 
 
 def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: Iterable[str] = ()) -> tuple[Source, ...]:
-    """Returns the sources that `what` stands for: for each scenario or suite entry all its seeds, then the next.
+    """Returns the sources that `what` stands for; each scenario or suite entry gives one source per seed, in order.
 
-    A name in the catalogue counts before a folder of that name.
+    If a name is both in the catalogue and a folder, the catalogue is used.
 
     Args:
-        what: A suite's or scenario's name, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a
-            list.
-        seeds: Of scenarios; the others ignore them.
-        set: "key=value" settings for the scenarios.
+        what: The name of a suite or scenario, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a
+            list of these.
+        seeds: Seeds with which scenarios are simulated; they have no effect on other sources.
+        set: Settings "key=value" of the scenarios.
 
     Raises:
         InputError: A name is unknown, a file or setting is wrong, there is no source, or there are settings but no
@@ -128,10 +130,8 @@ DEFAULT_LIMIT = 256 * 2**20  # Bytes that a SourceCache keeps by default.
 
 
 class OpenedSource:
-    """A source whose sequence is open; its detections, truth and background are kept once used.
-
-    `streams` are the pictures that are drawn if the source is simulated: "left", "right", "background".
-    """
+    """A source whose sequence is open; its detections, truth and background are kept after their first use. streams:
+    the pictures that are drawn if the source is simulated, some of "left", "right" and "background"."""
 
     def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
         self.source, self._kept = source, list[object]()
@@ -167,7 +167,7 @@ class OpenedSource:
 
     @cached_property
     def judge(self) -> ObjectiveScorer:
-        """An `ObjectiveScorer` for the sequence's truth, built on first use. InputError without labels."""
+        """An `ObjectiveScorer` of the sequence's truth, built on first use. Raises InputError without labels."""
         from tracking.objective import ObjectiveScorer
 
         self._kept.append(judge := ObjectiveScorer(self.truth))
@@ -175,17 +175,17 @@ class OpenedSource:
 
     @property
     def bytes(self) -> int:
-        """Bytes of what is kept, as pickled: nearly all are those of arrays, which pickling does not copy."""
+        """Number of bytes that detections, truth, background and scorer take so far, measured by pickling them."""
         arrays: list[pickle.PickleBuffer] = []
         packed = pickle.dumps(self._kept, protocol=5, buffer_callback=arrays.append)
         return len(packed) + sum(array.raw().nbytes for array in arrays)
 
 
 class SourceCache:
-    """Opened sources for reuse; the least recently used one is dropped first. len() gives their number.
+    """Opened sources, kept for reuse; the least recently used source is dropped first. len() gives their number.
 
-    limit: bytes that all of them may hold together. The source in use is kept whatever its size. The bytes of a source
-    are counted when another one is opened after its use.
+    limit: number of bytes that all kept sources may take together. It is checked when a new source is opened, before
+    that one is added; the source in use is kept whatever its size.
     """
 
     def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
@@ -200,7 +200,7 @@ class SourceCache:
 
     @property
     def bytes(self) -> int:
-        """Bytes that the opened sources hold, counted anew for the last used one; 0 without sources."""
+        """Number of bytes that all kept sources take, 0 without sources; only the last used one is measured anew."""
         last = next(reversed(self._opened), None)
         for key, opened in self._opened.items():
             if key == last or key not in self._bytes:
@@ -208,7 +208,7 @@ class SourceCache:
         return sum(self._bytes.values())
 
     def open(self, source: Source, streams: tuple[str, ...] = ()) -> OpenedSource:
-        """Returns the opened source; one that was opened with the same `streams` and is still kept is used again."""
+        """Returns the opened source: the kept one if it was opened with the same `streams`, else a new one."""
         key = (*source.key, streams)
         if key not in self._opened:
             held = self.bytes

@@ -32,13 +32,13 @@ class Episode:
     """The result of an episode: one tracker on one sequence.
 
     Attributes:
-        name: Of the scenario or recording.
-        seed: Of the source.
-        objective: Mean of HOTA and group_F1, or the one that is known; nan if there is nothing to score.
-        scores: By key of the catalogue, without those that are nan.
+        name: Name of the scenario or recording.
+        seed: Seed of the source.
+        objective: Mean of HOTA and group_F1, or the one of them that is known; nan if both are unknown.
+        scores: Scores by key of the catalogue, without scores that are nan.
         frames: Number of frames played.
-        seconds_tracking: Time in the tracker with the checks of what it returns, s; without reading frames.
-        left_out: Why the scene could not be played, as its script did not come true; "" if it was.
+        seconds_tracking: Time spent in the tracker and in checks of its tracks, s, without reading frames.
+        left_out: "" if the scene was played; else why not, namely how its script did not come true.
     """
 
     name: str
@@ -69,12 +69,12 @@ def play(
     Args:
         tracker: Name, file.py:Class, module:Class, class or TimeLimited.
         source: The sequence to play on: a scenario's entry with a seed, a path, or a Sequence.
-        config: The tracker's parameters; None for the defaults.
-        detections: The tracker's input; None chooses one that works.
+        config: The tracker's parameters, as `params` of `tracking.track`; None for the defaults.
+        detections: The tracker's input, "image", "file" or "truth"; None takes the first that is possible.
         tracker_seed: Seed of the tracker's random numbers.
-        cache: Keeps the opened source; None keeps nothing.
-        every_score: Computes the whole catalogue, else the objective and its two parts.
-        similarity: How people are compared; None by the data.
+        cache: Where the opened source is kept for later episodes; None keeps nothing.
+        every_score: True computes all scores of the catalogue, False only objective, HOTA and group_F1.
+        similarity: How people are compared, as in `tracking.evaluate`; None chooses by the data.
 
     Raises:
         InputError: An argument is wrong, tracker and source do not fit, the source has no labels, or the tracks lack
@@ -135,10 +135,8 @@ class Rollout:
         return self.truth.length
 
     def advance(self, upto: int | None = None) -> Iterator[tuple[Frame, Tracks]]:
-        """Plays to frame number `upto` (from 1), or to the last one; yields each frame and the tracker's tracks.
-
-        A frame is played when the iterator is asked for it. After an error the next call begins with the same frame.
-        """
+        """Plays up to and with frame number `upto` (from 1; None: the last); yields each frame and its `Tracks`. A
+        frame is played only when the iterator is asked for it. After an error, a new call repeats the same frame."""
         last = self.length if upto is None else min(upto, self.length)
         while len(self.tracks) < last:
             if self._frames is None:
@@ -155,13 +153,14 @@ class Rollout:
             yield frame, tracks
 
     def episode(self, every_score: bool = False) -> Episode:
-        """Returns the result of the frames so far; objective is nan if there is nothing to score."""
+        """Returns the result of the frames played so far. every_score: as in `play`."""
         scores = self.scores(every_score)
         objective, source = scores.get("objective", float("nan")), self.source
         return Episode(source.name, source.seed, objective, scores, len(self.tracks), self.seconds_tracking)
 
     def scores(self, every: bool = False) -> dict[str, float]:
-        """Returns the scores of the frames so far by key, without nan: objective, HOTA and group_F1, or all."""
+        """Returns the scores of the frames so far by key, without those that are nan: objective, HOTA and group_F1, or
+        if `every` is True all. Raises InputError if tracks and labels cannot be compared."""
         from tracking.scoring.people_comparison import IncomparableError
 
         px_per_m, pixels = self.prepared.px_per_m(self.tracks), self.prepared.mode == "image"
@@ -191,7 +190,8 @@ class Rollout:
 
 
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:
-    """Returns the pictures that a simulated sequence needs for this tracker, () if it needs none."""
+    """Returns the pictures to draw of a simulated sequence for this tracker and input: some of "left", "right" and
+    "background", or () if it gets boxes or points."""
     from tracking.running.tracker_registry import find
 
     needs = set((find(tracker) if isinstance(tracker, str) else tracker).needs)

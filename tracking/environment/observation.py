@@ -39,7 +39,7 @@ NAMES = tuple(s.name for s in STATISTICS)
 class Observer:
     """Collects frames and tracks between two decisions, for the statistics of the observation.
 
-    State: tracks of the frames since the last decision, numbers and scores of the detections."""
+    State: the tracks, and the scores of the detections, of each frame since the last decision."""
 
     def __init__(self, fps: float) -> None:
         self.fps = fps
@@ -47,16 +47,17 @@ class Observer:
         self._scores: list[Array] = []
 
     def add(self, frame: Frame, tracks: Tracks) -> None:
-        """Adds the next frame, as the tracker got it, and its tracks (one `Tracks`)."""
+        """Adds the next frame, as the tracker got it, and the tracks of this frame."""
         self._tracks.append(tracks)
         if frame.detections is not None:
             score = frame.detections.score
             self._scores.append(score if len(score) else np.ones(len(frame.detections.pos)))
 
     def statistics(self, px_per_m: float) -> NDArray[np.float32]:
-        """Returns the statistics (K,) of the frames since the last call, in the order of STATISTICS, and forgets them.
+        """Returns the statistics (K,) of the frames added since the last call, in the order of STATISTICS.
 
-        Unknown ones are 0. Without a scale (px_per_m nan or 0) the speed of tracks in the image is unknown.
+        The frames are then forgotten. Unknown statistics are 0. px_per_m: image scale; if it is nan or 0, the speed of
+        tracks in the image is unknown.
         """
         values = self._values(px_per_m) if self._tracks else {}
         self._tracks, self._scores = [], []

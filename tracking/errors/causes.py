@@ -55,7 +55,7 @@ class Cause:
 
 @dataclass(frozen=True, eq=False)
 class Facts:
-    """What is known of the true people in the R rows that are compared."""
+    """What is known of the true people, one row per person and frame, R rows sorted by frame."""
 
     frame: Ints
     id: Ints
@@ -71,13 +71,15 @@ class Facts:
     alarms: tuple[Ints, Array]  # frames (A,) and places (A, 2), as pos, of the detector's false alarms
 
     def rows(self, first: int, last: int | None = None, ids: Iterable[int] | None = None) -> Ints:
-        """Returns the rows from one frame to another, of that frame alone without another; ids: of these people."""
+        """Returns the row indices of the frames `first` to `last`, both included; of `first` alone if `last` is None.
+        ids: only of these people; None: of all."""
         low, high = np.searchsorted(self.frame, (first, (first if last is None else last) + 1)).tolist()
         kept = slice(None) if ids is None else np.isin(self.id[low:high], [*ids])
         return np.arange(low, high)[kept]
 
     def change_of_light(self, frame: int) -> Cause | None:
-        """Returns the change of brightness in the second before and after a frame as a cause, None if it is small."""
+        """Returns the change of brightness from 1 s before to 1 s after a frame as a cause; None if it is 20 % or less
+        or the light is unknown."""
         if self.light is None:
             return None
         near = self.light[max(frame - 1 - round(self.fps), 0) : frame + round(self.fps)]
@@ -85,10 +87,8 @@ class Facts:
         return Cause("light", f"brightness changes by {ratio - 1:.0%}") if ratio > LIGHT else None
 
     def false_alarm(self, rows: Ints, frames: range, reach: float) -> Cause | None:
-        """Returns the false alarm in these frames that is nearest to some people (rows) as a cause, None out of reach.
-
-        People and false alarms are compared in the same frame.
-        """
+        """Returns a false alarm as a cause if one is nearer than `reach` (m) to one of the people in `rows`, else None.
+        Only `frames` count, and a person and a false alarm must be in the same frame."""
         frame, pos = self.alarms
         near = np.flatnonzero((frame >= frames.start) & (frame < frames.stop))
         gaps = np.hypot(*(self.pos[rows][:, None] - pos[near][None]).transpose(2, 0, 1)) / self.metre
@@ -96,7 +96,8 @@ class Facts:
         return Cause("clutter", f"{least:.2f} m from a false alarm") if least < reach else None
 
     def nearest(self, at: Array, frame: int, without: int = NOBODY) -> tuple[float, int] | None:
-        """Returns the distance, m, and the row of the person nearest to a place in a frame, None without anybody."""
+        """Returns distance, m, and row of the person nearest to the place `at` in a frame; None if nobody is there.
+        without: a row that does not count."""
         people = self.rows(frame)
         people = people[people != without]
         d = np.hypot(*(self.pos[people] - at).T) / self.metre
@@ -104,7 +105,7 @@ class Facts:
 
 
 def cause_of_person(error: PersonError, of: Facts) -> Cause:
-    """Returns the cause of an error of a true person."""
+    """Returns the cause of an error that concerns a true person (not a ghost)."""
     assert error.person is not None
     gap = np.array(error.rows, np.int64)
     frames = len(gap) / of.fps
@@ -160,7 +161,7 @@ def _turn(rows: Ints, of: Facts) -> float:
 
 
 def cause_of_ghost(error: PersonError, matched: MatchedPeople, place: Array, of: Facts) -> Cause:
-    """Returns the cause of a ghost; place (S, 2): of the tracked rows, as `Facts.pos`."""
+    """Returns the cause of a ghost. place (S, 2): positions of all tracked rows, in the unit of `Facts.pos`."""
     frames = matched.pairs.est.frame
     found = (of.nearest(place[row], int(frames[row])) for row in error.rows)
     nearest = sorted(one for one in found if one is not None)
@@ -187,7 +188,7 @@ def _owner(error: PersonError, matched: MatchedPeople, of: Facts) -> int | None:
 
 
 def cause_of_group(error: GroupError, of: Facts) -> Cause:
-    """Returns the cause of an error of a group, from the middle of its time."""
+    """Returns the cause of an error of a group: by the places of people in its middle frame, then the light."""
     frame = (error.start + error.end) // 2
     rows = of.rows(frame, ids=error.people)
     return (

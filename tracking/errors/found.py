@@ -68,7 +68,8 @@ class FoundError:
 
 @dataclass(frozen=True)
 class CauseRow:
-    """What the repair of all errors of one kind and cause adds, after the repairs of the rows before."""
+    """Number and total duration of the errors of one kind and cause, and what their repair adds to each score. The
+    repair is made after those of the rows before. gains: by key of the score."""
 
     kind: str
     cause: str
@@ -79,7 +80,8 @@ class CauseRow:
 
 @dataclass(frozen=True)
 class RunErrors:
-    """The errors of a run by start, the scores as they are, and where the rest is lost, if this was asked for."""
+    """The errors of a run, sorted by start; its scores by key; the gains by cause ([] if not computed); and what is
+    left."""
 
     errors: list[FoundError]
     scores: dict[str, float]
@@ -88,10 +90,8 @@ class RunErrors:
 
 
 def sums_by_cause(runs: SequenceOf[RunErrors]) -> list[CauseRow]:
-    """Returns the rows of all runs by kind and cause, what adds most first.
-
-    Errors and seconds are sums; gains are means over the runs that have the score, nan if none has it.
-    """
+    """Returns one row per kind and cause over all runs, sorted by the gain in HOTA and group_F1, greatest first. Errors
+    and seconds are sums; gains are means over the runs that have the score, nan if none has it."""
     known = {key: sum(run.scores[key] == run.scores[key] for run in runs) for key in SHOWN}
     parts: dict[tuple[str, str], list[CauseRow]] = {}
     for row in (row for run in runs for row in run.causes):
@@ -107,7 +107,8 @@ def sums_by_cause(runs: SequenceOf[RunErrors]) -> list[CauseRow]:
 def errors_of_run(
     sequence: Sequence, run: TrackingRun, similarity: Similarity | None = None, costs: int = EVERY, causes: bool = True
 ) -> RunErrors:
-    """Returns the errors of a run, with the detections of the input that it names; raises as `find_errors`."""
+    """Returns the errors of a run as `find_errors` does, with the detections that the run's `info` tells; so causes
+    can tell who was not detected."""
     named = sequence.truth is not None and run.info.get("detections") is not None
     known = named and not any(t.unit == "group" for t in run)
     return find_errors(
@@ -119,10 +120,11 @@ def find_errors(
     sequence: Sequence, tracks: SequenceOf[Tracks], seen: SequenceOf[Tracks] | None = None,
     similarity: Similarity | None = None, costs: int = EVERY, causes: bool = True,
 ) -> RunErrors:  # fmt: skip
-    """Returns the errors of a run; seen: the detections, with the ids of the true people that they show.
+    """Returns the errors of one run of a sequence.
 
-    Costs are known of so many of the longest errors; the sums by cause only with `causes`. Both take most of the time.
-    Raises InputError without labels, or if they and the tracks cannot be compared.
+    seen: the detections, with the ids of the true people that they show; None: unknown. costs: for how many errors,
+    longest first, the cost is computed. causes: True computes the gains by cause. Costs and gains take most of the
+    time. Raises InputError without labels, or if labels and tracks cannot be compared.
     """
     given = [tracks] if seen is None else [tracks, seen]
     with scorer_of(sequence) as scorer:

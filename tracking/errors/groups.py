@@ -121,7 +121,8 @@ class Memberships:
         return set(self.true_group[self.persons[self.members[j]]].tolist()) - {-1}
 
     def astray(self, j: int) -> list[int]:
-        """Returns an estimated group's memberships of people in no true group, or in one that is found elsewhere."""
+        """Returns the memberships (indices) of estimated group j that do not belong there: of people in no true group,
+        or in a true group that another estimated group finds."""
         first, after = np.searchsorted(self.est.of, (j, j + 1)).tolist()
         groups = self.true_group[self.persons[self.est.member[first:after]]].tolist()
         return [k for k, i in enumerate(groups, first) if i < 0 or self.found.get(i, j) != j]
@@ -135,14 +136,15 @@ def _split(of: Ints, member: Ints, count: int) -> list[list[int]]:
 
 
 def group_errors(of: Memberships, events: Sequence[GroupEvent], fps: float) -> list[GroupError]:
-    """Returns all errors of groups in frames, by start; events: of the truth."""
+    """Returns all errors of groups except wrong lineages, sorted by start; events: the truth's events."""
     found = [*_errors_of_groups(of), *_false_groups(of)]
     named = [_named(error, of, events, AT_THE_EVENT * fps) for error in found]
     return sorted(named, key=lambda error: (error.start, error.end, error.kind))
 
 
 def wrong_lineages(matched: Iterable[MatchedEvents]) -> list[GroupError]:
-    """Returns the matched merges and splits whose lineage is known and wrong, by start."""
+    """Returns an error for each matched merge and split whose true lineage is known and differs from the reported one,
+    sorted by start."""
     pairs = [pair for one in matched if one.kind in HEADLINE for pair in one.pairs]
     return [
         GroupError(LINEAGE, a.start, max(a.start, b.emitted or a.start), None, tuple(sorted(a.members.people)))

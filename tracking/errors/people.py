@@ -34,7 +34,7 @@ NOBODY = -1
 
 @dataclass(frozen=True, eq=False)
 class MatchedPeople:
-    """R true and S tracked people in frames, matched as CLEAR does."""
+    """The R true and S tracked rows (one per person and frame), matched as CLEAR does."""
 
     pairs: Pairs  # candidate pairs of both sides
     track: Ints  # (R,): row of the track that each true person is matched with, -1 none
@@ -55,7 +55,7 @@ class PersonError:
 
 
 def matched_people(pairs: Pairs) -> MatchedPeople:
-    """Returns the people of both sides with the matches of CLEAR."""
+    """Returns the rows of both sides with the matches of CLEAR among their candidate pairs."""
     found = clear_matches(pairs)
     track, person = np.full(len(pairs.true), NOBODY, np.int64), np.full(len(pairs.est), NOBODY, np.int64)
     track[found.i], person[found.j] = found.j, found.i
@@ -63,7 +63,7 @@ def matched_people(pairs: Pairs) -> MatchedPeople:
 
 
 def person_errors(matched: MatchedPeople) -> list[PersonError]:
-    """Returns all errors of people, by start."""
+    """Returns all errors of people, ghosts included, sorted by start, then end and kind."""
     every = [*_errors_of_people(matched), *_ghosts(matched)]
     return sorted(every, key=lambda error: (error.start, error.end, error.kind))
 
@@ -100,7 +100,7 @@ def _ghosts(matched: MatchedPeople) -> Iterator[PersonError]:
 
 
 def first_and_last(rows: FrameRows, stretch: Sequence[int]) -> tuple[int, int]:
-    """Returns the first and the last frame of some rows, by frame."""
+    """Returns the first and the last frame of a stretch; stretch: row indices in `rows`, sorted by frame."""
     return int(rows.frame[stretch[0]]), int(rows.frame[stretch[-1]])
 
 

@@ -30,7 +30,7 @@ NO_HULL = np.zeros((0, 2))
 
 @dataclass(frozen=True, eq=False)
 class ComparedPeople:
-    """R true and S tracked people in frames as they are compared."""
+    """The R true and S tracked rows of people, with the places by which they are compared."""
 
     matched: MatchedPeople
     true_place: Array  # (R, D): positions or boxes by which people are compared
@@ -38,7 +38,7 @@ class ComparedPeople:
     reach: float | None  # by which points are matched, in units of their places; None: they are boxes
 
     def pairs(self, rows: FrameRows, place: Array) -> Pairs:
-        """Returns the candidate pairs of the truth with other tracked rows, at places (K, D)."""
+        """Returns the candidate pairs of the true rows with K tracked rows; place (K, D): their positions or boxes."""
         given = self.matched.pairs.true, rows, self.true_place, place
         return box_pairs(*given) if self.reach is None else point_pairs(*given, self.reach)
 
@@ -54,7 +54,8 @@ class ComparedRun:
 def scores(
     run: ComparedRun, errors: Collection[PersonError | GroupError] = (), keys: Collection[str] = SHOWN
 ) -> dict[str, float]:
-    """Returns HOTA, IDF1 and group_F1 of a run after the repair of some errors, or some of these; nan: unknown."""
+    """Returns the scores `keys` (some of HOTA, IDF1 and group_F1) of a run after the repair of these errors, by key;
+    nan if unknown."""
     found, added = dict.fromkeys(SHOWN, float("nan")), np.zeros(0, np.int64)
     if run.people is not None:
         label, kept, new = _labels(run.people.matched, [error for error in errors if isinstance(error, PersonError)])

@@ -31,8 +31,9 @@ THRESHOLDS = 100  # Evenly spaced probabilities, of which the threshold is one.
 
 @dataclass(frozen=True)
 class PairSample:
-    """Rows of scenes: values (R, len(NAMES)); together (R,); weight (R,), of sum 1, equal for all pairs of a
-    scene, and in proportion to the weights of scenes; scene (R,): number of the scene, from 0."""
+    """R rows of pairs of all scenes. values (R, len(NAMES)): quantities; together (R,): True if the two are in one true
+    group; weight (R,): sum 1, equal for all pairs of a scene, in proportion to the scenes' weights; scene (R,): number
+    of the scene, from 0."""
 
     values: np.ndarray
     together: Bools
@@ -42,7 +43,7 @@ class PairSample:
 
 
 def sample_of(scenes: Sequence[PairScene]) -> PairSample:
-    """Returns the rows of scenes. Raises InputError if there are none."""
+    """Returns the rows of all scenes as one sample. Raises InputError if there is no scene."""
     if not scenes:
         remedy = "name scenarios with people who meet"
         raise InputError(place="fit grouping", got="no two people within 4 m", expected="pairs", remedy=remedy)
@@ -60,7 +61,8 @@ def _weights(pair: Ints) -> Array:
 def fit_belief(now: PairSample, events: PairSample | None = None, used: Sequence[str] = NAMES) -> Belief:
     """Returns the belief with the least penalised log loss.
 
-    now, events: the samples of the two columns of its tables; None: the same. used: names of quantities with a table.
+    now, events: the samples to which the two columns of log-odds, "now" and "events", are fitted; None takes `now` for
+    both. used: names of the quantities that get a table.
     """
     knots_of = {name: _knots(now.values[:, NAMES.index(name)]) for name in used}
     knots_of = {name: at for name, at in knots_of.items() if len(at) > 1}
@@ -96,9 +98,9 @@ def _fit_column(sample: PairSample, knots_of: Mapping[str, Array], left_out: tup
 
 
 def best_threshold(sample: PairSample, log_odds: Array) -> float:
-    """Returns the probability above which a pair counts as together, for the greatest mean F1 of scenes with mates.
+    """Returns the threshold with the greatest mean F1 over scenes with pairs in one true group; of several the middle.
 
-    Of equal ones it is the middle.
+    A pair counts as together if its probability is above the threshold. log_odds (R,): beliefs of the sample's rows.
     """
     place = (THRESHOLDS / (1 + np.exp(-log_odds))).astype(np.int64).clip(0, THRESHOLDS - 1)
     shape = (sample.scene[-1] + 1, THRESHOLDS)
@@ -150,7 +152,8 @@ BINS = 15  # Of equal width, between the probabilities 0 and 1.
 
 
 def belief_scores(sample: PairSample, log_odds: Array) -> dict[str, float]:
-    """Returns pairs, log loss, calibration error and F1 of beliefs (R,) of a sample's rows, by name."""
+    """Returns "pairs" (their number), "log loss", "calibration error" and "F1" (at a probability above 1/2) of beliefs.
+    log_odds (R,): the beliefs of the sample's rows. F1 is nan without any pair together on either side."""
     true, weight = sample.together, sample.weight
     loss = np.logaddexp(0.0, log_odds) - log_odds * true
     bins = reliability(log_odds, true, weight)
@@ -164,7 +167,8 @@ def belief_scores(sample: PairSample, log_odds: Array) -> dict[str, float]:
 
 
 def reliability(log_odds: Array, true: Bools, weight: Array) -> Array:
-    """Returns share of the weight, mean probability and share of mates of each bin, (15, 3); nan in an empty one."""
+    """Returns for each of 15 bins of probability its share of the weight, the mean probability, and the share of rows
+    that are truly together, (15, 3); the two means are nan in an empty bin."""
     probability = 1 / (1 + np.exp(-log_odds))
     place = np.minimum((probability * BINS).astype(np.int64), BINS - 1)
     total = np.bincount(place, weight, BINS)

@@ -54,8 +54,8 @@ class MatchedRecording:
 def match_sequence(sequence: Sequence) -> MatchedRecording:
     """Returns the labels and detections of a recording, matched one to one in each frame.
 
-    Sparse labels leave their annotated frames, numbered from 1. Raises InputError without labelled people, detections,
-    or the boxes of either.
+    If labels are sparse, only the annotated frames are kept, renumbered from 1. Raises InputError if there are no
+    labelled people or no detections, or if either lack boxes.
     """
     file, truth = sequence.source.get("path", sequence.name), sequence.truth
     expected, remedy = "labelled boxes and a detector's boxes of the same recording", "give a recording with gt and det"
@@ -94,8 +94,8 @@ def match_detections(
 ) -> MatchedRecording:
     """Returns labels and detections, one per frame, matched one to one; both must have boxes.
 
-    size: of the picture, px; None: the extent of all boxes. A detection that covers a labelled row that is not scored
-    is dropped unless it matches a person.
+    size: width and height of the picture, px; None takes the extent of all boxes. An unmatched detection is dropped if
+    its IoU with an unscored label is 0.5 or more.
     """
     assert truth.box is not None
     box = np.concatenate([np.zeros((0, 4)), *(d.box for d in found if d.box is not None)])

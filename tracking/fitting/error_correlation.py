@@ -25,7 +25,8 @@ FEW = 20  # a lag with fewer pairs is left out
 
 
 def pairs_by_lag(truth: Truth, keep: Bools) -> list[tuple[float, Ints, Ints]]:
-    """Returns (lag in s, i (P,), j (P,)) by lag: labelled rows of one person, row j this lag after row i."""
+    """Returns for each lag (lag in s, i (P,), j (P,)): pairs of labelled rows of one person, row j this lag after row
+    i. keep (R,): the rows that are used. A lag with fewer than 20 pairs is left out."""
     rows = np.flatnonzero(keep)
     people, column = np.unique(truth.id[rows], return_inverse=True)
     row_of = np.full((len(people), truth.length + 1), -1, np.int64)
@@ -51,8 +52,8 @@ def correlations(truth: Truth, z: Array, keep: Bools) -> Array:
 
 
 def miss_correlations(truth: Truth, missed: Bools, p_miss: Array) -> Array:
-    """Returns the tetrachoric correlations over time of misses (R,), whose probability is p_miss (R,); as
-    `correlations`."""
+    """Returns the tetrachoric correlations over time of misses, in the columns (K, 3) of `correlations`. missed (R,):
+    True if a labelled row is missed; p_miss (R,): the probability of this."""
     from scipy.special import ndtri
 
     threshold = ndtri(np.clip(p_miss, 1e-3, 1.0 - 1e-3))
@@ -96,7 +97,8 @@ def _tetrachoric(a: Array, b: Array, both: float) -> float:
 
 
 def fit_memory(found: Sequence[Array]) -> tuple[Memory, ...]:
-    """Returns at most two parts whose sum of share · exp(-lag / time) is nearest to the correlations; () if none is."""
+    """Returns at most two parts whose sum of share · exp(-lag / time) is nearest to the correlations. found: tables of
+    `correlations`. It is () if no sum is nearer than 0, or all shares are below 3 %."""
     from scipy.optimize import nnls
 
     lag, rho, pairs = np.concatenate([np.zeros((0, 3)), *found]).T

@@ -46,7 +46,7 @@ def error_statistics(recordings: Sequence[MatchedRecording]) -> dict[str, float]
 
 
 def miss_runs(m: MatchedRecording) -> Ints:
-    """Returns the length in frames of each run of frames in which a labelled person is present and missed."""
+    """Returns the length, in frames, of each run of successive frames in which a labelled person is missed, (K,)."""
     lengths = []
     for id in np.unique(m.truth.id):
         rows = np.flatnonzero(m.truth.id == id)

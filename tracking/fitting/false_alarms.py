@@ -49,7 +49,7 @@ class AlarmTrack:
 
 
 def fit_false_alarms(recordings: Sequence[MatchedRecording]) -> tuple[float, FalseAlarms | None]:
-    """Returns the mean number of false alarms per frame, and their profile; None with fewer than 5 alarm tracks."""
+    """Returns the mean number of false alarms per frame, and their profile (None with fewer than 5 alarm tracks)."""
     tracks = [track for m in recordings for track in alarm_tracks(m)]
     frames = sum(m.truth.length for m in recordings)
     rate = sum(len(t.rows) for t in tracks) / max(frames, 1)

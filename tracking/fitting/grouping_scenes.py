@@ -38,10 +38,8 @@ class PairScene:
 
 
 def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScene]:
-    """Yields two scenes for each entry of the named scenarios, suites or *.toml files and each seed.
-
-    The scenes of a name that is given several times come once, with that weight.
-    """
+    """Yields two `PairScene`s for each entry of the named scenarios, suites or *.toml files and each seed: with exact,
+    then with rough positions; a scene without pairs is left out. A name that is given n times has the weight n."""
     for entry, weight in [(entry, count) for name, count in Counter(names).items() for entry in resolve(name)]:
         for seed in seeds:
             truth = simulated(entry, seed)
@@ -53,17 +51,15 @@ def pair_scenes(names: Sequence[str], seeds: Sequence[int]) -> Iterator[PairScen
 
 
 def simulated(entry: Entry, seed: int) -> Truth:
-    """Returns the truth of an entry, without pictures and detections."""
+    """Returns the truth of an entry that is simulated with a seed, without pictures and detections."""
     truth = simulate(entry.scenario, seed, entry.repeat, streams=()).truth
     assert truth is not None
     return truth
 
 
 def pair_scene(truth: Truth, seed: int, repeat: int, rough: bool, begin: float) -> PairScene | None:
-    """Returns the rows of pairs of people from `begin` s on, with the truth of each; None without pairs.
-
-    rough: with a detector's errors, else those of labels.
-    """
+    """Returns the rows of pairs of people from `begin` s on, each with whether the two are together; None without
+    pairs. rough: True adds a detector's errors and misses, False a labeller's errors at 2.5 frames/s."""
     erring = with_label_errors(truth, DETECTED if rough else SURVEYED, seed, repeat)
     assert erring.pos is not None
     every = 1 if rough else max(1, round(truth.fps / SLOW))

@@ -41,13 +41,14 @@ class EventRows:
 
     @classmethod
     def joined(cls, parts: Iterable[EventRows]) -> EventRows:
-        """Returns all rows together."""
+        """Returns the rows of all parts as one `EventRows`, in order."""
         given = [*parts, cls(np.zeros((0, FEATURES)), np.zeros(0, np.int64), np.zeros((0, 3), bool))]
         return cls(*(np.concatenate([getattr(p, name) for p in given]) for name in ("features", "event", "possible")))
 
 
 def event_rows(truth: Truth, lag: float, seed: int) -> EventRows:
-    """Returns the rows of a sequence; lag: s between the two times of the features; seed: of the errors."""
+    """Returns the rows of a sequence with truth. lag: time between the two moments of the features, s; seed: of the
+    random errors of positions, velocities and partitions."""
     assert truth.pos is not None
     assert truth.vel is not None
     frames, stride = max(1, round(lag * truth.fps)), max(1, round(STRIDE * truth.fps))
@@ -65,7 +66,8 @@ def event_rows(truth: Truth, lag: float, seed: int) -> EventRows:
 
 
 def wrong_partition(group: Ints, state: Array, draws: np.random.Generator) -> Ints:
-    """Returns groups (K,), -1 alone, with an error: a part leaves a group, or two groups are joined."""
+    """Returns a copy of the groups (K,), -1 alone, with a random error: a part leaves a group, or the two nearest
+    groups (or people alone) are joined. state (K, 4): position and velocity of each person."""
     out, new = group.copy(), group.max(initial=0) + 1
     named = np.unique(group[group >= 0])
     if len(named) and draws.random() < 0.5:
@@ -91,7 +93,8 @@ def _erring(state: Array, draws: np.random.Generator) -> Array:
 
 
 def partition_rows(early: Array, late: Array, before: Ints, after: Ints) -> EventRows:
-    """Returns the rows of one partition; early, late (K, 4): states; before, after (K,): groups, -1 for alone."""
+    """Returns the rows of one partition, one per group and person alone. early, late (K, 4): states of the people at
+    the two moments; before, after (K,): their groups then, -1 alone."""
     people = len(before)
     label = before + 1
     canonical(label)
@@ -141,7 +144,7 @@ def fit_events(rows: EventRows) -> dict[str, list[float]]:
 
 
 def log_probabilities(rows: EventRows, weights: Mapping[str, Sequence[float]]) -> Array:
-    """Returns log pi of Merge, Split and None, (R, 3); -inf for an event that is not possible."""
+    """Returns log pi(e | X, g, g') of the events Merge, Split and None, in this order, (R, 3); -inf if impossible."""
     table = np.array([weights[f"{CLASSES[event]}_weights"] for event in (MERGE, SPLIT)])
     design = np.concatenate([rows.features, np.ones((len(rows.event), 1))], axis=1)
     return _log_probabilities(design, table, rows.possible)
@@ -155,7 +158,8 @@ def _log_probabilities(design: Array, weights: Array, possible: Bools) -> Array:
 
 
 def event_scores(rows: EventRows, weights: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """Returns numbers of rows, merges and splits, and log losses of a classifier and of the shares of the events."""
+    """Returns by name the numbers of "rows", "merges" and "splits", the mean "log_loss" of a classifier with these
+    weights, and "prior_log_loss", that of the overall shares of the events."""
     counts, each = np.bincount(rows.event, minlength=3), np.arange(len(rows.event))
     prior = np.where(rows.possible, np.maximum(counts / max(len(rows.event), 1), 1e-12), 0.0)
     prior /= prior.sum(axis=1, keepdims=True)

@@ -51,9 +51,7 @@ class TruePairs:
 
 def fit_relational(truths: Iterable[Truth], ends: Sequence[float]) -> dict[str, float | list[float]]:
     """Returns fitted parameters of `relational` by name: drift, diffusion, relation_rate, _bias, _distance, _velocity.
-
-    ends: upper ends of the rows of the speed table, m/s.
-    """
+    ends: upper ends of the rows of the speed table, m/s; the last row has none. Raises InputError for too few data."""
     changes, pairs = [], []
     for truth in truths:
         changes.append(velocity_changes(truth, max(1, round(LAG * truth.fps))))
@@ -73,7 +71,8 @@ def fit_relational(truths: Iterable[Truth], ends: Sequence[float]) -> dict[str, 
 
 
 def fit_observed(sequences: Iterable[Recording], ends: Sequence[float]) -> dict[str, float | list[float]]:
-    """Returns fitted parameters by name: drift, diffusion, and point_noise, of positions about the truth."""
+    """Returns fitted parameters by name: drift, diffusion, and point_noise, the standard deviation of detected
+    positions, m. ends: upper ends of the rows of the speed table, m/s."""
     changes, errors = [], []
     for sequence in sequences:
         truth, error = observed(sequence)
@@ -84,8 +83,8 @@ def fit_observed(sequences: Iterable[Recording], ends: Sequence[float]) -> dict[
 
 
 def observed(sequence: Recording) -> tuple[Truth, Array]:
-    """Returns the truth with the positions of detections and their differences from the frame before as velocities,
-    people without them left out; and the errors (R, 2) of detected positions, m."""
+    """Returns the truth with detected positions in place of the true ones, and the errors (N, 2) of all detected
+    positions, m. Velocities are differences from the frame before; rows without a velocity are left out."""
     truth = sequence.truth
     assert truth is not None
     assert truth.pos is not None
@@ -111,7 +110,8 @@ def observed(sequence: Recording) -> tuple[Truth, Array]:
 
 
 def speed_table(changes: Sequence[Changes], ends: Sequence[float]) -> dict[str, float | list[float]]:
-    """Returns drift and diffusion of each row of speeds; changes: of `velocity_changes`."""
+    """Returns the lists drift (1/s · m/s) and diffusion (per root second), one number per row of speeds, by name.
+    changes: results of `velocity_changes`. ends: upper ends of the rows, m/s; the last row has none."""
     speed, along, across, lag = (np.concatenate(x) for x in zip(*changes, strict=True))
     row = np.searchsorted(ends, speed)
     drifts, diffusions = [], []
@@ -127,7 +127,8 @@ def speed_table(changes: Sequence[Changes], ends: Sequence[float]) -> dict[str, 
 
 
 def velocity_changes(truth: Truth, frames: int) -> Changes:
-    """Returns speed, change of velocity along and across its direction, m/s, and its time, s, (R,) each."""
+    """Returns four arrays (R,): speed, m/s; change of velocity over `frames` frames along and across the direction of
+    motion, m/s; and the time of the change, s."""
     assert truth.vel is not None
     order = np.lexsort((truth.frame, truth.id))
     frame, id, vel = truth.frame[order], truth.id[order], truth.vel[order]
@@ -145,7 +146,7 @@ def velocity_changes(truth: Truth, frames: int) -> Changes:
 
 
 def pair_rows(truth: Truth) -> TruePairs:
-    """Returns the rows of the pairs of a sequence that are at most NEAR apart."""
+    """Returns the rows of all pairs of people of a sequence, in the frames in which they are at most 6 m apart."""
     assert truth.pos is not None
     assert truth.vel is not None
     people, found = int(truth.id.max(initial=0)) + 1, []
@@ -164,7 +165,7 @@ def pair_rows(truth: Truth) -> TruePairs:
 
 
 def logistic(design: Array, same: Bools) -> Array:
-    """Returns the weights (3,) of a logistic regression with a normal prior, by Newton's method."""
+    """Returns the weights (3,) of a logistic regression of `same` (R,) on `design` (R, 3), with a normal prior."""
     weights = np.zeros(design.shape[1])
     for _ in range(STEPS):
         p = 1 / (1 + np.exp(-np.clip(design @ weights, -40, 40)))

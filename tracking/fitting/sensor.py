@@ -74,9 +74,10 @@ FEW = 20  # with fewer half hidden rows, boxes are taken as amodal and errors as
 
 
 def fit_box_noise(recordings: Sequence[MatchedRecording]) -> tuple[Literal["visible", "amodal"], BoxNoise]:
-    """Returns whether detected boxes are of the visible part or of the whole person, and their errors.
+    """Returns whether detected boxes enclose the visible part ("visible") or the whole person ("amodal"); their errors.
 
-    If no detected row is a quarter visible, means, standard deviations and `occluded` are 0, and `memory` is None.
+    If every detected row is less than a quarter visible, means, standard deviations and `occluded` are 0, and `memory`
+    is None.
     """
     kind: Literal["visible", "amodal"] = "visible" if _of_visible_part(recordings) else "amodal"
     errors = [_errors(m, kind) for m in recordings]
@@ -163,7 +164,8 @@ def _true(m: MatchedRecording, kind: str) -> Array:
 def fit_points(
     recordings: Sequence[MatchedRecording], kind: str
 ) -> tuple[Literal["own", "seen", "foot"], float | None]:
-    """Returns the setting `points` that explains the detections' ground positions best, and its deviation, m."""
+    """Returns the value of `points` that explains the detections' ground positions best, and the standard deviation of
+    the positions from it, m. Without positions, or if "foot" is best, the result is ("foot", None)."""
     found = [_point_errors(m, kind) for m in recordings if m.pos is not None and m.truth.pos is not None]
     e = np.concatenate([np.zeros((3, 0, 2)), *found], axis=1)
     best = int(np.abs(e).sum(axis=(1, 2)).argmin())
@@ -191,13 +193,15 @@ FEW_SCORES = 20  # with fewer scores, no quantiles are given
 
 
 def fit_sensor(sequences: Iterable[Recording] | Recording) -> Sensor:
-    """Returns the sensor whose errors are like those of the detector on these recordings, pooled."""
+    """Returns the sensor settings that imitate the detector's errors on these recordings, all recordings pooled. Raises
+    InputError if labels or detections are missing or too few."""
     recordings = [sequences] if isinstance(sequences, Recording) else list(sequences)
     return fit_matched([match_sequence(s) for s in recordings])
 
 
 def fit_matched(recordings: Sequence[MatchedRecording]) -> Sensor:
-    """Returns the sensor whose errors are like those of the detector on matched recordings, pooled."""
+    """Returns the sensor settings that imitate the detector's errors on matched recordings, all recordings pooled.
+    Raises InputError with fewer than 50 labelled people or 25 detected ones."""
     people, hits = sum(len(m.match) for m in recordings), sum(int(m.hit.sum()) for m in recordings)
     if people < LEAST or hits < LEAST // 2:
         name = recordings[0].truth.name if recordings else "fit sensor"

@@ -44,12 +44,12 @@ class Axis:
     about: str = ""  # what a value is
 
     def between(self, a: float, b: float) -> float | None:
-        """Returns the value in the middle of two values, None if there is none."""
+        """Returns the value in the middle of two values; None if whole numbers have none between them."""
         middle = round((a + b) / 2) if self.whole else (a + b) / 2
         return None if middle in (a, b) else middle
 
     def spread(self, count: int) -> list[float]:
-        """Returns evenly spread values, the easy one first, without repeats."""
+        """Returns up to `count` evenly spread values from easy to hard, without repeats."""
         return list(dict.fromkeys(self.at(k / (count - 1)) for k in range(count)))
 
     def at(self, share: float) -> float:
@@ -90,7 +90,7 @@ AXES = {
 
 
 def parse_axes(texts: Iterable[str]) -> tuple[Axis, ...]:
-    """Returns the axes of texts as of `parse_axis`, each named once."""
+    """Returns one axis per text, as `parse_axis` reads it. Raises InputError if an axis is named twice."""
     axes = tuple(parse_axis(text) for text in texts)
     for axis in axes:
         if sum(other.name == axis.name for other in axes) > 1:
@@ -99,7 +99,7 @@ def parse_axes(texts: Iterable[str]) -> tuple[Axis, ...]:
 
 
 def parse_axis(text: str) -> Axis:
-    """Returns the axis of a text NAME, NAME=EASY:HARD or KEY=EASY:HARD."""
+    """Returns the axis of a text NAME, NAME=EASY:HARD or KEY=EASY:HARD. Raises InputError for any other text."""
     name, equals, span = text.partition("=")
     known, expected = AXES.get(name), f"one of {', '.join(AXES)}, or KEY=EASY:HARD"
     if not equals:
@@ -117,7 +117,8 @@ def parse_axis(text: str) -> Axis:
 
 @dataclass(frozen=True)
 class BreakingPoint:
-    """Where a curve crosses a level, as a share of the way from easy (0) to hard (1); inf: it does not."""
+    """Where a curve crosses a level, and the low and high end of its 95 % interval, as shares of the way from easy (0)
+    to hard (1); inf means that there is no crossing."""
 
     at: float
     low: float
@@ -125,7 +126,8 @@ class BreakingPoint:
 
 
 def crossing(way: Array, height: Array) -> float:
-    """Returns where a curve first falls to 0, linear between its values (V,); inf if it does not."""
+    """Returns at which `way` a curve first falls to 0 or below, linear between its values; inf if it never does. way,
+    height (V,): the curve; nan heights are left out."""
     known = np.isfinite(height)
     way, height = way[known], height[known]
     below = np.flatnonzero(height <= 0)
@@ -139,7 +141,8 @@ def crossing(way: Array, height: Array) -> float:
 
 
 def breaking_point(way: Array, scores: Array, share: float) -> BreakingPoint:
-    """Returns where the curve of scores (P, V) at `way` (V,), ascending from 0, falls to a share of its easy value."""
+    """Returns where the mean curve of scores (P, V), of P scenes at `way` (V,), falls to a share of its value at the
+    easy end. way: ascending from 0. All three numbers are inf if the mean at the easy end is not above 0."""
     easy = scores[:, :1]
     if not mean_interval(easy)[0] > 0:
         return BreakingPoint(NEVER, NEVER, NEVER)

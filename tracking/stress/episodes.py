@@ -43,7 +43,8 @@ Tasks = tuple[EpisodeTask | OracleTask, ...]  # all of one scene
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of an episode: scores by key, () without; a script that did not come true; or a failed tracker."""
+    """The result of an episode: its scores by key, or {} and why there are none. `left_out` says how the script did not
+    come true, `failed` how the tracker failed; else they are ""."""
 
     scores: dict[str, float]
     seconds: float = 0.0  # in the tracker
@@ -57,14 +58,15 @@ PlayScenes = Callable[[Sequence[Tasks]], Iterator[Sequence[Outcome]]]  # Yields 
 
 
 def contender(name: str, step_timeout: float | None = None) -> TunedTracker:
-    """Returns a tracker of a sweep. Raises InputError if there is none of this name."""
+    """Returns the tracker of this name for a sweep; step_timeout: s, None for no limit. Raises InputError if there is
+    none."""
     find(name)
     return tuned_tracker(name, step_timeout)
 
 
 @contextmanager
 def scene_player(workers: int = 1, cluster: str | None = None) -> Iterator[PlayScenes]:
-    """Opens the workers for the time of the context and returns the function that plays scenes on them."""
+    """Context manager: opens the workers and yields the function that plays scenes on them (`PlayScenes`)."""
     from sim.workers.pool import results_in_order
 
     with playing_workers(workers, cluster) as run:
@@ -72,7 +74,8 @@ def scene_player(workers: int = 1, cluster: str | None = None) -> Iterator[PlayS
 
 
 def play_scene(tasks: Tasks) -> list[Outcome]:
-    """Plays all episodes of a scene; a scene that cannot be made is left out."""
+    """Plays all episodes of one scene and returns an outcome for each. If the scene cannot be made, no episode is
+    played and all outcomes are `left_out`."""
     first = tasks[0]
     try:
         opened = opened_sources().open(first.source, streams_for(first.tracker, first.detections))
@@ -83,7 +86,7 @@ def play_scene(tasks: Tasks) -> list[Outcome]:
 
 
 def play_oracle(task: OracleTask, opened: OpenedSource) -> Outcome:
-    """Returns the scores of the oracle, as `tracking.comparison.compare_one` scores it."""
+    """Returns the outcome of the oracle on an opened sequence, scored as by `tracking.comparison.compare_one`."""
     sequence, mode = opened.sequence, task.detections
     frames = () if mode == "image" else sequence.without_pictures()
     kind = input_kind(find(task.tracker).needs, mode, sequence, frames)
@@ -132,7 +135,7 @@ class Store:
             write_file(self.path, "".join(json.dumps(row) + "\n" for row in self.known.values()).encode())
 
     def add(self, row: dict[str, Any]) -> None:
-        """Stores an episode."""
+        """Stores an episode, a dict with its "key", in memory and as a new last line of the file."""
         self.known[row["key"]] = row
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.open("a", encoding="utf-8") as file:

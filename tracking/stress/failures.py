@@ -37,7 +37,7 @@ Run = Callable[[Sequence], TrackingRun]  # Tracks a sequence.
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of an episode."""
+    """The result of one episode: scores by key, errors, number of people, or the problem that prevents a judgement."""
 
     scores: Mapping[str, float] = field(default_factory=dict)
     errors: frozenset[tuple[str, str]] = frozenset()  # kinds and causes, if they were asked for
@@ -57,13 +57,13 @@ class Failure:
     cause: str = ""
 
     def holds(self, outcome: Outcome) -> bool:
-        """Returns True if the tracker failed in this way."""
+        """Returns True if the tracker failed in this way: the score is beyond the bound, or such an error occurred."""
         if self.kind:
             return any(self.kind == kind and self.cause in ("", cause) for kind, cause in outcome.errors)
         return OPERATORS[self.beyond](outcome.scores.get(self.score, float("nan")), self.bound)
 
     def found(self, outcome: Outcome) -> str:
-        """Returns what the episode shows instead, in words."""
+        """Returns in words what the episode shows: its problem, the errors that occurred, or the value of the score."""
         if outcome.problem is not None:
             return outcome.problem.line()
         if self.kind:
@@ -73,7 +73,8 @@ class Failure:
 
 
 def parse_failure(text: str) -> Failure:
-    """Returns the condition of `--while`. Raises InputError for any other text."""
+    """Returns the failure that a text of `--while` describes, such as "HOTA<0.7" or "switch:hidden". Raises InputError
+    for any other text."""
     found = COMPARISON.fullmatch(text)
     expected = "SCORE<NUMBER (or <=, >, >=), a kind of error, or crash, as in HOTA<0.7, switch, switch:hidden"
     if found is None:
@@ -99,9 +100,10 @@ def _wrong(text: str, expected: str, remedy: str) -> InputError:
 def play_episode(
     run: Run, streams: Iterable[str], failure: Failure, scenario: Scenario, seed: int, repeat: int = 0
 ) -> Outcome:
-    """Plays an episode; an order that does not come true, and an unwanted error of the tracker, are its problem.
+    """Simulates a scene, tracks it with `run`, and returns scores and errors as far as `failure` needs them.
 
-    repeat: number of the suite's copy that the scenario is.
+    streams: the pictures to draw. repeat: number of the copy in the suite. `problem` of the result is set if an order
+    of the script does not come true, or if the tracker raises an error and the failure is not "crash".
     """
     from sim.sequence import simulate
     from tracking.comparison import scorer_of

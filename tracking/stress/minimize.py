@@ -75,10 +75,10 @@ class Search:
         return self.trail[-1]
 
     def run(self, scenario: Scenario, repeat: int = 0) -> None:
-        """Searches until a scene is smallest and confirmed, or the budget is spent.
+        """Searches until no piece can be taken out and fresh seeds confirm the scene, or the budget is spent.
 
-        Raises WorkError if the tracker does not fail on the scene. repeat: number of the suite's copy that the scene
-        is; smaller ones are copies of none.
+        The result is `smallest`. Raises WorkError if the tracker does not fail on the scene. repeat: number of the copy
+        of the suite's entry that the scene is; it counts for the first scene only.
         """
         if self.minutes is not None:
             self._end = time.monotonic() + 60 * self.minutes
@@ -94,7 +94,7 @@ class Search:
             self.complete = False
 
     def fresh_seeds(self) -> list[int]:
-        """Returns the seeds after all that the search has used."""
+        """Returns `confirm` seeds that the search has not used, those after the greatest used one."""
         first = self.seed + len(self.guard) + 1
         return list(range(first, first + self.confirm))
 
@@ -192,7 +192,7 @@ class Search:
         return sum(self.fails(scenario, seed) for seed in seeds)
 
     def fails(self, scenario: Scenario, seed: int) -> bool:
-        """Returns True if the tracker fails on a scene."""
+        """Returns True if the tracker fails, in the way that is searched for, on a scene with this seed."""
         outcome = self.outcome(scenario, seed)
         return outcome.problem is None and self.failure.holds(outcome)
 

@@ -62,13 +62,14 @@ TIMES: tuple[Pattern, ...] = (
 
 @dataclass(frozen=True)
 class Piece:
-    """A value in the table of a scenario, () the whole table, and the function that takes something away from it."""
+    """One possible reduction of a scenario: `path`, the keys that lead to a value in its table (() the whole table),
+    and `change`, a function from this value to the reduced one."""
 
     path: Path
     change: Callable[[Any], Any]
 
     def words(self, table: Any) -> str:
-        """Returns the key, and the value that it has in a table if that is short."""
+        """Returns the path as text; also " = value", the value in a scenario's table, if that is no table or list."""
         value = reduce(operator.getitem, self.path, table)
         key = ".".join(map(str, self.path))
         return key if isinstance(value, dict | list) else f"{key} = {value}"
@@ -78,12 +79,13 @@ Stage = Callable[[Scenario], list[Piece]]
 
 
 def table_of(scenario: Scenario) -> Table:
-    """Returns all keys of a scenario as a plain table."""
+    """Returns a scenario as a plain table (nested dicts and lists) with all its keys."""
     return parse_toml(dump(scenario))
 
 
 def without(scenario: Scenario, pieces: Iterable[Piece]) -> Scenario | None:
-    """Returns the scenario without some pieces, None if nothing valid is left."""
+    """Returns the scenario with these reductions applied, and everything removed that names a removed group or order;
+    None if the result is no valid scenario."""
     table = table_of(scenario)
     for piece in pieces:
         table = _changed(table, piece.path, piece.change)
@@ -176,12 +178,12 @@ def _takes(event: Table, alive: list[str], made: list[str]) -> bool:
 
 
 def seconds(scenario: Scenario) -> list[Piece]:
-    """Returns the seconds that can be taken from the end."""
+    """Returns one piece for each second that can be cut off at the end; at least a part of a second is left."""
     return [Piece(("duration",), lambda now: round(now - 1.0, 6))] * (math.ceil(scenario.duration) - 1)
 
 
 def beginning(scenario: Scenario) -> list[Piece]:
-    """Returns the seconds that can be taken from the start, none where groups are drawn."""
+    """Returns one piece for each second that can be cut off at the start; none if some group is drawn at random."""
     fixed = all(g.speed is not None and g.repeat == 1 and _numbers(g.enter, *g.start, *g.goal) for g in scenario.group)
     return [Piece((), _second_later)] * (math.ceil(scenario.duration) - 1) if fixed else []
 
@@ -219,19 +221,21 @@ def _walk(group: Table) -> None:
 
 
 def script(scenario: Scenario) -> list[Piece]:
-    """Returns the orders, the last one first, and the groups."""
+    """Returns one piece for the removal of each order of the script, last order first, then of each group."""
     return [*reversed(_each([("event", EACH)], scenario)), *_each([("group", EACH)], scenario)]
 
 
 def difficulties(scenario: Scenario) -> list[Piece]:
-    """Returns the keys that do not have their easiest value, or their default if no other value is easier."""
+    """Returns a piece for each key that can be set to its easiest value (its default if no value is known to be
+    easiest), and does not have it."""
     layout = [key for key in LAYOUT if getattr(scenario, key) != Scenario.model_fields[key].default]
     keys = [(easiest, name, key) for name, key, easiest, now, easy, _ in _eased(scenario) if now != easy]
     return [*(_set(GONE, key) for key in layout), *(_set(*one) for one in keys)]
 
 
 def defaults(scenario: Scenario) -> list[Piece]:
-    """Returns the keys with an easiest value that have neither this one nor their default."""
+    """Returns a piece for each key with a known easiest value that has neither that value nor its default; the piece
+    sets the default."""
     return [
         _set(GONE, name, key)
         for name, key, easiest, now, easy, usual in _eased(scenario)
@@ -251,7 +255,8 @@ def _eased(scenario: Scenario) -> Iterator[tuple[str, str, Any, Any, Any, Any]]:
 
 
 def people(scenario: Scenario) -> list[Piece]:
-    """Returns the people after the first of each group, and its copies after the first."""
+    """Returns a piece for each person after the first of a group, and for each copy (`repeat`) after the first. A size
+    that is drawn is first set to its least value."""
     pieces = []
     for k, group in enumerate(scenario.group):
         size = ("group", k, "size")
@@ -279,10 +284,10 @@ def _set(value: Any, *path: str | int) -> Piece:
 
 
 def pinned(scenario: Scenario, seed: int, repeat: int = 0) -> Scenario | None:
-    """Returns the scenario with the groups that a seed draws, each with fixed size, places, speed and times.
+    """Returns the scenario with the groups that a seed draws, each with fixed size, places, speed and times; None if
+    the groups cannot be drawn.
 
-    A group that is taken out of it leaves all others where they are; of a drawn one, the random numbers depend on its
-    place in the list. None if the groups cannot be drawn.
+    If a fixed group is removed later, all others stay where they are. Removing a drawn group would change the others.
     """
     from sim.crowd.navigation import scene_of
     from sim.crowd.population import draw_population, script_placement

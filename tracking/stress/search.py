@@ -38,7 +38,7 @@ SCENARIO = "scenario"  # name of the parameter
 
 @dataclass(frozen=True)
 class Failure:
-    """A scene in which the tracker falls short of the oracle."""
+    """A scene that the search has drawn, with the scores of oracle and tracker on it."""
 
     number: int  # of the scene in the search, from 0
     scene: Scene
@@ -55,7 +55,8 @@ class Failure:
         return self.oracle - self.score
 
     def nearness(self, other: Failure) -> float:
-        """Returns 1 for an equal place and scenario, falling to 0 for scenes that are not near."""
+        """Returns how near two scenes are: 1 at an equal place, falling to 0 where an axis differs by a fifth of its
+        range; 0 for different scenarios."""
         if (self.scenario, self.scene.source.name) != (other.scenario, other.scene.source.name):
             return 0.0
         apart = max((abs(a - b) for a, b in zip(self.place, other.place, strict=True)), default=0.0)
@@ -65,13 +66,16 @@ class Failure:
 def search(
     sweep: Sweep, count: int, seed: int = 0, sampler: optuna.samplers.BaseSampler | None = None
 ) -> list[Failure]:
-    """Plays scenes with the first tracker, and returns all of them whose scores are known, in their order.
+    """Searches for scenes in which the first tracker of a sweep falls short of the oracle.
 
     Args:
-        sweep: Gives plan, trackers and store, and keeps the episodes. The search ends early with its budget of time.
-        count: Number of scenes.
-        seed: Of the search.
-        sampler: Draws scenes in place of TPE.
+        sweep: Gives the plan, the trackers and the store of episodes. The search ends early if its budget is spent.
+        count: Number of scenes to play.
+        seed: Seed of the search.
+        sampler: Optuna's sampler that draws scenes; None takes TPE.
+
+    Returns:
+        All scenes on which both scores are known, in the order in which they were drawn.
 
     Raises:
         InputError: Optuna is not installed, or a scene cannot be made.
@@ -109,7 +113,7 @@ def search(
 
 
 def worst(found: Sequence[Failure], most: int = LISTED) -> list[Failure]:
-    """Returns the failures with the greatest shortfalls, no two near each other."""
+    """Returns at most `most` failures with the greatest shortfalls above 0, worst first, no two near each other."""
     chosen = list[Failure]()
     for failure in sorted(found, key=lambda one: -one.shortfall):
         if failure.shortfall > 0 and len(chosen) < most and not any(failure.nearness(other) for other in chosen):

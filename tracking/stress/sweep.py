@@ -43,7 +43,7 @@ Values = tuple[float, ...]  # one for each axis
 
 @dataclass(frozen=True)
 class Plan:
-    """What is played."""
+    """The settings of a sweep: scenarios, axes, seeds, score, input and budget."""
 
     scenarios: tuple[str, ...]
     axes: tuple[Axis, ...]
@@ -57,14 +57,14 @@ class Plan:
     minutes: float | None = None
 
     def settings_at(self, values: Values) -> tuple[str, ...]:
-        """Returns the settings of scenes at a value for each axis."""
+        """Returns the settings "key=value" of scenes at these values, one value for each axis."""
         own = (text for axis, value in zip(self.axes, values, strict=True) for text in axis.settings(value))
         return (*self.settings, *own)
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene at a value for each axis."""
+    """A scene (scenario and seed) and the value of each axis with which it is made."""
 
     source: Source
     values: Values
@@ -170,7 +170,8 @@ class Sweep:
         return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:24]
 
     def rows(self) -> list[dict[str, Any]]:
-        """Returns the stored episodes of this sweep, by tracker, scenario, seed and values; `values` by axis."""
+        """Returns the stored episodes of this sweep as dicts, sorted by tracker, scenario, seed and values; "values" is
+        a dict by axis."""
         found = []
         for scene in self.scenes.values():
             values = {axis.name: value for axis, value in zip(self.plan.axes, scene.values, strict=True)}
@@ -183,14 +184,15 @@ class Sweep:
         return self.store.known.get(self._key(name, scene))
 
     def score(self, name: str, scene: Scene) -> float:
-        """Returns the score of an episode; 0 for a failed one, nan without an episode or a score."""
+        """Returns the plan's score of a tracker or the oracle on a scene: 0 if the tracker failed, nan if the episode
+        is not played or has no such score."""
         row = self.row(name, scene)
         if row is None:
             return float("nan")
         return 0.0 if row["failed"] else float(row["scores"].get(self.plan.by, "nan"))
 
     def scores(self, name: str) -> Array:
-        """Returns the scores (P, V) of a tracker or the oracle by scene and values, as of `score`."""
+        """Returns the scores (P, V) of a tracker or the oracle on P scenes at V values, each as `score` returns it."""
         return np.array([[self.score(name, scene) for scene in self._scenes(values)] for values in self.values]).T
 
     @property
@@ -249,12 +251,13 @@ def _width(point: BreakingPoint) -> float:
 
 
 def last_of_each_key(settings: Iterable[str]) -> tuple[str, ...]:
-    """Returns the settings that count, each key once, as `--set` wants them."""
+    """Returns the settings "key=value" with each key once: the last value of a key counts."""
     return tuple({text.partition("=")[0].strip(): text for text in settings}.values())
 
 
 def generate_command(scenario: str, seed: int, settings: Iterable[str], out: str) -> str:
-    """Returns the command that generates one scene; of several settings of a key the last one counts."""
+    """Returns the command line (text) that generates one scene into the folder `out`; of several settings of a key the
+    last one counts."""
     words = ["flockscope", "generate", scenario, "--seeds", f"{seed}:{seed + 1}", "--out", out]
     return shlex.join([*words, *(word for text in last_of_each_key(settings) for word in ("--set", text))])
 

@@ -39,7 +39,8 @@ class Goal:
         return episode.scores.get(self.key, float("nan"))
 
     def mean(self, episodes: Sequence[Episode]) -> float:
-        """Returns the mean over the episodes that have the score, nan if none has."""
+        """Returns the mean over the episodes that have the score, nan if none has; for "frames/s" all frames over all
+        seconds."""
         if self.key == SPEED:
             seconds = sum(e.seconds_tracking for e in episodes)
             return sum(e.frames for e in episodes) / seconds if seconds else float("nan")
@@ -51,7 +52,8 @@ class Goal:
 
 
 def goals_of(keys: Iterable[str]) -> tuple[Goal, ...]:
-    """Returns one goal per key, in the order given; the catalogue of scores says which direction is better."""
+    """Returns one goal per different key, in the order given; the catalogue says which direction is better. Raises
+    InputError for an unknown key, or a score of which neither direction is better."""
     from tracking.scoring.catalogue import CATALOGUE
 
     found: list[Goal] = []
@@ -93,19 +95,19 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """Returns "better" or "worse" if the interval of the difference excludes 0, else "no sure difference"."""
+        """"better" or "worse" (of `after`) if the interval of the difference excludes 0, else "no sure difference"."""
         if not (self.low > 0 or self.high < 0):
             return "no sure difference"
         return "better" if (self.difference > 0) == self.higher else "worse"
 
     @property
     def difference_words(self) -> str:
-        """The difference with its interval; without it if an end is unknown (nan)."""
+        """The difference and its interval as text; "(no interval)" stands for an interval with an unknown end."""
         known = math.isfinite(self.low) and math.isfinite(self.high)
         return f"{self.difference:+.4f}" + (f" [{self.low:+.4f}, {self.high:+.4f}]" if known else " (no interval)")
 
     def line(self) -> str:
-        """Returns one line of text."""
+        """Returns the comparison as one line: scenes, score, both means, difference, number of sequences, verdict."""
         change = f"{self.before:.4f} → {self.after:.4f}, {self.difference_words}"
         return f"{self.scenes}: {self.key} {change}, {counted(self.sequences, 'sequence')}: {self.verdict}"
 
@@ -122,7 +124,8 @@ class Candidate:
 
 
 def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: Sequence[Episode]) -> Comparison | None:
-    """Returns the comparison of a goal, paired by sequence, where both sides have a finite score; None without any."""
+    """Returns the comparison of a goal's values, paired by sequence; None if no pair is finite. before, after: episodes
+    of the defaults and of the config on the same sequences, in one order. Pairs that are not finite are left out."""
     a, b = (np.array([goal.of(e) for e in episodes]) for episodes in (before, after))
     known = np.isfinite(a) & np.isfinite(b)
     if not known.any():
@@ -135,7 +138,8 @@ def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: 
 
 
 def pareto_front(candidates: Sequence[Candidate], goals: Sequence[Goal]) -> list[Candidate]:
-    """Returns the candidates that no other dominates on the validation scenes, best first goal first."""
+    """Returns the candidates that no other dominates on the validation scenes, sorted by the first goal, best first. Of
+    candidates with equal values the first counts; candidates with a value of nan are left out."""
     known = [c for c in candidates if not np.isnan(c.validation).any()]  # nothing is known of the others' rank
 
     def dominates(one: Candidate, other: Candidate) -> bool:

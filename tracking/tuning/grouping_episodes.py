@@ -37,7 +37,8 @@ SURVEYED, FILMED = LabelErrors(0.02, 0.1, filmed=False), LabelErrors(0.06, 0.1, 
 
 
 def play_rule(source: Source, rule: LinkRule, source_cache: SourceCache) -> Episode:
-    """Returns the episode of the baseline rule of groups on the people of a source, whose identity is known."""
+    """Returns the episode of the baseline rule of groups on the people of a source, whose ids are known. People of a
+    simulated source get the errors of labels first, `SURVEYED` for even seeds, `FILMED` for odd ones."""
     from tracking.scoring.evaluation import evaluate
 
     truth = source_cache.open(source).truth
@@ -55,7 +56,8 @@ def play_rule(source: Source, rule: LinkRule, source_cache: SourceCache) -> Epis
 
 
 def with_label_errors(truth: Truth, errors: LabelErrors, seed: int, repeat: int = 0) -> Truth:
-    """Returns a copy of the truth with label errors: a first-order autoregressive process per person and coordinate."""
+    """Returns a copy of the truth with errors added to positions: a first-order autoregressive process per coordinate.
+    If the errors are of filmed people, the copy has boxes, displaced in the image, and no positions."""
     assert truth.pos is not None, "simulated people have positions"
     assert truth.box is not None, "scenes have cameras"
     stay, error = float(np.exp(-1 / (truth.fps * errors.time))), np.empty_like(truth.pos)

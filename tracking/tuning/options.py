@@ -21,7 +21,7 @@ Progress = Callable[[int, int | None, str], None]
 
 @dataclass(frozen=True, kw_only=True)
 class TuneOptions:
-    """The options of a search; the metadata of each field hold its help text and range."""
+    """The options of a search (`tracking.tune`); the metadata of each field hold its help text and range."""
 
     # fmt: off
     tracker: str | type[Tracker] = option(

@@ -50,7 +50,8 @@ def episode_player(
     cluster: str | None = None,
     similarity: Similarity | None = None,
 ) -> Iterator[PlayEpisodes]:
-    """Opens the workers for the time of the context and returns the function play(sources, values, every_score)."""
+    """Context manager: opens the workers and yields the function play(sources, values, every_score) (`PlayEpisodes`).
+    cluster: address of a dask scheduler, None for processes here. A class as tracker needs one worker here."""
     from sim.workers.pool import results_in_order
 
     if isinstance(tracker.tracker, type) and (workers > 1 or cluster):
@@ -69,7 +70,8 @@ def episode_player(
 
 @contextmanager
 def playing_workers(workers: int = 1, cluster: str | None = None) -> Iterator[RunItems]:
-    """Opens workers for episodes for the time of the context; then this process forgets what it kept for them."""
+    """Context manager: opens workers and yields the function that runs items on them. At the end this process closes
+    the trackers and forgets the sequences that it kept for episodes."""
     from sim.workers.pool import start_workers
 
     with start_workers(workers, cluster) as run:
@@ -83,9 +85,10 @@ def playing_workers(workers: int = 1, cluster: str | None = None) -> Iterator[Ru
 
 
 def play_task(task: EpisodeTask) -> EpisodeOrError:
-    """Plays an episode in a worker, which keeps the tracker and its opened sources for later tasks.
+    """Plays an episode in this process and returns it, or the error that the tracker or its parameters caused.
 
-    The seed of the tracker is that of the source.
+    The process keeps the tracker and the opened sequences for later tasks. The tracker's seed is the source's seed. If
+    the scene's script does not come true, the episode says so in `left_out`.
     """
     tracker, source, cache = _tracker(task.tracker, task.code, task.step_timeout), task.source, opened_sources()
     try:
@@ -120,5 +123,5 @@ def _tracker(name: str | type[Tracker], code: str, step_timeout: float | None) -
 
 @cache
 def opened_sources() -> SourceCache:
-    """Returns the sequences that this process keeps for later episodes."""
+    """Returns the cache of the sequences that this process keeps for later episodes; always the same object."""
     return SourceCache(CACHE_BYTES)

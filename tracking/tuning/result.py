@@ -56,7 +56,7 @@ def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
 
 
 def importance_plot(plan: SearchPlan, importance: Mapping[str, float]) -> str:
-    """Returns as SVG a bar for the importance of each parameter."""
+    """Returns an SVG text: bar chart of the importance of each parameter. importance: shares (0 to 1) by name."""
     ranked = sorted(importance, key=lambda name: importance[name])
     title = f"{_title(plan)}: importance for {plan.goals[0].key} in training (PED-ANOVA)"
     figure, axes = _figure(title, 1 + len(ranked) / 3)
@@ -87,7 +87,7 @@ def _title(plan: SearchPlan) -> str:
 
 
 def short(value: object) -> str:
-    """Returns the value of a parameter as text, a number with four digits."""
+    """Returns the value of a parameter as text, a float with four significant digits."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
@@ -100,14 +100,15 @@ class TuningResult:
     """The result of `tracking.tune`.
 
     Attributes:
-        plan: The search.
-        config: The winner, all its parameters.
-        front: With several goals the candidates that no other dominates, best first goal first; else ().
+        plan: The plan of the search.
+        config: The winning config, with all parameters.
+        front: With several goals, the candidates that no other dominates, sorted by the first goal, best first; with
+            one goal ().
         candidates: The defaults, then the best trials, with their values on the validation scenes.
-        trials: All finished ones in the order of the search, pruned and impossible ones included.
-        importance: Share (0 to 1) of each parameter, by name, in the first goal's training values.
-        comparisons: Of winner and defaults on the test scenes; () if the defaults won.
-        validation: Two tuples, of the defaults and of the winner: one value for each goal on the validation scenes.
+        trials: All finished trials in the order of the search, with those stopped early and impossible ones.
+        importance: By parameter, the share (0 to 1) of the first goal's training values that it explains.
+        comparisons: Comparisons of the winner with the defaults on the test scenes; () if the defaults won.
+        validation: The values on the validation scenes, one per goal: a tuple of the defaults, then of the winner.
         notes: Remarks for the reader.
         left_out: A line for each scene whose script did not come true.
     """
@@ -130,14 +131,14 @@ class TuningResult:
 
     @property
     def changed(self) -> dict[str, tuple[Any, Any]]:
-        """Default and new value of each parameter that the winner changed, by name."""
+        """The parameters in which the winner differs from the defaults: by name, (default, new value)."""
         old, new = self.default.as_dict(), self.config.as_dict()
         return {name: (old[name], new[name]) for name in new if old[name] != new[name]}
 
     @property
     def counts(self) -> dict[str, int]:
-        """Numbers of trials, of training episodes that were played in them, of trials that were stopped early
-        ("pruned"), and of "impossible" ones, whose parameters the tracker refused or failed with."""
+        """By name: numbers of "trials", of training "episodes" played in them, of trials that were stopped early
+        ("pruned"), and of "impossible" trials, whose parameters the tracker refused or failed with."""
         return {
             "trials": len(self.trials), "episodes": sum(t.episodes for t in self.trials),
             "pruned": sum(t.pruned for t in self.trials), "impossible": sum(bool(t.error) for t in self.trials),
@@ -148,7 +149,8 @@ class TuningResult:
         return "\n".join(self.lines())
 
     def lines(self, chosen: Candidate | None = None) -> list[str]:
-        """Returns lines of text: settings, counts, validation values, and the comparisons and notes on the winner."""
+        """Returns lines of text: settings, counts, validation values, and the comparisons and notes on the winner.
+        chosen: a candidate of the front, whose lines are returned instead, without comparisons and notes."""
         plan, seeds = self.plan, {name: seeds_text(seeds) for name, seeds in self.plan.seeds.items()}
         names = ", ".join(goal.key for goal in plan.goals)
         chosen_similarity = plan.options.similarity
@@ -209,7 +211,8 @@ class TuningResult:
         }  # fmt: skip
 
     def write(self, path: str | Path) -> list[Path]:
-        """Writes the parameters to `path` (TOML), and beside it all figures (.json) and the plots (.svg)."""
+        """Writes the parameters to `path` (TOML), and beside it all figures (.json), the plots (.svg) and, with several
+        goals, the parameters of each candidate of the front. Returns the paths of all files."""
         target = Path(path)
         files = {".json": json.dumps(_without_nan(self.as_dict()), indent=1, allow_nan=False) + "\n", **self.plots()}
         files |= {f".front-{k}.toml": self.to_toml(c) for k, c in enumerate(self.front, 1)}
@@ -219,7 +222,7 @@ class TuningResult:
         return [target, *(target.with_suffix(suffix) for suffix in files)]
 
     def plots(self) -> dict[str, str]:
-        """Returns the plots as SVG text by file suffix: ".history.svg", ".importance.svg"."""
+        """Returns the plots as SVG text by file suffix: ".history.svg", and if any share is above 0 ".importance.svg"."""
         plots = {".history.svg": history_plot(self.plan, self.trials)}
         if any(self.importance.values()):
             plots[".importance.svg"] = importance_plot(self.plan, self.importance)

@@ -42,7 +42,7 @@ TPE_FROM = 10  # Number of complete trials before TPE is used.
 
 
 def distribution(p: Param) -> BaseDistribution:
-    """Returns Optuna's distribution of the declared parameter p, in the unit of the parameter."""
+    """Returns Optuna's distribution over the range or the choices of the parameter p, in its unit."""
     if p.scale == "categorical":
         return CategoricalDistribution(cast(Any, p.choices))
     if p.scale == "int":
@@ -51,13 +51,14 @@ def distribution(p: Param) -> BaseDistribution:
 
 
 def tpe_sampler(plan: SearchPlan, number: int) -> TPESampler:
-    """Returns the TPE sampler of trial `number`."""
+    """Returns Optuna's TPE sampler for trial `number`, with a seed that follows from the search's seed and number."""
     seed = np.random.SeedSequence([plan.options.seed, number]).generate_state(1)[0]
     return TPESampler(seed=int(seed), n_startup_trials=TPE_FROM)
 
 
 def propose(plan: SearchPlan, study: optuna.Study, number: int) -> None:
-    """Enqueues the parameters of trial `number` in the study, unless the study's sampler, TPE, is to draw them."""
+    """Makes TPE the study's sampler, and enqueues the parameters of trial `number` unless TPE is to draw them. TPE
+    draws every fourth trial, once 10 trials are complete."""
     study.sampler = tpe_sampler(plan, number)
     complete = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
     if number % TPE_EVERY != TPE_EVERY - 1 or len(complete) < TPE_FROM:
@@ -104,7 +105,8 @@ LEAST_SCENES = 2
 
 
 def surely_loses(gains: Sequence[float], p: float) -> bool:
-    """Returns True if gains over the best trial on the same scenes are surely negative: with a p-value below p."""
+    """Returns True if a trial surely loses: at least 2 gains, a negative sum, and a signed-rank p-value below p. gains:
+    by how much the trial is better than the best one on each scene that both were played on."""
     return len(gains) >= LEAST_SCENES and sum(gains) < 0 and signed_rank_p_value(gains) < p
 
 

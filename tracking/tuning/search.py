@@ -52,8 +52,8 @@ STORED = "judged "  # Prefix of the study attributes in which episodes are store
 class HeldOutEvaluator:
     """Plays configs on the validation and test scenes, which the search did not use.
 
-    State: scenes, all that were counted, by key of their source; left_out, a line for each that was left out, because
-    its script did not come true.
+    State: scenes, the keys of all scenes counted so far; left_out, by key, one line for each scene that was left out
+    because its script did not come true.
     """
 
     plan: SearchPlan
@@ -64,7 +64,8 @@ class HeldOutEvaluator:
     left_out: dict[object, str] = field(default_factory=dict)
 
     def validated(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Returns the candidates that can be played, with validation values and gain over the first, the defaults."""
+        """Returns the candidates that can be played, with `validation` (values) and `gain` filled in. The first
+        candidate must be the defaults; gains are over them. Raises their error if they cannot be played."""
         found = list[Candidate]()
         defaults: Sequence[Episode] = ()
         for k, candidate in enumerate(candidates):
@@ -81,7 +82,8 @@ class HeldOutEvaluator:
         return found
 
     def simplified(self, config: Config, value: float, order: Sequence[str]) -> tuple[Config, float]:
-        """Returns the config without changes that bring nothing in validation, tried in `order`, and its value."""
+        """Returns the config with changed parameters reset to the default where validation is no worse, and its value.
+        value: the config's mean of the first goal on the validation scenes. order: names in the order to try."""
         goal = self.plan.goals[0]
         changed = [name for name in order if getattr(config, name) != self.plan.defaults[name]]
         for k, name in enumerate(changed):
@@ -96,7 +98,8 @@ class HeldOutEvaluator:
         return config, value
 
     def compared(self, config: Config) -> tuple[list[Comparison], list[str]]:
-        """Returns the comparisons of the config with the defaults, suite by suite of the tests, and notes (texts)."""
+        """Returns the comparisons of the config with the defaults on the test scenes, one per suite and score. Also
+        returns notes: one text for each suite that cannot be played with the config."""
         found, notes = list[Comparison](), list[str]()
         keys = [goal.key for goal in self.plan.goals]
         goals = [*self.plan.goals, *(Goal(key) for key in COMPARED_KEYS if key not in keys)]
@@ -134,14 +137,14 @@ class HeldOutEvaluator:
         return found
 
     def count(self, sources: Sequence[Source], reasons: Sequence[str]) -> None:
-        """Counts scenes; reasons: why each was left out, "" if it was not."""
+        """Counts the sources as scenes; reasons: for each source why it was left out, "" if it was not."""
         self.scenes.update(source.key for source in sources)
         for source, reason in zip(sources, reasons, strict=True):
             if reason:
                 self.left_out[source.key] = f"{source.name} seed {source.seed}: {reason}"
 
     def require_most(self) -> None:
-        """Raises WorkError if more than 5 % of the scenes were left out."""
+        """Raises WorkError if more than 5 % of the counted scenes were left out."""
         if len(self.left_out) > LEFT_OUT * len(self.scenes):
             first = next(iter(self.left_out.values()))
             raise WorkError(
@@ -168,7 +171,8 @@ def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.
         trials: Number of sets of parameters to play, the defaults included.
 
     Returns:
-        The winner and its comparison with the defaults on the test scenes; with `out` written to files, too.
+        `TuningResult`: the best config and its comparison with the defaults on the test scenes. If `out` is given, it
+        is also written to files.
 
     Raises:
         InputError: An option is unknown or wrong, options contradict each other, the study in the storage is about

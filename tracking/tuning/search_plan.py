@@ -43,7 +43,8 @@ CHECK_SUITES = ("friends-meet", "crossing")  # Candidates for the default of --c
 
 
 def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
-    """Returns the seeds, or the default of the split if they are None."""
+    """Returns the seeds, or if they are None the default: the first seeds of the split ("train", "val" or "test"), as
+    many as make enough episodes with this number of scenes. Raises InputError for seeds of another split."""
     low, high = next((low, high) for name, low, high in SPLITS if name == split)
     option, word, episodes = SPLIT_OPTIONS[split]
     if seeds is None:
@@ -57,7 +58,8 @@ def chosen_seeds(seeds: range | None, split: str, scenes: int) -> range:
 
 
 def count_scenes(names: Sequence[str], settings: Sequence[str], option: str) -> int:
-    """Returns the number of scenes that the suites, scenarios and files `names` contain, each counted with one seed."""
+    """Returns the number of scenes of the suites, scenarios and files `names`, each with one seed. Raises InputError,
+    about `option`, for recordings and unknown names."""
     for name in names:
         if not is_catalogued(name) and Path(name).exists():
             raise InputError(
@@ -91,7 +93,7 @@ def _files(name: str) -> list[str]:
 
 @dataclass(frozen=True)
 class SearchPlan:
-    """A search whose options fit together."""
+    """The plan of a search: options that fit together, and everything that follows from them."""
 
     options: TuneOptions
     tracker: TunedTracker
@@ -106,7 +108,7 @@ class SearchPlan:
 
     @property
     def tracker_name(self) -> str:
-        """The name of the tracker; of a tracker given by file, file.py:Class without the folder; that of a class."""
+        """The name of the tracker: as registered, "file.py:Class" without the folder, or the name of the class."""
         return self.tracker.name.rpartition("/")[2]
 
     @property
@@ -116,7 +118,8 @@ class SearchPlan:
 
     @property
     def check_name(self) -> str | None:
-        """The name of the second suite without its folder; with " (--check)" if the first has the same."""
+        """The name of the second suite without its folder, None if there is none; " (--check)" is appended if it equals
+        `suite_name`."""
         name = None if self.check is None else _without_folder(self.check)
         return f"{name} (--check)" if name == self.suite_name else name
 
@@ -131,7 +134,7 @@ class SearchPlan:
         return any(goal.key not in (*FAST_KEYS, SPEED) for goal in self.goals)
 
     def config(self, values: dict[str, Any]) -> Config:
-        """Returns the base config with these values (by parameter name)."""
+        """Returns the base config with these values by parameter name. Raises InputError if they are not allowed."""
         return type(self.base).from_dict({**self.base.as_dict(), **values})
 
     @cached_property
@@ -154,7 +157,7 @@ class SearchPlan:
         return found
 
     def identity(self) -> dict[str, Any]:
-        """Returns a dict of everything that the value of a trial depends on."""
+        """Returns a dict, for JSON, of everything that the value of a trial depends on; long parts are hashed."""
         return {
             "tracker": self.tracker_name,
             "code": self.tracker.code,
@@ -174,7 +177,8 @@ class SearchPlan:
 
 
 def search_plan(options: TuneOptions) -> SearchPlan:
-    """Returns the plan that follows from the options, with defaults for everything that the options leave open."""
+    """Returns the plan that follows from the options, with defaults for everything that the options leave open. Raises
+    InputError if options are wrong or contradict each other."""
     tracker = tuned_tracker(options.tracker, options.step_timeout)
     fixed, scene_settings = _split_settings(options.set)
     suite = (str(options.suite),) if isinstance(options.suite, str | Path) else tuple(map(str, options.suite))

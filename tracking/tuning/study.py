@@ -61,7 +61,8 @@ class TrialLocks:
         self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
 
     def lock(self, byte: int, wait: bool = True) -> bool:
-        """Locks a byte (offset in the file) for this process; returns False if another has it and `wait` is False."""
+        """Locks the byte at this offset of the file for this process and returns True. If another process holds the
+        lock, waits for it, or if `wait` is False returns False at once."""
         try:
             fcntl.lockf(self._file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB), 1, byte)
         except OSError:
@@ -76,7 +77,7 @@ class TrialLocks:
 
     @contextmanager
     def locked(self, byte: int) -> Iterator[None]:
-        """Holds the lock on a byte for the time of the context; waits until it is free."""
+        """Context manager: waits until the byte is free and holds its lock while the block runs."""
         self.lock(byte)
         try:
             yield
@@ -139,13 +140,14 @@ class SearchStudy:
         return self.optuna.get_trials(deepcopy=False)
 
     def finished(self) -> list[FrozenTrial]:
-        """Returns the finished trials by number: complete, stopped early, or with impossible parameters."""
+        """Returns Optuna's finished trials, sorted by number: complete, stopped early, or impossible ones."""
         return [t for t in self.trials() if t.state in FINISHED]
 
     def ask(self, take_running: bool = False) -> optuna.Trial | None:
-        """Returns the next trial to play, locked for this process: first one that another process has abandoned.
+        """Returns the next trial to play, locked for this process; None if enough trials were begun.
 
-        take_running: without locks, running trials are taken for abandoned.
+        A trial that another process began and abandoned comes first. take_running: True takes running trials for
+        abandoned if the study has no locks.
         """
         with self._choosing():
             trials = self.trials()
@@ -172,14 +174,14 @@ class SearchStudy:
         return without_locks if self.locks is None else self.locks.lock(FIRST_TRIAL + number, wait=False)
 
     def tell(self, trial: optuna.Trial, values: Sequence[float] | None) -> None:
-        """Stores the values of a trial, one per goal, and releases its lock."""
+        """Stores the values of a trial, one per goal, and releases its lock; None: the parameters are impossible."""
         state = TrialState.PRUNED if values is None else TrialState.COMPLETE
         self.optuna.tell(trial, values, state, skip_if_finished=True)
         if self.locks is not None:
             self.locks.release(FIRST_TRIAL + trial.number)
 
     def records(self) -> list[TrialRecord]:
-        """Returns the finished trials by number, 0 for the defaults."""
+        """Returns the finished trials, sorted by number; number 0 is the defaults."""
         return [self._record(t) for t in self.finished()]
 
     def _record(self, t: FrozenTrial) -> TrialRecord:
@@ -189,11 +191,12 @@ class SearchStudy:
         return TrialRecord(t.number, tuple(t.values or ()), dict(t.params), episodes, PRUNED in t.user_attrs)
 
     def left_out(self) -> list[str]:
-        """Returns why each training scene was left out, "" if it was not."""
+        """Returns for each training scene, in order, why it was left out, "" if it was not."""
         return list(self.trials()[0].user_attrs[LEFT_OUT])
 
     def importance(self) -> dict[str, float]:
-        """Returns the share (0 to 1) of each parameter in the first goal's training values (PED-ANOVA)."""
+        """Returns by parameter the share (0 to 1) of the first goal's training values that it explains (PED-ANOVA). All
+        shares are 0 with fewer than two different values."""
         from optuna.importance import get_param_importances
 
         names = [p.name for p in self.plan.space]
@@ -211,7 +214,8 @@ class SearchStudy:
 
 @contextmanager
 def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Iterator[SearchStudy]:
-    """Opens or creates the study `name` for the time of the context, and yields it as a `SearchStudy`."""
+    """Context manager: opens or creates the study `name`, and yields it as a `SearchStudy`. storage: a journal file, a
+    URL (with "://"), or None for memory. Raises InputError if it cannot be opened or is of another search."""
     url = str(storage) if "://" in str(storage) else None
     file = Path(storage) if storage is not None and url is None else None
     with quiet_optuna(), ExitStack() as opened:
@@ -249,7 +253,7 @@ def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> N
 
 @contextmanager
 def quiet_optuna() -> Iterator[None]:
-    """Keeps Optuna from printing for the time of the context."""
+    """Context manager: keeps Optuna from printing messages, except errors, while the block runs."""
     level = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     try:

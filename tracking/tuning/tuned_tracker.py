@@ -32,18 +32,18 @@ class TunedTracker:
 
     @property
     def config_class(self) -> type[Config]:
-        """The class of its parameters. Raises InputError if it has none."""
+        """The tracker's config class, `LinkRule` for the rule. Raises InputError if the tracker has no parameters."""
         if self.name == RULE:
             return LinkRule
         return config_class(find(self.tracker) if isinstance(self.tracker, str) else self.tracker, self.name)
 
     @property
     def step_timeout(self) -> float | None:
-        """Seconds that each `reset` and `step` may take."""
+        """Seconds that each `reset` and `step` may take, None without a limit."""
         return None if self.limited is None else self.limited.seconds
 
     def close(self) -> None:
-        """Ends its process, if it has one; the next episode starts another."""
+        """Ends the tracker's process if it has one; the next episode starts a new process."""
         if self.limited is not None:
             self.limited.close()
 
@@ -64,7 +64,8 @@ class TunedTracker:
 
 
 def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = None) -> TunedTracker:
-    """Returns what is to be tuned; `grouping` is the baseline rule of groups."""
+    """Returns the tracker that is to be tuned, given by name, file or class; "grouping" is the baseline rule of groups.
+    step_timeout: seconds that each `reset` and `step` may take, None for no limit; the rule takes None only."""
     if tracker == RULE:
         if step_timeout is not None:
             remedy = "leave it out: the rule has no steps"
