@@ -60,7 +60,7 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def main() -> None:
-    """Runs the command line of this process (sys.argv) and never returns."""
+    """Runs the command line of this process (sys.argv), and ends the process with the command's exit code."""
     _open_streams()
     code = run(sys.argv[1:])
     if code == INTERRUPTED:

@@ -36,11 +36,10 @@ JSON = Annotated[bool, typer.Option("--json", help="Print one JSON object instea
 
 
 def add_command(app: typer.Typer, name: str, options: type, target: str) -> None:
-    """Adds the command `name`, which calls `target` with the dataclass `options`, whose docstring is its help.
+    """Adds the command `name` to the app. It calls the function `target` with an instance of the dataclass `options`.
 
-    Typer reads a command's options from the signature of its function, here one keyword for every field.
-
-    target: "module:function" in `commands/`.
+    Each field of the dataclass is an option of the command, and its docstring is the command's help. target:
+    "module:function" in `commands/`.
     """
 
     def command(**values: Any) -> CommandResult:
@@ -67,7 +66,7 @@ def _declared(f: Any) -> Any:
 
 
 class StrictCommand(TyperCommand):
-    """A command that raises InputError for an option given twice, unless it may be, and for an empty value."""
+    """A command that raises InputError if an option has an empty value, or is given twice and takes one value only."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parses the words of the command line after the command's name, as Typer does."""

@@ -52,7 +52,8 @@ TUNING = {f.name: f for f in fields(TuneOptions)}
 
 
 def tuned(name: str, default: Any = ..., flag: str | None = None) -> Any:
-    """Returns an option of `tracking.tune` as one of the command, with another default if it is given."""
+    """Returns an option of `tracking.tune` as an option of the command, with its help text. default: ... keeps the
+    default of `tracking.tune`. flag: as of `option`; None takes "--name"."""
     f = TUNING[name]
     more = {"metavar": f.metadata["metavar"], "flag": f"--{name}" if flag is None else flag}
     return option(f.metadata["help"], f.default if default is ... else default, **more)
@@ -64,9 +65,10 @@ COMMANDS: dict[str, tuple[type, str]] = {}
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
 class Options:
-    """The options of a command; each subclass is made a frozen dataclass.
+    """The options of a command. Each subclass is made a frozen dataclass; its docstring is the command's help.
 
-    words: of the command; run: the function that takes the options, by its module in `commands/`.
+    words: the words of the command, such as "fit joint". run: the function that takes the options, as "module:function"
+    in `commands/`.
     """
 
     def __init_subclass__(cls, words: str = "", run: str = "") -> None:

@@ -49,7 +49,7 @@ def print_error(error: FlockscopeError, as_json: bool) -> int:
 
 
 def print_interrupted(as_json: bool) -> int:
-    """Prints that Ctrl-C ended the command and that the same command continues; returns 130."""
+    """Prints that Ctrl-C ended the command and that running it again continues the work; returns the exit code 130."""
     remedy = "run the same command again: completed parts are kept"
     error = WorkError(got="an interruption", expected="to finish", remedy=remedy)
     if as_json:
@@ -60,7 +60,8 @@ def print_interrupted(as_json: bool) -> int:
 
 
 def as_flockscope_error(error: BaseException) -> FlockscopeError:
-    """Returns, not raises, the error for users that stands for an unexpected exception."""
+    """Returns (does not raise) the error to show to users for an unexpected exception: InputError or WorkError for a
+    fault of the system, such as a full disk, else a WorkError that says that it is a bug."""
     if isinstance(error, OSError):
         return _system_error(error)
     remedy = f"this is a bug: {DEBUG}=1 shows where"
@@ -86,7 +87,8 @@ def _print_json(data: dict[str, Any]) -> None:
 
 
 def as_json_value(value: Any) -> Any:
-    """Returns a copy of the value in types that `json` can write."""
+    """Returns a copy of the value in types that `json` can write: paths as text, arrays and tuples as lists, None for
+    nan and infinity."""
     if isinstance(value, dict):
         return {str(key): as_json_value(v) for key, v in value.items()}
     if isinstance(value, list | tuple | range):

@@ -23,7 +23,8 @@ def seeds(text: str, option: str = "--seeds") -> range:
 
 
 def settings(texts: Iterable[str], default: str, subjects: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Splits `--set` texts into pairs (subject, "key=value"), in the order given."""
+    """Splits `--set` texts "subject.key=value" into pairs (subject, "key=value"), in the order given. default: subject
+    of a text without one of `subjects`. Raises InputError for a wrong text or a key that is given twice."""
     found: dict[tuple[str, str], str] = {}
     for text in texts:
         subject, key, value = _setting(text, default, subjects)
@@ -55,7 +56,7 @@ def _setting(text: str, default: str, subjects: tuple[str, ...]) -> tuple[str, s
 
 
 def scenario_settings(texts: Iterable[str]) -> list[str]:
-    """Returns `--set` texts of a command on scenarios as "key=value", in the order given."""
+    """Returns `--set` texts of a command on scenarios as "key=value" in the order given, without "scenario."."""
     found = settings(texts, "scenario", ("scenario", "sensor"))
     return [f"sensor.{text}" if subject == "sensor" else text for subject, text in found]
 
@@ -81,7 +82,7 @@ def pictures(streams: str, images: str | None) -> tuple[tuple[str, ...], str]:
 
 
 def toml_values(texts: Iterable[str]) -> dict[str, Any]:
-    """Returns texts "key=value" as a dictionary from key to value; of equal keys the last counts."""
+    """Returns texts "key=value" as a dictionary from key to the TOML value; of equal keys the last counts."""
     from scenarios.loading.toml_files import parse_setting
 
     return {".".join(steps): value for steps, value in map(parse_setting, texts)}

@@ -29,7 +29,7 @@ def total_frames(sequences: Iterable[Sequence]) -> int | None:
 
 
 class ProgressMeter:
-    """Counts finished items of a long work and shows them on stderr. A context manager; leaving it removes the bar.
+    """Counts finished items of a long task and shows the count on stderr. A context manager; its end removes the bar.
 
     On a terminal a bar appears 2 s after entering, from a thread. Elsewhere `update` prints a line, at most every 10 s.
     """
@@ -54,7 +54,8 @@ class ProgressMeter:
                 self._bar.stop()
 
     def step(self, item: str = "") -> None:
-        """Adds a finished item and shows the count. item: name to show, "" for none."""
+        """Adds one finished item and shows the count. item: name to show, "" for none. Raises KeyboardInterrupt after
+        Ctrl-C."""
         self.update(self.done + 1, self.total, item)
 
     def update(self, done: int, total: int | None, item: str = "") -> None:

@@ -30,12 +30,13 @@ class OpenedAs:
     options: tuple[tuple[str, Any], ...] = ()
 
     def open(self) -> list[Sequence]:
-        """Returns the sequences of the source. Raises InputError as `open_source`."""
+        """Returns the sequences of the source. Raises InputError if it cannot be opened, as `open_source` does."""
         return open_source(self.path, **dict(self.options))
 
 
 def source_of(options: Any, path: Path, images: bool = False, without: str = "") -> OpenedAs:
-    """Returns a source with those options of a command that `open_source` has, too; without: one that means more."""
+    """Returns the source at `path` with all options of a command that `open_source` takes, too. images: True reads
+    pictures. without: name of an option that is left out, as it has another meaning in the command."""
     given = [(name, value) for name, value in vars(options).items() if name in OPTIONS and name != without]
     return OpenedAs(path, (("images", images), *given))
 
@@ -52,7 +53,8 @@ def over_sequences(
     source: OpenedAs,
     workers: int,
 ) -> Iterator[R]:
-    """Yields function(sequence, job) for each sequence and its job, in order, and shows the progress as `what`."""
+    """Yields function(sequence, job) for each sequence and its job, in order, and shows the progress. what: word shown
+    with the progress. source: from which other processes open the sequences. workers: greatest number of processes."""
     several = min(workers, len(sequences)) > 1
     found = _in_processes(function, sequences, jobs, source, workers) if several else map(function, sequences, jobs)
     with ProgressMeter(what, len(sequences)) as meter:

@@ -43,13 +43,15 @@ class StoredTracks:
         return self.path if self.path.is_dir() else self.path.parent
 
     def check(self) -> None:
-        """Raises InputError if these are tracks of a run of ours that is unfinished, damaged or mixed with another."""
+        """Raises InputError if flockscope stored these tracks and the run is unfinished, damaged or mixed with another.
+        Tracks of other programs are not checked."""
         folder = run_folder(self.path)
         if folder is not None:
             check_run(folder)
 
     def sequence(self, fps: float | None) -> Sequence:
-        """Returns what stands for the sequence that was tracked, without frames; fps: if run.json does not state it."""
+        """Returns a `Sequence` without frames that stands for the tracked one, from run.json. fps: the frame rate,
+        required if run.json does not state it and else forbidden (None)."""
         self.check()
         info, scale = self.info, self.info.get("px_per_m")
         if "fps" in info:
@@ -64,7 +66,8 @@ class StoredTracks:
         )  # fmt: skip
 
     def read(self, sequence: Sequence, box_scale: BoxScale | None = None) -> TrackingRun:
-        """Reads the tracks at the sequence's frame rate; returns them, one `Tracks` per frame, with `info`."""
+        """Reads the tracks and returns them as a run of this sequence, one `Tracks` per frame, with `info`. Raises
+        InputError if they are of another sequence or frame rate. box_scale: factors of boxes in texts of others."""
         fps, seal = self.info.get("fps"), self.folder / RUN
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
             remedy = f"read the sequence with --fps {fps:g}, as `track` did, or track it again"
@@ -83,7 +86,7 @@ class StoredTracks:
 
 
 def holds_tracks(path: Path) -> bool:
-    """Returns True if a path leads to a run of ours, or to a folder without sequences."""
+    """Returns True if a path is a run that flockscope stored (its folder or a file), or a folder without sequences."""
     own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)
     return own or (path.is_dir() and not holds_sequences(path))
 

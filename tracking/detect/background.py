@@ -61,7 +61,7 @@ class Background:
     """
 
     def __init__(self, sample: Image, fps: float, settings: BackgroundSettings | None = None) -> None:
-        """Train the model on a sample of frames (K, H, W, 3) BGR uint8.
+        """Trains the model on a sample of frames (K, H, W, 3) BGR uint8.
 
         fps: frames per second, for the time constants of `adapt`. settings: None stands for the defaults.
 
@@ -85,7 +85,7 @@ class Background:
         self.follow(self.settings)
 
     def follow(self, settings: BackgroundSettings) -> None:
-        """Replace the settings: thresholds and limits of brightness are computed anew, mean, variance and gain stay as
+        """Replaces the settings: thresholds and limits of brightness are computed anew, mean, variance and gain stay as
         learned.
         """
         self.settings = settings
@@ -112,7 +112,7 @@ class Background:
         return classes
 
     def adapt(self, image: Image, classes: Image, protected: Bools | None = None) -> None:
-        """Change the model's mean and variance in place towards a frame (H, W, 3) BGR uint8.
+        """Changes the model's mean and variance in place towards a frame (H, W, 3) BGR uint8.
 
         classes (H, W): the result of the last `classify`, which must have been of this frame, as it set the gain.
         BACKGROUND pixels move with the time constant background_time (s), the mean of all others FOREGROUND_SLOWER
@@ -137,10 +137,8 @@ class Background:
         return np.asarray(np.sqrt(np.median(self.var[:, self.valid], axis=1)), np.float32)
 
     def mend(self, where: Bools, colour: Floats) -> None:
-        """Replace the model at the pixels `where` (H, W): mean from `colour` (3, H, W), at gain 1, noise as elsewhere.
-
-        Variance and normalisers were those of something else, so they become the medians over the image.
-        """
+        """Replaces the model at the pixels `where` (H, W): mean from `colour` (3, H, W), at gain 1, noise as elsewhere.
+        Variance and normalisers were those of something else, so they become the medians over the image."""
         self.mean[:, where] = np.maximum(colour[:, where], 1.0)
         self.var[:, where] = np.square(self.noise)[:, None]
         self.s[where], self.b[where] = np.median(self.s[self.valid]), np.median(self.b[self.valid])

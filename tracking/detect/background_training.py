@@ -112,7 +112,8 @@ class Trained:
 
 
 def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
-    """Returns the background model of a sample of frames (K, H, W, 3) BGR uint8."""
+    """Returns the background model of a sample of frames (K, H, W, 3) BGR uint8. rate: detection rate of the
+    thresholds; follow_gain: True estimates the brightness of each frame first. Raises InputError for a bad sample."""
     check(sample)
     gains = frame_gains(sample) if follow_gain else np.ones((len(sample), 3), np.float32)
     size = sample.shape[1:3]

@@ -83,10 +83,11 @@ class Features:
         self, grey: Image, mask: Bools, disparity: Disparities, window_time: float, spacing: float,
         deviations: tuple[float, float, float],
     ) -> SpacePoints:  # fmt: skip
-        """Follow the features into the next picture, find new ones, and return those that lived through the window.
+        """Follows the features into the next picture, finds new ones, and returns those older than the time window.
 
-        window_time: s that a feature must have lived; spacing: least distance of a new feature from others, px;
-        deviations (3,): standard deviations of u, v and d, px.
+        grey (H, W): the picture; mask (H, W): where features may lie; disparity (H, W), px. window_time: s that a
+        feature must have been followed; spacing: least distance of a new feature from others, px; deviations (3,):
+        standard deviations of u, v and disparity, px.
         """
         self.world = last_frames(self.world, max(round(window_time * self.fps), 1) + 1)
         if self.grey is not None and len(self.uv):
@@ -101,7 +102,7 @@ class Features:
         return self._measured(np.square(deviations))
 
     def forget(self) -> None:
-        """Drop all features, after a lost picture for instance; returns nothing."""
+        """Drops all features, after a lost picture for instance; returns nothing."""
         self.grey = None
         self._keep(np.zeros(len(self.uv), bool))
 
@@ -163,13 +164,14 @@ class Features:
 
 
 def last_frames(world: Array, frames: int) -> Array:
-    """Returns the last frames of points (N, K, 3), (N, frames, 3), nan before the first of them."""
+    """Returns the points (N, K, 3) in the last `frames` frames, (N, frames, 3); nan is put before if K is less."""
     kept = world[:, -frames:]
     return np.concatenate([np.full((len(kept), frames - kept.shape[1], 3), np.nan), kept], 1)
 
 
 def slopes(points: Array, known: Bools, times: Array) -> tuple[Array, Array]:
-    """Returns the velocities (M, 3) of least squares of M points over K frames, and sum (t - mean t)^2 (M,), s^2."""
+    """Returns the velocities (M, 3), m/s, of M points by least squares, and sum (t - mean t)^2 (M,), s^2. points (M, K,
+    3), m: in K frames; known (M, K): where they are measured; times (K,), s."""
     mean = known @ times / np.maximum(known.sum(1), 1)
     t = np.where(known, times - mean[:, None], 0.0)
     spread = np.square(t).sum(1)

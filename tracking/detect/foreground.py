@@ -52,7 +52,7 @@ class Foreground:
     """
 
     def __init__(self, context: Context, settings: BackgroundSettings) -> None:
-        """Train the background model on the context's background sample, which must not be None (AssertionError).
+        """Trains the background model on the context's background sample, which must not be None (AssertionError).
 
         Raises InputError if the sample has a wrong shape or dtype, fewer than 10 frames or shows too little background.
         """
@@ -64,7 +64,7 @@ class Foreground:
             self.model.mend(uncovered_in_sample(self.model.mean, self.model.second, self.scale), self.model.second)
 
     def follow(self, settings: BackgroundSettings) -> None:
-        """Replace the settings of the background model; what the model learned stays."""
+        """Replaces the settings of the background model; what the model learned stays."""
         self.model.follow(settings)
 
     @property
@@ -94,7 +94,7 @@ class Foreground:
         return Segmented(image, classes, mask, not flooded)
 
     def adapt(self, seen: Segmented, protected: Bools) -> None:
-        """Let the background model learn from a segmented picture, except at pixels where `protected` (H, W) is True.
+        """Lets the background model learn from a segmented picture, except at pixels where `protected` (H, W) is True.
 
         seen: the result of the last `segment`, as that call also set the brightness of the model. Each call changes
         every fourth row. Ghosts are replaced also where `protected` is True, but not in an implausible picture.
@@ -118,7 +118,7 @@ class Foreground:
         return blobs.find(mask, self.least_area)
 
     def learn_person_size(self, size: PersonSize, sample: Image) -> None:
-        """Let `size` learn, in place, from the blobs of a background sample (K, H, W, 3) BGR uint8.
+        """Lets `size` learn, in place, from the blobs of a background sample (K, H, W, 3) BGR uint8.
 
         All frames of fewer than 50 are used, else 25 to 37 evenly spaced ones. Blobs that the image's edge cuts are
         left out; `size` itself chooses those that may be one person. The model's estimate of brightness changes. Raises
@@ -130,7 +130,7 @@ class Foreground:
         self.take_scale(size)
 
     def take_scale(self, size: PersonSize) -> None:
-        """Take the scale that `size` has learned, if the context has none."""
+        """Takes the scale that `size` has learned, if the context has none."""
         if self._learns:
             self.px_per_m = size.px_per_m
 

@@ -67,7 +67,11 @@ class Ghosts:
     def find(
         self, image: Image, gain: Floats, mask: Bools, model: Floats, ghost_time: float, px_per_m: float, least: float
     ) -> Bools | None:
-        """Returns the pixels (H, W) of ghosts and of a band round them that are still, None if there is no ghost."""
+        """Adds a picture; returns the pixels (H, W) of ghosts with the unchanging pixels in a band round them, or None.
+
+        It is None if there is no ghost, and in most frames, as only some are looked at. ghost_time: s that a ghost must
+        have been unchanged. least: fewest pixels of a ghost.
+        """
         self._frames += 1
         if self._frames % self._every:
             return None
@@ -89,7 +93,8 @@ class Ghosts:
 
 
 def has_left(region: Bools, mask: Bools, model: Floats, colour: Floats, band: int) -> bool:
-    """True if the model, and not the picture, has steps in colour at the edge of a region."""
+    """Returns True if the background model has clear colour steps at the edge of a region, and the picture has not: the
+    object of the model has left. region, mask (H, W); model, colour (3, H, W), grey levels; band: px."""
     edge = cv2.dilate(region.astype(np.uint8), blobs.disc(3)).astype(bool) & ~region
     border = edge & ~mask
     if np.count_nonzero(border) <= OPEN * np.count_nonzero(edge):
@@ -99,7 +104,8 @@ def has_left(region: Bools, mask: Bools, model: Floats, colour: Floats, band: in
 
 
 def steps(inside: Bools, outside: Bools, planes: Floats, band: int) -> Floats:
-    """Returns the difference (H, W) of mean colours inside and outside, in the channel where it is largest."""
+    """Returns at each pixel the difference (H, W) between the mean colours, near it, of the pixels `inside` and of
+    those `outside`, in the colour channel where it is largest, grey levels. band: half width of "near", px."""
     means = [_means(planes, where.astype(np.float32), band) for where in (inside, outside)]
     return np.asarray(np.max(np.abs(means[0] - means[1]), axis=0), np.float32)
 

@@ -96,8 +96,8 @@ class PersonSize:
 
     @property
     def reliable(self) -> bool:
-        """True if the size may decide how many people a blob holds: with a camera, or if at least 12 lone blobs, and 30
-        % of all remembered ones, agree with the learned height."""
+        """True if the size may decide how many people a blob holds: always with a camera, else if at least 12 lone
+        blobs, which are at least 30 % of all remembered ones, agree with the learned height."""
         return self.from_camera or self.agreed >= max(ENOUGH, AGREE_SHARE * len(self.lone))
 
     @property
@@ -148,7 +148,8 @@ class PersonSize:
         return float(np.median(self.lone[:, 2])) / PERSON_HEIGHT if len(self.lone) else float("nan")
 
     def learn(self, box: Array, ellipse: Array, whole: Bools) -> None:
-        """Change the size in place by the blobs of a picture that may be one person; the others are ignored."""
+        """Learns the size, in place, from the blobs of a picture that may be one person; other blobs are ignored. box
+        (M, 4), ellipse (M, 5): as of `Blobs`; whole (M,): False for blobs that are cut and do not count."""
         foot, size = _feet(box), ellipse[:, 2:4] if self.above else box[:, :1:-1]
         expected = np.divide(*self._unscaled(foot).T[::-1]) if self.from_camera else SLIM
         with np.errstate(invalid="ignore"):

@@ -37,7 +37,8 @@ ROUNDS = 5  # Rounds of k-means.
 
 
 def divided(found: Blobs, people: Array, size: PersonSize) -> Array:
-    """Returns the boxes (N, 4), left, top, width, height, px, of the people in the blobs of a frame."""
+    """Returns the boxes (N, 4), left, top, width, height, px, of the people in the blobs of a frame; blobs of several
+    people are divided. people (K, 4): boxes of the people reported last. Too small blobs are left out."""
     boxes = [np.zeros((0, 4))]
     centre = people[:, :2] + people[:, 2:] / 2
     foot = found.box[:, :2] + found.box[:, 2:] * np.array([0.5, 1.0])
@@ -85,7 +86,8 @@ BOX_TIME = 0.5  # Time constant with which the size of a person's box follows me
 
 
 def ordered_points(detections: Detections, unit: float) -> tuple[Array, Array]:
-    """Returns places (M, 2), m, and width and height of the boxes (M, 2), px, nan on the ground or without boxes."""
+    """Returns the positions (M, 2), m, of the detections sorted by x, then y, and width and height of their boxes (M,
+    2), px, nan on the ground or without boxes. unit: units of the positions per m."""
     order = np.lexsort(detections.pos[:, 1::-1].T)
     box = detections.box if detections.plane == "image" else None
     sizes = np.full((len(order), 2), np.nan) if box is None else box[order, 2:]
@@ -93,7 +95,8 @@ def ordered_points(detections: Detections, unit: float) -> tuple[Array, Array]:
 
 
 def followed_sizes(old: Array, new: Array, dt: Array | float) -> Array:
-    """Returns the sizes of boxes (N, 2), px, after boxes of sizes `new` (N, 2), nan if unknown, were measured."""
+    """Returns sizes of boxes (N, 2), px, that move from `old` towards the measured sizes `new` with a time constant. An
+    unknown (nan) size takes the other's value. dt: time step, s."""
     followed = np.where(np.isnan(old), new, new + (old - new) * np.exp(-dt / BOX_TIME))
     return np.where(np.isnan(new), old, followed)
 
@@ -115,7 +118,7 @@ class ForegroundBlobs:
     """
 
     def __init__(self, settings: BackgroundSettings, context: Context, divide: bool = False) -> None:
-        """Train the background model; divide: blobs of several people are divided."""
+        """Trains the background model; divide: blobs of several people are divided."""
         assert context.background is not None
         self.settings = settings
         self.foreground = Foreground(context, settings)
@@ -127,13 +130,13 @@ class ForegroundBlobs:
         self.scale = required(self.foreground.px_per_m)
 
     def follow(self, settings: BackgroundSettings) -> None:
-        """Replace the settings of the background model; what the model learned and the scale stay."""
+        """Replaces the settings of the background model; what the model learned and the scale stay."""
         self.settings = settings
         self.foreground.follow(settings)
 
     def detections(self, frame: Frame, people: Array) -> Detections | None:
         """Returns the blobs of the frame's picture as detections; None without a picture, or if too much of it is
-        foreground."""
+        foreground. people (K, 4): boxes of the people reported last, where the background does not adapt."""
         if frame.image is None:
             return None
         seen = self.foreground.segment(frame.image)
@@ -148,7 +151,7 @@ class ForegroundBlobs:
 
 
 class PointTracker:
-    """What trackers of people from points, or from pixels through blobs, share.
+    """Base class of the trackers that follow people from points, or from pixels by their foreground blobs.
 
     State: config, which may be replaced between two frames; context; pixels: detector of blobs, None from points;
     plane, "ground" or "image". All but config exist after `begin` only.
@@ -170,7 +173,8 @@ class PointTracker:
         self.dt = 1.0 / context.fps
 
     def detected(self, frame: Frame, detections: Detections | None, boxes: Array | None) -> Detections | None:
-        """Returns the detections, or from pixels the blobs; boxes (K, 4): of the people reported last."""
+        """Returns the frame's detections: those given, or from pixels the blobs; None if there was no measurement.
+        boxes (K, 4): of the people reported last, None for nobody."""
         if self.pixels is None:
             return detections
         if self.pixels.settings is not self.config:
@@ -178,7 +182,7 @@ class PointTracker:
         return self.pixels.detections(frame, np.zeros((0, 4)) if boxes is None else boxes)
 
     def points(self, detections: Detections) -> tuple[Array, Array]:
-        """Returns places (M, 2), m, and sizes of boxes (M, 2), px, nan if unknown; notes the plane of detections."""
+        """Sets `plane` to that of the detections, and returns their positions and box sizes as `ordered_points`."""
         self.plane = "image" if detections.plane == "image" else "ground"
         return ordered_points(detections, self.unit)
 
@@ -201,7 +205,7 @@ class PointTracker:
 
 @dataclass
 class PersonTable:
-    """The people of such a tracker, one row each; a subclass adds columns.
+    """The tracked people of a `PointTracker`, one row each; a subclass adds columns.
 
     missed (K,): s since the last measurement. size (K, 2): width, height of the box, px, nan if unknown. key (K,): of
     the random streams, made of the first measurement."""
@@ -211,13 +215,13 @@ class PersonTable:
     key: Keys = field(default_factory=lambda: np.zeros(0, np.uint64))
 
     def keep(self, rows: Bools) -> None:
-        """Remove all people but those where `rows` (K,) is True."""
+        """Removes all people except those where `rows` (K,) is True."""
         for name, column in vars(self).items():
             if isinstance(column, np.ndarray):
                 setattr(self, name, column[:, rows] if column.ndim == 3 else column[rows])
 
     def extend(self, **columns: Any) -> None:
-        """Add people who were measured just now, with their values in all columns but `missed`."""
+        """Adds people who were measured just now, with their values in all columns but `missed`."""
         for name, new in {"missed": np.zeros(len(columns["key"])), **columns}.items():
             old = getattr(self, name)
             setattr(self, name, np.concatenate([old, new], axis=1 if old.ndim == 3 else 0))

@@ -58,7 +58,8 @@ class SubtractionStereo:
 
 
 def sampled(disparity: Disparities, uv: Array | Disparities, half: int) -> Array:
-    """Returns the median disparity (N,), px, of the known pixels in a square of 2 half + 1 px round each point."""
+    """Returns the median disparity (N,), px, of the known pixels in a square of 2 half + 1 px round each point uv (N,
+    2), u, v in px; nan if none is known."""
     high, wide = disparity.shape
     step = np.arange(-half, half + 1)
     column = np.clip(np.floor(uv[:, 0]).astype(int)[:, None] + step, 0, wide - 1)

@@ -42,7 +42,8 @@ def kind_colour(kind: str) -> Colour:
 
 
 def event_words(event: GroupEvent, prefix: str = "G") -> str:
-    """Returns an event in words, as "merge G1+G2 -> G1"; people alone (negative ids) are only counted."""
+    """Returns an event in words, such as "merge G1+G2 -> G1"; people alone (negative ids) are only counted. prefix:
+    letter before the ids of groups."""
 
     def listed(ids: tuple[int, ...]) -> str:
         alone = sum(i < 0 for i in ids)
@@ -135,7 +136,8 @@ def draw_label(image: Image, words: str, at: tuple[float, float] | Array, size: 
 
 
 def draw_captions(image: Image, layer: Layer, index: int, fps: float, size: float) -> None:
-    """Writes the captions of recent events in place, upwards from the lower left corner, the newest lowest."""
+    """Writes the captions of recent events onto the image, upwards from the lower left corner, the newest at the
+    bottom. index: the frame, from 1; size: cv2's font scale."""
     y = float(image.shape[0] - 6)
     for event in layer.recent_events(index, CAPTION_SECONDS * fps)[:CAPTIONS]:
         y -= draw_label(image, event_words(event, layer.prefix), (6, y), size * 1.25, kind_colour(event.kind)) + 3

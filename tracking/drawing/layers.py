@@ -115,7 +115,8 @@ class Layer:
 
 
 def layer_of_truth(truth: Truth, plan: bool = False) -> Layer:
-    """Returns the layer of the truth over pictures, in px, or on a plan, in m; it has no frames without such labels."""
+    """Returns the layer of the truth over pictures, in px, or if `plan` is True on a plan, in m. It has no frames if
+    boxes (for pictures) or positions (for a plan) are not labelled."""
     frames, known = {}, truth.pos if plan else truth.box
     for index in range(1, truth.length + 1) if known is not None else ():
         now = truth.at(index)
@@ -207,7 +208,8 @@ def _in_picture(points: Array, camera: Camera | None, scene: Scene | None) -> Ar
 
 
 def ellipse(centre: Array, cov: Array, sigmas: float) -> Array:
-    """Returns points (32, 2) of the ellipse at `sigmas` deviations round `centre`, none if `cov` is not finite."""
+    """Returns points (32, 2) of the ellipse at `sigmas` standard deviations round `centre` (2,), or (0, 2) if `cov` (2,
+    2), the covariance, is not finite."""
     if not np.isfinite(cov).all():
         return np.zeros((0, 2))
     values, vectors = np.linalg.eigh(cov)

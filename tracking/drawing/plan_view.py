@@ -14,7 +14,8 @@ MARGIN = 1.0  # m: the least margin of a plan round people and objects.
 
 
 def plan_area(scene: Scene | None, places: Array) -> tuple[Array, Array] | None:
-    """Returns the lower left and upper right corner (2,), m, of the ground to show; None if nothing is known."""
+    """Returns the lower left and the upper right corner (2,), m, of the ground to show, by the scene and the positions
+    `places` (N, 2), m; None if there is no scene and no finite position."""
     places = _finite(places)
     if scene is not None:
         return _scene_area(scene, places)

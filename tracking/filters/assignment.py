@@ -15,7 +15,8 @@ from sim.types import Array, Ints
 
 
 def nearest(cost: Array) -> tuple[Ints, Ints]:
-    """Returns rows and columns (K,) of the pairs of each measurement with its cheapest track, in order of columns."""
+    """Returns rows and columns (K,) of the pairs of each measurement with its cheapest track, in order of columns.
+    cost: tracks by measurements; inf forbids a pair, and a measurement without an allowed pair has none."""
     if not cost.size:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     row = cost.argmin(0)
@@ -34,7 +35,8 @@ def cheapest_per_track(rows: Ints, columns: Ints, cost: Array) -> tuple[Ints, In
 
 
 def optimal(cost: Array, unassigned: float) -> tuple[Ints, Ints]:
-    """Returns rows and columns (K,) of the one-to-one pairs with the least total cost, none of `unassigned` or more."""
+    """Returns rows and columns (K,) of the one-to-one pairs with the least total cost, where a row without a pair costs
+    `unassigned`. No pair costs `unassigned` or more; inf forbids a pair."""
     from scipy.optimize import linear_sum_assignment
 
     # scipy refuses a table of which no full assignment is finite, so that inf becomes the cost of no measurement

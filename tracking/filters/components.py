@@ -42,7 +42,8 @@ class Constraint:
 
 
 def linked(points: Array, link: float) -> Ints:
-    """Returns the component of each point (M,), by first points: at most `link` apart, also through others."""
+    """Returns the number of each point's connected component, (M,), in order of first points. Two points are connected
+    if they are at most `link` apart, directly or through other points."""
     return kernels.components(points, np.ones(len(points)), link)[0]
 
 
@@ -59,7 +60,7 @@ def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
 
 
 def prefixes(points: Array, weights: Array, start: int, rule: Constraint) -> Bools:
-    """Returns flags (M - start + 1,): True if the first start, start + 1, … M points are exactly one group."""
+    """Returns for n = start, start + 1, … M if the first n points form exactly one group, bool (M - start + 1,)."""
     return kernels.prefixes(
         points, weights, start, rule.link, rule.gate, rule.prior_entries, rule.strength, rule.least
     )[0]

@@ -29,7 +29,8 @@ VAGUE = np.radians(30.0) ** 2
 
 
 def white_acceleration(dt: float, sigma: Array | float) -> Array:
-    """Returns entries 11, 12, 22 of the process noise Q of a step, (3, ...) in the shape of `sigma`."""
+    """Returns the entries 11, 12 and 22 of the process noise Q of a step of dt s, (3, …), where … is the shape of
+    `sigma`, the standard deviation of the acceleration."""
     # imported here, as filterpy takes 0.65 s to import; a bank is equal to as many of its filters to 1e-9, and faster
     from filterpy.common import Q_discrete_white_noise
 
@@ -47,7 +48,8 @@ def constant_velocity(dt: float, axes: int) -> tuple[Array, Array]:
 
 
 def born(place: Array, var: Array | float, rate_var: Array | float) -> Array:
-    """Returns the state (5, N, D) of N new filters at `place` (N, D), with rate 0 and covariance 0."""
+    """Returns the state (5, N, D) of N new filters: place (N, D), rate 0, variances `var` of place and `rate_var` of
+    rate, covariance of both 0."""
     state = np.zeros((5, *place.shape))
     state[PLACE], state[VAR], state[RATE_VAR] = place, var, rate_var
     return state
@@ -112,7 +114,8 @@ def distances(state: Array, z: Array, noise: Array | float, scale: Array | float
 
 
 def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
-    """Returns the innovation variance S to which a filter converges that is measured in every frame (Kalata 1984)."""
+    """Returns the innovation variance S to which a filter converges if it is measured in every frame (Kalata 1984). dt:
+    s; sigma: standard deviation of the acceleration; noise: variance of a measurement."""
     index = np.asarray(sigma) * dt**2 / np.sqrt(noise)
     # the closed form of the Riccati equation of one coordinate, with the tracking index sigma dt² / sqrt(noise)
     r = (4 + index - np.sqrt(8 * index + index**2)) / 4
@@ -126,7 +129,8 @@ def angle_innovation(measured: Array, predicted: Array) -> Array:
 
 
 def directed(noise: Array) -> Bools:
-    """Returns flags (N,): True where a measured direction carries information, as a near circle's does not."""
+    """Returns bool (N,): True if a measured direction carries information. noise (N,): its variance, rad^2, which is
+    large for a nearly round blob."""
     return np.asarray(noise < VAGUE)
 
 

@@ -12,7 +12,8 @@ from sim.types import Array, Ints
 
 
 def residual_resample(weights: Array, uniforms: Array) -> Ints:
-    """Returns the indices (P,) that replace the particles, ascending: residual sampling (Liu & Chen)."""
+    """Returns the indices (P,), ascending, of the particles to copy by residual sampling (Liu & Chen). weights (P,):
+    sum 1; uniforms (P,) in [0, 1), of which the first are used."""
     count = len(weights)
     expected = count * weights
     # filterpy takes w - floor(P w) as remainders, which are negative; its copies are these. Equal weights must keep
@@ -27,7 +28,8 @@ def residual_resample(weights: Array, uniforms: Array) -> Ints:
 
 
 def systematic_resample_rows(weights: Array, uniforms: Array) -> Ints:
-    """Returns the indices (R, P) that replace the particles of R sets: systematic sampling; uniforms (R,)."""
+    """Returns the indices (R, P) of the particles to copy in each of R sets by systematic sampling. weights (R, P);
+    uniforms (R,) in [0, 1)."""
     rows, count = weights.shape
     total = np.cumsum(weights, axis=1)
     total /= total[:, -1:]

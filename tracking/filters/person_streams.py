@@ -20,7 +20,8 @@ NOBODY = np.zeros(1, np.uint64)  # The key of what belongs to all people togethe
 
 
 def birth_keys(points: Array, frame: int) -> Keys:
-    """Returns the keys of people who are first detected at points (M, 2), m, in a frame."""
+    """Returns the keys (M,) that identify the random numbers of people first detected at points (M, 2), m, in a frame.
+    They depend on places, frame number and, for equal places, order only."""
     place = np.rint(points * PLACE).astype(np.int64)
     # people at one place, to a millimetre, are told apart by their order
     order = np.lexsort(place.T)
@@ -36,7 +37,8 @@ def birth_keys(points: Array, frame: int) -> Keys:
 
 
 class PersonStreams:
-    """The random numbers of a tracker. State: entropy, made of the seed; frame, the number of the current one."""
+    """Random numbers of a tracker that depend on the seed, the frame, the role and each person's key only. State:
+    entropy, made of the seed; frame, the number of the current frame."""
 
     def __init__(self, seed: int) -> None:
         self.frame = 0
@@ -44,13 +46,14 @@ class PersonStreams:
         self.entropy = np.asarray(entropy.generate_state(1, np.uint64), np.uint64)
 
     def uniforms(self, role: int, key: Keys, rows: int, columns: int) -> Array:
-        """Returns uniform numbers in [0, 1), (rows, K, columns), of this frame; key (K,)."""
+        """Returns uniform numbers in [0, 1), (rows, K, columns), for the current frame. role: number of the purpose;
+        key (K,): of each person."""
         out = np.empty((rows, len(key), columns))
         person_streams_kernels.fill_uniforms(self._begin(role), key, out)
         return out
 
     def normals(self, role: int, key: Keys, rows: int, columns: int) -> Array:
-        """Returns standard normal numbers, (rows, K, columns), of this frame; key (K,)."""
+        """Returns standard normal numbers, (rows, K, columns), for the current frame; role, key: as of `uniforms`."""
         uniforms = self.uniforms(role, key, rows, columns)
         out = np.empty_like(uniforms)
         person_streams_kernels.to_normals(uniforms.ravel(), out.ravel())

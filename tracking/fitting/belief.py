@@ -99,9 +99,7 @@ def _fit_column(sample: PairSample, knots_of: Mapping[str, Array], left_out: tup
 
 def best_threshold(sample: PairSample, log_odds: Array) -> float:
     """Returns the threshold with the greatest mean F1 over scenes with pairs in one true group; of several the middle.
-
-    A pair counts as together if its probability is above the threshold. log_odds (R,): beliefs of the sample's rows.
-    """
+    A pair counts as together if its probability is above the threshold. log_odds (R,): beliefs of the sample's rows."""
     place = (THRESHOLDS / (1 + np.exp(-log_odds))).astype(np.int64).clip(0, THRESHOLDS - 1)
     shape = (sample.scene[-1] + 1, THRESHOLDS)
     place += sample.scene * THRESHOLDS

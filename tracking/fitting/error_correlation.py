@@ -98,7 +98,7 @@ def _tetrachoric(a: Array, b: Array, both: float) -> float:
 
 def fit_memory(found: Sequence[Array]) -> tuple[Memory, ...]:
     """Returns at most two parts whose sum of share · exp(-lag / time) is nearest to the correlations. found: tables of
-    `correlations`. It is () if no sum is nearer than 0, or all shares are below 3 %."""
+    `correlations`. It is () if no sum is nearer than a correlation of 0, or all shares are below 3 %."""
     from scipy.optimize import nnls
 
     lag, rho, pairs = np.concatenate([np.zeros((0, 3)), *found]).T

@@ -65,8 +65,9 @@ class Parts:
 def event_of_change(
     change: GroupChange, t: int, parts: Parts, motion: TrackedMotion, arrival: int
 ) -> GroupEvent | None:
-    """Returns the event of a change that became known in frame t. It is None if people join, or enter, within `arrival`
-    frames of their first frame: they were together already."""
+    """Returns the event of a change that became known in frame t. It is None for a merge or
+    form within `arrival` frames of the first frame with all parts, and for an enter as soon after the first frame of
+    all: these people were together from the start."""
     # a group leaves when its last two people were seen, or its last one
     if change.kind == "leave":
         seen = np.isfinite(motion.pos[: t + 1, change.members, 0]).sum(axis=1)

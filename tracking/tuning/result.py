@@ -222,7 +222,8 @@ class TuningResult:
         return [target, *(target.with_suffix(suffix) for suffix in files)]
 
     def plots(self) -> dict[str, str]:
-        """Returns the plots as SVG text by file suffix: ".history.svg", and if any share is above 0 ".importance.svg"."""
+        """Returns the plots as SVG text by file suffix: ".history.svg", and if any share is above 0 also
+        ".importance.svg"."""
         plots = {".history.svg": history_plot(self.plan, self.trials)}
         if any(self.importance.values()):
             plots[".importance.svg"] = importance_plot(self.plan, self.importance)

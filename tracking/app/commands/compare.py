@@ -36,7 +36,7 @@ Stored = dict[str, dict[str, Any]]  # by name of the sequence
 
 
 def compare(options: CompareOptions) -> CommandResult:
-    """Compares stored scores with those of a baseline; exit code 1 if one of them is surely worse."""
+    """Compares stored scores with those of a baseline; the exit code of the result is 1 if a score is surely worse."""
     keys = [checked_key(key) for key in options.by or ["objective"]]
     before, now = _read(options.baseline), _read(options.now)
     _require_same(options, before, now)

@@ -43,7 +43,7 @@ def errors(options: ErrorsOptions) -> CommandResult:
 
 
 def errors_of(sequence: Sequence, job: Job) -> RunErrors:
-    """Returns the errors of one stored run."""
+    """Returns the errors of one stored run of the sequence; job: the stored tracks, the similarity, the box scale."""
     stored, similarity, box_scale = job
     return errors_of_run(sequence, stored.read(sequence, box_scale), similarity)
 

@@ -42,7 +42,8 @@ Row = dict[str, Any]
 
 
 def groups_of(run: TrackingRun, fps: float) -> list[Row]:
-    """Returns id, members, greatest size, first and last frame and duration of each group, in order of their starts."""
+    """Returns a dict for each group, by first frame: id, members (all ids), size (greatest), start, end (frames),
+    seconds."""
     found: dict[int, Row] = {}
     for t in run:
         for name in np.unique(t.group[t.group >= 0]).tolist():
@@ -61,7 +62,7 @@ def lasting(groups: Iterable[Row]) -> int:
 
 
 def group_row(run: TrackingRun, folder: Path) -> Row:
-    """Returns what the command tells of one run, as a dictionary."""
+    """Returns the command's result for one run, as a dictionary; folder: where the run is stored."""
     fps = run.info["fps"]
     events = Counter(e.kind for t in run for e in t.events)
     speed = median_speed(run, fps, run.info["px_per_m"] or 1.0)

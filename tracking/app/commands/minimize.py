@@ -44,7 +44,8 @@ class Scene:
 
 
 def minimize(options: MinimizeOptions) -> CommandResult:
-    """Searches the smallest scene, writes it as a scenario file and a replay page, and returns what was removed."""
+    """Searches the smallest scene in which the tracker fails, writes it as a scenario file and a replay page, and
+    returns what was removed."""
     failure = parse_failure(options.condition)
     out = option_parsing.output_file(options.out, ".toml")
     page = out.with_suffix(".html")

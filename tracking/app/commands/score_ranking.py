@@ -25,7 +25,7 @@ LONGEST_NAME = 40  # Characters of an input or run that a table shows at most.
 
 @dataclass(frozen=True)
 class RankedRuns:
-    """A comparison of runs by one score, and what is shown of it."""
+    """A comparison of runs that are ranked by one score, with its table and notes."""
 
     comparison: ComparedRuns
     key: str  # the score
@@ -35,7 +35,8 @@ class RankedRuns:
 
 
 def ranked_runs(names: list[str], sequences: list[Sequence], found: list[ScoredSequence], by: str | None) -> RankedRuns:
-    """Returns the ranking of runs whose scores were found on each sequence."""
+    """Returns the ranking of runs. names: of the runs; found: their scores on each sequence; by: key of the score that
+    ranks, None for `usual_key`."""
     comparison = joined(names, [s.name for s in sequences], [one.compared for one in found])
     key, scenarios = by or usual_key(comparison), dict[str, list[int]]()
     for k, sequence in enumerate(sequences):
@@ -50,7 +51,8 @@ def _scenario(sequence: str) -> str:
 
 
 def usual_key(comparison: ComparedRuns) -> str:
-    """Returns "objective"; "group_F1" if it would mean something else for some runs, which track whole groups."""
+    """Returns the score that ranks by default: "objective", but "group_F1" if some runs, not all, track whole groups.
+    Such runs have no HOTA, so that their objective means something else."""
     people = np.isfinite(comparison.values("HOTA")).any(axis=1)
     return "group_F1" if people.any() and not people.all() else "objective"
 
@@ -71,9 +73,10 @@ def scoring_notes(sequences: list[Sequence], found: list[ScoredSequence]) -> lis
 
 
 def differences(c: ComparedRuns, key: str, by: str) -> list[dict[str, Any]]:
-    """Returns the difference in a score, "run" minus "minus", of each pair of runs, in the order of the ranking `by`.
+    """Returns a dict for each pair of runs, in the order of the ranking by the score `by`: the difference in `key`.
 
-    "sure": False, or that the first of the two is "better" or "worse".
+    "run" minus "minus" has the "mean", "low" and "high"; "sure" is "better" or "worse" if "run" surely is so, else
+    False.
     """
     found, places = c.ranking(key), {k: place for place, k in enumerate(c.ranking(key).order.tolist())}
     rows = []
@@ -147,7 +150,7 @@ def _ranking_table(every: RankedRuns) -> str:
 
 
 def shown_columns(table: list[dict[str, Any]], key: str) -> list[str]:
-    """Returns which of `COLUMNS` a ranking by `key` shows beside it: those that are known for some row."""
+    """Returns the scores that a ranking by `key` shows beside it: those of `COLUMNS` that are known for some row."""
     others = [k for k in COLUMNS if k not in (key, key.removesuffix("_hull"))]
     return [k for k in others if any(math.isfinite(row.get(k, math.nan)) for row in table)]
 
@@ -203,7 +206,8 @@ def _can_be_sure(comparison: ComparedRuns, key: str) -> bool:
 
 
 def verdict(comparison: ComparedRuns, key: str) -> list[str]:
-    """Returns lines that say in words which runs are surely better, and that the others share ranks."""
+    """Returns lines of text that say which runs are surely better than which others, by how much, and who shares
+    ranks."""
     pairs = differences(comparison, key, key)
     sure = [p for p in pairs if p["sure"]]
     lines = []

@@ -57,7 +57,8 @@ class SequenceScores:
 
 
 def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = ()) -> str:
-    """Returns a table for each family of scores with a known mean, and how all was compared."""
+    """Returns text: a table for each family of scores with a known mean, then lines on detections, comparison and
+    notes. rows: one per sequence; means: by key, the mean over sequences."""
     given = " and ".join(dict.fromkeys(printable(row.given) or "unknown (no run.json)" for row in rows))
     people = _any_known(PEOPLE[1:], means)
     titles = TABLES if people else GROUP_TRACKER_TABLES
@@ -89,7 +90,8 @@ def _heading(key: str, rows: Sequence[SequenceScores]) -> str:
 
 
 def checked_key(key: str, better: Sequence[str] = ("higher", "lower")) -> str:
-    """Returns the key of a score that was given with --by. Raises InputError for another, or of another direction."""
+    """Returns the key unchanged if it is a score that has one of the directions `better`, else raises InputError about
+    --by."""
     if key not in CATALOGUE or CATALOGUE[key].better not in better:
         expected = f"a score of which {' or '.join(better)} is better, such as HOTA"
         raise InputError(place="--by", got=key, expected=expected, remedy="docs/reference/metrics.md lists them")
@@ -133,12 +135,12 @@ def arrow(key: str) -> str:
 
 
 def chance(rows: int) -> str:
-    """Returns in words how many of so many rows would be called sure by chance."""
+    """Returns a sentence on how many of `rows` rows would be called sure by chance, at 95 % each."""
     return f"of {counted(rows, 'row')} about {(1 - LEVEL) * rows:.2g} would be called sure by chance"
 
 
 def number(key: str, value: float, *, mean: bool = False) -> str:
-    """Returns a score as text: three decimals, none for a count; a dash if it is unknown."""
+    """Returns a score as text: three decimals, for a count none, or one if it is a mean; "–" if it is not finite."""
     if not math.isfinite(value):
         return "–"
     return f"{value:.3f}" if CATALOGUE[key].unit != "count" else f"{value:.{int(mean)}f}"

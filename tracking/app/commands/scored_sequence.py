@@ -53,7 +53,8 @@ def is_class(text: str) -> bool:
 
 
 def run_names(texts: list[str]) -> dict[str, str]:
-    """Returns the texts that name runs, by a short name. Raises InputError if one is given twice."""
+    """Returns the given texts by short names, as {short name: text}. Raises InputError if a text is given twice. A
+    short name is a class or file name; the text itself stands for it if several are equal."""
     short = [text.rpartition(":")[2] if is_class(text) else Path(text).name for text in texts]
     if len(set(texts)) < len(texts):
         twice = next(text for text in texts if texts.count(text) > 1)
@@ -62,7 +63,7 @@ def run_names(texts: list[str]) -> dict[str, str]:
 
 
 def stored_runs(texts: Iterable[str], sequences: list[Sequence]) -> list[list[Source]]:
-    """Returns for each run its tracks of each sequence."""
+    """Returns for each run a list with one source per sequence: its stored tracks, or the text that names a class."""
     return [
         [text] * len(sequences)
         if is_class(text)
@@ -72,7 +73,8 @@ def stored_runs(texts: Iterable[str], sequences: list[Sequence]) -> list[list[So
 
 
 def box_scale_of(text: str | None, sources: Iterable[Source]) -> BoxScale | None:
-    """Returns the factors of --box-scale. Raises InputError if no source is a text of another program."""
+    """Returns the factors of x and y in the text of --box-scale, None for None. Raises InputError if all sources are
+    runs of flockscope, which need no factor."""
     if text is not None and all(isinstance(source, str) or source.info for source in sources):
         got, expected = "runs of `flockscope track`", "a text of another program"
         raise InputError(place="--box-scale", got=got, expected=expected, remedy="give it to `flockscope track`")
@@ -80,7 +82,7 @@ def box_scale_of(text: str | None, sources: Iterable[Source]) -> BoxScale | None
 
 
 def score_sequence(sequence: Sequence, job: ScoringJob) -> ScoredSequence:
-    """Returns the scores of all runs of one sequence, compared alike."""
+    """Reads or makes the runs of a job on one sequence, and returns the scores of all of them."""
     return score_runs(sequence, read_runs(sequence, job), job)
 
 
@@ -96,7 +98,7 @@ def read_runs(sequence: Sequence, job: ScoringJob) -> list[TrackingRun]:
 
 
 def score_runs(sequence: Sequence, runs: list[TrackingRun], job: ScoringJob) -> ScoredSequence:
-    """Returns the scores of the runs of a job."""
+    """Returns the scores of these runs of one sequence, as the job says; warns if hardly any box matches a label."""
     for run in runs:
         if sequence.truth is not None:
             text = likely_misreading(sequence.truth, run, sequence.image_size)

@@ -32,7 +32,7 @@ MOST_AXES = 2  # without a search
 
 
 def stress(options: StressOptions) -> CommandResult:
-    """Plays the sweep or the search, stores it, and returns what was found."""
+    """Plays a sweep, or with --search a search for the worst scenes, stores the episodes, and returns the findings."""
     trackers = {name: contender(name, options.step_timeout) for name in dict.fromkeys(options.trackers)}
     detects = all({"boxes", "points"} & {*tracker.needs} for tracker in trackers.values())
     plan = _plan(options, options.detections or ("file" if detects else "image"))

@@ -13,7 +13,7 @@ NO_CHECK = "none"
 
 
 def tune(options: TuneCommandOptions) -> CommandResult:
-    """Searches parameters as `tracking.tune` does, and returns what was gained."""
+    """Searches parameters as `tracking.tune` does, writes the files of --out, and returns the gain on test scenes."""
     from tracking.tuning.result import short
     from tracking.tuning.search import tune as search
 

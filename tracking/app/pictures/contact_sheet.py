@@ -47,7 +47,7 @@ class View:
     pictures: dict[int, Image | None] = field(default_factory=dict)  # by frame; None: a lost one
 
     def height(self) -> int:
-        """Returns the height in px in a panel."""
+        """Returns the height, px, of this view in a panel of the sheet."""
         ratio = (self.high - self.low)[1] / (self.high - self.low)[0]
         return round(WIDTH * float(ratio if self.pictures else np.clip(ratio, 0.4, 1.2)))
 
@@ -64,10 +64,8 @@ class View:
 
 
 def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8, tracks: SequenceOf[Tracks] | None = None) -> Path:
-    """Writes the contact sheet as PNG and returns its path. The file is complete, or is not written at all.
-
-    tracks: are shown in place of the truth.
-    """
+    """Writes the contact sheet as PNG and returns its path. The file is complete, or is not written at all. frames:
+    number of frames to show. tracks: drawn instead of the truth. Raises InputError if there is nothing to draw."""
     layers = _layers(sequence, tracks)
     length = sequence.length or sum(1 for _ in sequence.without_pictures())
     chosen = choose_frames(layers[-1], length, sequence.fps, frames)
@@ -99,7 +97,8 @@ def _layers(sequence: Sequence, tracks: SequenceOf[Tracks] | None) -> list[Layer
 
 
 def views(sequence: Sequence, layers: SequenceOf[Layer], chosen: SequenceOf[int]) -> list[View]:
-    """Returns the parts of a panel: pictures, and a plan if there is a layer for it; boxes alone without both."""
+    """Returns the views of a panel: pictures if there are any, and a plan if positions on the ground are known; without
+    both, the boxes on a plain area. chosen: the frames that are shown, from 1."""
     found = []
     if sequence.has_images and sequence.image_size is not None:
         size = np.array(sequence.image_size, float)
@@ -161,7 +160,8 @@ def _draw_title(area: Image, layer: Layer, index: int, fps: float) -> None:
 
 
 def events_near(layer: Layer, index: int, fps: float) -> list[GroupEvent]:
-    """Returns the events that are shown and become known at most a second from a frame."""
+    """Returns the events of the kinds that are shown which become known at most 1 s before or after frame `index`,
+    most important kinds first."""
     near = [e for known, e in layer.events if e.kind in SHOWN_KINDS and abs(known - index) <= CLOSE_SECONDS * fps]
     return sorted(near, key=lambda event: SHOWN_KINDS[event.kind])
 
@@ -200,8 +200,8 @@ def _draw_foot(area: Image, layer: Layer, length: int, fps: float, chosen: Itera
 def choose_frames(layer: Layer, length: int, fps: float, count: int) -> list[int]:
     """Returns the numbers, from 1, of `count` frames in ascending order.
 
-    Frames in which events become known come first, by rank, if they are more than a second apart; then others, each as
-    far as can be from those that are chosen already.
+    Frames in which events become known are taken first, by rank of the kind, if they are more than 1 s apart. Then
+    frames are added, each as far as possible from all frames chosen so far.
     """
     shown = [(known, e.kind) for known, e in layer.events if e.kind in SHOWN_KINDS and 1 <= known <= length]
     every, wanted, chosen = np.arange(1, length + 1), min(max(1, count), length), list[int]()

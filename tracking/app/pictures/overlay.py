@@ -37,7 +37,8 @@ def write_overlay(
 ) -> Path:
     """Writes the MP4, complete or not at all, and returns its path.
 
-    truth: "over" draws it, too; without tracks it is drawn alone.
+    truth: "over" draws the truth over the tracks. If `tracks` is None, the truth is drawn alone. step: called with the
+    name of each step of the work. Raises InputError without pictures.
     """
     if not sequence.has_images:
         raise InputError(

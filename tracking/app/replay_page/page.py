@@ -55,7 +55,7 @@ def write_page(
 ) -> Path:
     """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all.
 
-    other: of a second tracker, which is shown beside the first. start: the frame that is shown first.
+    other: the run of a second tracker, which is shown beside the first. start: the frame that is shown first, from 1.
     """
     shown = page_data(sequence, run, other, start=start)
     shown |= {"video": None if video is None else video.facts()}
@@ -67,7 +67,7 @@ def write_page(
 
 
 def page_html(title: str, data: str, film: str = "") -> str:
-    """Returns the page; data: a JSON object as text for a script element."""
+    """Returns the page as HTML. data: from `script_json`, what the page shows; film: the video in base64, or ""."""
     parts = {
         "TITLE": escape(title),
         "STYLE": theme() + (HERE / "page.css").read_text(encoding="utf-8"),
@@ -85,7 +85,7 @@ def theme() -> str:
 
 
 def script_json(value: Json) -> str:
-    """Returns a JSON object as text that may stand in a script element."""
+    """Returns a JSON object as text in which no character can end the script element that it is put into."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
@@ -203,7 +203,8 @@ def _detections(sequence: Sequence, low: int, high: int) -> Json | None:
 
 
 def plain(value: Any) -> Any:
-    """Returns arrays, numbers, and tuples and dataclasses of them, as JSON has them: with 6 digits, None for nan."""
+    """Returns a value as JSON can hold it: dataclasses as dicts, tuples and arrays as lists, floats rounded to 6
+    decimals, None for a float that is nan."""
     if is_dataclass(value):
         return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
     if isinstance(value, tuple):

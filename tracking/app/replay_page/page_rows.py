@@ -40,9 +40,10 @@ class Link(NamedTuple):
 
 
 def bars(frame: Ints, group: Ints, people: Array | None = None) -> list[Bar]:
-    """Returns the bars, unbroken lives, of the groups in rows of (frame, group), (R,) each, sorted by first frame.
+    """Returns the bars of the timeline, one per unbroken life of a group, sorted by first frame.
 
-    people: estimated number in each row, (R,), of whole groups; without it, each row is a person, and two are a group.
+    frame, group (R,): of each row. people None: each row is a person, and two or more in a frame are a group. Else each
+    row is a whole group, and people (R,) is the estimated number of people in it.
     """
     rows = group >= 0
     pairs, place = np.unique(np.stack([group[rows], frame[rows]], axis=1), axis=0, return_inverse=True)
@@ -72,7 +73,7 @@ def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
 
 
 def links(events: Iterable[GroupEvent]) -> list[Link]:
-    """Returns a link for each pair of different groups before and after a merge or split."""
+    """Returns a link for each merge or split and each pair of a group before and another group after it."""
     return [
         Link(event.start if event.emitted is None else event.emitted, a, b)
         for event in events
@@ -120,7 +121,7 @@ class PageRows:
     hull: NDArray[np.object_] | None = None  # (R,) polygons (V, 2) x, y, without vertices where unknown
 
     def ordered(self, rows: Ints) -> PageRows:
-        """Returns some rows in this order."""
+        """Returns the rows with the indices `rows`, in this order."""
         names = [field.name for field in fields(self) if field.name != "plane"]
         columns: dict[str, Any] = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         cut: dict[str, Any] = {name: column[rows] for name, column in columns.items()}
@@ -227,7 +228,8 @@ def _encoded_wholes(rows: PageRows, scale: int) -> Json | None:
 
 
 def ellipses(extent: Array) -> Array:
-    """Returns (R, 3) of covariances (R, 2, 2): long and short standard deviation, direction of the long axis, rad."""
+    """Returns the ellipses (R, 3) of covariances (R, 2, 2): standard deviation along the long and the short axis, and
+    direction of the long axis, rad; nan for a covariance that is not finite."""
     known: Bools = np.asarray(np.isfinite(extent).all(axis=(1, 2)))
     values, vectors = np.linalg.eigh(np.where(known[:, None, None], extent, np.eye(2)))
     sigma = np.sqrt(np.maximum(values, 0.0))
@@ -236,7 +238,8 @@ def ellipses(extent: Array) -> Array:
 
 
 def simplified(hull: Array, least: float) -> Array:
-    """Returns a convex polygon (V, 2) without corners nearer than `least` to what is left, by Douglas and Peucker."""
+    """Returns a convex polygon (V, 2) simplified by Douglas and Peucker: without corners that are nearer than `least`,
+    in its unit, to the remaining outline."""
     if len(hull) > 3:
         corners = hull.astype(np.float32)
         kept = (corners[:, None] == cv2.approxPolyDP(corners, least, closed=True)[:, 0]).all(axis=2).any(axis=1)
@@ -250,7 +253,8 @@ def _steps(corners: Ints) -> list[int]:
 
 
 def deltas(column: NDArray[np.float64]) -> list[int]:
-    """Returns the rounded column (N,) as its first value and the steps; nan and infinity are -99999."""
+    """Returns the column (N,), rounded to whole numbers, as its first value and the differences between neighbours; nan
+    and infinity count as -99999."""
     whole = np.where(np.isfinite(column), np.rint(column), NIL).astype(np.int64)
     listed: list[int] = np.diff(whole, prepend=0).tolist()
     return listed

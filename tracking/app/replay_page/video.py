@@ -43,7 +43,8 @@ class PageVideo:
 def page_video(
     sequence: Sequence, page: Path, placement: VideoPlacement = "auto", step: Callable[[str], None] = lambda _: None
 ) -> PageVideo | None:
-    """Makes the video for the page FILE.html and returns it; a video beside the page is written as FILE.view.mp4."""
+    """Makes the video for the page FILE.html and returns it; None without pictures, or if placement is "none". A video
+    beside the page is written as FILE.view.mp4; "auto" puts it inside the page if it is small."""
     if placement == "none" or not sequence.has_images:
         return None
     beside = page.with_suffix(".view.mp4")  # FILE.mp4 may be an overlay, or the source itself
@@ -79,7 +80,7 @@ def _encode(sequence: Sequence, path: Path, step: Callable[[str], None]) -> tupl
 
 
 def shown_pictures(sequence: Sequence) -> Iterator[tuple[Frame, Image]]:
-    """Yields each frame with its picture; a frame without one with the picture before it, grey if there is none."""
+    """Yields each frame with its picture; a frame without a picture gets the previous one, or a grey one at first."""
     assert sequence.image_size is not None, "pictures have a size"
     last: Image = np.full((*sequence.image_size[::-1], 3), GREY, np.uint8)
     for frame in sequence:

@@ -30,7 +30,7 @@ def scripts() -> str:
 
 
 def charts(report: Report) -> Json:
-    """Returns the charts of a report by the id of the element that they fill."""
+    """Returns the charts of a report as JSON for Bokeh, by the id of the HTML element that each fills."""
     found: dict[str, Any] = {}
     if report.curves:
         found["chart-curves"] = _curves(report.curves, report.by)
@@ -76,7 +76,8 @@ def _curves(curves: Curves, by: str) -> Any:
 
 
 def cause_parts(causes: SequenceOf[tuple[str, CauseRow]]) -> dict[str, tuple[str, dict[str, float]]]:
-    """Returns colour, and gain by tracker, of the kinds and causes that cost most, and of all others together."""
+    """Returns by "kind: cause" a colour and the cost of these errors by tracker: the kinds and causes that cost most
+    first, at last "other" with the sum of the rest. causes: pairs of a tracker and a row."""
     gains: dict[str, dict[str, float]] = {}
     for name, row in causes:
         of_kind = gains.setdefault(f"{row.kind}: {row.cause}", {})

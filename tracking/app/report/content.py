@@ -18,7 +18,7 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class Played:
-    """A run of one sequence."""
+    """One run of a tracker on one sequence, with its score."""
 
     name: str
     scenario: str
@@ -30,7 +30,7 @@ class Played:
 
     @property
     def shortfall(self) -> float:
-        """What the run lacks beside the oracle."""
+        """The oracle's score minus the run's; 1 minus the run's score if the oracle's is unknown."""
         return (1.0 if math.isnan(self.best) else self.best) - self.score
 
 
@@ -58,7 +58,8 @@ class HeatMap:
 
 
 def heat_map(title: str, played: Iterable[tuple[str, str, Played]]) -> HeatMap:
-    """Returns mean scores; played: row, column and run. Rows and columns have the order in which they come."""
+    """Returns the mean score of each cell. played: for each run the names of its row and column, and the run; rows and
+    columns are in order of first occurrence."""
     found: dict[str, dict[str, list[Played]]] = {}
     for row, column, one in played:
         found.setdefault(row, {}).setdefault(column, []).append(one)
@@ -87,7 +88,7 @@ class Curves:
 
 @dataclass(frozen=True)
 class Moment:
-    """A stretch of a sequence in which a tracker is bad, with its replay."""
+    """A part of a sequence around the costliest error of a run, with its replay."""
 
     run: Played
     start: float  # s
@@ -98,7 +99,7 @@ class Moment:
 
 @dataclass(frozen=True)
 class Report:
-    """All that a report shows."""
+    """The whole content of a report; parts that are empty or None are not shown."""
 
     title: str
     about: str

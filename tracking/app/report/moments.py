@@ -30,7 +30,8 @@ Runs = Callable[[Played, str], tuple[Sequence, Run, Run | None]]  # the sequence
 
 
 def chosen(played: SequenceOf[Played], most: int = MOST) -> list[Played]:
-    """Returns the runs that are shown, worst first: in turn each tracker's worst, of another scenario if it can be."""
+    """Returns at most `most` runs to show. The trackers take turns; each time a tracker's worst run that is left is
+    taken, if possible of a scenario not yet shown for it. Runs that are no worse than the oracle are left out."""
     waiting: dict[str, list[Played]] = {}
     bad = [one for one in played if not one.why and one.shortfall > 0]
     for one in sorted(bad, key=lambda one: -one.shortfall):
@@ -47,9 +48,10 @@ def chosen(played: SequenceOf[Played], most: int = MOST) -> list[Played]:
 
 
 def moments(played: SequenceOf[Played], runs: Runs) -> list[Moment]:
-    """Returns the worst moments, with replays as far as the report stays small; runs: with costs of their errors.
+    """Returns one `Moment` for each of the worst runs (`chosen`); once the replays exceed a size, `replay` is None.
 
-    The rival is the best other tracker on the sequence.
+    runs: a function of a run and the name of its rival ("" without one) to the sequence, the run with errors and their
+    costs, and the rival's run. The rival is the best other tracker on the sequence.
     """
     found, size = [], 0
     for one in chosen(played):
@@ -76,7 +78,8 @@ def _moment(one: Played, sequence: Sequence, run: Run, rival: Run | None) -> Mom
 
 
 def cause_rows(found: SequenceOf[tuple[str, RunErrors]]) -> list[tuple[str, CauseRow]]:
-    """Returns what each kind and cause of errors costs each tracker, mean over its runs; found: trackers and runs."""
+    """Returns pairs of a tracker and a `CauseRow`: what each kind and cause of errors costs it, as the mean over its
+    runs. found: for each run, the tracker's name and its errors."""
     names = sorted({name for name, _ in found})
     runs = {name: [errors for other, errors in found if other == name and errors.scores] for name in names}
     return [(name, row) for name in names for row in sums_by_cause(runs[name])]
@@ -89,7 +92,8 @@ def _words(error: FoundError) -> str:
 
 
 def shown_errors(sequence: Sequence, run: TrackingRun, costs: int = 0, causes: bool = False) -> RunErrors:
-    """Returns the errors of a run; none, with a warning, where tracks and labels cannot be compared."""
+    """Returns the errors of a run, without labels none; if tracks and labels cannot be compared, none and a warning.
+    costs, causes: as of `find_errors`."""
     none = RunErrors([], {}, [], {})
     if sequence.truth is None:
         return none

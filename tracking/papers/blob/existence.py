@@ -41,12 +41,14 @@ def transition(dt: float, hidden_time: float) -> Array:
 
 
 def newborn(person: Array) -> Array:
-    """Returns the probabilities (3, K) of new tracks, each a person with the probability person (K,), else false."""
+    """Returns the probabilities (3, K) of the states shown, hidden and false of K new tracks; person (K,): probability
+    that each is a person, who is then shown."""
     return np.stack([person, np.zeros_like(person), 1 - person])
 
 
 def update(states: Array, rows: Ints, p: Array, g: Array, ratio: Array | float) -> None:
-    """Updates the probabilities `states` (3, N) in place: tracks at `rows` (K,) were measured, all others missed."""
+    """Updates the probabilities `states` (3, N) in place: tracks at `rows` (K,) were measured, all others missed. p
+    (N,): probability of detection; g (K,): density of the measurement over that of false ones; ratio: of scores."""
     likelihood = np.ones_like(states)
     likelihood[SHOWN] = likelihood[FALSE] = 1 - p
     likelihood[SHOWN, rows] += p[rows] * g * ratio
@@ -71,7 +73,8 @@ class ScoreCalibration:
         return np.asarray(self.table[np.searchsorted(self.edges, score)])
 
     def add(self, score: Array, weight: Array) -> None:
-        """Add boxes with scores (M,) and weights (M,): the probability that each is a person."""
+        """Adds boxes with scores (M,) and weights (M,), the probability that each is a person; only the first boxes
+        count, later ones are ignored."""
         if len(self.score) < LEARNED and len(score):
             self.score, self.weight = np.append(self.score, score), np.append(self.weight, weight)
             self._learn()

@@ -52,7 +52,7 @@ class ExplainedForeground:
         self.cover: kernels.Cover = np.zeros(foreground.shape, np.int16)
 
     def mark_explained(self, label: Labels, rows: Ints) -> None:
-        """Mark the pixels of blobs as explained: templates get no support from them."""
+        """Marks the pixels of blobs as explained: templates get no support from them."""
         which = np.zeros(int(rows.max(initial=-1)) + 2, bool)
         which[rows + 1] = True
         kernels.mark_explained(self.cover, label, which)

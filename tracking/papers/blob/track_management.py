@@ -79,7 +79,7 @@ class TrackedPeople:
         self.follow(config, dynamics)
 
     def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
-        """Replace the config and its nominal filter `dynamics` (of the config at the frame rate); the tracks stay as
+        """Replaces the config and its nominal filter `dynamics` (of the config at the frame rate); the tracks stay as
         they are."""
         self.config, self.dynamics = config, dynamics
         self.q, self.noise, self.asymptote = dynamics.q, dynamics.noise, dynamics.asymptote
@@ -92,7 +92,7 @@ class TrackedPeople:
         self.death_rho = track_uncertainty.after_misses(dynamics, frames - 1)
 
     def predict(self) -> None:
-        """Predict all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence."""
+        """Predicts all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
         self.rho[:] = self.compute_rho()
         self.states[:] = self.transition @ self.states
@@ -159,7 +159,7 @@ class TrackedPeople:
     def record_measured(
         self, rows: Ints, near: Bools, score: Array, evidence: Array, ratio: Array | float = 1.0
     ) -> None:
-        """Record that the tracks at positions `rows` (K,) were measured in this frame and all others missed; confirm
+        """Records that the tracks at positions `rows` (K,) were measured in this frame and all others missed; confirms
         tracks."""
         self.measured[:] = False
         self.measured[rows] = True
@@ -198,7 +198,7 @@ class TrackedPeople:
         return np.asarray(new / (new + c.clutter_rate + double))
 
     def delete_tracks(self, t: float) -> None:
-        """Delete tracks from the table at time t, s (sec. 5, and ours)."""
+        """Deletes tracks from the table at time t, s (sec. 5, and ours)."""
         unseen = ~self.measured
         over = unseen & self._outside(self.bank[kalman.PLACE])
         if self.by_existence:
@@ -211,7 +211,7 @@ class TrackedPeople:
             self.keep_only((~over).nonzero()[0])
 
     def keep_only(self, rows: Ints) -> None:
-        """Delete all tracks except those at table positions `rows` (K,); they are in the order of `rows` afterwards."""
+        """Deletes all tracks except those at table positions `rows` (K,), which are then in the order of `rows`."""
         for name, axis in self.columns.items():
             setattr(self, name, getattr(self, name).take(rows, axis))
 
@@ -221,7 +221,7 @@ class TrackedPeople:
         return np.asarray(((place[:, :2] < 0) | (place[:, :2] > self.context.image_size)).any(1))
 
     def start_tracks(self, z: Array, score: Array, t: float, person: Array) -> None:
-        """Append a track at rest for each box z (K, 4): centre x, y, height, width, px; person (K,): probability that
+        """Appends a track at rest for each box z (K, 4): centre x, y, height, width, px; person (K,): probability that
         it is one."""
         n = len(z)
         if not n:
@@ -246,7 +246,7 @@ class TrackedPeople:
         return np.asarray((right & (self.measured | ~self._leaving())).nonzero()[0])
 
     def widen_view(self, z: Array) -> None:
-        """Set the field of view to the image, or, if its size is unknown, widen it to hold the boxes z (M, 4)."""
+        """Sets the field of view to the image, or, if its size is unknown, widens it to hold the boxes z (M, 4)."""
         if self.context.image_size is not None:
             self.view_low, self.view_high = np.zeros(2), np.array(self.context.image_size, float)
         elif len(z):
@@ -282,15 +282,15 @@ class TrackedEllipses(TrackedPeople):
         super().__init__(config, dynamics, context)
 
     def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
-        """Replace the config and its nominal filter `dynamics` (of the config at the frame rate); the tracks stay as
+        """Replaces the config and its nominal filter `dynamics` (of the config at the frame rate); the tracks stay as
         they are."""
         super().follow(config, dynamics)
         rate = ANGLE_RATE * (HEADING if self.top else 1.0)
         self.angle_var_per_step = np.radians(rate) ** 2 * dynamics.dt
 
     def predict(self) -> None:
-        """Predict all tracks one frame ahead, in place (eqs 1, 2), and compute their uncertainty rho; directions stay,
-        their variances grow."""
+        """Predicts all tracks one frame ahead, in place (eqs 1, 2), and computes their uncertainty rho; directions
+        stay, their variances grow."""
         kalman.predict(self.nominal, self.dynamics.dt, self.q)
         self.angle[kalman.DIRECTION_VAR] += self.angle_var_per_step
         super().predict()
@@ -305,7 +305,7 @@ class TrackedEllipses(TrackedPeople):
         return upright(self.bank[kalman.PLACE], self.angle[kalman.DIRECTION])
 
     def start_tracks(self, z: Array, score: Array, t: float, person: Array) -> None:
-        """Append a track at rest for each ellipse z (K, 5): centre x, y, full axes h, w (px), direction theta (rad)."""
+        """Appends a track at rest for each ellipse z (K, 5): centre x, y, full axes h, w, px, direction theta, rad."""
         super().start_tracks(z, score, t, person)
         self._append(
             angle=np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)]), look=person_look_kernels.unknown(len(z)),
@@ -327,7 +327,7 @@ class TrackedEllipses(TrackedPeople):
         return d2 + self.direction_distances(z[:, 4], angle_var), log_det + np.log(np.minimum(2 / np.pi * angle_s, 1.0))
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
-        """Update the tracks at table positions `rows` (K,), each at most once, with ellipses z (K, 5), in place (eqs 3
+        """Updates the tracks at table positions `rows` (K,), each at most once, with ellipses z (K, 5), in place (eqs 3
         to 7)."""
         terms = kalman.update(self.bank, rows, z[:, :4], noise)
         turn = self.direction_distances(z[:, 4], angle_var)[rows, np.arange(len(rows))]
@@ -336,7 +336,7 @@ class TrackedEllipses(TrackedPeople):
         return np.asarray(np.add.reduce(terms, 1) / np.square(self.scale[rows]) + turn)
 
     def relax_axes(self, rows: Ints, axes: Array, var: float) -> None:
-        """Move the axes of the tracks at positions `rows` (K,) towards expected axes (K, 2), px, in place (ours)."""
+        """Moves the axes of the tracks at positions `rows` (K,) towards expected axes (K, 2), px, in place (ours)."""
         stay = np.exp(-self.dynamics.dt / RELAXATION)
         bank = self.bank[:, rows, 2:]
         bank[kalman.PLACE] += (1 - stay) * (axes - bank[kalman.PLACE])

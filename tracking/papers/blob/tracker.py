@@ -108,7 +108,7 @@ class Blob:
         self.config = config or BlobConfig()
 
     def reset(self, context: Context, seed: int) -> None:
-        """Delete all tracks and start a sequence: from pixels if the context has a background sample, else from boxes.
+        """Deletes all tracks and starts a sequence, from pixels if the context has a background sample, else boxes.
 
         Ids begin at 1 again. `seed` is not used. If the image's size is unknown, it is taken from the background
         sample. Raises InputError if the config's noises confirm new tracks at once. From pixels it is also raised if
@@ -169,7 +169,7 @@ class Blob:
 
 
 def image_covariance(state: Array, scale: Array) -> Array:
-    """Returns covariances (N, 4, 4) of x, y, vx, vy in px and px/s."""
+    """Returns the covariances (N, 4, 4) of x, y, vx, vy, px and px/s, of filters (5, N, D); scale (N,): px per m."""
     cov = np.zeros((state.shape[1], 16))  # entry (i, j) at 4 i + j: the strides below walk along diagonals
     var, cross, rate = state[kalman.VAR :, :, :2] * (scale * scale)[:, None]
     cov[:, 0:6:5], cov[:, 10:16:5] = var, rate

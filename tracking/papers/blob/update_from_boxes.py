@@ -33,13 +33,13 @@ class BoxUpdater:
         self.follow(config)
 
     def follow(self, config: BlobConfig) -> None:
-        """Replace the config and compute the gates anew; `people` must follow the config already."""
+        """Replaces the config and computes the gates anew; `people` must follow the config already."""
         from scipy.special import chdtri
 
         self.gate, self.confirm_gate = chdtri(4, 1 - np.array([config.gate, CONFIRM_GATE]))  # eq. 10
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
-        """Update the tracks with a frame's detections: predict, associate, update, confirm, delete, start."""
+        """Updates the tracks with a frame's detections: predict, associate, update, confirm, delete, start."""
         z, score = self._measurements(detections)
         people = self.people
         if len(z):

@@ -79,7 +79,7 @@ class PixelUpdater:
     """
 
     def __init__(self, config: BlobConfig, people: TrackedEllipses, context: Context) -> None:
-        """Learn background and person size from the context's background sample, which must not be None
+        """Learns background and person size from the context's background sample, which must not be None
         (AssertionError)."""
         assert context.background is not None
         if not np.isnan(context.px_per_m):
@@ -92,7 +92,7 @@ class PixelUpdater:
         self.follow(config)
 
     def follow(self, config: BlobConfig) -> None:
-        """Replace the config, which `people` must follow already; background and person size stay as learned."""
+        """Replaces the config, which `people` must follow already; background and person size stay as learned."""
         from scipy.special import chdtri
 
         self.config = config
@@ -102,7 +102,7 @@ class PixelUpdater:
         self.confirm_gates = chdtri(np.array([4, 5]), 1 - CONFIRM_GATE)
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
-        """Update the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used."""
+        """Updates the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used."""
         people, foreground = self.people, self.foreground
         people.px_per_m = foreground.scale
         people.predict()

@@ -88,7 +88,8 @@ def gated_distances(bank: GroupBank, points: Array, region: Array, scaled: Scale
 
 
 def walking_reach(scaled: ScaledParameters, elapsed: Array) -> Array:
-    """Returns how far (K,), in the unit of the points, a member may be from its predicted place."""
+    """Returns how far (K,), in the unit of the points, a member may be from its predicted place; elapsed (K,): s since
+    it was measured."""
     return np.asarray(scaled.scale * FASTEST * np.maximum(elapsed, scaled.dt) + 3 * scaled.point_sd)
 
 
@@ -100,7 +101,7 @@ def claimed(points: Array, weights: Array, d2: Array, t: float) -> PointClaims:
 def associate(
     bank: GroupBank, claims: PointClaims, region: Array, log_ratio: Array, scaled: ScaledParameters, t: float
 ) -> Bools:
-    """Update the groups of the bank in place by their associations (sec. 4.1 to 4.3) and return the points that they
+    """Updates the groups of the bank in place by their associations (sec. 4.1 to 4.3) and returns the points that they
     have, (G, M); a point is one group's at most."""
     weighted = scaled.config.appearance * log_ratio
     log_density = point_log_density(bank.size, region, claims, weighted)

@@ -40,7 +40,7 @@ def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> Exp
 def add_newborns(
     bank: GroupBank, points: Array, weights: Array, expected: ExpectedMembers, scaled: ScaledParameters, t: float
 ) -> None:
-    """Append to the bank the tentative groups that the unclaimed points form under the group constraint G_y (sec.
+    """Appends to the bank the tentative groups that the unclaimed points form under the group constraint G_y (sec.
     3.3)."""
     if not len(points):
         return
@@ -60,8 +60,8 @@ def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: Scal
 
 
 def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[WholeGroupEvent]:
-    """Give ids to tentative groups that were measured for longer than `confirm_time`; yield an event of each that is no
-    part of a group."""
+    """Gives ids to tentative groups that were measured for longer than `confirm_time`; yields an event of each that is
+    no part of a group."""
     for row in np.flatnonzero(~bank.confirmed & (bank.measured_time > scaled.config.confirm_time + 1e-9)).tolist():
         if bank.parent[row] != NO_ID and not (bank.group == bank.parent[row]).any():
             # its group is gone
@@ -73,8 +73,8 @@ def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) 
 
 
 def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-    """Remove groups and parts that were not measured for too long, at time t (s); yield a leave event of each group of
-    which no part is left. Else the largest part has its id."""
+    """Removes groups and parts that were not measured for too long, at time t (s); yields a leave event of each group
+    of which no part is left. Else the largest part has its id."""
     patience = np.where(bank.confirmed, scaled.config.coast_time, scaled.config.confirm_time)
     patience = np.maximum(patience, scaled.dt)  # This frame is still to be measured: a frame before was missed.
     dead: Bools = t - bank.last_seen > patience + 1e-9

@@ -53,7 +53,7 @@ class ForegroundPoints:
         self.person = _person(context.camera, self.scale)
 
     def follow(self, config: GroupPdaConfig) -> None:
-        """Replace the config: settings of the background model change; what the model learned and the scale stay."""
+        """Replaces the config: settings of the background model change; what the model learned and the scale stay."""
         self.config = config
         self.foreground.follow(config)
 
@@ -133,7 +133,7 @@ def colour_log_ratio(bank: GroupBank, d2: Array, bins: Ints) -> Array:
 def update_histograms(
     bank: GroupBank, chosen: Bools, claimants: Ints, bins: Ints, weights: Array, scaled: ScaledParameters
 ) -> None:
-    """Update the groups' colour histograms (in the bank) in place by their points that no other group may have."""
+    """Updates the groups' colour histograms (in the bank) in place by their points that no other group may have."""
     keep = np.exp(-scaled.dt / scaled.config.extent_time)
     for row in np.flatnonzero(chosen.any(1)).tolist():
         mine = chosen[row] & (claimants < 2)

@@ -98,29 +98,29 @@ class GroupBank:
         return self.members[row].offset + self.x[row, :2]
 
     def keep(self, kept: Bools) -> None:
-        """Remove the rows that are False in kept (G,) bool, in place."""
+        """Removes the rows that are False in kept (G,) bool, in place."""
         chosen = self.at(kept)
         for f in fields(self):
             setattr(self, f.name, getattr(chosen, f.name))
 
     def remove(self, row: int) -> None:
-        """Remove the group in `row` (from 0; another row changes nothing), in place; later rows move up by one."""
+        """Removes the group in `row` (from 0; another row changes nothing), in place; later rows move up by one."""
         self.keep(np.arange(len(self)) != row)
 
     def add(self, other: GroupBank) -> None:
-        """Append the rows of another bank with as many colour bins (else ValueError), in place."""
+        """Appends the rows of another bank with as many colour bins (else ValueError), in place."""
         for f in fields(self):
             a, b = getattr(self, f.name), getattr(other, f.name)
             setattr(self, f.name, a + b if f.name in LISTS else np.concatenate([a, b]))
 
     def move_with(self, rows: int | slice, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
-        """Give these rows the velocity of the group in `row` of a bank, in place; nothing without `corrections`."""
+        """Gives these rows the velocity of the group in `row` of a bank, in place; nothing without `corrections`."""
         if scaled.config.corrections:
             self.x[rows, 2:] = bank.x[row, 2:]
             self.P[rows, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * SPLIT_SPEED) ** 2 * np.eye(2)
 
     def predict(self, scaled: ScaledParameters) -> None:
-        """Predict all groups to the next frame, in place: x = F x, P = F P F' + Q (eq. 2.3), F and Q from `scaled`."""
+        """Predicts all groups to the next frame, in place: x = F x, P = F P F' + Q (eq. 2.3), F and Q from `scaled`."""
         self.x = self.x @ scaled.F.T
         self.P = scaled.F @ self.P @ scaled.F.T + scaled.Q
 

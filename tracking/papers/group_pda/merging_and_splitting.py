@@ -71,9 +71,9 @@ class PairMoment(NamedTuple):
 def merge_onset(moments: list[PairMoment], alike: float) -> tuple[int, float]:
     """Returns the index of the moment since which two groups are most probably one, and the evidence for it, s.
 
-    Each moment speaks for one group, by up to its time, if their people are near and their velocities differ by less
-    than `alike`, m/s, on the mean of two steps; else against it, by at most as much. Before the first moment they came
-    on as the filter has it.
+    A moment adds at most its duration to the evidence if people of both are near and the velocities, averaged over two
+    steps, differ by less than `alike`, m/s; else it subtracts at most its duration. Before the first moment, the two
+    are taken to have moved with the velocity that the filter then had.
     """
     t, gap = np.array([m.t for m in moments]), np.array([m.gap for m in moments])
     before = np.linspace(-2 * WALK_TIME, 0, BEFORE, endpoint=False)
@@ -144,7 +144,7 @@ class GroupChanges:
         self.moments: dict[Pair, list[PairMoment]] = {}
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
-        """Split groups, and merge parts and groups; yield the events of groups. t: s."""
+        """Splits groups, and merges parts and groups, in the bank, in place, at time t, s; yields their events."""
         # First: an id that a part has from its lost group must not bring that group's past, if it is older.
         patience = scaled.config.coast_time + 1e-9
         self.moments = {p: past for p, past in self.moments.items() if t - past[-1].t <= patience}
@@ -234,7 +234,7 @@ def _latest_points(bank: GroupBank, row: int) -> Array:
 
 
 def pooled_points(recent: list[list[tuple[float, Array]]]) -> list[tuple[float, Array]]:
-    """Returns the recent points of several rows together, by time, oldest first."""
+    """Returns the recent points of several rows of the bank, joined by time: pairs (time, points), oldest first."""
     by_time: dict[float, list[Array]] = {}
     for t, points in (moment for past in recent for moment in past):
         by_time.setdefault(t, []).append(points)
@@ -323,7 +323,7 @@ def _connected(pairs: list[Pair], alone: Iterable[int] = ()) -> list[list[int]]:
 def fall_apart(
     bank: GroupBank, row: int, points: Array, weights: Array, scaled: ScaledParameters, t: float, ids: GroupIds
 ) -> None:
-    """Replace the row of the bank by one for each part of its points (M, 2) under G_y; the largest keeps its id."""
+    """Replaces the row of the bank by one for each part of its points (M, 2) under G_y; the largest keeps its id."""
     group = partition(points, weights, scaled.constraint)
     bank.null_time[row] = 0.0
     if group.max(initial=-1) < 1:
@@ -369,7 +369,7 @@ class DuplicateGroups:
         self.clock: dict[tuple[int, int], float] = {}
 
     def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
-        """Advance the clocks by a frame, at time t (s), and make one group lost of each pair whose clock has passed
+        """Advances the clocks by a frame, at time t (s), and makes one group lost of each pair whose clock has passed
         `coast_time`."""
         rows = np.flatnonzero(bank.confirmed & (bank.last_seen >= t))
         rows = rows[np.argsort(bank.id[rows])]

@@ -136,7 +136,7 @@ class GroupPda:
         self.config = config or GroupPdaConfig()
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forget everything and start a sequence. With a background sample in the context pixels are tracked, else
+        """Forgets everything and starts a sequence. With a background sample in the context pixels are tracked, else
         points.
 
         `seed` has no effect: nothing is random. Until the first detections `plane` is "image" from pixels, or with a

@@ -26,14 +26,14 @@ class Distributions(Protocol):
     """The four distributions of Table 1. p_0 is any reference dynamics of the components."""
 
     def individuals(self, x: Array, z: Ints) -> tuple[Array, Array]:
-        """Step 4: return X' (N_x, K, D) drawn from pi(X' | X, y), and the log (N_x, K) of p(y | x'_k) p_0(x'_k | x_k) /
-        pi(x'_k | x_k, y); z (N_x, ...): the likeliest Z under each X."""
+        """Step 4: returns X' (N_x, K, D) drawn from pi(X' | X, y), and the log (N_x, K) of p(y | x'_k) p_0(x'_k | x_k)
+        / pi(x'_k | x_k, y); z (N_x, ...): the likeliest Z under each X."""
 
     def dynamics(self, new: Array, x: Array, z: Ints) -> Array:
         """Returns the log (N_x, N_z) of p(X' | X, Z) / p_0(X' | X)."""
 
     def groups(self, new: Array, x: Array, z: Ints) -> Ints:
-        """Step 7: return Z' (N_x, N_z, ...) drawn from pi(Z' | X', X, Z, y)."""
+        """Step 7: returns Z' (N_x, N_z, ...) drawn from pi(Z' | X', X, Z, y)."""
 
     def energy(self, new: Array, z: Ints) -> Array:
         """Returns the log (N_x, N_z) of p(Z' | X'), the part of p(y | X', Z') of eq. 4 that depends on Z'."""
@@ -61,7 +61,7 @@ class Nested:
         return cls(x, z, log_q, log_w, np.zeros(shape[0]))
 
     def kept(self, rows: Bools) -> Nested:
-        """Returns the particles of the components where `rows` (K,) is True; parts of Z are numbered anew."""
+        """Returns the particles without the components where `rows` (K,) is False; parts of Z are numbered anew."""
         z = np.ascontiguousarray(self.z[..., rows])
         relabel(z)
         x = np.ascontiguousarray(self.x[:, rows])
@@ -120,6 +120,6 @@ def log_sum(values: Array) -> Array:
 
 
 def normalised(log_weights: Array) -> Array:
-    """Returns weights that sum to 1 over the last axis."""
+    """Returns the weights exp(log_weights), normalised to sum 1 over the last axis."""
     weights = np.exp(log_weights - log_weights.max(axis=-1, keepdims=True))
     return np.asarray(weights / weights.sum(axis=-1, keepdims=True))

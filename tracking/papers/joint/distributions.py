@@ -44,7 +44,7 @@ def log_density(x: Array, mean: Array, cov: Array) -> Array:
 
 
 def moved(state: Array, dt: float) -> Array:
-    """Returns A x: states (..., 4) that went on for dt s."""
+    """Returns A x, the states (..., 4) after dt s at constant velocity; state: x, y, vx, vy."""
     out = state.copy()
     out[..., :2] += dt * state[..., 2:]
     return out
@@ -138,7 +138,7 @@ class FrameModel:
         return process_noise(self.config.place_noise, self.config.velocity_noise, self.dt)
 
     def individuals(self, x: Array, z: Ints) -> tuple[Array, Array]:
-        """Step 4: pi(X_{t+1} | X_{0:t}, y)."""
+        """Step 4: returns states drawn from pi(X_{t+1} | X_{0:t}, y) and logs, as `Distributions.individuals`."""
         c, shape = self.config, x.shape[:2]
         normals = self.streams.normals(MOTION, self.key, shape[0], STATE)
         uniforms = self.streams.uniforms(CHOICES, self.key, shape[0], 1)[..., 0]
@@ -160,7 +160,7 @@ class FrameModel:
         return out
 
     def dynamics(self, new: Array, x: Array, z: Ints) -> Array:
-        """log p(X_{t+1} | X_t, Z_t) / p_0, with eq. 3 as p_0: eq. 5, and 0 in the other variants."""
+        """Returns log p(X_{t+1} | X_t, Z_t) / p_0, (N_x, N_z), with eq. 3 as p_0: eq. 5 in variant "full", else 0."""
         out = np.zeros(z.shape[:2])
         if self.config.variant != "full":
             return out
@@ -171,7 +171,8 @@ class FrameModel:
         return np.asarray(out - own.sum(axis=1)[:, None])
 
     def groups(self, new: Array, x: Array, z: Ints) -> Ints:
-        """Step 7: pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7; uniform over all partitions in VAR2 and VAR3."""
+        """Step 7: returns Z' drawn from pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7; in VAR2 and VAR3 from all
+        partitions uniformly."""
         c, shape = self.config, z.shape
         out = z.copy()
         if c.variant in ("VAR2", "VAR3"):
@@ -188,8 +189,8 @@ class FrameModel:
         return drawn.reshape(shape[0], shape[1], len(key), columns)
 
     def energy(self, new: Array, z: Ints) -> Array:
-        """log p(Z_t | X_t) of eq. 4: the beliefs of the pairs in one group (ours) or, without, -lambda_cl d_cl(Z_t,
-        X_t), per second; 0 in VAR3."""
+        """Returns log p(Z_t | X_t) of eq. 4, (N_x, N_z), times dt: the sum of the beliefs of pairs in one group (ours),
+        or if belief_rate is 0 -lambda_cl d_cl(Z_t, X_t); 0 in VAR3."""
         c = self.config
         out = np.zeros(z.shape[:2])
         if c.variant == "VAR3":

@@ -28,12 +28,13 @@ class People(PersonTable):
     next_id: int = 1
 
     def add(self, size: Array, key: Keys) -> None:
-        """Add people; size (M, 2): of their boxes, px, nan if unknown; key (M,)."""
+        """Adds people; size (M, 2): of their boxes, px, nan if unknown; key (M,)."""
         self.extend(id=self.next_id + np.arange(len(size)), size=size, key=key)
         self.next_id += len(size)
 
     def record(self, rows: Ints, sizes: Array, dt: float) -> None:
-        """Note that the people `rows` (R,) were measured, with boxes of `sizes` (R, 2), px; others missed."""
+        """Records that the people `rows` (R,) were measured in a frame, with boxes of `sizes` (R, 2), px, and that all
+        others were missed for dt s more."""
         self.missed += dt
         self.missed[rows] = 0.0
         self.size[rows] = followed_sizes(self.size[rows], sizes, dt)
@@ -48,21 +49,20 @@ class People(PersonTable):
 
 @dataclass
 class Newcomers(PersonTable):
-    """People who are not confirmed yet; missed: without frames that have no detector.
-
-    bank (5, M, 2): a Kalman filter of x, y, m, for each. age (M,): s since the first measurement.
-    """
+    """People who are not confirmed yet. `missed` does not grow in frames in which nobody could be measured. bank (5, M,
+    2): a Kalman filter of x, y, m, for each. age (M,): s since the first measurement."""
 
     bank: Array = field(default_factory=lambda: np.zeros((5, 0, 2)))
     age: Array = field(default_factory=lambda: np.zeros(0))
 
     def predict(self, dt: float) -> None:
-        """Predict to dt s later."""
+        """Predicts all filters dt s ahead, in place, and adds dt to the ages."""
         kalman.predict(self.bank, dt, kalman.white_acceleration(dt, np.full(2, NEWCOMER_NOISE)))
         self.age += dt
 
     def measure(self, points: Array, sizes: Array, noise: float, gate: float) -> Bools:
-        """Update by the points (M, 2), m, that they are associated with; return flags of the points left over."""
+        """Updates the newcomers by the points (M, 2), m, associated with them, in place; returns bool (M,), True for
+        points left over. sizes (M, 2), px: of boxes; noise: standard deviation, m; gate: largest d^2."""
         d2 = kalman.distances(self.bank, points, noise**2)
         rows, columns = optimal(np.where(d2 <= gate, d2, np.inf), 2 * gate)
         kalman.update(self.bank, rows, points[columns], noise**2)
@@ -73,8 +73,8 @@ class Newcomers(PersonTable):
         return free
 
     def start(self, points: Array, sizes: Array, noise: float, speed: float, frame: int) -> None:
-        """Add a person at each of the points (M, 2), m; speed: standard deviation of the velocity per axis, m/s; frame:
-        number of this frame."""
+        """Adds a person at each of the points (M, 2), m; speed: standard deviation of the velocity per axis, m/s;
+        frame: number of this frame."""
         bank, age = kalman.born(points, noise**2, speed**2), np.zeros(len(points))
         self.extend(bank=bank, age=age, size=sizes, key=birth_keys(points, frame))
 

@@ -49,8 +49,8 @@ ARRIVAL = 1.0  # s: people who were together so soon after they were first seen 
 
 
 class ReportedEvents:
-    """State: recent, the ids (K,) and places (K, 2), m, of the frames of the last SEARCHED s; first: frame from 0 in
-    which each person was seen first; frames: their number so far; fps."""
+    """Makes events from changes of the reported groups. State: recent, ids (K,) and positions (K, 2), m, of the last
+    frames; first, by id, the frame (from 0) of each person's first report; frames, their number so far; fps."""
 
     def __init__(self, fps: float) -> None:
         self.fps, self.frames = fps, 0
@@ -58,7 +58,7 @@ class ReportedEvents:
         self.first: dict[int, int] = {}
 
     def add(self, id: Ints, pos: Array) -> None:
-        """Add a frame: ids (K,) and places (K, 2), m, of the people reported."""
+        """Adds a frame: ids (K,) and places (K, 2), m, of the people reported."""
         self.recent.append((id.copy(), pos.copy()))
         for person in id.tolist():
             self.first.setdefault(person, self.frames)
@@ -107,5 +107,5 @@ def known_groups(identities: Identities, ids: Ints) -> Ints:
 
 
 def no_groups(group: Ints) -> Groups | None:
-    """Returns empty Groups if nobody is in a group, which says so; else None: hulls are derived from the group ids."""
+    """Returns empty `Groups` if nobody is in a group; else None, so that groups are derived from the group ids."""
     return Groups.none() if (group < 0).all() else None

@@ -115,9 +115,9 @@ class Joint(PointTracker):
     """The tracker `joint`: people and the groups they form, from points or from pixels.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
-    particles after step 2; people, newcomers: who is tracked and who may be; identities, the groups; events: those of
-    the reported groups; belief: of pairs; streams, the random
-    numbers; shown (K, 4): boxes of the people reported last, px, or None.
+    particles after step 2; people, the tracked people; newcomers, people who are not confirmed yet; identities, the
+    groups; events, which makes their events; belief, of pairs; streams, the random numbers; shown (K, 4), boxes of the
+    people reported last, px, or None.
     """
 
     config_class: ClassVar[type[JointConfig]] = JointConfig
@@ -126,9 +126,8 @@ class Joint(PointTracker):
         self.config = config or JointConfig()
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forget everything and start a sequence. seed: of all random numbers.
-
-        With a background sample in the context pixels are tracked, else points. Raises InputError as `begin`."""
+        """Forgets everything and starts a sequence. seed: of all random numbers. With a background sample in the
+        context pixels are tracked, else points. Raises InputError as `begin`."""
         c = self.config
         self.begin(context, divide=False)
         self.shown: Array | None = None
@@ -244,7 +243,8 @@ class Joint(PointTracker):
 
 
 def remembered(log_odds: Array, group: Ints, known: Array, share: float) -> Array:
-    """Returns the log-odds (K, K) of pairs, more for people who were in one group, and less for others."""
+    """Returns the log-odds (K, K) of pairs, raised for people who were in one group and lowered for others. group (K,):
+    reported group, -1 alone; known (K,): 1 for people reported before, else 0. share: factor of the change."""
     belief = default_belief()
     same = (group[:, None] >= 0) & (group[:, None] == group)
     return np.asarray(log_odds + share * np.outer(known, known) * np.where(same, belief.stay, -belief.come))

@@ -70,7 +70,7 @@ class ParticleConfig(BackgroundSettings):
         "people whose existence is at least so probable are reported (ours)")
 
     def check(self) -> None:
-        """Refuse a sensor without clutter that misses people."""
+        """Raises InputError if clutter_density is 0 and detect_prob is below 1."""
         super().check()
         if self.clutter_density == 0 and self.detect_prob < 1:
             raise InputError(

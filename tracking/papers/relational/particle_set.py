@@ -89,7 +89,8 @@ class ParticleSet:
         return out
 
     def share_weights(self, one_weight: bool) -> None:
-        """Give each particle one weight, the product of the people's, or each person weights of the own."""
+        """Switches between one weight per particle, the product of its people's weights (one_weight True), and weights
+        of each person alone (False)."""
         if one_weight and not self.one_weight and self.people:
             weights = self.weights.prod(axis=1)
             if not weights.sum() > 0:
@@ -98,7 +99,7 @@ class ParticleSet:
         self.one_weight = one_weight or (self.one_weight and bool(np.ptp(self.weights) > 1e-12 / self.count))
 
     def weigh(self, logs: Array) -> None:
-        """Multiply the weights by likelihoods: logs (P, K), natural, of each person; (P, 1) with one weight."""
+        """Multiplies the weights by likelihoods: logs (P, K), natural, of each person; (P, 1) with one weight."""
         particle_set_kernels.weigh(self.weights, logs)
 
     def effective(self) -> Array:
@@ -106,7 +107,7 @@ class ParticleSet:
         return np.asarray(1 / particle_set_kernels.column_sums(self.weights, self.weights))
 
     def resample(self, share: float, draws: Draws) -> Ints:
-        """Resample each person whose effective number is at most this share of the particles (sec. 2.1); with one
+        """Resamples each person whose effective number is at most this share of the particles (sec. 2.1); with one
         weight all people together. Returns who is resampled."""
         few = np.flatnonzero(self.effective() <= share * self.count * (1 + 1e-9))
         if not len(few):
@@ -131,7 +132,7 @@ class ParticleSet:
         return few
 
     def spread(self, members: Ints, width: float, normals: Array) -> None:
-        """Draw the particles of members (R,) apart by a kernel of so many optimal widths, which keeps their moments;
+        """Draws the particles of members (R,) apart by a kernel of so many optimal widths, which keeps their moments;
         normals (R, 4, P): standard normals."""
         h = min(width * (4 / (self.count * 6)) ** (1 / 8), 1.0)
         state = np.concatenate([self.pos[:, members], self.vel[:, members]], axis=2)
@@ -144,7 +145,7 @@ class ParticleSet:
         self.pos[:, members], self.vel[:, members] = new[..., :2], new[..., 2:]
 
     def keep(self, slots: Bools) -> None:
-        """Remove all slots but those where `slots` (K,) is True."""
+        """Removes all slots except those where `slots` (K,) is True."""
         # np.compress keeps arrays C-contiguous: kernels are compiled once more for another layout
         for name in ("weights", "exist", "pos", "vel"):
             setattr(self, name, np.compress(slots, getattr(self, name), 1))
@@ -152,7 +153,7 @@ class ParticleSet:
         self.pairs, self.related = number[self.pairs[rows]], self.related[rows]
 
     def add(self, pos: Array, vel: Array, exist: float) -> None:
-        """Add M slots with places pos (P, M, 2) and velocities vel (P, M, 2), the same existence in each particle, and
+        """Adds M slots with places pos (P, M, 2) and velocities vel (P, M, 2), the same existence in each particle, and
         no relations; their weights are equal, or the particles' one weight."""
         count, k, new = self.count, self.people, pos.shape[1]
         weights = self.weights[:, :1] if self.one_weight and k else np.full((count, 1), 1 / count)
@@ -166,7 +167,7 @@ class ParticleSet:
             setattr(self, name, np.concatenate([getattr(self, name), np.ascontiguousarray(values)], axis=1))
 
     def hold(self, pairs: Ints) -> None:
-        """Keep relations of further pairs i < j (N', 2), in any order; others do not walk together."""
+        """Keeps relations of further pairs i < j (N', 2), in any order; others do not walk together."""
         kept, further = _order_key(self.pairs), _order_key(pairs)
         key = np.union1d(kept, further)
         related = np.zeros((len(key), self.count), bool)
@@ -174,7 +175,7 @@ class ParticleSet:
         self.pairs, self.related = np.stack([key % LARGEST, key // LARGEST], axis=1), related
 
     def close_groups(self) -> None:
-        """Relate all members of each group, the connected components of a particle's relations, to each other."""
+        """Relates all members of each group, the connected components of a particle's relations, to each other."""
         label, some = self.labels(), np.empty((1, self.people), np.int64)
         ever: Bools = np.asarray(self.related.any(axis=1))
         particle_set_kernels.group_labels(self.pairs, ever[:, None], some)
@@ -182,7 +183,7 @@ class ParticleSet:
         self.related[:] = (label[:, self.pairs[:, 0]] == label[:, self.pairs[:, 1]]).T
 
     def drop_strangers(self) -> None:
-        """Keep no relation of pairs that walk together in no particle."""
+        """Keeps no relation of pairs that walk together in no particle."""
         rows = self.related.any(axis=1)
         if not rows.all():
             self.pairs, self.related = self.pairs[rows], self.related[rows]
@@ -209,7 +210,7 @@ def near_pairs(pos: Array, rules: Array) -> Ints:
 def join(
     pos: Array, exist: Array, label: Ints, points: Array, share: float, uniforms: Array, rules: Array
 ) -> tuple[Ints, Bools]:
-    """Relate M new people, the last slots, to the groups that they join in each particle, one after the other (sec.
+    """Relates M new people, the last slots, to the groups that they join in each particle, one after the other (sec.
     3.2). Return their pairs (N, 2) and relations (N, P); the groups label (P, K) of the new people are changed.
 
     pos (P, K, 2), m; exist (P, K): with the new people; points (M, 2), m: where they were detected; uniforms (M, P) in

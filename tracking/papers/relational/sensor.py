@@ -46,7 +46,7 @@ class Sight:
 def weigh(
     particles: ParticleSet, points: Array, sight: Sight, noise: float, config: ParticleConfig
 ) -> tuple[Array, Array, Array]:
-    """Multiply the weights of the particles by p(z_t | s^a_t), update existence, and return what the detections say.
+    """Multiplies the weights of the particles by p(z_t | s^a_t), updates existence, and returns three probabilities.
 
     Returned are the probabilities that person and detection belong together, (K, M), weighted over particles; that each
     person, if existing, is measured, (K,); and that each detection is no known person's, (M,).
@@ -140,8 +140,8 @@ def free_detections(W: Array, miss: Array) -> Array:
 
 
 def add_partner_factors(particles: ParticleSet, missed: Bools, logs: Array) -> None:
-    """Add to the log-likelihoods of each missed person those of the partners: what is seen of them tells where the
-    person is.
+    """Adds the partners' log-likelihoods to those of each missed person, in place: what is seen of partners tells where
+    the person is.
 
     particles: with the weights before the frame; missed (K,); logs (P, K): log-likelihoods of each person; changed.
 

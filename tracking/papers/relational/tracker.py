@@ -115,8 +115,8 @@ class Slots(PersonTable):
     next_id: int = 1
 
     def measure(self, seen: Array, pairs: Array, sizes: Array, dt: Array) -> None:
-        """Note who was measured in a frame: those with seen (K,) above 1/2; dt (K,): s by which others count as
-        missed."""
+        """Records who was measured in a frame: people with seen (K,), a probability, above 1/2; the others were missed
+        for dt (K,) s more. pairs (K, M): probability of each detection; sizes (M, 2): of boxes, px."""
         self.seen = seen > 0.5
         self.missed = np.where(self.seen, 0.0, self.missed + dt)
         if not pairs.size:
@@ -126,14 +126,14 @@ class Slots(PersonTable):
         self.size[sure] = followed_sizes(self.size[sure], sizes[best[sure]], dt[sure, None])
 
     def name(self, rows: Bools) -> None:
-        """Give new ids to the people where `rows` (K,) is True who have none."""
+        """Gives new ids to the people where `rows` (K,) is True and who have no id yet."""
         new = np.flatnonzero(rows & (self.id < 0))
         self.id[new] = self.next_id + np.arange(len(new))
         self.next_id += len(new)
 
 
 class Particle(PointTracker):
-    """The tracker `particle`: a particle filter of people who do not know of each other.
+    """The tracker `particle`: a particle filter of people who move independently of each other.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; particles; slots,
     the people; streams, the random numbers of each person; hidden (K,): probability that each person is behind a known
@@ -147,9 +147,8 @@ class Particle(PointTracker):
         self.config = config or self.config_class()
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forget everything and start a sequence. seed: of all random numbers.
-
-        With a background sample in the context pixels are tracked, else points. Raises InputError as `begin`."""
+        """Forgets everything and starts a sequence. seed: of all random numbers. With a background sample in the
+        context pixels are tracked, else points. Raises InputError as `begin`."""
         self.begin(context, divide=True)
         self.shown: Tracks | None = None
         self.particles, self.slots = ParticleSet.empty(self.config.particles), Slots()
@@ -278,7 +277,7 @@ class Relational(Particle):
     config: RelationalConfig
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forget everything and start a sequence, as `Particle.reset`."""
+        """Forgets everything and starts a sequence, as `Particle.reset`."""
         super().reset(context, seed)
         self.together = np.zeros((0, 0))
         self.belief = PairBelief(context.fps) if self.config.relation_evidence == "belief" else None

@@ -48,7 +48,8 @@ STEPS = 60  # Halvings of the interval in which f has its maximum.
 
 
 def separation(d: Array, A: Array, B: Array) -> float:
-    """Returns the largest f(s) of two ellipsoids A, B (D, D), centres d (D,) apart; they overlap if it is 1 or less."""
+    """Returns the largest f(s), s in [0, 1], of two ellipsoids with matrices A, B (D, D) whose centres differ by d
+    (D,); they overlap if it is 1 or less."""
     # The result is also the squared factor by which both would have to be enlarged to touch.
     L = np.linalg.cholesky(B)
     inverse = np.linalg.inv(L)
@@ -69,7 +70,7 @@ def separation(d: Array, A: Array, B: Array) -> float:
 
 
 def merge(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[WholeGroupEvent]:
-    """Merge groups of the list, in place, at t (s); return an event for each union of two or more confirmed ones."""
+    """Merges groups of the list, in place, at t (s); returns an event for each union of two or more confirmed ones."""
     events = [_merge(groups, parts, t) for parts in connected(groups, config.merge_gate)]
     return [event for event in events if event is not None]
 
@@ -170,12 +171,12 @@ def split(
 
 
 def born(points: SpacePoints, group: Ints, measurement: Measurement, motion: Motion3D, t: float) -> list[SpaceGroup]:
-    """Returns the tentative groups that free points form (sec. 3.4)."""
+    """Returns the tentative groups of free points (sec. 3.4); group (M,): number of each point's group, -1 for none."""
     return [newborn(points.at(group == k), measurement, motion, t) for k in range(int(group.max(initial=-1)) + 1)]
 
 
 def confirm(groups: list[SpaceGroup], config: StereoConfig, t: float, ids: GroupIds) -> list[WholeGroupEvent]:
-    """Give ids to tentative groups that have been measured for `confirm_time`, and return the events."""
+    """Gives ids to tentative groups that have been measured for `confirm_time`, and returns the events."""
     events, alive = [], {g.id for g in groups if g.confirmed}
     for g in groups:
         if g.confirmed or g.last_seen < t or g.measured_time < config.confirm_time - 1e-9:
@@ -190,7 +191,7 @@ def confirm(groups: list[SpaceGroup], config: StereoConfig, t: float, ids: Group
 
 
 def remove_lost(groups: list[SpaceGroup], config: StereoConfig, t: float) -> list[WholeGroupEvent]:
-    """Delete groups without measurements for too long, in place, and return the leave events of confirmed ones."""
+    """Deletes groups without measurements for too long, in place, and returns the leave events of confirmed ones."""
     events, kept = [], []
     for g in groups:
         if t - g.last_seen <= (config.coast_time if g.confirmed else config.confirm_time) + 1e-9:

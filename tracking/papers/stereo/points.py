@@ -87,7 +87,7 @@ class PicturePoints:
         self.follow(config)
 
     def follow(self, config: StereoConfig) -> None:
-        """Replace the config: the matcher is made anew; features and what the background model learned stay."""
+        """Replaces the config: the matcher is made anew; features and what the background model learned stay."""
         self.config = config
         self.foreground.follow(config)
         largest = self.camera.focal_px[0] * self.camera.baseline / config.nearest
@@ -95,7 +95,8 @@ class PicturePoints:
         self.stereo = SubtractionStereo(largest, block)
 
     def points(self, image: Image, right: Image) -> SpacePoints:
-        """Returns the features of people as points in space, none if too much is foreground."""
+        """Returns the features on people in a pair of pictures as points in space; none if too much is foreground.
+        Raises InputError if the pictures differ in shape."""
         if right.shape != image.shape:
             expected = f"the left picture's shape {image.shape}"
             raise InputError(place="right picture", got=str(right.shape), expected=expected, remedy="give a pair")
@@ -124,7 +125,8 @@ def moved_away(points: SpacePoints, camera: Camera, offset: float) -> SpacePoint
 
 
 def stereo_camera(camera: Camera | None) -> Camera:
-    """Returns the camera of a rectified pair unchanged."""
+    """Returns the camera unchanged if it can be that of a rectified pair: pinhole, with a baseline, without lens
+    distortion; else raises InputError."""
     if camera is not None and camera.kind == "pinhole" and camera.baseline > 0 and not camera.radial:
         return camera
     got = "no camera" if camera is None else f"{camera.kind}, baseline {camera.baseline:g}, radial {camera.radial:g}"
@@ -170,7 +172,7 @@ class PointLinks:
         return self._points(config)
 
     def forget(self) -> None:
-        """End all links, after a frame without detections; returns nothing."""
+        """Ends all links, after a frame without detections; returns nothing."""
         self.id, self.world = no_ids(), np.zeros((0, 2, 3))
 
     def _motion(self, world: Array) -> tuple[Array, Array]:

@@ -100,7 +100,7 @@ LEAST_VARIANCE = 1e-6  # m^2, m^2/s^2: least eigenvalue of a spread.
 
 @dataclass
 class SpaceGroup:
-    """A group.
+    """A group of points in space, confirmed or tentative.
 
     ekf: filter with the state x (6, 1), order x, x', y, y', z, z', and its covariance P. spread (6, 6): Sigma, in
     the same order. count: N, number of its points in its last measured frame. id: NO_ID while tentative.
@@ -154,7 +154,7 @@ def motion_model(config: StereoConfig, dt: float) -> Motion3D:
 
 
 def predict(group: SpaceGroup, motion: Motion3D) -> None:
-    """Predict a group to the next frame, in place: X = Phi X, P = Phi P Phi' + Q (eq. 2)."""
+    """Predicts a group to the next frame, in place: X = Phi X, P = Phi P Phi' + Q (eq. 2)."""
     group.ekf.F, group.ekf.Q = motion.Phi, motion.Q
     group.ekf.predict()
 
@@ -207,7 +207,7 @@ def spread_of(points: SpacePoints, config: StereoConfig) -> Array:
 
 
 def measure(group: SpaceGroup, points: SpacePoints, measurement: Measurement, motion: Motion3D, t: float) -> None:
-    """Update a group, in place, by its M points of the frame at t s: state (eqs 4 to 6), Sigma (eq. 7) and N."""
+    """Updates a group, in place, by its M points of the frame at t s: state (eqs 4 to 6), Sigma (eq. 7) and N."""
     config = motion.config
     mean, weights = mean_position(points, measurement, config)
     J = measurement.jacobian(mean)

@@ -118,7 +118,7 @@ class Stereo:
         self.config = config or StereoConfig()
 
     def reset(self, context: Context, seed: int) -> None:
-        """Forget everything and start a sequence. With a background sample in the context pairs of pictures are
+        """Forgets everything and starts a sequence. With a background sample in the context pairs of pictures are
         tracked, else points.
 
         `seed` has no effect: nothing is random. From pictures, raises InputError if the context has no pinhole camera
