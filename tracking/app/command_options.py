@@ -78,35 +78,35 @@ class Options:
 
 
 class SceneOptions(Options):
-    """How simulated scenes are changed."""
+    """Options that change simulated scenes, for commands that simulate or that get a sensor."""
 
     settings: list[str] = SET()
     sensor: Path | None = SENSOR()
 
 
 class PictureOptions(SceneOptions):
-    """What is stored of simulated scenes."""
+    """Options on what is stored of simulated scenes, for commands that simulate."""
 
     streams: str = STREAMS()
     images: Images = IMAGES()
 
 
 class WorkerOptions(Options):
-    """Who does the work."""
+    """Options on the processes or the cluster that do the work."""
 
     workers: int = WORKERS()
     cluster: str | None = CLUSTER()
 
 
 class RecordingOptions(Options):
-    """What a recording may lack."""
+    """Options that state what a recording does not tell itself: frame rate and image scale."""
 
     fps: float | None = FPS()
     px_per_m: float | None = option("Pixels per metre of a recording without a camera.", None)
 
 
 class BoxOptions(RecordingOptions):
-    """How boxes are read."""
+    """Options on how boxes are read from files."""
 
     person_class: str | None = PERSON_CLASS()
     box_scale: str | None = option(

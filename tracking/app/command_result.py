@@ -23,7 +23,7 @@ DEBUG = "FLOCKSCOPE_DEBUG"  # With this environment variable set, an unexpected 
 
 @dataclass(frozen=True)
 class CommandResult:
-    """What a command returns."""
+    """The result of a command: the data for --json, the text to print, and the exit code."""
 
     data: dict[str, Any]  # content of the JSON object that --json prints, without its "status"
     text: str = ""  # printed without --json

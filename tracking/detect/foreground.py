@@ -79,7 +79,7 @@ class Foreground:
 
     @property
     def least_area(self) -> float:
-        """Fewest pixels of a blob."""
+        """Least area, in pixels, of a blob that may be a person or a part of one."""
         return max(LEAST_AREA * self.scale**2, LEAST_PIXELS)
 
     def segment(self, image: Image) -> Segmented:

@@ -110,7 +110,7 @@ def observed(sequence: Recording) -> tuple[Truth, Array]:
 
 
 def speed_table(changes: Sequence[Changes], ends: Sequence[float]) -> dict[str, float | list[float]]:
-    """Returns the lists drift (1/s · m/s) and diffusion (per root second), one number per row of speeds, by name.
+    """Returns the lists drift (m/s^2) and diffusion (m/s^1.5), one number per row of the speed table, by name.
     changes: results of `velocity_changes`. ends: upper ends of the rows, m/s; the last row has none."""
     speed, along, across, lag = (np.concatenate(x) for x in zip(*changes, strict=True))
     row = np.searchsorted(ends, speed)

@@ -110,7 +110,7 @@ class Scores(Mapping[str, float]):
 
 @dataclass(frozen=True, eq=False)
 class MatchedSides:
-    """One truth and one tracker's tracks, compared but not counted yet."""
+    """One truth and one tracker's tracks in the scored frames, with people matched, ready for computing scores."""
 
     sides: ComparedSides  # both sides in the scored frames, people mapped
     similarity: Similarity  # how people are compared

@@ -95,7 +95,7 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """"better" or "worse" (of `after`) if the interval of the difference excludes 0, else "no sure difference"."""
+        """How `after` compares: "better" or "worse" if the interval excludes 0, else "no sure difference"."""
         if not (self.low > 0 or self.high < 0):
             return "no sure difference"
         return "better" if (self.difference > 0) == self.higher else "worse"

@@ -23,7 +23,8 @@ from tracking.grouping.link_rule import LinkRule
 
 @dataclass(frozen=True)
 class LabelErrors:
-    """How the labelled positions of people err."""
+    """The random errors of labelled positions: their standard deviation, m, and correlation time, s; if filmed, they
+    are errors of boxes in the image, whose scale is wrong by a random factor, too."""
 
     sd: float  # standard deviation of each coordinate, m; of boxes it is multiplied by the true image scale
     time: float  # correlation time, s

@@ -21,7 +21,7 @@ Job = tuple[StoredTracks, Similarity | None, BoxScale | None]
 
 
 def errors(options: ErrorsOptions) -> CommandResult:
-    """Lists the errors of every sequence of the truth."""
+    """Lists the errors of the stored tracks on every sequence of the truth, with causes and costs."""
     source = source_of(options, options.truth, without="box_scale")
     sequences = source.open()
     stored = [tracks for _, tracks in match_tracks(sequences, find_tracks(options.tracks))]

@@ -57,7 +57,7 @@ def groups_of(run: TrackingRun, fps: float) -> list[Row]:
 
 
 def lasting(groups: Iterable[Row]) -> int:
-    """Returns the number of groups that last for LASTING seconds or longer."""
+    """Returns the number of groups of `groups_of` that last for LASTING seconds or longer."""
     return sum(group["seconds"] >= LASTING for group in groups)
 
 

@@ -31,7 +31,8 @@ class JudgedRuns:
 def judged_runs(
     names: Mapping[str, str], sequences: list[Sequence], source: OpenedAs, workers: int
 ) -> list[JudgedRuns]:
-    """Returns scores and errors of runs, by name the text of the command line: stored tracks or a tracker class."""
+    """Returns for each sequence the scores and errors of all runs. names: by the run's name, the text of the command
+    line that names stored tracks or a tracker class."""
     runs = stored_runs(names.values(), sequences)
     jobs = [ScoringJob(sources, oracles=True) for sources in zip(*runs, strict=True)]
     return list(over_sequences("report", _judge, sequences, jobs, source, workers))

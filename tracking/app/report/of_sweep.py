@@ -30,10 +30,7 @@ CAUSES = "What the repair of the errors of one kind and cause adds, mean over th
 
 
 def report_of_sweep(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Report:
-    """Returns the report on a sweep.
-
-    data: as stress.json has it; words: on breaking points.
-    """
+    """Returns the report on a sweep. data: the content of stress.json; words: sentences on the breaking points."""
     plan, searched = sweep.plan, data["found"] is not None
     scenes = [*sweep.scenes.values()]
     easy = scenes if searched or not plan.axes else [s for s in scenes if s.values == sweep.values[0]]

@@ -29,7 +29,8 @@ SHOWN_TIME = 1.0  # s: mean time in which a person can be detected
 
 
 def transition(dt: float, hidden_time: float) -> Array:
-    """Returns the matrix (3, 3) from the probabilities of S, H, F to those a step of dt s later; the rest is 0."""
+    """Returns the matrix (3, 3) that maps the probabilities of shown, hidden and false to those dt s later. Sums that
+    fall below 1 are objects that have gone. hidden_time: mean time for which a person is hidden, s."""
     hide, show = 1 / SHOWN_TIME, 1 / hidden_time
     left = (1 - np.exp(-(hide + show) * dt)) / (hide + show)
     stay, false = np.exp(-dt / LIFETIME), np.exp(-dt / CLUTTER_TIME)

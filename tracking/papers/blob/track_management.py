@@ -142,7 +142,8 @@ class TrackedPeople:
         return np.asarray(self.config.clutter_rate * np.square(scale) / area / (2 * np.pi * SIZE_SPREAD**2))
 
     def associate(self, d2: Array, evidence: Array, ratio: Array | float = 1.0) -> tuple[Ints, Ints]:
-        """Returns rows and columns (K,) of associated tracks and measurements, one to one."""
+        """Returns rows and columns (K,) of associated tracks and measurements, one to one. d2, evidence (N, M): as of
+        `innovations` and `evidence`; inf in d2 forbids a pair. ratio: likelihood ratio of the score, (M,)."""
         if not self.by_existence:
             return assignment.cheapest_per_track(*assignment.nearest(d2), d2)
         c, (shown, _, false) = self.config, self.states

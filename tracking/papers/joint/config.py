@@ -77,7 +77,7 @@ class JointConfig(BackgroundSettings):
 
     @property
     def own_weights(self) -> bool:
-        """True if people are resampled one by one."""
+        """True (algorithm "ours") if people have weights of their own and are resampled one by one."""
         return self.algorithm == "ours"
 
     @property

@@ -71,7 +71,7 @@ class ParticleSet:
         return mean, cov, exist
 
     def labels(self) -> Ints:
-        """Returns the group of each person in each particle, (P, K): the least slot in it."""
+        """Returns a label of each person's group in each particle, (P, K): the lowest slot number in the group."""
         label = np.empty(self.exist.shape, np.int64)
         particle_set_kernels.group_labels(self.pairs, self.related, label)
         return label
