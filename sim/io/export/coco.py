@@ -55,10 +55,10 @@ def coco(source: str | Path, out: str | Path, *, person_class: int | str | None 
     if not sequences:
         expected, remedy = "a dataset with boxes", "give a generated dataset"
         raise InputError(file=source, got="no labelled boxes", expected=expected, remedy=remedy)
-    seeds = [s.source["seed"] for s in sequences if s.source.get("kind") == "generated"]
-    splits = sorted({split_of(range(seed, seed + 1)) for seed in seeds})
+    made = [s.source for s in sequences if s.source.get("kind") == "generated"]
+    splits = sorted({split_of(range(facts["seed"], facts["seed"] + 1)) for facts in made})
     if len(splits) > 1:
-        got, remedy = f"the splits {', '.join(splits)}", f"export each by itself, as {source / 'flockscope-train'}"
+        got, remedy = f"the splits {', '.join(splits)}", f"export each by itself, as {Path(made[0]['path']).parent}"
         raise InputError(file=source, got=got, expected="one split in a file", remedy=remedy)
     output_paths("", [s.name for s in sequences], source=source)
     write_file(out, _document(sequences, source if source.is_dir() else source.parent, out).encode())

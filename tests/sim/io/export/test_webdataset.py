@@ -93,18 +93,20 @@ def test_shards_hold_whole_sequences_up_to_their_size(data: Path, tmp_path: Path
     assert samples(*paths) == samples(*[tmp_path / "whole" / shard["name"] for shard in whole])
 
 
-def test_the_same_export_again(data: Path, tmp_path: Path) -> None:
-    """What an interrupted one left is removed; a damaged shard is replaced."""
-    out = tmp_path / "out"
+def test_the_same_export_again(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What an interrupted one left is removed, a damaged shard replaced; links stay, and the folder may be "."."""
+    out, disk = tmp_path / "out", tmp_path / "disk"
+    disk.mkdir()
+    out.symlink_to(disk)
     webdataset(data, out, shard_size=1)
-    before = content(out)
+    before = content(disk)
     (out / "shard-000002.tar").write_bytes(b"")
-    (tmp_path / f"{atomic.PARTIAL}out-0123456789ab").mkdir()
+    (out / f"{atomic.PARTIAL}index.json-0123456789ab").mkdir()
     seen = []
-    webdataset(data, out, shard_size=1, progress=lambda *a: seen.append(a))
-    assert content(out) == before
+    monkeypatch.chdir(disk)
+    webdataset(data, ".", shard_size=1, progress=lambda *a: seen.append(a))
+    assert content(disk) == before
     assert seen == [(k, 3, f"shard-{k - 1:06d}.tar") for k in (1, 2, 3)]
-    assert not list(tmp_path.glob(f"{atomic.PARTIAL}*"))
     (out / "mine").write_text("mine")
     with pytest.raises(InputError, match="other files"):
         webdataset(data, out, shard_size=1)
