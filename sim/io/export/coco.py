@@ -23,7 +23,7 @@ from sim.io.files.own_files import GENERATOR, output_paths
 from sim.io.files.tables import json_text
 from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
-from sim.io.store.seal import read_manifest
+from sim.io.store.seal import read_whole_manifest
 from sim.streams import file_name
 from sim.types import Array, Ints, Sequence, Truth
 
@@ -69,7 +69,7 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
     info: dict[str, Any] = {"description": GENERATOR, "version": "1"}
     if all(s.source.get("kind") == "generated" for s in sequences):
         folders = [Path(s.source["path"]) for s in sequences]
-        hashes = {split_and_name(folder): read_manifest(folder)["content_hash"] for folder in folders}
+        hashes = {split_and_name(folder): read_whole_manifest(folder)["content_hash"] for folder in folders}
         info["content_hash"] = hashing.dataset_hash(hashes)
     info["root"] = Path(os.path.relpath(root, path.parent)).as_posix()
     videos, images, annotations = [], list[str](), list[str]()

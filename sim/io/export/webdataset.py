@@ -23,7 +23,7 @@ from sim.io.files.atomic import lock_folder, remove_partials, staged_path, write
 from sim.io.files.own_files import is_side_file
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
-from sim.io.store.seal import MANIFEST, read_manifest
+from sim.io.store.seal import MANIFEST, read_whole_manifest
 
 BLOCK = 512  # bytes: a tar holds whole blocks
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
@@ -99,7 +99,7 @@ def _shards(source: Path, size: int) -> list[dict[Path, str]]:
     shards: list[dict[Path, str]] = []
     full = size
     for folder in folders:
-        manifest = read_manifest(folder)  # not kept: those of a large dataset would fill the memory
+        manifest = read_whole_manifest(folder)  # not kept: those of a large dataset would fill the memory
         sizes = {MANIFEST: (folder / MANIFEST).stat().st_size}
         sizes |= {name: facts["bytes"] for name, facts in manifest["files"].items()}
         # A header before each file, and two more blocks with its name if that is long.
@@ -130,7 +130,7 @@ def _write_shard(path: Path, some: dict[Path, str]) -> dict[str, Any]:
 
 def _members(folder: Path) -> Iterator[tuple[str, bytes]]:
     """Yields name and content of each file of a sequence as it stands in the tar, the manifest first."""
-    stored = StoredPictures(folder, read_manifest(folder))
+    stored = StoredPictures(folder, read_whole_manifest(folder))
     yield f"{_key(folder)}.{MANIFEST}", (folder / MANIFEST).read_bytes()
     for name in stored.manifest["files"]:
         yield f"{_key(folder)}.{name.replace('/', '.')}", stored.body(name)

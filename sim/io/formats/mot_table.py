@@ -42,11 +42,7 @@ NO_ID = "frame,left,top,width,height,score"
 
 
 def reject_missing_ids(rows: NumericTable) -> None:
-<<<<<<< HEAD
-    """Raises InputError if the ids seem to be missing: column 2 is then the left edge, and column 6 a score up to 1."""
-=======
     """Raises InputError if column 2 is no id but the left edge of a box, and the ids are missing."""
->>>>>>> s13-r1
     values = rows.values
     frame, id = values[:, 0], values[:, 1]
     if not len(values) or values.shape[1] < 6 or (id == -1).all():
