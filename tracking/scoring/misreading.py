@@ -77,10 +77,13 @@ class Side:
         return Side(self.rows.keep(mask), self.values[mask])
 
 
-def likely_misreading(truth: Truth, tracks: SequenceOf[Tracks], size: tuple[int, int] | None = None) -> str:
+def likely_misreading(
+    truth: Truth, tracks: SequenceOf[Tracks], size: tuple[int, int] | None = None, files: bool = True
+) -> str:
     """Returns a warning if hardly any tracked person matches a label though both sides have people, else "".
 
-    size: width and height of the pictures, px, None if unknown.
+    size: width and height of the pictures, px, None if unknown. files: False if the tracks are arrays, for which the
+    remedies of files are of no use.
     """
     sides = _comparable(truth, tracks)
     if sides is None:
@@ -106,6 +109,7 @@ def likely_misreading(truth: Truth, tracks: SequenceOf[Tracks], size: tuple[int,
         words = f"no frame in common: labels in frames {labels}, tracks in frames {numbers}"
     if good:
         _, matching, done, remedy = min(good)
+        remedy = remedy if files else "give frames, order and units of the columns as in the truth"
         return f"{words}; {done}, {-matching:.0%} would: {remedy}"
     tried = " No other columns, scale or shift of frames match better." if len(together) else ""
     return f"{words}.{tried} Check the columns, and that these are tracks of this very sequence"
