@@ -144,7 +144,8 @@ def _table(path: str | Path, place: str, row: Any) -> Table:
         _refuse(path, place, row, ", ".join(keys))
     if row["name"] not in NAMES:
         _refuse(path, f"{place}: name", row["name"], "one of " + "; ".join(NAMES))
-    columns = np.array([_numbers(path, f"{place}: {key}", row[key], np.size(row["at"])) for key in keys[1:]])
+    count = len(row["at"]) if isinstance(row["at"], list) else 1
+    columns = np.array([_numbers(path, f"{place}: {key}", row[key], count) for key in keys[1:]])
     if len(columns[0]) < 2 or (np.diff(columns[0]) <= 0).any():
         _refuse(path, f"{place}: at", row["at"], "two ascending numbers or more")
     return Table(row["name"], columns[0], columns[1:])
