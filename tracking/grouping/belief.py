@@ -60,11 +60,6 @@ class Belief:
     memory: float = 1.0  # (s): a missed member stays so long in the group
     arrival: float = 1.0  # (s): people who were together so soon after a first frame arrived together: no merge
 
-    @property
-    def smooth(self) -> float:
-        """Time over which velocities of tracks are replaced by chords, s: 0, as the belief uses positions only."""
-        return 0.0
-
     def as_dict(self) -> dict[str, object]:
         """Returns what run.json tells of the belief: its numbers, and a hash of its file's text."""
         text, numbers = self.toml_text().encode(), {name: getattr(self, name) for name in NUMBERS}
