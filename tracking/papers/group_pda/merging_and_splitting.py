@@ -285,7 +285,8 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     return GroupBank(
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1), size[None],
-        bank.parent[one], bank.colour_hist[rows].sum(0, keepdims=True),
+        np.array([[bank.last_seen[rows].max(), *x[2:]]]), bank.parent[one],
+        bank.colour_hist[rows].sum(0, keepdims=True),
         [MemberPlaces(offset, last_seen, known)], [pooled_points([bank.recent_points[r] for r in rows.tolist()])],
     )  # fmt: skip
 
@@ -337,7 +338,7 @@ def fall_apart(
     largest = int(np.lexsort((parts.x[:, 1], parts.x[:, 0], away, -parts.size))[0])
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
-    parts.recent_points[largest] = bank.recent_points[row]
+    parts.recent_points[largest], parts.unshared[:] = bank.recent_points[row], bank.unshared[row]
     places, members = bank.positions(row), bank.members[row]
     of = group[cKDTree(points).query(places)[1]]
     for k in range(len(parts)):
