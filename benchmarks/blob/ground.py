@@ -39,6 +39,7 @@ PARTS: Mapping[str, Replacement] = {
     "by 100 boxes": (ground_of_boxes, "BOXES", 100),
     "by all boxes": (ground_of_boxes, "BOXES", 10**9),
     "boxes that agree less, too": (ground_of_boxes, "SURE", 1.0),
+    "lone deviations not bounded": (ground_of_boxes, "FARTHEST", 100.0),
 }
 
 

@@ -12,17 +12,23 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from unittest import mock
 
+import numpy as np
+
 from benchmarks.group_pda.encounters import ids_kept
 from benchmarks.support.in_memory import in_memory
+from benchmarks.support.replaced_code import Replacement, replaced_code
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import Entry
 from sim.sequence import simulate
-from sim.types import DetectionMode, Image, Tracks, Truth
+from sim.types import Array, DetectionMode, Image, Tracks, Truth
 from sim.types import Sequence as Recording
 from sim.workers.pool import process_pool
 from tracking.detect import background
 from tracking.detect.background_training import Trained, train
+from tracking.papers.group_pda import merging_and_splitting
+from tracking.papers.group_pda import tracker as group_pda
 from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.running.run import TrackingRun, track
 from tracking.scoring import evaluate
 from tracking.scoring.people_comparison import in_one_plane
@@ -36,6 +42,7 @@ class Variant:
 
     grouping: of a tracker of people, "rule" or "belief". in_image: the answers of a tracker of people from pixels are
     scored in the image, as groups from pixels are: its groups stay, their hulls are those of its boxes.
+    replaced: a name in REPLACED, a rule of `group-pda` without a parameter that is replaced.
     """
 
     name: str
@@ -43,6 +50,7 @@ class Variant:
     params: Mapping[str, object] = field(default_factory=dict)
     grouping: str | None = None
     in_image: bool = False
+    replaced: str = ""
 
 
 @dataclass(frozen=True)
@@ -114,14 +122,35 @@ def rows_of_job(job: TrackingJob) -> dict[str, Row] | str:
 
 def tracked(sequence: Recording, variants: Iterable[Variant], mode: DetectionMode) -> dict[str, TrackingRun]:
     """Returns the answers of each variant; variants that differ only in how they are scored share one run."""
-    made: dict[tuple[str, str, str | None], TrackingRun] = {}
+    made: dict[tuple[str, str, str | None, str], TrackingRun] = {}
     found = {}
     for v in variants:
-        key = v.tracker, repr(v.params), v.grouping
+        key = v.tracker, repr(v.params), v.grouping, v.replaced
         if key not in made:
-            made[key] = track(v.tracker, sequence, params=v.params or None, detections=mode, grouping=v.grouping)
+            with replaced_code([REPLACED[v.replaced]] if v.replaced else []):
+                made[key] = track(v.tracker, sequence, params=v.params or None, detections=mode, grouping=v.grouping)
         found[v.name] = made[key]
     return found
+
+
+likeness = merging_and_splitting.likeness
+
+
+def unbroken(moments: list[merging_and_splitting.PairMoment], alike: float) -> Array:
+    """Replaces `likeness`: a moment speaks for one group with all its time, or takes back all before."""
+    return np.where(likeness(moments, alike) > 0, 1.0, -1e3)
+
+
+def evenly(bank: GroupBank, points: Array, *others: object) -> Array:
+    """Replaces `place_density`: nothing is known of members' places."""
+    del others
+    return np.ones((len(bank), len(points)))
+
+
+REPLACED: Mapping[str, Replacement] = {
+    "evidence over time: an unbroken time in its place": (merging_and_splitting, "likeness", unbroken),
+    "members' places in shared points": (group_pda, "place_density", evenly),
+}
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.group_pda.runs import Row, TrackingJob, Variant, measure, trackers, with_points
+from benchmarks.group_pda.runs import REPLACED, Row, TrackingJob, Variant, measure, trackers, with_points
 from benchmarks.support.options import seeds_text
 from benchmarks.support.tables import interval, share, signed, table
 from scenarios.loading.resolve import Entry, resolve
@@ -93,13 +93,14 @@ def decisions(given: argparse.Namespace) -> Any:
     variants = (
         Variant("default", given.tracker),
         *(Variant(name, given.tracker, params) for name, params in WITHOUT.items()),
+        *(Variant(name, given.tracker, replaced=name) for name in REPLACED),
     )
     found = gathered([entry for name in names for entry in resolve(name, given.set)], given, variants)
     pooled = {v.name: [row for rows in found.values() for row in rows[v.name]] for v in variants}
     for scene, rows in {"all": pooled, **(found if given.each else {})}.items():
         default = values(rows["default"], DECIDED)
         cells = {"default": [mean_of(key)(rows["default"]) for key in DECIDED]}
-        for name in WITHOUT:
+        for name in (*WITHOUT, *REPLACED):
             ends = paired(values(rows[name], DECIDED), default)
             cells[f"default minus without {name}"] = [signed(*(float(e[k]) for e in ends)) for k in range(len(DECIDED))]
         title = f"{scene}: {heading(given, rows)}; paired differences"

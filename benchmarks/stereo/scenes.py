@@ -12,9 +12,9 @@ ground            on the ground plane
 3-D, all depths   as 3-D, offset, of groups at any depth
 along             mean error along the horizontal line of sight, positive away from the camera
 
-The mean is over the frames of all sequences. The preset has the spheres of the paper's scene. `group F1`, `merge F1`:
-of the catalogue; `extra`: number of reported merges and splits of a sequence above that of the true ones. 95 %
-intervals over sequences are Student's.
+The mean is over the frames of all sequences, and so is that of the deviations in each. The preset has the spheres of
+the paper's scene. `group F1`, `merge F1`: of the catalogue; `extra`: number of reported merges and splits of a sequence
+above that of the true ones. 95 % intervals over sequences are Student's.
 
 `VARIANTS` and `FROM_POINTS` switch decisions off. Those without a parameter replace code of the tracker. Differences
 are paired, over the same sequences.

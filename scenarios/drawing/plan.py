@@ -99,7 +99,7 @@ def svg(scenario: Scenario) -> str:
     ]
     with rc_context(STYLE):
         figure, out = Figure(SIZE), io.StringIO()
-        plan = figure.subplots()
+        plan = figure.add_axes((0, 0, 1, 1))
         _draw_world(plan, scenario)
         _draw_ways(plan, scenario, orders)
         above: Any = {"xycoords": "axes fraction", "textcoords": "offset points"}
@@ -161,7 +161,8 @@ def _draw_ways(axes: Any, scenario: Scenario, orders: list[OrderMark]) -> None:
     for mark in orders:
         for name, way in mark.ways.items():
             _draw_way(axes, way, colour[name], lw=2, alpha=0.9, ls="--")
-            _label(axes, way[-1], name, colour[name], 6)
+            if not mark.slots:  # the way from a queue is that of all its groups
+                _label(axes, way[-1], name, colour[name], 6)
         for slot in mark.slots:
             axes.add_patch(Circle(slot, 0.25, fill=False, ec=GREY, ls=":"))
     for group in scenario.group:
@@ -171,7 +172,8 @@ def _draw_ways(axes: Any, scenario: Scenario, orders: list[OrderMark]) -> None:
     for number, mark in enumerate(orders, 1):
         beside = _neighbours(scenario, mark.at, used) * scenario.world.size[0] / 40
         disc = {"boxstyle": "circle,pad=0.25", "facecolor": DARK, "edgecolor": "white"}
-        axes.text(mark.at[0] + beside, mark.at[1], str(number), color="white", weight="bold", ha="center", bbox=disc)
+        style: Any = {"color": "white", "weight": "bold", "ha": "center", "va": "center", "bbox": disc, "zorder": 5}
+        axes.text(mark.at[0] + beside, mark.at[1], str(number), **style)
 
 
 def _neighbours(scenario: Scenario, place: XY, used: list[XY]) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from scenarios.loading.toml_files import toml_value
 from scenarios.schema.scenario import GroupSpec, MergeOrder, Scenario, ScriptOrder, SplitOrder, Stop, When
 from scenarios.schema.values import Distribution, Point, Value
@@ -20,7 +22,10 @@ def number(value: Value, unit: str = "") -> str:
     if value.uniform is not None:
         return f"{value.uniform[0]:g} to {value.uniform[1]:g}{tail}"
     if value.choice is not None:
-        return " or ".join(f"{v:g}" for v in value.choice) + tail
+        times = Counter(value.choice)
+        equal = len(set(times.values())) == 1
+        shares = {v: "" if equal else f" ({n / len(value.choice):.0%})" for v, n in times.items()}
+        return " or ".join(f"{v:g}{share}" for v, share in shares.items()) + tail
     mean = value.exponential if value.exponential is not None else value.poisson
     return f"about {mean:g}{tail}{clip}"
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from typing import NoReturn
 
@@ -23,7 +24,7 @@ from scenarios.schema.scenario import (
 )
 # fmt: on
 # isort: on
-from scenarios.schema.values import Point, bounds, fixed
+from scenarios.schema.values import SURE, Distribution, Point, Value, bounds, fixed, share_within
 
 BODY = 0.2  # m: least distance from a person's middle to a wall or pillar (the radius of a body in the physics)
 
@@ -49,8 +50,14 @@ def _check_amounts(scenario: Scenario) -> None:
 
 
 def most_people(scenario: Scenario) -> float:
-    """Returns the greatest number of people that a scenario can have; inf if a size is unbounded."""
-    return sum(group.repeat * bounds(group.size)[1] for group in scenario.group)
+    """Returns how many people there can be, by sizes (powers of 2) that 999 of 1000 draws do not exceed."""
+    return sum(group.repeat * _most(group.size) for group in scenario.group)
+
+
+def _most(size: Value) -> float:
+    if not isinstance(size, Distribution):
+        return max(1.0, float(round(size)))
+    return next(2.0**k for k in count() if share_within(size, -math.inf, 2.0**k) >= SURE)
 
 
 def _check_world(scenario: Scenario) -> None:

@@ -36,6 +36,8 @@ def cut_walls(world: WorldSpec) -> tuple[list[WallSegment], list[WallSegment]]:
     """
     pieces, openings = list(world.walls), []
     for door in world.doors:
+        if not pieces:  # the doors before have opened all walls
+            break
         wall = min(pieces, key=partial(wall_distance, point=door.at))
         pieces.remove(wall)
         x, y, dx, dy = wall[0], wall[1], wall[2] - wall[0], wall[3] - wall[1]

@@ -88,7 +88,7 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
         key.removesuffix("_hash") for key in wanted if manifest.get(key, 1 if key == "stride" else None) != wanted[key]
     ]
     if other:
-        got = f"a sequence of another {' and '.join(other)}"
+        got = f"a sequence that differs in {', '.join(other)}"
         expected = "the same scenario, version, streams and images, or an empty place"
         raise InputError(file=folder, got=got, expected=expected, remedy="choose another --out, or delete that folder")
     return manifest

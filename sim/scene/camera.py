@@ -241,7 +241,7 @@ def _facts(camera: Camera) -> Iterator[tuple[str, bool, str, str]]:
         yield from _lens(camera)
     with np.errstate(over="ignore", invalid="ignore"):
         off = float(np.abs(product(r, r.T) - np.eye(3)).max())
-    turn = float(dot(r[0], np.cross(r[1], r[2])))
+        turn = float(dot(r[0], np.cross(r[1], r[2])))
     got = f"rows that are no unit vectors at right angles (off by {off:.2g}), or mirrored (determinant {turn:.2g})"
     expected = "a rotation matrix, world to camera: x right, y down, z forward"
     yield "rotation", off <= ROTATION_TOLERANCE and turn > 0, got, expected

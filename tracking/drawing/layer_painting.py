@@ -17,7 +17,7 @@ from tracking.drawing.canvas import (
     text,
     text_width,
 )
-from tracking.drawing.layers import FrameMarks, GroupMark, Layer
+from tracking.drawing.layers import NO_POINTS, FrameMarks, GroupMark, Layer
 
 CAPTION_SECONDS = 2.5  # s for which an event's caption is shown.
 
@@ -76,8 +76,8 @@ def paint_layer(canvas: Canvas, layer: Layer, index: int, fps: float) -> None:
             canvas.line(corners, ink, 1 if thin else 2, closed=True)
         elif np.isfinite(marks.at[k]).all():
             canvas.disc(marks.at[k], radius, ink, 2 if layer.plain else -1)
-    for group in groups[:MANY]:
-        _paint_group_id(canvas, layer.prefix, group)
+    for k, group in enumerate(groups[:MANY]):
+        _paint_group_id(canvas, layer.prefix, group, marks.at[k : k + 1] if marks.whole_groups else NO_POINTS)
     if not layer.plain and len(marks.id) <= MANY and not marks.whole_groups:
         _paint_ids(canvas, marks, radius)
 
@@ -111,8 +111,9 @@ def _paint_ring(canvas: Canvas, ring: Array, ink: Colour) -> None:
         canvas.line(ring, ink, 1, closed=True)
 
 
-def _paint_group_id(canvas: Canvas, prefix: str, group: GroupMark) -> None:
-    for points in [canvas.map(part) for part in (group.hull, group.extent) if len(part)][:1]:
+def _paint_group_id(canvas: Canvas, prefix: str, group: GroupMark, centre: Array) -> None:
+    known = [part for part in (group.hull, group.extent, centre) if len(part) and np.isfinite(part).all()]
+    for points in map(canvas.map, known[:1]):
         x, y = points[points[:, 1].argmax()]
         words = f"{prefix}{group.id}" + (f" ~{round(group.size, 1):g}" if np.isfinite(group.size) else "")
         size = letter_size(canvas)

@@ -52,7 +52,9 @@ def draw_scene(canvas: Canvas, scene: Scene | None) -> None:
     width, depth = scene.size
     canvas.line(np.array([[0, 0], [width, 0], [width, depth], [0, depth]]), THING, 2, closed=True)
     for flight in scene.stairs:
-        canvas.line(np.stack([flight.foot, flight.head]), THING, round(flight.width * canvas.scale))
+        ends, (along, across) = np.stack([flight.foot, flight.head]), flight.head - flight.foot
+        side = np.array([-across, along]) / np.hypot(along, across) * flight.width / 2
+        canvas.line(np.concatenate([ends - side, ends[::-1] + side]), THING, 2, closed=True)
     for wall in scene.walls:
         canvas.line(wall, WALL, 6)
     for door in scene.doors:

@@ -60,11 +60,6 @@ class Belief:
     memory: float = 1.0  # (s): a missed member stays so long in the group
     arrival: float = 1.0  # (s): people who were together so soon after a first frame arrived together: no merge
 
-    @property
-    def smooth(self) -> float:
-        """Time over which velocities of tracks are replaced by chords, s: 0, as the belief uses positions only."""
-        return 0.0
-
     def as_dict(self) -> dict[str, object]:
         """Returns the entries of run.json about the belief: kind, bias, its numbers, and a hash of `toml_text`."""
         text, numbers = self.toml_text().encode(), {name: getattr(self, name) for name in NUMBERS}
@@ -149,7 +144,8 @@ def _table(path: str | Path, place: str, row: Any) -> Table:
         _refuse(path, place, row, ", ".join(keys))
     if row["name"] not in NAMES:
         _refuse(path, f"{place}: name", row["name"], "one of " + "; ".join(NAMES))
-    columns = np.array([_numbers(path, f"{place}: {key}", row[key], np.size(row["at"])) for key in keys[1:]])
+    count = len(row["at"]) if isinstance(row["at"], list) else 1
+    columns = np.array([_numbers(path, f"{place}: {key}", row[key], count) for key in keys[1:]])
     if len(columns[0]) < 2 or (np.diff(columns[0]) <= 0).any():
         _refuse(path, f"{place}: at", row["at"], "two ascending numbers or more")
     return Table(row["name"], columns[0], columns[1:])

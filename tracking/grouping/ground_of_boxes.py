@@ -7,8 +7,9 @@ height H who stands there has a box of height h. With r = 1 - h / (focal s), the
     H / C = (1 - r) / (1 - r s sin t cos t)                                                                         (1)
 
 so that each tilt gives one value for each box. The tilt is the one on which the boxes agree best: with the least mean
-absolute deviation of ln (H / C) from its median. Where the boxes do not agree much better than on one height in px
-(equal boxes, all people at one row, stairs, a moving camera), the ground is unknown.
+absolute deviation of ln (H / C) from its median. Lone deviations are bounded, as boxes are cut and people sit. Where
+the boxes do not agree much better than on one height in px (equal boxes, all people at one row, stairs, a moving
+camera), the ground is unknown.
 
 The first boxes decide, so that later frames change nothing. The focal length hardly matters for who is together: scores
 of groups are the same from 0.8 to 1.1 of the width of the picture, and a little lower at 1.5.
@@ -27,7 +28,7 @@ from sim.types import Array, Camera, Tracks
 BOXES, LEAST = 300, 100  # boxes that the first frames hold together, and least number
 TILTS = np.radians(np.arange(-10.0, 71.0))
 FOCAL = 1.1  # focal length over the width of the picture: between wide lenses (0.8) and surveillance (1.5)
-CANNOT_STAND = 0.5  # deviation of ln (H / C) that counts for boxes that cannot stand on the ground
+FARTHEST = 0.5  # largest deviation of ln (H / C) that counts, and that of boxes that cannot stand on the ground
 SURE = 2 / 3  # the mean deviation must be below that of ln h times this
 
 
@@ -87,4 +88,4 @@ def _log_ratios(foot: Array, size: Array) -> Array:
 
 
 def _spread(deviation: Array) -> Array:
-    return np.asarray(np.where(np.isnan(deviation), CANNOT_STAND, np.abs(deviation)).mean(axis=-1))
+    return np.asarray(np.nan_to_num(np.minimum(np.abs(deviation), FARTHEST), nan=FARTHEST).mean(axis=-1))

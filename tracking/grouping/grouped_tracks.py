@@ -179,7 +179,9 @@ def groups_in_frames(tracks: Sequence[Tracks], px_per_m: float = 1.0) -> list[Gr
     if not tracks:
         return []
     frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])
-    id, group, pos, vel = (np.concatenate([getattr(t, name) for t in tracks]) for name in ("id", "group", "pos", "vel"))
+    id, group = np.concatenate([t.id for t in tracks]), np.concatenate([t.group for t in tracks])
+    # of people in space x and y, as frames without groups have two coordinates, too
+    pos, vel = np.concatenate([t.pos[:, :2] for t in tracks]), np.concatenate([t.vel[:, :2] for t in tracks])
     box = np.concatenate([
         np.full((len(t.id), 4), np.nan) if t.box is None or t.plane != "image" else t.box for t in tracks
     ])  # fmt: skip

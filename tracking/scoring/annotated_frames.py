@@ -57,7 +57,9 @@ def annotated_frames(truth: Truth) -> AnnotatedFrames:
 
 
 def _labelled_frames(truth: Truth) -> Ints:
-    beside = [] if truth.unscored is None else [truth.unscored.frame]
+    # Without distractors, such rows may stand between keyframes.
+    rest = truth.unscored
+    beside = [rest.frame] if rest is not None and rest.distractor.any() else []
     grouped = [] if truth.labelled is None else [np.flatnonzero(truth.labelled) + 1]
     return np.unique(np.concatenate([truth.frame, *beside, *grouped]))
 

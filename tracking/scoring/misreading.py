@@ -27,9 +27,9 @@ PAIRS = 20_000  # Most pairs of boxes that are looked at, unless one frame has m
 SPREAD = 0.25  # Least ratio of the extents of both sides, lest positions that shrink to the origin match labels there.
 SHIFTS = (1, -1, 2, -2, 5, -5, 10, -10)
 RATES = (2, 3, 4, 5, 6, 10, 12, 15, 25, 30)
-SCALES = (1 / 3, 0.5, 2 / 3, 0.75, 4 / 3, 1.5, 2.0, 3.0, 4.0)
+SCALES = (1 / 3, 0.5, 2 / 3, 0.75, 0.8, 1.25, 4 / 3, 1.5, 2.0, 2.25, 3.0, 4.0)
 # Sides in px of square pictures that detectors stretch a picture to; 1: shares of the picture.
-SQUARES = (1, 320, 416, 512, 608, 640, 768, 800, 960, 1024, 1280)
+SQUARES = (1, 320, 416, 512, 608, 640, 768, 800, 960, 1000, 1024, 1280)
 SIDE = 3.0  # Side in m of the square that stands for a position.
 
 # A way to read the tracks: how far it is from the usual one, minus the share of boxes that match, what is done, remedy.
@@ -77,10 +77,13 @@ class Side:
         return Side(self.rows.keep(mask), self.values[mask])
 
 
-def likely_misreading(truth: Truth, tracks: SequenceOf[Tracks], size: tuple[int, int] | None = None) -> str:
+def likely_misreading(
+    truth: Truth, tracks: SequenceOf[Tracks], size: tuple[int, int] | None = None, files: bool = True
+) -> str:
     """Returns a warning if hardly any tracked person matches a label though both sides have people, else "".
 
-    size: width and height of the pictures, px, None if unknown.
+    size: width and height of the pictures, px, None if unknown. files: False if the tracks are arrays, for which the
+    remedies of files are of no use.
     """
     sides = _comparable(truth, tracks)
     if sides is None:
@@ -106,8 +109,9 @@ def likely_misreading(truth: Truth, tracks: SequenceOf[Tracks], size: tuple[int,
         words = f"no frame in common: labels in frames {labels}, tracks in frames {numbers}"
     if good:
         _, matching, done, remedy = min(good)
+        remedy = remedy if files else "give frames, order and units of the columns as in the truth"
         return f"{words}; {done}, {-matching:.0%} would: {remedy}"
-    tried = " No other columns, scale or shift of frames match better." if len(together) else ""
+    tried = " No other usual columns, scale or shift of frames match better." if len(together) else ""
     return f"{words}.{tried} Check the columns, and that these are tracks of this very sequence"
 
 

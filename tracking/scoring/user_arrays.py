@@ -90,7 +90,7 @@ def score_arrays(
     annotated = annotated_frames(made).frames
     known = np.flatnonzero(annotated) if annotated[est["frame"]].all() else np.arange(1, length + 1)
     given = _tracks(est, known, fps, scale, plane, true["group"] is not None)
-    doubt = likely_misreading(made, given)
+    doubt = likely_misreading(made, given, files=False)
     if doubt:
         warnings.warn(doubt, stacklevel=2)
     return evaluate(made, given, similarity=similarity, group_match=group_match)

@@ -12,7 +12,7 @@ result is then played on N seeds that the search has not seen. If fewer than 80 
 the start, if that is less), they become confirming seeds, too, and the search goes on from the last accepted scene that
 holds on all. After three rounds it stops there. The seeds on which the last result is shown are always new.
 
-Episodes depend on scenario and seed only. No episode is played twice, and workers do not change the result.
+Episodes depend on scenario and seed only. No episode is played twice.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from sim.io.files.own_files import GENERATOR, output_paths
 from sim.io.files.tables import json_text
 from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
-from sim.io.store.seal import read_manifest
+from sim.io.store.seal import read_whole_manifest
 from sim.streams import file_name
 from sim.types import Array, Ints, Sequence, Truth
 
@@ -55,10 +55,10 @@ def coco(source: str | Path, out: str | Path, *, person_class: int | str | None 
     if not sequences:
         expected, remedy = "a dataset with boxes", "give a generated dataset"
         raise InputError(file=source, got="no labelled boxes", expected=expected, remedy=remedy)
-    seeds = [s.source["seed"] for s in sequences if s.source.get("kind") == "generated"]
-    splits = sorted({split_of(range(seed, seed + 1)) for seed in seeds})
+    made = [s.source for s in sequences if s.source.get("kind") == "generated"]
+    splits = sorted({split_of(range(facts["seed"], facts["seed"] + 1)) for facts in made})
     if len(splits) > 1:
-        got, remedy = f"the splits {', '.join(splits)}", f"export each by itself, as {source / 'flockscope-train'}"
+        got, remedy = f"the splits {', '.join(splits)}", f"export each by itself, as {Path(made[0]['path']).parent}"
         raise InputError(file=source, got=got, expected="one split in a file", remedy=remedy)
     output_paths("", [s.name for s in sequences], source=source)
     write_file(out, _document(sequences, source if source.is_dir() else source.parent, out).encode())
@@ -69,7 +69,7 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
     info: dict[str, Any] = {"description": GENERATOR, "version": "1"}
     if all(s.source.get("kind") == "generated" for s in sequences):
         folders = [Path(s.source["path"]) for s in sequences]
-        hashes = {split_and_name(folder): read_manifest(folder)["content_hash"] for folder in folders}
+        hashes = {split_and_name(folder): read_whole_manifest(folder)["content_hash"] for folder in folders}
         info["content_hash"] = hashing.dataset_hash(hashes)
     info["root"] = Path(os.path.relpath(root, path.parent)).as_posix()
     videos, images, annotations = [], list[str](), list[str]()

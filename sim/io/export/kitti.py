@@ -22,7 +22,7 @@ from sim.io.files.atomic import write_file
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
 from sim.io.store.camera_files import read_camera
-from sim.io.store.seal import read_manifest
+from sim.io.store.seal import read_whole_manifest
 from sim.types import Camera
 
 FOLDERS = {"left": "image_2", "right": "image_3", "disparity": "disp_noc_0"}
@@ -64,7 +64,7 @@ def calibration(camera: Camera) -> str:
 
 
 def _export(folder: Path, target: Path) -> None:
-    stored = StoredPictures(folder, read_manifest(folder))
+    stored = StoredPictures(folder, read_whole_manifest(folder))
     missing = [name for name in ("left", "right") if name not in stored.streams]
     if missing:
         remedy = "generate it with --streams left,right,disparity"

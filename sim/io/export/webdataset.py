@@ -2,12 +2,13 @@
 
 A sample is a whole sequence: all its files, hence its content hash. They share a key and stand next to each other. The
 same dataset gives the same bytes: members are sorted by sequence and have no times or owners. index.json lists all
-shards. The folder appears complete or not at all.
+shards. The files appear when all are complete, index.json last.
 """
 
 from __future__ import annotations
 
 import io
+import os
 import re
 import tarfile
 from collections.abc import Callable, Iterator
@@ -18,11 +19,11 @@ from typing import Any
 from scenarios.errors import InputError
 from sim import hashing
 from sim.io.files import tables
-from sim.io.files.atomic import lock_folder, new_folder, remove_partials, write_file
+from sim.io.files.atomic import lock_folder, remove_partials, staged_path, write_file
 from sim.io.files.own_files import is_side_file
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import sequence_folders, split_and_name
-from sim.io.store.seal import MANIFEST, read_manifest
+from sim.io.store.seal import MANIFEST, read_whole_manifest
 
 BLOCK = 512  # bytes: a tar holds whole blocks
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
@@ -49,15 +50,20 @@ def webdataset(
     hashes = {split_and_name(p): content for some in shards for p, content in some.items()}
     content = hashing.dataset_hash(hashes)
     with lock_folder(root):
-        remove_partials(root.parent, of=root.name)
+        remove_partials(root)
         _reject_others(root, content, len(shards))
-        with new_folder(root, lambda: _reject_others(root, content, len(shards))) as partial:
+        # Inside the folder, which may be a link, a mount or the current one.
+        with staged_path(root / INDEX) as partial:
+            partial.mkdir()
             for number, some in enumerate(shards):
                 done.append(_write_shard(partial / _name(number), some))
                 if progress is not None:
                     progress(len(done), len(shards), done[-1]["name"])
             index = {"format": tables.FORMAT, "content_hash": content, "shards": done}
-            write_file(partial / INDEX, tables.json_document(index))
+            (root / INDEX).unlink(missing_ok=True)
+            for facts in done:
+                os.replace(partial / facts["name"], root / facts["name"])
+            write_file(root / INDEX, tables.json_document(index))
     return index
 
 
@@ -65,14 +71,13 @@ def _name(number: int) -> str:
     return f"shard-{number:06d}.tar"
 
 
-def _reject_others(root: Path, content: str, count: int) -> bool:
+def _reject_others(root: Path, content: str, count: int) -> None:
     """Raises InputError if the folder holds anything but the same export."""
     found = {path.name for path in root.iterdir() if not is_side_file(path.name)}
     stored = tables.read_json(root / INDEX).get("content_hash") if INDEX in found else None
     if found and not (stored == content and found == {INDEX, *map(_name, range(count))}):
         got, remedy = "other files, or another export", "choose another --out, or delete that folder"
         raise InputError(file=root, got=got, expected="this dataset in shards of this size, or nothing", remedy=remedy)
-    return False
 
 
 def size_of(text: str) -> int:
@@ -94,7 +99,7 @@ def _shards(source: Path, size: int) -> list[dict[Path, str]]:
     shards: list[dict[Path, str]] = []
     full = size
     for folder in folders:
-        manifest = read_manifest(folder)  # not kept: those of a large dataset would fill the memory
+        manifest = read_whole_manifest(folder)  # not kept: those of a large dataset would fill the memory
         sizes = {MANIFEST: (folder / MANIFEST).stat().st_size}
         sizes |= {name: facts["bytes"] for name, facts in manifest["files"].items()}
         # A header before each file, and two more blocks with its name if that is long.
@@ -125,7 +130,7 @@ def _write_shard(path: Path, some: dict[Path, str]) -> dict[str, Any]:
 
 def _members(folder: Path) -> Iterator[tuple[str, bytes]]:
     """Yields name and content of each file of a sequence as it stands in the tar, the manifest first."""
-    stored = StoredPictures(folder, read_manifest(folder))
+    stored = StoredPictures(folder, read_whole_manifest(folder))
     yield f"{_key(folder)}.{MANIFEST}", (folder / MANIFEST).read_bytes()
     for name in stored.manifest["files"]:
         yield f"{_key(folder)}.{name.replace('/', '.')}", stored.body(name)

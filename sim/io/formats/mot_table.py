@@ -28,6 +28,10 @@ ENOUGH = 10  # rows that are needed to judge by how their columns vary
 
 MOST_SHARE = 2.0  # greatest left and top of boxes in shares of the picture; people may be partly outside
 
+PERSON = (1.2, 6.0)  # height of a person's box divided by its width
+
+STAY = 0.5  # least share of rows whose id is in the frame before or after, too, among tracks
+
 SMOOTH = 0.3  # Corners: the difference of x2 and x1 varies by less than this part of what x2 does
 
 BEYOND = 0.2  # share of boxes beyond the picture, above which they are those of larger pictures
@@ -38,16 +42,36 @@ NO_ID = "frame,left,top,width,height,score"
 
 
 def reject_missing_ids(rows: NumericTable) -> None:
-    """Raises InputError if the ids seem to be missing: column 2 is then the left edge, and column 6 a score up to 1."""
+    """Raises InputError if column 2 is no id but the left edge of a box, and the ids are missing."""
     values = rows.values
-    if not len(values) or values.shape[1] < 6 or (values[:, 1] == -1).all():
+    frame, id = values[:, 0], values[:, 1]
+    if not len(values) or values.shape[1] < 6 or (id == -1).all():
         return
-    if ((values[:, 5] >= 0) & (values[:, 5] <= 1) & (values[:, 4] > 1) & (values[:, 3] > 1)).all():
+    # Column 6 then holds scores: at most 1, which is no height. Scores up to 100 show in other ways: the six columns
+    # make boxes of people one column earlier only, and the ids do not last.
+    score = (values[:, 5] >= 0) & (values[:, 5] <= 1) & (values[:, 4] > 1) & (values[:, 3] > 1)
+    earlier = values.shape[1] == 6 and _aspect(values[:, 1:5]) and not _aspect(values[:, 2:6]) and not _lasts(frame, id)
+    if score.all() or (len(values) >= ENOUGH and earlier):
         raise InputError(
             file=rows.file, place="columns", got=f"in {len(values)} lines what looks like {NO_ID} without an id",
             expected="frame,id,left,top,width,height,…", remedy=f"write {NO_ID} as the first line, if they are these, "
             "or -1 as the id",
         )  # fmt: skip
+
+
+def _aspect(box: Array) -> bool:
+    low, high = PERSON
+    return bool(low <= np.median(box[:, 3] / np.maximum(box[:, 2], 1e-9)) <= high)
+
+
+def _lasts(frame: Array, id: Array) -> bool:
+    if len(np.unique(frame)) < 2 or (np.diff(id) > 0).all():
+        return True
+    number = np.unique(frame, return_inverse=True)[1]
+    order = np.lexsort((number, id))
+    follows = (np.diff(id[order]) == 0) & (np.diff(number[order]) == 1)
+    near = np.append(follows, False) | np.append(False, follows)
+    return bool(near.mean() >= STAY)
 
 
 def require_pixels(rows: NumericTable, box: Array) -> None:

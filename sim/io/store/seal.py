@@ -20,8 +20,8 @@ from sim import hashing
 from sim.io.files import tables
 from sim.io.files.own_files import Marks, is_ours
 from sim.io.files.tables import Count, FrameNumber, Id, Rate, Scale, validated
-from sim.streams import IMAGES, STREAMS, check_streams, coding
-from sim.types import Sequence
+from sim.streams import IMAGES, STREAMS, check_streams, coding, file_name
+from sim.types import BACKGROUNDS, Sequence
 
 MANIFEST, RUN = "manifest.json", "run.json"
 # what every manifest.json and run.json of ours has, and no other program writes
@@ -200,6 +200,27 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     if manifest.get("streams") and manifest["sequence"]["image_size"] is None:
         expected = "the size of the pictures"
         raise InputError(file=path, place="sequence.image_size", got="null", expected=expected, remedy=REDO)
+    return manifest
+
+
+def read_whole_manifest(folder: Path) -> dict[str, Any]:
+    """Returns the manifest of a sequence that is exported: it must name every file of the sequence."""
+    manifest = read_manifest(folder)
+    length, images = manifest["sequence"]["length"], manifest.get("images") or "png"
+    wanted = ["scenario.toml", "seqinfo.ini"]
+    for stream in manifest.get("streams", ()):
+        count = BACKGROUNDS if stream == "background" else length
+        wanted += [file_name(stream, images, k) for k in range(1, count + 1)]
+    expected = "every file of the sequence"
+    first, *more = [name for name in wanted if name not in manifest["files"]] or [""]
+    if first:
+        got = f"no {first}" + (f" and {len(more)} more" if more else "")
+        raise InputError(file=folder / MANIFEST, place="files", got=got, expected=expected, remedy=REDO)
+    # A stranger's dataset must not make an export read files elsewhere.
+    for path in (folder / name for name in (MANIFEST, *manifest["files"])):
+        if not path.resolve().is_relative_to(folder.resolve()):
+            got, remedy = "a link that leads out of the sequence", "export a copy that holds the files (cp -rL)"
+            raise InputError(file=path, got=got, expected=expected, remedy=remedy)
     return manifest
 
 

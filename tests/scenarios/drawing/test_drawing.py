@@ -6,8 +6,9 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from scenarios.drawing.plan import svg
-from scenarios.drawing.words import text
+from scenarios.drawing.words import number, text
 from scenarios.loading.resolve import load, names
+from scenarios.schema.values import Distribution
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -20,6 +21,11 @@ def test_text_says_who_what_and_when(path: Path) -> None:
     said = text(load(path))
     for words in ("1.2 ± 0.1 m/s", "from (11, 3 to 5) past (9, 4)", "merge a + b → ab", "after m1, 4 s later", "95%"):
         assert words in said
+
+
+def test_text_says_how_often_a_value_is_chosen() -> None:
+    choices = {(1, 1, 2, 1): "1 (75%) or 2 (25%)", (3, 2, 3, 2): "3 or 2", (4,): "4"}
+    assert [number(Distribution(choice=choice)) for choice in choices] == list(choices.values())
 
 
 def test_svg_is_well_formed_and_names_groups_and_orders(path: Path) -> None:

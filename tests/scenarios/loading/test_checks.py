@@ -80,6 +80,7 @@ RIGHT = [
     ["turn_deg={uniform=[0, 360]}", "group.a.start=[2, 2]"],  # turned: its place depends on the draw
     ["group.a.start=[{normal=[5, 1]}, 5]"],
     ["group.w.size={poisson=1.1, clip=[1, 6]}"],
+    ["world.walls=[[0, 8, 2, 8]]", "world.doors=[{at=[1, 8], width=2}, {at=[1, 8], width=2}]"],  # no wall is left
 ]
 
 

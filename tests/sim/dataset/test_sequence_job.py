@@ -76,7 +76,7 @@ def test_a_folder_of_others_is_no_place_for_a_sequence(job: SequenceJob, made: F
 
 
 DIFFERENCES = [
-    ({"camera": {"fps": 5}}, {"streams": ("left",)}, "scenario and streams and images"),
+    ({"camera": {"fps": 5}}, {"streams": ("left",)}, "scenario, streams, images"),
     ({"about": "1.2.0"}, {}, "scenario"),
     ({}, {"stride": 4}, "stride"),
 ]
@@ -90,4 +90,4 @@ def test_what_differs_is_named(
     other = SequenceJob(job.folder, Entry("x", scenario(**more)), 1, **change)
     with pytest.raises(InputError) as refused:
         stored_manifest(other)
-    assert refused.value.got == f"a sequence of another {words}"
+    assert refused.value.got == f"a sequence that differs in {words}"

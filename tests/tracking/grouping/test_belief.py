@@ -130,6 +130,7 @@ BAD_FILES = [
     ('name = "sideways, 5 s"', 'name = "sideways, 3 s"', "table 8: name"),
     ("now = [", "now = [1, ", "table 1: now"),
     ("at = [", "at = [9, ", "table 1: now"),
+    ("at = [", "at = [[1], [2, 3], ", "table 1: at"),
     ("events = [", 'events = ["x", ', "table 1: events"),
     ("events = [", "change = [", "table 1"),
     ("[[table]]", "[[row]]", "grouping"),

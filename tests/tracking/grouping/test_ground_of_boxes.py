@@ -21,14 +21,16 @@ from tracking.running.run import grouped
 
 
 @pytest.mark.parametrize(
-    ("tilt", "height", "known"), [(15, 6, True), (40, 8, True), (65, 8, True), (90, 20, False), (3, 2.2, True)]
+    ("tilt", "height", "known", "cut"),
+    [(15, 6, True, 0), (40, 8, True, 0), (65, 8, True, 0), (90, 20, False, 0), (3, 2.2, True, 0), (25, 6, True, 0.2)],
 )
-def test_ground_is_that_of_the_camera_or_unknown(tilt: float, height: float, known: bool) -> None:
+def test_ground_is_that_of_the_camera_or_unknown(tilt: float, height: float, known: bool, cut: float) -> None:
     view, r = camera_rotation(np.radians(tilt), 0.0), np.random.default_rng(30_000)
     camera = Camera("pinhole", (640, 480), (700.0, 700.0), (320.0, 240.0), np.array([0.0, 0.0, height]), view)
     away = height / np.tan(np.radians(max(tilt, 10)))
     feet = np.column_stack([r.uniform(-3, 3, 400), away * r.uniform(0.7, 1.6, 400), np.zeros(400)])
     box = person_boxes(camera, feet, np.zeros(400), r.normal(1.7, 0.08, 400))
+    box[:, 3] *= np.where(r.random(400) < cut, r.uniform(0.1, 0.4, 400), 1)
     one = (np.arange(400), np.full(400, -1), box[:, :2], box[:, :2], np.zeros((400, 4, 4)), box)
     tracks, px_per_m = Tracks(1, 0.0, "image", "person", *one), np.median(box[:, 3]) / 1.7
     ground = ground_below([tracks], None, px_per_m, pixels=False)

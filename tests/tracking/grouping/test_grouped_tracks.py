@@ -64,6 +64,8 @@ def test_a_pair_is_a_group_once_it_is_acquainted():
     assert all(len(t.groups.id) == (t.index > 9) for t in made)
     assert events(made) == [], "who was there when it began neither formed nor entered"
     assert made[50].groups.members[0].tolist() == [1, 2]
+    high = [t.replace(plane="space", pos=np.pad(t.pos, ((0, 0), (0, 1)))) for t in tracks(side_by_side())]
+    assert {t.groups.pos.shape[1] for t in derive(high, FPS, rule=RULE)} == {2}, "as of frames without groups"
 
 
 def test_merge_is_told_when_known_and_dated_back():

@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from sim.types import Groups, Truth
+from sim.types import Groups, Truth, Unscored
 from tests.hand_made import with_rows
 from tracking import track
 from tracking.objective import ObjectiveScorer
@@ -54,6 +54,11 @@ def test_sparse_labels_are_found(kind: str) -> None:
     found = annotated_frames(labelled_in(frames))
     assert np.flatnonzero(found.frames).tolist() == list(expected)
     assert found.step == step
+
+
+def test_rows_to_be_ignored_are_no_labels() -> None:
+    ignored = Unscored(np.arange(1, LENGTH + 1), np.tile([0.0, 0, 40, 100], (LENGTH, 1)), np.zeros(LENGTH, bool))
+    assert annotated_frames(labelled_in(range(1, LENGTH, 10), unscored=ignored)).step == 10
 
 
 def visits(seed: int) -> list[int]:

@@ -69,6 +69,11 @@ def test_empty_sides_are_no_error() -> None:
     assert score_arrays(none, none, fps=10)["FP"] == 0
 
 
+def test_the_warning_of_misread_arrays_names_nothing_of_files() -> None:
+    with pytest.warns(UserWarning, match=r"read as x_cm,y_cm, 100% would: give frames, order and units of the columns"):
+        score_arrays(ROWS | {"pos": np.full((4, 2), 5)}, ROWS | {"pos": np.full((4, 2), 500)}, fps=10)
+
+
 WRONG_COLUMNS = [
     ({"grp": [1, 1, 1, 1]}, "'grp'"), ({"pos": None}, "frame, id, and pos or box"),
     ({"pos": [0, 1, 0, 1]}, r"pos of shape \(4,\)"), ({"id": [1, 2, 1]}, "3 rows of id"),

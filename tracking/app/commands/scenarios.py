@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import dump, load, names, read_suite, resolve, suite_file, suite_names
@@ -25,8 +26,22 @@ def scenarios(options: ScenariosOptions) -> CommandResult:
             raise InputError(place=option, got=got, expected="NAME", remedy=remedy)
     if not options.schema:
         return catalogue()
-    schema = Scenario.model_json_schema(by_alias=True)
+    schema = file_schema()
     return CommandResult({"schema": schema}, json.dumps(schema, indent=1, ensure_ascii=False))
+
+
+def file_schema() -> dict[str, Any]:
+    """Returns the JSON schema of scenario files; keys that `extends` may give a file are optional."""
+    schema = Scenario.model_json_schema(by_alias=True)
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    schema["properties"]["extends"] = {"type": "string", "description": "a file or scenario to which this one is added"}
+    del schema["required"]
+    for table in schema["$defs"].values():
+        if "id" in table["properties"]:
+            table["required"] = ["id"]
+    orders = schema["properties"]["event"]["items"]
+    schema["properties"]["event"]["items"] = {"anyOf": orders["oneOf"]}  # without `type` several kinds may fit
+    return schema
 
 
 def catalogue() -> CommandResult:

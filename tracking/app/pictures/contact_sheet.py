@@ -16,7 +16,7 @@ import numpy as np
 from scenarios.errors import InputError, counted
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import marked_png
-from sim.types import Array, GroupEvent, Image, Scene, Sequence, Tracks
+from sim.types import Array, GroupEvent, Image, Ints, Scene, Sequence, Tracks
 from tracking.drawing.canvas import FLOOR, INK, QUIET, THING, TRAIL_SECONDS, Canvas, text, text_width
 from tracking.drawing.layer_painting import KIND_COLOUR, event_words, kind_colour, paint_layer
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
@@ -200,16 +200,23 @@ def _draw_foot(area: Image, layer: Layer, length: int, fps: float, chosen: Itera
 def choose_frames(layer: Layer, length: int, fps: float, count: int) -> list[int]:
     """Returns the numbers, from 1, of `count` frames in ascending order.
 
-    Frames in which events become known are taken first, by rank of the kind, if they are more than 1 s apart. Then
-    frames are added, each as far as possible from all frames chosen so far.
+    Frames in which events become known are taken first, by rank of the kind, if they are more than 1 s apart; then any
+    frames are added. Each frame is taken as far as possible from all frames chosen so far.
     """
-    shown = [(known, e.kind) for known, e in layer.events if e.kind in SHOWN_KINDS and 1 <= known <= length]
-    every, wanted, chosen = np.arange(1, length + 1), min(max(1, count), length), list[int]()
-    for known, _ in sorted(shown, key=lambda item: (SHOWN_KINDS[item[1]], item[0])):
-        if len(chosen) < wanted and all(abs(known - one) > CLOSE_SECONDS * fps for one in chosen):
-            chosen.append(known)
+    wanted, chosen = min(max(1, count), length), list[int]()
+    for rank in sorted({*SHOWN_KINDS.values()}):
+        pool = sorted({k for k, e in layer.events if SHOWN_KINDS.get(e.kind) == rank and 1 <= k <= length})
+        while len(chosen) < wanted:
+            pool = [k for k in pool if all(abs(k - one) > CLOSE_SECONDS * fps for one in chosen)]
+            if not pool:
+                break
+            chosen.append(_farthest(np.array(pool), chosen, length))
     while len(chosen) < wanted:
-        # The ends count as an eighth of the length further out, so that frames near them are chosen, too.
-        marks = np.array([-(length // 8), length + 1 + length // 8, *chosen])
-        chosen.append(int(every[np.abs(every[:, None] - marks).min(axis=1).argmax()]))
+        chosen.append(_farthest(np.arange(1, length + 1), chosen, length))
     return sorted(chosen)
+
+
+def _farthest(pool: Ints, chosen: list[int], length: int) -> int:
+    # The ends count as an eighth of the length further out, so that frames near them are chosen, too.
+    marks = np.array([-(length // 8), length + 1 + length // 8, *chosen])
+    return int(pool[np.abs(pool[:, None] - marks).min(axis=1).argmax()])

@@ -103,10 +103,9 @@ def associate(
 ) -> Bools:
     """Updates the groups of the bank in place by their associations (sec. 4.1 to 4.3) and returns the points that they
     have, (G, M); a point is one group's at most."""
-    weighted = scaled.config.appearance * log_ratio
-    log_density = point_log_density(bank.size, region, claims, weighted)
+    log_density = point_log_density(bank.size, region, claims, log_ratio)
     state, chosen = kernels.associate(
-        claims.points, claims.weights, claims.d2, weighted, claims.owner, claims.claimants,
+        claims.points, claims.weights, claims.d2, log_ratio, claims.owner, claims.claimants,
         shares(log_density, np.isfinite(log_density)), t - claims.last_seen, region,
         bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,
     )  # fmt: skip
@@ -122,13 +121,40 @@ def associate(
 
 
 def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio: Array) -> Array:
-    """Returns the log of N_g N(y; xi_g, S_g) times the colour ratio (G, M) of each point y and group g, without its
-    constant; -inf where a group may not have the point."""
+    """Returns the log of N_g N(y; xi_g, S_g) times the ratio that `log_ratio` has of each point y and group g, (G, M),
+    without its constant; -inf where a group may not have the point."""
     log_weight = np.log(np.maximum(size, 1e-300)) - np.log(np.linalg.det(region)) / 2
-    found = log_weight[:, None] - claims.d2 / 2 + (log_ratio if log_ratio.shape[1] else 0.0)
+    found = log_weight[:, None] - claims.d2 / 2 + log_ratio
     owned = np.flatnonzero(claims.owner >= 0)
     found[claims.owner[owned], owned] = 0.0
     return np.asarray(found)
+
+
+# Part of the density of a group's members that is even over its extent, of those who are not where they walked.
+LEAST_PLACES = 0.05
+
+
+def place_density(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> Array:
+    """Returns the density (G, M) of the points about the places to which each group's members have walked on since no
+    other group could have its points, and a little of it all over the group's extent."""
+    density = np.tile(LEAST_PLACES / np.sqrt(np.linalg.det(bank.extent))[:, None], len(points))
+    for row, (then, *velocity) in enumerate(bank.unshared.tolist()):
+        places = [y + (t - then) * np.array(velocity) for at, y in bank.recent_points[row] if at == then]
+        if places:
+            away = np.square(points[:, None] - places[0]).sum(2)
+            var = 2 * scaled.point_sd**2 + np.square(scaled.scale * SPLIT_SPEED * (t - then))
+            density[row] += (np.exp(-away / var / 2) / var).mean(1)
+    return density
+
+
+def log_ratio(density: Array, claims: PointClaims) -> Array:
+    """Returns log p(y | g) - log p(y | other groups) (G, M) of each shared point y, given p (G, M), and 0 of others."""
+    ratio, shared = np.zeros(claims.d2.shape), np.flatnonzero(claims.claimants > 1)
+    may = np.isfinite(claims.d2[:, shared])
+    p = np.where(may, density[:, shared], 0.0)
+    others = np.where(may, (p.sum(0) - p) / (claims.claimants[shared] - 1), 1.0)
+    ratio[:, shared] = np.log(np.where(may, p, 1.0)) - np.log(others)
+    return ratio
 
 
 def shares(log_density: Array, may: Bools) -> Array:
@@ -183,6 +209,8 @@ def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: Sca
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]
         kept = [p for p in bank.recent_points[row] if p[0] > t - RECENT_TIME]
         bank.recent_points[row] = [*kept, (t, thinned(mine))]
+        if not (exclusive[row] & (claims.claimants > 1)).any():
+            bank.unshared[row] = t, *bank.x[row, 2:]
         offset = mine - bank.x[row, :2]
         if not scaled.from_pixels:
             known = any_within(offset, bank.members[row].offset, scaled.scale * scaled.config.carry_reach)

@@ -105,8 +105,8 @@ def associate(
     """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (sec. 4.1 to 4.3).
 
     x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M) and
-    region (G, 2, 2): of `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour, or (G,
-    0) without colours. owner (M,): the row of the only group that may have the point outside its region, or -1.
+    region (G, 2, 2): of `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour
+    or place. owner (M,): the row of the only group that may have the point outside its region, or -1.
     claimants (M,): number of groups that may have the point. share (G, M): probability that a point is the group's. age
     (M,): time, s, since a missed member that stands in was measured, 0 for a point of this frame.
     rest (G,): True for groups whose extent and size must not change. rules: see association_mass_kernels.

@@ -115,19 +115,10 @@ def colour_bins(image: Image, points: Array) -> Ints:
     return np.asarray(level @ np.array([1, LEVELS, LEVELS**2]))
 
 
-def colour_log_ratio(bank: GroupBank, d2: Array, bins: Ints) -> Array:
-    """Returns log p(c | g) - log p(c | other groups) (G, M) of each point's colour c for each group g."""
-    ratio, may = np.zeros(d2.shape), np.isfinite(d2)
-    count = may.sum(0)
-    shared = np.flatnonzero(count > 1)
-    if not len(shared):
-        return ratio
+def colour_density(bank: GroupBank, bins: Ints) -> Array:
+    """Returns the probability (G, M) of each point's colour among the people of each group."""
     smooth = (bank.colour_hist + SMOOTHING / COLOUR_BINS) / (bank.colour_hist.sum(1, keepdims=True) + SMOOTHING)
-    may = may[:, shared]
-    p = np.where(may, smooth[:, bins[shared]], 0.0)
-    others = np.where(may, (p.sum(0) - p) / (count[shared] - 1), 1.0)
-    ratio[:, shared] = np.log(np.where(may, p, 1.0)) - np.log(others)
-    return ratio
+    return np.asarray(smooth[:, bins])
 
 
 def update_histograms(

@@ -69,21 +69,26 @@ class PairMoment(NamedTuple):
 
 
 def merge_onset(moments: list[PairMoment], alike: float) -> tuple[int, float]:
-    """Returns the index of the moment since which two groups are most probably one, and the evidence for it, s.
+    """Returns the index of the moment since which two groups are most probably one, and the evidence for it, s."""
+    t = np.array([m.t for m in moments])
+    total = np.concatenate([[0.0], np.cumsum(likeness(moments, alike)[1:] * np.diff(t))])
+    k = len(total) - 1 - int(total[::-1].argmin())
+    return k, float(total[-1] - total[k])
 
-    A moment adds at most its duration to the evidence if people of both are near and the velocities, averaged over two
-    steps, differ by less than `alike`, m/s; else it subtracts at most its duration. Before the first moment, the two
-    are taken to have moved with the velocity that the filter then had.
+
+def likeness(moments: list[PairMoment], alike: float) -> Array:
+    """Returns how much each of K moments is evidence that two groups are one, (K,): -1 (against) to 1 (for).
+
+    It is for one group if people of both are near and the velocities, averaged over two steps, differ by less than
+    `alike`, m/s; else against it. Before the first moment, the two are taken to have moved with the velocity that the
+    filter then had.
     """
     t, gap = np.array([m.t for m in moments]), np.array([m.gap for m in moments])
     before = np.linspace(-2 * WALK_TIME, 0, BEFORE, endpoint=False)
     came = moments[0].way + before[:, None] * moments[0].velocity
     way = np.concatenate([came, np.array([m.way for m in moments])])
     differ = chords(np.concatenate([t[0] + before, t]), way, WALK_TIME)[BEFORE:]
-    speaks = np.where(gap > MERGE_DISTANCE, -1.0, np.maximum(1 - np.square(differ / alike), -1.0))
-    total = np.concatenate([[0.0], np.cumsum(speaks[1:] * np.diff(t))])
-    k = len(total) - 1 - int(total[::-1].argmin())
-    return k, float(total[-1] - total[k])
+    return np.where(gap > MERGE_DISTANCE, -1.0, np.maximum(1 - np.square(differ / alike), -1.0))
 
 
 def windows(t: Array, half: float) -> tuple[Ints, Ints]:
@@ -281,7 +286,8 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     return GroupBank(
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1), size[None],
-        bank.parent[one], bank.colour_hist[rows].sum(0, keepdims=True),
+        np.array([[bank.last_seen[rows].max(), *x[2:]]]), bank.parent[one],
+        bank.colour_hist[rows].sum(0, keepdims=True),
         [MemberPlaces(offset, last_seen, known)], [pooled_points([bank.recent_points[r] for r in rows.tolist()])],
     )  # fmt: skip
 
@@ -333,7 +339,7 @@ def fall_apart(
     largest = int(np.lexsort((parts.x[:, 1], parts.x[:, 0], away, -parts.size))[0])
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
-    parts.recent_points[largest] = bank.recent_points[row]
+    parts.recent_points[largest], parts.unshared[:] = bank.recent_points[row], bank.unshared[row]
     places, members = bank.positions(row), bank.members[row]
     of = group[cKDTree(points).query(places)[1]]
     for k in range(len(parts)):

@@ -54,6 +54,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - pixels: on a grid of 0.1 m, each a share of a person. Paper: all, each counts one. Why: N in people; speed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
   similar groups cross.
+- places, from points (c): in the same, where members have walked since the group last shared no point, for 3 s. Paper:
+  none. Why: groups that meet keep their people.
 - split: after `split_time`; measured frames count back; members' places go along; (c) parent's velocity. Paper: after
   infeasible frames, at rest. Why: misses.
 - parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
@@ -100,6 +102,8 @@ from tracking.papers.group_pda.association import (
     below_heads,
     claimed,
     gated_distances,
+    log_ratio,
+    place_density,
     remember,
     search_regions,
     with_missed_members,
@@ -109,7 +113,7 @@ from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.from_pixels import (
     ForegroundPoints,
     colour_bins,
-    colour_log_ratio,
+    colour_density,
     sine_tilt,
     update_histograms,
 )
@@ -262,8 +266,14 @@ class GroupPda:
         d2 = gated_distances(bank, points, region, scaled)
         claims = with_missed_members(claimed(points, weights, d2, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
-        log_ratio = colour_log_ratio(bank, claims.d2, self.colours) if scaled.colour_bins else np.zeros((len(bank), 0))
-        mine = associate(bank, claims, region, log_ratio, scaled, t)
+        if scaled.colour_bins:
+            density = colour_density(bank, self.colours)
+        elif scaled.from_pixels or not self.config.corrections:
+            density = np.ones(claims.d2.shape)
+        else:
+            density = place_density(bank, claims.points, scaled, t)
+        weight = self.config.appearance if scaled.colour_bins else 1.0
+        mine = associate(bank, claims, region, weight * log_ratio(density, claims), scaled, t)
         remember(bank, claims, mine, scaled, t)
         if scaled.colour_bins:
             update_histograms(bank, mine, claims.claimants, self.colours, claims.weights, scaled)

@@ -9,7 +9,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
-from tracking.papers.joint.partition_labels_kernels import canonical, validity_of
+from tracking.papers.joint.partition_labels_kernels import validity_of
 
 MOST_LISTED = 6
 """Largest group of which all divisions into two parts are tried."""
@@ -39,9 +39,9 @@ def divide(points: Array, cluster: Ints, g: int, uniform: float, sharpness: floa
     while row < len(sides) - 1 and uniform * total >= reached:
         row += 1
         reached += energy[row]
-    for k in range(len(members)):
-        label[members[k]] = len(label) + 1 + sides[row, k]  # no other label is that large
-    canonical(label)
+    for side in range(2):
+        part = members[sides[row] == side]
+        label[part] = 1 + part[0] if len(part) > 1 else 0
 
 
 @njit(cache=True)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import tarfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,10 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.export.webdataset import size_of, webdataset
-from sim.io.files import atomic
+from sim.io.files import atomic, tables
+from sim.io.source import sequence_folders
 from sim.io.store import sequence_folder
+from sim.io.store.seal import read_manifest, with_hash
 from sim.io.store.validate import content_hash, validate
 from tests.fake_simulator import content
 from tests.made_up import make_pictured
@@ -93,18 +97,20 @@ def test_shards_hold_whole_sequences_up_to_their_size(data: Path, tmp_path: Path
     assert samples(*paths) == samples(*[tmp_path / "whole" / shard["name"] for shard in whole])
 
 
-def test_the_same_export_again(data: Path, tmp_path: Path) -> None:
-    """What an interrupted one left is removed; a damaged shard is replaced."""
-    out = tmp_path / "out"
+def test_the_same_export_again(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What an interrupted one left is removed, a damaged shard replaced; links stay, and the folder may be "."."""
+    out, disk = tmp_path / "out", tmp_path / "disk"
+    disk.mkdir()
+    out.symlink_to(disk)
     webdataset(data, out, shard_size=1)
-    before = content(out)
+    before = content(disk)
     (out / "shard-000002.tar").write_bytes(b"")
-    (tmp_path / f"{atomic.PARTIAL}out-0123456789ab").mkdir()
+    (out / f"{atomic.PARTIAL}index.json-0123456789ab").mkdir()
     seen = []
-    webdataset(data, out, shard_size=1, progress=lambda *a: seen.append(a))
-    assert content(out) == before
+    monkeypatch.chdir(disk)
+    webdataset(data, ".", shard_size=1, progress=lambda *a: seen.append(a))
+    assert content(disk) == before
     assert seen == [(k, 3, f"shard-{k - 1:06d}.tar") for k in (1, 2, 3)]
-    assert not list(tmp_path.glob(f"{atomic.PARTIAL}*"))
     (out / "mine").write_text("mine")
     with pytest.raises(InputError, match="other files"):
         webdataset(data, out, shard_size=1)
@@ -132,6 +138,35 @@ def test_what_is_not_ours_is_refused(tmp_path: Path) -> None:
 )
 def test_sizes(text: str, size: int) -> None:
     assert size_of(text) == size
+
+
+def copied(data: Path, tmp_path: Path, change: Callable[[dict[str, Any], Path], None]) -> Path:
+    """A copy of the first sequence whose manifest is changed and sealed again."""
+    folder = Path(shutil.copytree(sequence_folders(data, "generated")[0], tmp_path / "flockscope-train/a"))
+    manifest = read_manifest(folder)
+    change(manifest, folder)
+    (folder / "manifest.json").write_bytes(tables.json_document(with_hash(manifest)))
+    return folder
+
+
+def link_out_of_the_sequence(manifest: dict[str, Any], folder: Path) -> None:
+    secret = folder.parent / "secret"
+    (folder / "scenario.toml").rename(secret)
+    (folder / "scenario.toml").symlink_to(secret)
+
+
+CHANGED_MANIFESTS = [
+    (lambda manifest, _: manifest.update(files={}), r"files: got no scenario.toml and \d+ more"),
+    (link_out_of_the_sequence, r"scenario.toml: got a link that leads out of the sequence"),
+]
+
+
+@pytest.mark.parametrize(("change", "words"), CHANGED_MANIFESTS)
+def test_what_a_changed_manifest_vouches_for_is_not_exported(data, tmp_path: Path, change, words) -> None:
+    folder = copied(data, tmp_path, change)
+    with pytest.raises(InputError, match=words):
+        webdataset(folder, tmp_path / "out")
+    assert not list((tmp_path / "out").glob("*"))
 
 
 @pytest.mark.parametrize(("part", "more"), [("", {"shard_size": 1}), ("b-s00000", {})])

@@ -35,7 +35,7 @@ def without_ids(score):
     return np.c_[rows[:, 0], rows[:, 2:], np.resize(score, len(rows))]
 
 
-@pytest.mark.parametrize("score", [(0.3, 0.9), (1,), (0, 1)])
+@pytest.mark.parametrize("score", [(0.3, 0.9), (1,), (0, 1), (55.5, 90.5, 20)])
 def test_rows_without_ids_are_no_guess(tmp_path, score):
     with pytest.raises(InputError, match="frame,left,top,width,height,score without an id") as error:
         open_source(written(tmp_path, without_ids(score)), fps=10)

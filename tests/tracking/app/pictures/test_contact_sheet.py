@@ -37,6 +37,11 @@ def test_onsets_come_first_and_gaps_are_filled() -> None:
     assert chosen == sorted(chosen)
 
 
+def test_events_of_all_parts_are_shown() -> None:
+    layer = layer_of_truth(bare(1000, dict.fromkeys(range(20, 1000, 20), "merge")))
+    assert max(np.diff([1, *contact_sheet.choose_frames(layer, 1000, 10.0, 8), 1000])) < 300
+
+
 @settings(deadline=None)
 @given(
     length=st.integers(1, 300),

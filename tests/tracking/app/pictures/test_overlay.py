@@ -136,6 +136,12 @@ def test_a_group_has_its_extent_and_its_size() -> None:
     assert (drawn[:, 0].min(), drawn[:, 0].max()) == pytest.approx((40 - reach, 40 + reach), abs=1.5)
 
 
+def test_a_group_without_an_extent_has_its_name_at_its_place() -> None:
+    side = layer_of_tracks([a_group((40, 20)).replace(groups=None)], None, None)
+    (picture,) = overlay_pictures(sequence(1), [side])
+    assert np.ptp(coloured(picture, 4), axis=0).min() > 8  # the disc alone has 5
+
+
 def test_groups_on_the_ground_lie_there_in_the_picture(sequence: Sequence) -> None:
     """Projected as people are; nothing of them where no camera is known, or all is behind it."""
     tracks = wholes(sequence, "ground")

@@ -13,11 +13,11 @@ from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.association import PointClaims, point_log_density, shares
+from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, shares
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.merging_and_splitting import merged
 from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
 
@@ -317,16 +317,26 @@ def test_whose_a_shared_point_is() -> None:
         _, case, region = random_case(seed)
         points, weights, d2, own, hits, _, x, _, _, size, _ = case
         claims = PointClaims(points, weights, np.zeros(len(points)), d2, own, hits)
-        log_density = point_log_density(size, region, claims, d2[:, :0])
+        log_density = point_log_density(size, region, claims, np.zeros(d2.shape))
         may = np.isfinite(log_density) & (np.random.default_rng(seed).random(d2.shape) < 0.8)
         found = shares(log_density, may)
         np.testing.assert_allclose(found, reference.shares(points, x, region, size, own, may), rtol=1e-9, atol=1e-12)
     region, d2 = np.array([4.0, 0.25])[:, None, None] * np.eye(2), np.array([[1.0], [1.2]])
     claims = PointClaims(np.zeros((1, 2)), np.ones(1), np.zeros(1), d2, np.full(1, -1), np.full(1, 2))
-    log_density = point_log_density(np.full(2, 2.0), region, claims, d2[:, :0])
+    log_density = point_log_density(np.full(2, 2.0), region, claims, np.zeros((2, 1)))
     assert shares(log_density, d2 > 0)[1] > 0.9  # the nearer by d2 is the diffuse one
     colours = point_log_density(np.full(2, 2.0), region, claims, np.array([[2.0], [-2.0]]))
     assert shares(colours, d2 > 0)[0] > 0.7
+
+
+def test_a_shared_point_is_of_the_group_whose_members_walked_there() -> None:
+    scaled, points = scale_parameters(GroupPdaConfig(), 10, 1.0), np.array([[0.0, 0.0], [2.0, 0.2]])
+    bank = newborn(points, np.ones(2), np.arange(2), scaled, 5.0)
+    bank.recent_points, bank.unshared = [[(5.0, points[:1])], [(5.0, points[1:])]], np.array([[5, 1, 0], [5, -1, 0.0]])
+    bank.x[:, 2:] *= -1  # of no account: they may have been led astray by shared points
+    soon, late = (place_density(bank, points + np.array([[t, 0.0], [-t, 0.0]]), scaled, 5 + t) for t in (0.5, 2.0))
+    assert (np.diag(soon) > 10 * soon[[1, 0], [0, 1]]).all()
+    assert late.max() < 0.2 * soon.max()
 
 
 @pytest.mark.parametrize("seed", range(30))
