@@ -403,10 +403,11 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
 
 
 def crossings(frame: Ints, id: Ints, pos: Array, line: Array, downwards: bool) -> tuple[Ints, Ints]:
-    """Returns the frames of crossings to the left side of a line, and of crossings to the right side, one each.
+    """Returns the frames of crossings to the left side of a line, and of crossings to the right side.
 
-    frame, id (N,), pos (N, 2): people, in any order. line (2, 2): its corners; left and right are those of
-    somebody who looks from the first corner to the second. downwards: True if y points down, as in the image.
+    Each crossing gives the first frame on the other side. frame, id (N,), pos (N, 2): people, in any order. line
+    (2, 2): its two ends, beyond which nobody crosses it; left and right are those of somebody who looks from the first
+    to the second. downwards: True if y points down, as in the image.
     """
     order = np.lexsort((frame, id))
     frame, pos = frame[order], pos[order, :2]
