@@ -2,7 +2,7 @@
 2011, sec. 3.1).
 
 KLT is OpenCV's pyramidal Lucas-Kanade tracker on corners of Shi and Tomasi. A feature is followed forwards and
-backwards; it ends where it does not come back to its place, and where it leaves the foreground. Each feature keeps its
+backwards; it ends where it does not come back to its place, and where it leaves the mask. Each feature keeps its
 world points of the last frames. Its velocity is the slope of the line of least squares through those of the time
 window. Features that have not lived through the time window are not used (Fig. 3).
 

@@ -15,9 +15,10 @@ Data association (sec. 3.3): which group each point belongs to.
     (y_i - xi_j)' S^-1 (y_i - xi_j) < gamma                  search region of group j (eq. 8)
     m_total = p(y_i | xi_j, P_xi)^k_p p(lambda_i | v_j, P_v)^k_v            (eqs 9 to 11)
 
-Each point belongs to the group with the largest m_total among those in whose region it lies. S is the sum of the
-group's spread Sigma, the covariance P of its centroid and that of the point, C_i; the same for velocities. Departures
-are listed in `tracker`.
+Each point belongs to the group with the largest m_total among those in whose region it lies. With `point_covariance` S
+is the sum of the group's spread Sigma, the covariance P of its centroid and that of the point, C_i. Without it S is
+Sigma, as in the paper. P_xi and P_v are the blocks of S for positions and velocities. Departures are listed in
+`tracker`.
 """
 
 from __future__ import annotations

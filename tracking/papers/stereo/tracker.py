@@ -14,26 +14,34 @@ covariance of its points' positions and velocities; N, the number of its points.
     new groups: points whose spheres overlap               eq. 12              group_life
     merging by the full state, weighted by N               eqs 13 to 15        group_life
 
-C_y is the covariance of the points' positions y and velocities lambda; spheres have the radius `radius`; groups merge
-whose regions of X overlap (`merge_gate`). The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in
-tracking.detect.
+C_y is the covariance of the points' positions y and velocities lambda. S is Sigma in the paper; here P and the point's
+covariance are added (`point_covariance`). Spheres have the radius `radius`; groups merge whose regions of X overlap
+(`merge_gate`). The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in tracking.detect.
 
-Readings: eq. 6 is printed with y for x, and takes world for camera coordinates; here f contains the camera's pose. A
-feature has the covariance J^-1 R J^-T, with the Jacobian J of (u, v, d) and R from `pixel_noise` and `disparity_noise`:
-its error grows with the squared depth. The mean position of sec. 3.3 is that of (x, y, z), projected by f: the mean
-disparity would be biased in depth. The number of sec. 3.4 (`group_points`) is that of the points of a connected
-component. I_n of eq. 13 is transitive. The filter is an extended one, as f is not linear.
+Readings: eq. 6 is printed with y for x, and takes world for camera coordinates; here f contains the camera's pose and
+the image's centre. A feature has the covariance J^-1 R J^-T, with the Jacobian J of (u, v, d) and R from `pixel_noise`
+and `disparity_noise`: its error grows with the squared depth. The mean position of sec. 3.3 is that of (x, y, z),
+projected by f: the mean disparity would be biased in depth. The threshold of updates (sec. 3.3) is that of sec. 4: more
+than two points. Sec. 3.3 names the size and velocity of groups as cues; eqs 9 to 11, as here, have position and
+velocity. C_y of eq. 7 is that of the current frame. The number of sec. 3.4 (`group_points`) is that of the points of a
+connected component. I_n of eq. 13 is transitive. The filter is an extended one, as f is not linear. The text does not
+state the order of steps in a frame; here it is that of secs. 3.3 to 3.5: association, update, new groups, merging. So a
+new group can merge in its first frame. Groups that overlap only after a merger can merge in the next frame.
 
-Departures. Without a parameter that switches it off, one holds in the preset `paper`, too:
+Departures. Without a parameter that switches it off, one holds in the preset `paper`, too; `density_width`,
+`spread_weight`, `split_time` and `coast_time` only make theirs weak there:
 
 - subtraction: in the left picture only. Paper: not stated. Why: one background model.
 - foreground: that of `blob` (five classes, cleaning, least area). Paper: background subtraction. Why: shared.
-- matching: OpenCV's block matching with its checks, up to the disparity of `nearest`. Paper: not stated. Why: speed,
-  wrong matches.
-- person or not: fixed limits, by quantiles; any width; regions cut by the edge are not too small; fewer than 5
-  disparities are nobody. Paper: by height and width. Why: no limits printed.
-- features: checked backwards, a least distance apart; they end outside people, need a disparity (median of 3 x 3 px)
-  now and in most of `window_time`; at most 400. Paper: KLT, the window. Why: wrong matches, speed.
+- matching: OpenCV's block matching with its checks, blocks of 0.27 m, up to the disparity of `nearest`. Paper: not
+  stated. Why: speed, wrong matches.
+- scale: blocks, spacing of features and least areas are in px by one scale of the image. Paper: none. Why: any camera.
+- person or not: fixed limits, by quantiles; the highest one without the errors of points; any width; regions cut by the
+  edge are not too small; fewer than 5 disparities are nobody. Paper: by height and width. Why: no limits printed.
+- features: in the left picture; checked backwards, a least distance apart, new ones 1 px inside; they end outside
+  people, need a disparity (median of 3 x 3 px) now and in most of `window_time`; at most 400. Paper: KLT, the window.
+  Why: wrong matches, speed.
+- far features: no disparity below 4 `disparity_noise`. Paper: none. Why: the error of such a depth is not normal.
 - velocity of a feature: slope over `window_time`. Paper: not stated. Why: one frame is too noisy.
 - time: seconds; α_s = exp(−dt / `spread_time`). Paper: steps of a frame. Why: any frame rate.
 - Q: white acceleration (`accel_noise`). Paper: not printed. Why: any frame rate.
@@ -49,27 +57,33 @@ Departures. Without a parameter that switches it off, one holds in the preset `p
 - P and Σ: P of the filter, Σ of the members; search regions and eqs 9, 10 use both (`point_covariance`), merging Σ.
   Paper: one covariance. Why: a member is no centroid.
 - merged P: that of the weighted mean, sum of n² P_i. Paper: one covariance, eq. 15. Why: P is of the centroid.
-- Σ: shrunk to a prior (`spread_weight`). Paper: sample covariance. Why: few points in six dimensions.
-- N: of the last frame in which the group was measured. Paper: of every frame. Why: a hidden group would have no
-  weight.
+- Σ: shrunk to a prior (`spread_weight`) of `person_spread` and 0.25 m/s; C_y divides by n; 1e-6 is added to its
+  diagonal. Paper: sample covariance. Why: few points in six dimensions.
+- N: of the last frame in which the group was measured, also when a hidden group merges. Paper: of every frame. Why: a
+  hidden group would have no weight.
 - R: of the mean of the points, and `centroid_noise`. Paper: one, not printed. Why: points come and go.
-- first P: of the points' mean position and velocity. Paper: covariance of the points. Why: a member is no centroid.
+- first P: of the points' mean position and velocity, members' velocities varying by 0.25 m/s. Paper: covariance of the
+  points. Why: a member is no centroid.
 - k_p, k_v: exponents, 1 and `velocity_weight`. Paper: factors. Why: factors have no effect.
 - merged id: of the largest confirmed group. Paper: a new number (Fig. 7). Why: a group keeps its identity, as in the
   scores.
-- young groups: tentative ones merge without event. Paper: merge. Why: nobody knows of them.
+- young groups: tentative ones merge without event, and a known group keeps its id; with `confirm_time` 0 those of this
+  frame. Paper: a new group is a tracker at once (sec. 3.4), and merges as all do. Why: nobody knows of them.
+- events: enter, leave, merge, split. Paper: none. Why: they are scored.
+- report: groups that are measured in the frame. Paper: ellipses round associated points; of others not stated. Why: a
+  hidden group has no places of members.
 - splits: linked parts for `split_time`, unless they would merge again. Paper: none. Why: groups part.
 - parts: start anew from their points, with the group's velocity; the largest keeps the id. Paper: none. Why: tracks
   need ids.
 - confirmation, deletion: `confirm_time`, `coast_time`. Paper: none. Why: wrong matches.
-- too much foreground: features start anew, so nothing is measured for `window_time`; groups go on. Paper: none. Why:
-  light changes.
+- too much foreground (`background`), no picture: features start anew, so nothing is measured for `window_time`; groups
+  go on. Paper: none. Why: light changes, lost pictures.
 - hulls: round places corrected for errors (`point_covariance`), half a footprint each, from points a whole one. Paper:
   ellipses. Why: features lie all over a body.
 - background: adapts, but not where people are, except for ghosts and in frames with too much foreground
   (`background`). Paper: not stated. Why: light changes.
-- points as input: linked between frames; used at once, one is enough; Z is their place; velocity 0 when new. Paper:
-  none. Why: other detectors.
+- points as input: linked between frames, at most 2 m/s and 3 `point_noise` off; used at once, one is enough; Z is their
+  place; velocity 0 when new; spheres of `point_radius`, 0.75 m in the preset, too. Paper: none. Why: other detectors.
 """
 
 from __future__ import annotations
