@@ -211,7 +211,7 @@ def join(
     pos: Array, exist: Array, label: Ints, points: Array, share: float, uniforms: Array, rules: Array
 ) -> tuple[Ints, Bools]:
     """Relates M new people, the last slots, to the groups that they join in each particle, one after the other (sec.
-    3.2). Return their pairs (N, 2) and relations (N, P); the groups label (P, K) of the new people are changed.
+    3.2). Returns their pairs (N, 2) and relations (N, P); the groups label (P, K) of the new people are changed.
 
     pos (P, K, 2), m; exist (P, K): with the new people; points (M, 2), m: where they were detected; uniforms (M, P) in
     [0, 1); rules (4,). With the probability `share` (the paper: 1/2) a person joins a group, people alone being groups

@@ -9,55 +9,65 @@ together. z are the detections of a frame, w the weights. The steps of a frame:
               |u| in Table 3, per axis, e normal
               s^r ~ p(s^r_t | s^a_t, s^r_t-1)    relations from new attributes  eq. 7                transition_kernels
     weight    w = w p(z_t | s^a_t)               sum over all mappings          eqs 6, 12, sec. 3.3  sensor
+    deaths    not measured for `time_window`     with their relations           sec. 2.1.1           tracker
     births    x ~ N(z, .), v ~ N(0, .)           relations of newcomers         secs. 2.1.1, 3.2     tracker
     estimate  means over particles                                                                   particle_set
     resample  residual sampling                                                 sec. 2.1             filters.particles
 
-Readings: eqs 2 and 8 condition on earlier states only. Eq. 14 ends with the posterior of the frame before. Table 3 is
-read with B and C in m per frame, and C per axis; members of a group have the row of its mean velocity. If people and
-detections differ in number, a mapping maps all of the fewer ones. Positions advance by the new velocity. A newcomer is
-alone with probability 1/2; people alone are groups of one. The estimate is the mean over the particles before they are
-resampled.
+Readings: eqs 2, 8 and 10 condition on earlier states only. Eq. 13 lacks the normaliser of eqs 4 and 14. Eq. 14 ends
+with the posterior of the frame before. Table 3 is read with B and C in m per frame, and C per axis; the mean speed of a
+group is the mean of velocity vectors, and its members have the row of this mean. If people and detections differ in
+number, a mapping maps all of the fewer ones. The sensor's noise is the same along both axes and everywhere; a
+newcomer's place has it, too. Positions advance by the new velocity. A newcomer is alone with probability 1/2; people
+alone are groups of one. The estimate is the mean over the particles before they are resampled.
 
 Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_distance` x distance -
 `relation_velocity` x difference of velocities. A star marks those that stay in the preset `paper`:
 
-- speed table: from simulated people, times `noise_scale`. Paper: from observations in successive frames. Why: errors of
-  observations are no motion.
+- speed table: from simulated people, over 0.4 s, with rows of its own (`speed_ends`), times `noise_scale`. Paper: from
+  observations in successive frames. Why: errors of observations are no motion.
 - time*: drift and diffusion per second. Paper: per frame. Why: any frame rate.
 - relations: pairs. Paper: one group for each person. Why: groups part in steps.
 - relation dynamics*: with the hazard `relation_rate` / 2 a person redraws all relations: to those whose g is above
   one uniform number; in the preset the groups of these unite. Only near people start to walk together. Paper: not
   stated; with a limited number of others. Why: it starts and stops at a rate.
-- evidence: the belief about reported tracks (`relation_evidence`). Paper: the particle's state. Why: it looks back for
-  seconds.
-- unreported people: their relations stay as they are (`relation_evidence`). Paper: forecast. Why: no belief about
-  them.
+- evidence: for the relation dynamics, l is the belief about the tracks reported before this frame; the belief is also
+  what `walking_together()` returns (`relation_evidence`). Paper: the particle's new state; the posterior. Why: it looks
+  back for seconds.
+- unreported people: without a track in the belief's last step, relations stay as they are (`relation_evidence`). Paper:
+  forecast. Why: no belief about them.
 - coupling: approached within `coupling_time`; partners weighted by existence and, with the belief
-  (`relation_evidence`), by g(l), less the filter's scatter. Paper: the group's mean velocity. Why: members differ.
+  (`relation_evidence`), by g(l) of their state, less the filter's scatter. Paper: the group's mean velocity. Why:
+  members differ.
 - noise: a shared part (`common_noise`). Paper: independent. Why: a hidden member turns, too.
 - people*: slots common to all particles. Paper: each particle has a number of people. Why: few particles would have
   each newcomer.
-- existence: a probability, computed; at birth by `birth_rate` and `clutter_density`. Paper: none. Why: false alarms.
-- sensor: pairs: e P_D g / λ_c, missed: 1 − e P_D, with existence e, `detect_prob`, `clutter_density`; 1 and 0 switch
-  off what follows from misses and false alarms. Paper: no misses or false alarms in the weights. Why: detectors err.
+- existence: a probability, computed; at birth by `birth_rate` and `clutter_density`; means over particles are weighted
+  by it. Paper: none. Why: false alarms.
+- sensor: pairs: e P_D p(z | x) / λ_c, missed: 1 − e P_D, with existence e, `detect_prob`, `clutter_density`; 1 and 0
+  switch off what follows from misses and false alarms. Paper: no misses or false alarms in the weights. Why: detectors
+  err.
 - displaced points: a share `outlier_share`, away from the camera, without one in all directions, more if feet are
   covered. Paper: normal. Why: hidden feet.
 - misses: after a miss, detected again with `hidden_time`. Paper: all alike. Why: occlusions last.
 - occluders: nobody is measured behind others, or behind known pillars and walls. Paper: none. Why: nobody is visible
   there.
-- sums*: exact up to a size, then belief propagation; in the preset people and detections are mapped if they are in
-  reach in some particle, or linked by such, else if in reach and not improbable. Paper: all mappings. Why: exponential
-  cost; nobody becomes a newcomer far away.
-- pixels*: blobs, large ones divided by k-means. In the image*: centres of boxes. Paper: feet of boxes on the ground.
-  Why: no calibration.
+- sums*: exact up to a size, then belief propagation; in the preset each set of people and detections that are linked
+  by reach in some particle is mapped by itself, without pairs that are negligible beside the best mapping, else only
+  pairs in reach and not improbable. Paper: all mappings. Why: exponential cost; nobody becomes a newcomer far away.
+- pixels*: blobs; large ones are divided by k-means, small ones left out. In the image*: centres of boxes, at one scale.
+  Paper: feet of boxes on the ground. Why: no calibration.
+- boxes*: reported in the image, with sizes that follow the measured ones. Paper: none. Why: they are shown and scored.
+- frames without measurement*: forecast alone; the window of deaths stands still. Paper: each frame is measured. Why:
+  nobody could be seen.
 - births*: a detection in nobody's reach, or probably nobody's; no weight until the next frame. Paper: a new object.
   Why: not stated when.
 - deaths*: the window slows by the probability of being behind known pillars and walls, by default also people; a
   person counts as measured with more than 1/2. Paper: after a window, which may depend on occlusion. Why: nobody is
   visible there.
 - deaths, report: also below an existence; from `report_existence`. Paper: after the window; all. Why: false alarms.
-- newcomers*: half of those near join, by distance. Paper: half join a group. Why: far groups are improbable.
+- newcomers*: half of those near join a group, by g at the distance of the nearest member. Paper: half join a group.
+  Why: far groups are improbable.
 - weights: one for each person, others averaged; a missed person has the partners'. Paper: one for a particle. Why:
   many people, few particles.
 - resampling: of people with few effective particles, with a kernel. Paper: each frame. Why: equal particles.
@@ -65,8 +75,9 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
 - groups*: reported ones are derived from the tracks. Paper: in the state. Why: particles differ in groups.
 
 Fitted, as the paper leaves them open (see the presets): B and C of the rows of Table 3 and the sensor's noise at our
-frame rate, on fitting seeds; the relation's rate, bias and weights of distance and velocity, on training seeds. Not
-fitted: `time_window`, the spread of a newcomer's velocity, the number of particles.
+frame rate, on fitting seeds (the preset `caviar-25fps` has Table 3 as printed); the relation's rate, bias and weights
+of distance and velocity, on training seeds. Not fitted: `time_window`, the spread of a newcomer's velocity, the number
+of particles (the paper: 500 to 4000).
 """
 
 from __future__ import annotations
