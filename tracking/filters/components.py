@@ -1,17 +1,17 @@
 """Components of points: linked points, and components with overlapping search regions (Gennari & Hager 2004).
 
-The grouping function of measurements (3.3, 4.2.1), which `group-pda` and its kernels use:
+The grouping function of measurements (sec. 3.3, 4.2.1), which `group-pda` and its kernels use:
     G_0  points y_i, y_j are linked (y_i R_0 y_j) if regions of radius r round them overlap: at most 2 r apart;
          G_0 are the connected components
-    G_x  components whose search regions (y - m)' S^-1 (y - m) < gate overlap are joined (3.1); m is a component's
+    G_x  components whose search regions (y - m)' S^-1 (y - m) < gate overlap are joined (sec. 3.1); m is a component's
          mean, S its covariance, gate a squared Mahalanobis radius
-    G_y  G_x of the components of G_0; points satisfy the group constraint if |G_y| = 1 (3.3)
+    G_y  G_x of the components of G_0; points satisfy the group constraint if |G_y| = 1 (sec. 3.3)
 In G_y velocities have no part: all fresh components are at rest with the same covariance.
 
 Ours: S is shrunk to (N S + n0 S0) / (N + n0), as one or two points have none. N is the component's weight, S its
 covariance with 1/N, S0 a prior covariance and n0 the prior's weight. G_x is repeated until nothing changes, since the
 region of joined components may overlap one that none of them did. Points have weights (the share of a person that a
-pixel is). A component below a least weight is noise.
+pixel is). A component below a least weight is noise. Regions that only touch overlap; those of eq. 2.2 have no border.
 Gennari & Hager do not say how they test for overlap: see components_kernels.overlap.
 """
 

@@ -107,7 +107,7 @@ def overlaps(mean: Array, shape: Array) -> Bools:
 
 @njit(cache=True)
 def pool(into: Array, other: Array) -> None:
-    """Changes the moments `into` (6,) of a set of points to those of its union with another set (3.1)."""
+    """Changes the moments `into` (6,) of a set of points to those of its union with another set (eq. 3.1)."""
     n = into[WEIGHT] + other[WEIGHT]
     share = other[WEIGHT] / n
     dx, dy = other[X] - into[X], other[Y] - into[Y]
@@ -152,7 +152,7 @@ def unset(count: int) -> Ints:
 
 @shared_njit(cache=True)
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[Ints, int]:
-    """Returns the first component that each of K is joined with (K,) (G_x, 3.1), and the number of pairs compared."""
+    """Returns the first component that each of K is joined with (K,) (G_x, sec. 3.1), and the pairs compared."""
     k, compared = len(sums), 0
     label, alive, order, tree = (
         np.empty(k, np.int64),
@@ -268,7 +268,7 @@ def add_point(
     k: int, points: Array, weight: float, link: float, cell: Ints, around: Ints,
     parent: Ints, head: Ints, after: Ints, box: Array, sums: Array, work: Ints,
 ) -> None:  # fmt: skip
-    """Adds point k to the components of the points before it, in place (4.2.1).
+    """Adds point k to the components of the points before it, in place (sec. 4.2.1).
 
     head (C,), after (M,): the last added point of each cell, and the one before each point. box (C, 4): bounds of each
     cell's points. parent (M,), sums (M, 6): forest of the points, and moments at the roots.

@@ -71,7 +71,9 @@ def below_heads(points: Array, box: Array, camera: Camera) -> Array:
 
 
 def search_regions(bank: GroupBank, scaled: ScaledParameters) -> Array:
-    """Returns the covariances (G, 2, 2) of the groups' search regions: Sigma + H P H' + (r^2 + w^2) I (eq. 2.2)."""
+    """Returns the covariances (G, 2, 2) of the groups' search regions: Sigma + H P H' + (r^2 + w^2) I (eq. 2.2: Sigma).
+
+    r: standard deviation of a person's position; w: what the region is wider by in infeasible time (ours)."""
     wider = np.square(scaled.scale * (SPLIT_SPEED if scaled.config.corrections else 0.0) * bank.null_time)
     return np.asarray(bank.extent + bank.P[:, :2, :2] + (scaled.point_sd**2 + wider)[:, None, None] * np.eye(2))
 

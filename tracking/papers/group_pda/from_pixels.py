@@ -7,7 +7,7 @@ ours).
 
 The mass of an association is the relative weight of a set of points as the measurement of a group.
 
-Each group has a histogram of the colours of its unshared points. A shared point of colour c adds
+Each group has a histogram of the colours of its unshared points. A shared point of colour c adds `appearance` times
 log p(c | g) - log p(c | the other groups that may have the point) to the log mass of group g's associations, where
 p(c | g), the probability of colour c in group g, comes from the smoothed histograms. It counts as the share of a person
 that the point stands for, because neighbouring pixels have like colours.

@@ -9,7 +9,7 @@ velocities is beside `merge_velocity`, on the mean of two steps, and against it 
 apart. Since the onset, when the sum was least, it must have grown by `merge_time`. Without, velocities are alike if the
 regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
 
-Splitting (sec. 3.3): a group without feasible associations for `split_time` falls apart. An association (a set of
+Splitting (sec. 3.3, 4.2): a group without feasible associations for `split_time` falls apart. An association (a set of
 points that may be a group's) is feasible if its points form one group under the group constraint G_y
 (tracking.filters.components). `fall_apart` partitions the points (M, 2) of such a group by G_y and replaces its row of
 the bank by one row per part. A group that G_y leaves whole stays. Each member's place, hidden or not, goes to the part

@@ -23,65 +23,79 @@ and the module:
 The grouping functions G_0, G_x, G_y of points (sec. 3.1, 3.3, 4.2.1) are in tracking.filters.components: G_y links
 points at most 2 x `radius` apart, and joins linked sets whose regions overlap. A group or part that is not measured for
 `coast_time` is lost; a group leaves with its last part. `association = "none"` is section 5.2.1: a group takes all
-points in its region.
+points in its region, whether they are one group or not, and does not fall apart.
 
 Departures. Those marked (c) are off with `corrections` off.
 
-- search region of the gate: Σ, P and a point's variance; (c) wider in infeasible time. Paper: Σ, as in merges here.
-  Why: few points give a small Σ.
-- extents: shrunk to a prior (`spread_weight`); (c) corrected for the gate. Paper: sample covariance. Why: few people.
+- units: m and s, in an image by one scale. Paper: px and frames. Why: any camera and frame rate.
+- F, Q: constant velocity, white acceleration, per root second. Paper: not stated. Why: any frame rate.
+- search region of the gate, and distances that order shared points: by Σ, P and a point's variance; (c) wider in
+  infeasible time. Paper: Σ, as in merges here. Why: few points give a small Σ.
+- extents: with 1/N, shrunk by `spread_weight` to a prior: `person_spread`, from pixels one person's; (c) corrected for
+  the gate. Paper: sample covariance. Why: few people; with 1/N eq. 3.1 is exact.
 - G_x in G_y: repeated until nothing changes. Paper: applied once. Why: joined regions overlap others.
 - noise, (c): from pixels, components below 0.25 people do not count in G_y. Paper: all count. Why: specks of
   foreground.
-- births: after `confirm_time`, removed after as long without points; until then no points of a confirmed group. Paper:
-  at once. Why: false alarms.
+- births: confirmed after `confirm_time`, merged from the next frame on, removed after as long without points; until
+  confirmed no points of a confirmed group. Paper: at once. Why: false alarms.
 - P: Σ w² P of merged groups; new ones r² (1 + 1/N) and 1.3 m/s per axis, (c) parts the group's and 0.5 m/s. Paper:
   none. Why: the filter and SR_v need one.
-- R, (c): members keep places, some are missed. Paper: a member's place and noise, read as Σ / m, of m people. Why:
-  less noise.
+- R, (c): members keep places, some are missed. Paper: a member's place and noise, read as Σ / m, of m people. Why: less
+  noise.
 - m_d: S with the R of each association's m. Paper: one P_yc. Why: fewer people measure a centroid worse.
 - m_N: σ_n grows with N, (c) by 15 %, else 1 %; heavy tails. Paper: normal, σ_n. Why: several join at once.
+- `association` nearest, all: one association, with the shared points that are most probably the group's, or with all.
+  Paper: none. Why: comparison.
 - α_s and α_N: equal, from `extent_time`. Paper: two constants. Why: one parameter less.
-- missed detections: (c) a miss hypothesis; from points, missed members stand in for `carry_time`, and their places
-  stay the group's for `coast_time`. Paper: not considered. Why: detectors miss people.
-- size: N over the probability that a member is seen (`detect_prob`), from points. Paper: N. Why: detectors miss
-  people.
-- Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated.
-  Why: they would swell.
-- no points: coasts, lost after `coast_time`. Paper: null masses, as before a split. Why: occlusion.
-- hidden feet: with boxes and a camera, points are put no further than below heads at 1.5 m. Paper: points as they are.
-  Why: hidden feet displace points.
-- pixels: on a grid of 0.1 m, each a share of a person. Paper: all, each counts one. Why: N in people; speed.
+- missed detections: (c) a miss hypothesis; if it outweighs all associations, the group coasts; from points, missed
+  members stand in for `carry_time`, and their places stay the group's for `coast_time`. Paper: not considered. Why:
+  detectors miss people.
+- stand-ins: the centroid is measured as of its points' mean time; associations of stand-ins alone leave x and P as they
+  are. Paper: none. Why: their places come from x.
+- size: N over the probability that a member is seen (`detect_prob`) within `carry_time`, from points. Paper: N. Why:
+  detectors miss people.
+- Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated. Why:
+  they would swell.
+- no points: coasts, lost after `coast_time`; frames without detections are predicted only. Paper: null masses, as
+  before a split. Why: occlusion.
+- hidden feet: with boxes and a camera not overhead, points whose feet another box may hide are put no further than
+  below heads at 1.5 m. Paper: points as they are. Why: hidden feet displace points.
+- pixels: foreground of tracking.detect on a grid of 0.1 m, each a share of a person. Paper: all of an unnamed
+  background subtraction, each counts one. Why: N in people; speed.
+- too much foreground: predicted only. Paper: none. Why: the light has changed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
   similar groups cross.
-- places, from points (c): in the same, where members have walked since the group last shared no point, for 3 s. Paper:
-  none. Why: groups that meet keep their people.
-- split: after `split_time`; measured frames count back; members' places go along; (c) parent's velocity. Paper: after
-  infeasible frames, at rest. Why: misses.
+- places, from points (c): in the same, where members have walked since the group last shared no point, for 3 s, at most
+  64 points of a frame. Paper: none. Why: groups that meet keep their people.
+- split: after `split_time`, until then predicted only; measured frames count back; members' places, colours and age go
+  along; (c) parent's velocity. Paper: after consecutive infeasible frames (Fig. 1: at once), at rest. Why: misses.
 - parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
   some have been more than 1.5 m from the rest for `confirm_time`; a part that is not measured holds the others; R_x
   joins parts again. Paper: new groups at once. Why: misses and sway take people apart for a moment.
 - split into one part or none: the group stays as it is. Paper: initialised anew. Why: others' points made it
   infeasible.
-- divided points: those most probably the group's. Paper: all in the region. Why: others' people stay out.
+- points of a split, and members' places: those most probably the group's, with stand-ins. Paper: all in the region.
+  Why: others' people stay out.
 - ids: the part that was largest when the group fell apart keeps the id, after its loss the largest left; of merged
-  groups the largest. Paper: none. Why: tracks need ids.
-- walking out: a new group within reach of a member is a part of its group and as old, (c) with its velocity; without
-  corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
+  groups the largest, then the oldest. Paper: none. Why: tracks need ids.
+- walking out: a new group within reach (2 m/s) of a member is a part of its group and as old, (c) with its velocity;
+  without corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
 - like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`. Paper: SR_v
   overlap. Why: P does not measure likeness; people sway with each step.
-- SR_v, without corrections: of the updated velocity. Paper: of the predicted one. Why: Fig. 1 merges after the update.
+- SR_v, without corrections: of the updated velocity, with the gate's γ. Paper: of the predicted one; its size is not
+  stated. Why: Fig. 1 merges after the update.
 - near groups, (c): people at most 1.5 m apart, too; from pixels by centroids and extents. Paper: regions overlap. Why:
   no merge after a split.
-- merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) once the evidence is
-  `merge_time`; gaps up to 1.5 s count. Paper: at once. Why: crossing groups.
+- merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) once the evidence of the
+  last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing groups.
 - enter: so is a merge reported if at most one of the groups was there 1 s before. Paper: none. Why: they came together.
-- duplicates: of two groups or parts on the same people for `coast_time` the one with the smaller share of own people is
-  lost. Paper: none. Why: hidden groups follow others.
-- reports: parts that had points within `report_coast`, with hulls of points. Paper: every group. Why: lost groups are
-  guesses.
+- duplicates: of two groups or parts whose regions overlap, with less than 55 % of their people measured for
+  `coast_time`, the one with the smaller share of own people is lost. Paper: none. Why: hidden groups follow others.
+- reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
+  search region. Why: lost groups are guesses.
 - onsets: dated back. Paper: none. Why: decisions lag.
-- depth: divided by the sine of the tilt. Paper: px. Why: oblique views.
+- depth in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px. Why:
+  oblique views.
 """
 
 from __future__ import annotations
