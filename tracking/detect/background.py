@@ -8,15 +8,17 @@ Both are divided by their RMS over the training sample, so that one threshold se
 Classes, tested in the order of Gonzalez et al., sec. 3.2:
     1. CD / b above its threshold: foreground
     2. (alpha - 1) / a below the lower threshold and alpha below `dark`: dark foreground
-    3. (alpha - 1) / a above the upper threshold: highlight; foreground if alpha is above BRIGHT (ours)
+    3. (alpha - 1) / a above the upper threshold: highlight; if the model adapts, foreground where alpha is above
+       BRIGHT (ours)
     4. (alpha - 1) / a below the lower threshold: shadow
     5. otherwise: background
 Eqs 5, 6, 9, 10 are in background_kernels, eqs 3, 4, 7, 8 in background_training_kernels.
 
-Departures (ours; all of them: docs/reference/foreground.md). `dark` is a limit of alpha instead of a normalised
-threshold, and a pixel within the noise is never dark foreground. BRIGHT is a limit of alpha, too. The model adapts,
-and follows the gain of each frame. If all frames of the sample are grey (R = G = B), chromaticity is not available:
-every pixel beyond the brightness thresholds is foreground, dark foreground if it is darker.
+Departures (ours; those of the training: background_training). `dark` is a limit of alpha instead of a normalised
+threshold, and a pixel within the noise is never dark foreground. BRIGHT is a limit of alpha, too. Unless the settings
+say "trained", the model adapts, and follows the gain of each frame. If all frames of the sample are grey (R = G = B),
+chromaticity is not available: every pixel beyond the brightness thresholds is foreground, dark foreground if it is
+darker.
 """
 
 from __future__ import annotations

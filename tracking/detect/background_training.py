@@ -11,9 +11,11 @@ distortion, its colour's distance from the line through E in sigmas.
    is kept as the second colour. People who stand through most of the sample are E, and the ground is the second colour
    (tracking.detect.ghosts).
 2. a_i and b_i of each pixel i: the RMS of alpha - 1 and of CD over the inliers (eqs 7, 8). a_i is kept as
-   s_i = a_i sqrt(sum (E / sigma)^2), which is 1 for independent Gaussian noise and holds at any gain (ours).
+   s_i = a_i sqrt(sum (E / sigma)^2), which is 1 for independent Gaussian noise and holds at any gain (ours). Neither is
+   less than noise of FLOOR would give; sigma is at least FLOOR = 2 grey levels (ours).
 3. Thresholds: quantiles of the normalised distortions at the detection rate (Gonzalez et al. 2006, Fig. 2), over
-   pixels that were background in all frames of the sample; over all inliers if these pixels are too few.
+   pixels that were background in all frames of the sample; over all inliers if these pixels are too few. They are never
+   tighter than those of Gaussian noise (ours).
 
 Also here: the brightness of a frame relative to the background model: one factor per colour channel (ours).
 

@@ -2,11 +2,12 @@
 
 For each picture, in this order:
     segment    classify each pixel (Gonzalez et al. 2006, sec. 3.2), fuse the foreground classes, clean them (sec. 3.3);
-               the result is implausible if more of the image is foreground than people can cover (ours)
+               where the background adapts, the result is implausible if more of the image is foreground than people
+               can cover (ours)
     ...        the tracker measures its people and says which pixels they cover (protected)
     adapt      the background model learns from all other pixels (ours)
-The pipeline also learns the scale of the image and the size of people from the background sample, if no camera and no
-scale are given (ours).
+From the background sample the pipeline also learns the size of people, and the scale of the image if none is given
+(ours).
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ class Segmented:
 
     image (H, W, 3): the picture, BGR uint8. classes (H, W) uint8: class of each pixel: 0 BACKGROUND, 1 FOREGROUND, 2
     DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. mask (H, W) bool: the foreground (1 and 2) after cleaning. plausible:
-    False if more of the mask is foreground than MOST_FOREGROUND: then a light was switched or the camera moved.
+    False if the background adapts and a share of the mask above MOST_FOREGROUND = 0.6 is foreground: then a light was
+    switched or the camera moved.
     """
 
     image: Image

@@ -7,7 +7,7 @@ something came, the model if something left.
 
 A region of the foreground is a ghost if
     still    its pixels have kept their colour for `ghost_time`
-    open     at most of its edge it borders on background, not on other foreground
+    open     more than half of its edge borders on background, not on other foreground
     left     along that edge the steps of the model sum to at least STEPS times those of the picture
 The step at a pixel of the edge is the difference of the mean colours inside the region and outside the foreground,
 within BAND_M of the pixel, in the channel where it is largest.

@@ -1,8 +1,7 @@
 """The size of a person in the image: height and width of a person's box at every foot point (ours).
 
 Three sources:
-- A pinhole camera. The box of an upright typical person (tracking.detect.person_size) that stands at the foot
-  point.
+- A pinhole camera. The box (`boxes`) of an upright typical person who stands at the foot point.
 - A camera straight above. Everybody is the same ellipse, turned with the heading; its axes are used instead of the box.
 - No camera. Learned from lone blobs (blobs that may be one person each): the height is a line h = a + b v over the row
   v of the foot, as in a pinhole without roll; the width is SLIM times the height. The line is the one of many on which
@@ -13,9 +12,9 @@ In all three cases height and width are then multiplied by factors on which most
 Also here: the person whom trackers expect before they have seen anybody: a prior in metres for any camera (ours).
 
 Its width and depth are the trackers' own belief about real people, not the body that the simulator draws. Its height is
-PERSON_HEIGHT, which defines the scale of an image. A real person with arms is some
-0.5 m wide and 0.3 m deep, so that the silhouette is some 0.42 m wide in the mean over headings. Stride, bags and wide
-clothes add to that; tracking.detect.person_size learns how much from people who stand alone.
+PERSON_HEIGHT, which defines the scale of an image. A real person with arms is some 0.5 m wide and 0.3 m deep, so that
+the silhouette is some 0.42 m wide in the mean over headings. Stride, bags and wide clothes add to that; `PersonSize`
+learns how much from lone blobs.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 Gonzalez, Rowe, Andrade, Villanueva, "Efficient management of multiple agent tracking through observation handling",
 2006. State of a track (sec. 4.1): (x, x', y, y', h, h', w, w'), constant speed with white acceleration; places in image
 px, covariances in m and s. The measurement is z = (x, y, h, w): centre, height and width of a box. A box has no
-direction; the paper's ninth state, the angle theta, is measured from pixels only. There h and w are the axes of a
-blob's ellipse.
+direction; the paper's ninth state, the angle theta, is measured from pixels only. There h and w are the full axes
+of a blob's ellipse.
 
     (A, Q: transition and process noise; P: covariance of x; C: picks the measured coordinates; R: measurement noise;
     y = z - C x: innovation; S = C P C' + R its covariance; K: gain; d^2: squared Mahalanobis distance; chi2:
@@ -19,30 +19,36 @@ blob's ellipse.
     manage     rho = sqrt|S| / asymptote: confirmed if rho     secs. 4.5, 5    track_management,
                and d^2 are low, deleted if rho is high                         tracking.filters.track_uncertainty
                or by existence                                 ours            existence
-    pixels     five classes, cleaning, blobs, ellipses         secs. 3.2, 3.3  tracking.detect
+    pixels     background, classes, cleaning, ellipses         secs. 3.1-3.3   tracking.detect
 
 Readings: eq. 4 lacks brackets. Eq. 9 has row and column exchanged; eq. 5 of theta is modulo pi. The "Mahalanobis
-radius" of sec. 4.3 is the quantile of chi2. A percentage of the asymptotic value (sec. 5) may be above 100 %
-(`confirm_ratio`).
+radius" of sec. 4.3 is the quantile of chi2. The nearest track (sec. 4.4) is that of least d^2. A percentage of the
+asymptotic value (sec. 5) may be above 100 % (`confirm_ratio`). The "given ellipsoid variance" of secs. 4.5 and 5 is the
+quantile 0.99 of chi2. With "rho" a confirmed track stays confirmed, and all confirmed tracks are reported.
 
 Departures, from boxes and from pixels. Those from `management` on hold unless it is "rho"; without a parameter that
 switches it off, one holds in the preset `paper`, too.
 
 - input: also boxes, without θ. Paper: blobs. Why: detectors report boxes.
-- noises: in m at the person and per root second. Paper: no values. Why: any scale and frame rate.
-- first P: R and `speed_prior`, at rest; with "rho" one measurement after birth never confirms. Paper: not stated.
-  Why: a filter needs it.
+- noises: in m at the person and per root second, those of x, y, h, w independent. Paper: no values. Why: any scale
+  and frame rate.
+- scale of a track: its longer side is 1.7 m, but at most a factor of 2 from the image's scale; from straight above the
+  image's. Paper: none. Why: near people are larger.
+- first P: R, `speed_prior` and 0.2 m/s for sizes, at rest; with "rho" one measurement after birth never confirms.
+  Paper: not stated. Why: a filter needs it.
 - deletion: also missed tracks outside the image. Paper: ρ. Why: they do not come back.
-- ρ of deletion, with "rho": tentative tracks at its value at birth or at `tentative_time`, confirmed ones 2 % early.
-  Paper: one value. Why: false alarms end early.
+- deletion, with "rho": missed tracks by ρ, tentative ones at that of their birth, confirmed ones 2 % early; tentative
+  ones, missed or not, also after `tentative_time`. Paper: one value of ρ. Why: false alarms end early.
 - several boxes or blobs of one track, with "rho": the nearest counts. Paper: all are assigned (frame 367), not how.
   Why: a filter takes one.
-- `management`: by an existence probability (existence). Paper: ρ. Why: rates hold at any frame rate and detector.
+- places: with a camera on the ground, not of tracks above the horizon. Paper: px. Why: scenes are in m.
+- `management`: by an existence probability (existence); a track below 0.5 is tentative again. Paper: ρ. Why: rates hold
+  at any frame rate and detector.
 - association: one to one, most likely, against false and new boxes. Paper: nearest gated track. Why: a wide gate must
   not win.
 - scores of boxes: likelihood ratios, learned from the existence of the boxes' tracks. Paper: none. Why: any unit.
-- births from boxes: by the odds of new people to false boxes and second boxes of people; from pixels the odds are the
-  first existence. Paper: a measurement in no gate. Why: people near others must start tracks.
+- births: the first existence is by the odds of new people to false boxes and second boxes of people; boxes start tracks
+  from 0.01, also inside gates. Paper: a measurement in no gate. Why: people near others must start tracks.
 - hidden people: detected as far as no other in front covers them, and not at all for `hidden_time`. Paper: none. Why:
   misses come in rows.
 - rates of height and width, from boxes: return to zero. Paper: constant. Why: a missed person's size settles.
@@ -51,29 +57,39 @@ switches it off, one holds in the preset `paper`, too.
 
 Departures from pixels only:
 
-- training: robust, with least σ, normalisers and thresholds, from the sample. Paper: all frames; the histogram of a
-  frame (Fig. 2). Why: people walk through the sample.
-- light: gain of each frame; far brighter pixels are foreground; ghosts are replaced (`background`). Paper: none. Why:
-  light and scene change.
-- dark foreground: by the brightness itself (`dark`). Paper: normalised. Why: noise must not move the limit.
+- training: from inliers, of two colours of a pixel the more frequent; with least σ, normalisers and thresholds, from
+  pixels that nothing covered in the sample. Paper: all frames; the histogram of a frame (Fig. 2). Why: people walk
+  through the sample.
+- unsteady pixels, first σ above 20 grey levels: always background. Paper: none. Why: they show no background.
+- light: gain of each frame; far brighter pixels are foreground; ghosts are replaced, also those of the sample
+  (`background`). Paper: none. Why: light and scene change.
+- dark foreground: by the brightness itself (`dark`), beyond the lower threshold, too. Paper: normalised. Why: noise
+  must not move the limit.
 - grey samples: no shadows or highlights. Paper: colour. Why: no chromaticity.
-- opening: none up to 40 px per m; windows in m. Paper: opening. Why: it removes heads.
-- θ: noise by the blob's moments; not used if it is 30° or more, nor in gates from straight above. Paper: one R, gates
-  with θ. Why: a circle has no direction.
-- shared blobs: once the size of a person is known, templates share the foreground: each moves to the most support,
-  confirmed tracks first; no gate (`split`). Paper: one measurement for each blob. Why: people merge in the mask.
+- opening: none up to 40 px per m. Paper: opening. Why: it removes heads.
+- cleaning: windows and least area in m. Paper: not stated. Why: any scale.
+- contours: none. Paper: extracted (sec. 3.3). Why: only pictures need them.
+- θ: noise by the blob's moments and 8°; not used if it is 30° or more, nor in the gates of association from straight
+  above. Paper: one R, gates with θ. Why: a circle has no direction.
+- noise of θ: 30° at birth, then 15° per root second, 90° from straight above. Paper: no values. Why: as above.
+- lone blobs (`split`): once the size of a person is known, a blob is a measurement only if it has that size, is not cut
+  by the image's edge, and at most one confirmed track is expected in it. Paper: each blob. Why: others are not one
+  whole person.
+- shared blobs (`split`): in the rest templates share the foreground: each moves to the most support, confirmed tracks
+  first; no gate. Paper: one measurement for each blob; event management, not printed. Why: people merge in the mask.
+- size of templates (`split`): as predicted, 0.75 to 1.3 of a person's. Paper: none. Why: they measure none.
 - looks (`split`): templates of confirmed tracks that touch move also to where the person's colours are seen, learned
   where nobody hides them. Paper: none. Why: people who meet in the mask must not change places.
 - misses (`split`): too little foreground under the template. Paper: no blob in the gate. Why: templates always fit
   somewhere.
-- noise (`split`): divided by the square of the visible share; 25 times for h, w of templates, 25° for θ. Paper: R.
-  Why: hidden parts are not measured, templates measure no size.
+- noise of templates (`split`): R over the square of the visible share; 25 times that for h, w; 25° for θ, which
+  is not measured from straight above. Paper: R. Why: hidden parts are not measured, templates measure no size.
 - births (`split`): also a lone blob inside a gate; other unexplained foreground, by templates. Paper: a blob outside
   all gates. Why: people enter as one blob.
 - sizes (`split`): return to those of a person at that place. Paper: free. Why: templates measure none.
 - ρ: of a nominal covariance without θ. Paper: of the filter. Why: noise must not count.
 - report from pixels: boxes, by the usual ratio to ellipses. Paper: ellipses. Why: scores need boxes.
-- too much foreground (`background`): prediction and deletion only. Paper: none. Why: light has changed.
+- too much foreground (`background`): all tracks are missed, none starts. Paper: none. Why: light has changed.
 - background: adapts where no confirmed track is, ghosts anywhere (`background`). Paper: trained once. Why: light
   changes.
 """

@@ -3,13 +3,15 @@
 Order of a frame, with the paper's sections:
     predict all tracks                                                        sec. 4.2, eqs 1, 2
     classify, clean, find blobs                                               secs. 3.2, 3.3 (detect.foreground)
-    blobs of one person's size: gate, associate, update with the ellipse      secs. 4.2 to 4.4, eqs 3 to 10
+    blobs of one person's size (without `split` all): gate, associate         secs. 4.3, 4.4, eqs 8 to 10
     other foreground: split among the tracks expected there, by templates     ours (person_template)
     foreground that no track explains, as large as a person: new tracks       ours (person_template)
+    update with the ellipses                                                  sec. 4.2, eqs 3 to 7
     axes return towards those of a person at the track's place                ours (track_management)
     looks: the colours of people, where nobody hides them, are learned        ours (person_look_kernels)
     rho: confirm, delete, start tracks                                        secs. 4.5, 5 (track_management)
     adapt the background, except where confirmed tracks are                   ours
+    learn the size of a person, and an unknown scale, from lone blobs         ours (detect.person_size)
 
 A blob that is associated with no track may start one; without `split` no blob inside any gate does. At frame 367 of
 Gonzalez et al. (2006, sec. 5) pieces "still lie within the gate" and "are assigned to the existing tracker"; the paper
