@@ -33,7 +33,7 @@ class GroupPdaConfig(BackgroundSettings):
         "time constant of extent and number of people, alpha_s and alpha_N of eq. 2.4", "log")
     count_noise: float = param(0.5, (0.05, 5.0), "people", "sigma_n of m_N: the part that does not grow with N", "log")
     detect_prob: float = param(0.95, (0.3, 1.0), "probability",
-        "from points: that a member is measured in a frame", sees="points")
+        "from points: that a member is measured in a frame (ours)", sees="points")
     association: str = param("pda", ("pda", "nearest", "all", "none"), "",
         "pda: by masses (sec. 4.2); nearest, all: one association; none: no constraint (sec. 5.2.1)", "categorical")
     corrections: bool = param(True, (True, False), "",
