@@ -11,7 +11,7 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Context
-from tracking.parameter_space import decode
+from tracking.parameter_space import decode, decode_and_build
 from tracking.running.prepare import prepare
 from tracking.running.tracker_registry import find, names
 
@@ -110,9 +110,14 @@ def test_from_pixels_too(name, request):
     kind, rng = find(name).config_class, np.random.default_rng(5)
     space = tuple(p for p in kind.space(online=True) if p.name not in TRAINED)
     plain = answers(name, pixels, "image", {})
+
+    def allowed(config):
+        find(name)(config).reset(Context(pixels.fps, 40.0), 0)
+        return config
+
     for _ in range(2):  # each of which changes every parameter
         action = rng.uniform(-0.5, 0.5, len(space))
-        config = decode(space, action, kind(), lambda c: find(name)(c).reset(Context(pixels.fps, 40.0), 0))
+        config = decode_and_build(space, action, kind(), allowed)
         reset = answers(name, pixels, "image", {0: config})
         same(reset, answers(name, pixels, "image", {1: config}))
         assert differ(plain, reset)

@@ -81,7 +81,7 @@ WORLDS = {
     "out of view": (f"camera = {{ height = 2, position = [4, 1] }}\ngroup = [{GROUP}]", 2, "camera.height view"),
     "a taken place": (f"group = [{GROUP}, {GROUP.replace('a', 'b', 1)}]", 2, "group.b.start another"),
     "an order that does not come true": (
-        f"duration = 4\ngroup = [{GROUP}, {OTHER}]\nevent = [{MERGE}]", 1, "event m such merge"
+        f"duration = 4\ngroup = [{GROUP}, {OTHER}]\nevent = [{MERGE}]", 1, "event m merge fired"
     ),
 }  # fmt: skip
 

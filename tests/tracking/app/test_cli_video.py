@@ -148,7 +148,7 @@ WITHOUT = {
     "track blob {0}/loose --out {0}/x": "move the pictures to {0}/loose/img1",
     "track blob {0}/boxes.json --out {0}/x": "if these are boxes: flockscope track TRACKER VIDEO --boxes",
     "errors {0}/film.mp4 {0}/run": "{0}/film.mp4: got no labels",
-    "overlay {0}/film.mp4 {0}/other --out {0}/x.mp4": "give {0}/other/tracks.txt",
+    "overlay {0}/film.mp4 {0}/other --out {0}/x.mp4": "a text that is named itself counts for any sequence",
 }
 
 
