@@ -282,7 +282,7 @@ class GroupPda:
         expected = expected_members(bank, scaled, t)
         if scaled.colour_bins:
             density = colour_density(bank, self.colours)
-        elif scaled.from_pixels or not self.config.corrections:
+        elif scaled.from_pixels or not self.config.corrections or not (claims.claimants > 1).any():
             density = np.ones(claims.d2.shape)
         else:
             density = place_density(bank, claims.points, scaled, t)
