@@ -61,6 +61,7 @@ def demo(options: DemoOptions) -> CommandResult:
     from sim.io.files.own_files import refuse_foreign_file
     from sim.io.source import open_source
     from sim.workers.pool import WorkerOptions
+    from tracking.app.replay_page.page import theme
 
     start, out, quick = time.monotonic(), options.out, options.quick
     page = option_parsing.output_folder(out) / "index.html"
@@ -99,7 +100,8 @@ def demo(options: DemoOptions) -> CommandResult:
         ) for name, (page,) in pages.items()
     ]  # fmt: skip
     text = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
-    words = {"GENERATOR": GENERATOR, "FRAMES": str(frames), "PARTS": "\n".join(parts), "FILMS": "".join(films)}
+    words = {"GENERATOR": GENERATOR, "STYLE": theme(), "FRAMES": str(frames)}
+    words |= {"PARTS": "\n".join(parts), "FILMS": "".join(films)}
     write_file(page, re.sub("@@([A-Z]+)@@", lambda found: words[found[1]], text).encode())
     lines = [table("", ["tracker"], COLUMNS, cells)]
     lines += [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]
