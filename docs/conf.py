@@ -31,7 +31,8 @@ html_show_sphinx = False
 html_show_copyright = False
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
-highlight_language = "none"  # of blocks that name none: commands
+highlight_language = "none"
+smartquotes = False  # They would make a dash of `--`.
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence", "html_image"]
 nitpicky = True
@@ -274,6 +275,7 @@ GENERATED = re.compile(r"^<!-- generated: (\S+) ?(\S*) -->(?:\n\*`make docs` put
 OUTSIDE = re.compile(r"\]\((?:\.\./)+(README|CONTRIBUTING|CHANGELOG)\.md")
 PAGE_OF = {"README": "index.md", "CONTRIBUTING": "contributing.md", "CHANGELOG": "changelog.md"}
 INTERVAL = re.compile(r"(?<=\d \[)([-+]?[\d.]+,) (?=[-+]?[\d.]+\])|(?<=\d\]) (?=\*)")
+COMMANDS = re.compile(r"^```\n(?=(flockscope|python|pip|make) )", re.MULTILINE)
 PAGES = re.compile(r"^<!-- pages (\w+): (.*) -->$", re.MULTILINE)
 
 
@@ -281,7 +283,7 @@ def with_generated_parts(text: str) -> str:
     """Returns the text of a page with all parts that are made from the code."""
     text = OUTSIDE.sub(lambda found: f"](/{PAGE_OF[found[1]]}", text)
     text = GENERATED.sub(lambda found: PARTS[found[1]](*filter(None, [found[2]])), text)
-    text = INTERVAL.sub("\\1\N{NO-BREAK SPACE}", text)
+    text = COMMANDS.sub("```sh\n", INTERVAL.sub("\\1\N{NO-BREAK SPACE}", text))
     return PAGES.sub(lambda found: navigation(*found.groups()), text)
 
 
