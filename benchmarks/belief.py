@@ -229,7 +229,8 @@ def calibration(names: Sequence[str], seeds: range, belief: Belief, out: Path | 
         sample = sample_of(list(pair_scenes([name], seeds)))
         log_odds = belief.log_odds(sample.values)[:, 0]
         scores, bins = belief_scores(sample, log_odds), reliability(log_odds, sample.together, sample.weight)
-        print(f"\n{Path(name).stem}: " + ", ".join(f"{key} {value:.4g}" for key, value in scores.items()))
+        words = [f"{key} {value:.0f}" if key == "pairs" else f"{key} {value:.3f}" for key, value in scores.items()]
+        print(f"\n{Path(name).stem}: {', '.join(words)}")
         head(["probability", "share of rows", "mean probability", "share of mates"])
         for k, (share, mean, mates) in enumerate(bins):
             row([f"{k / BINS:.2f}–{(k + 1) / BINS:.2f}", number(share, 4), number(mean), number(mates)])

@@ -28,6 +28,11 @@ root_doc = "index"
 html_theme = "furo"
 html_title = "flockscope"
 html_show_sphinx = False
+html_show_copyright = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+highlight_language = "none"
+smartquotes = False  # They would make a dash of `--`.
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence", "html_image"]
 nitpicky = True
@@ -190,7 +195,7 @@ def parameters(config: str) -> str:
         span = ", ".join(f"`{c}`" for c in p.choices) if p.choices else f"{p.low:g} to {p.high:g}"
         span += " (log)" if p.scale == "log" else ""
         given = ["" if value == p.default else str(value) for value in changed]
-        rows.append(f"| {' | '.join([f'`{p.name}`', str(p.default), *given, span, p.unit, p.meaning])} |")
+        rows.append(f"| {' | '.join([f'`{p.name}`', str(p.default), *given, span, p.unit, _cell(p.meaning)])} |")
     named = (f"preset `{preset}`" for preset in presets)
     return table("parameter", "default", *named, "range", "unit", "meaning", rows=rows)
 
@@ -269,6 +274,8 @@ PARTS: dict[str, Callable[..., str]] = {
 GENERATED = re.compile(r"^<!-- generated: (\S+) ?(\S*) -->(?:\n\*`make docs` puts .*\*)?$", re.MULTILINE)
 OUTSIDE = re.compile(r"\]\((?:\.\./)+(README|CONTRIBUTING|CHANGELOG)\.md")
 PAGE_OF = {"README": "index.md", "CONTRIBUTING": "contributing.md", "CHANGELOG": "changelog.md"}
+INTERVAL = re.compile(r"(?<=\d \[)([-+]?[\d.]+,) (?=[-+]?[\d.]+\])|(?<=\d\]) (?=\*)")
+COMMANDS = re.compile(r"^```\n(?=(flockscope|python|pip|make) )", re.MULTILINE)
 PAGES = re.compile(r"^<!-- pages (\w+): (.*) -->$", re.MULTILINE)
 
 
@@ -276,6 +283,7 @@ def with_generated_parts(text: str) -> str:
     """Returns the text of a page with all parts that are made from the code."""
     text = OUTSIDE.sub(lambda found: f"](/{PAGE_OF[found[1]]}", text)
     text = GENERATED.sub(lambda found: PARTS[found[1]](*filter(None, [found[2]])), text)
+    text = COMMANDS.sub("```sh\n", INTERVAL.sub("\\1\N{NO-BREAK SPACE}", text))
     return PAGES.sub(lambda found: navigation(*found.groups()), text)
 
 

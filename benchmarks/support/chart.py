@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#aa3377", "#8a6d00", "#5c5c5c")
+MARKERS = "os^Dv*"
 STYLE = {"svg.hashsalt": "flockscope", "svg.fonttype": "none", "axes.grid": True, "grid.color": "#dcdfe4"}
 
 
@@ -39,14 +40,17 @@ def lines(panels: Sequence[Panel], path: Path, columns: int = 2) -> Path:
     """
     columns = min(columns, len(panels))
     names = list(dict.fromkeys(name for panel in panels for name in panel.curves))
-    colour = {name: COLOURS[k % len(COLOURS)] for k, name in enumerate(names)}
+    looks = {
+        name: {"color": COLOURS[k % len(COLOURS)], "marker": MARKERS[k % len(MARKERS)]} for k, name in enumerate(names)
+    }
     rows = -(-len(panels) // columns)
     path.parent.mkdir(parents=True, exist_ok=True)
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(4.8 * columns, 3.1 * rows + 0.5), layout="constrained")
+        # At most as wide as a page of the docs, which would make the text smaller.
+        figure = Figure(figsize=(min(4.8 * columns, 9.6), 3.1 * rows + 0.5), layout="constrained")
         for axes, panel in zip(figure.subplots(rows, columns, squeeze=False).flat, panels, strict=False):
-            _draw(axes, panel, colour)
-        handles = [matplotlib.lines.Line2D([], [], color=colour[name]) for name in names]
+            _draw(axes, panel, looks)
+        handles = [matplotlib.lines.Line2D([], [], markersize=4, **looks[name]) for name in names]
         figure.legend(
             handles,
             [name.replace("`", "") for name in names],
@@ -58,13 +62,12 @@ def lines(panels: Sequence[Panel], path: Path, columns: int = 2) -> Path:
     return path
 
 
-def _draw(axes: matplotlib.axes.Axes, panel: Panel, colour: Mapping[str, str]) -> None:
+def _draw(axes: matplotlib.axes.Axes, panel: Panel, looks: Mapping[str, dict[str, str]]) -> None:
     for name, curve in panel.curves.items():
         values, *band = curve if isinstance(curve, tuple) else (curve,)
-        marker = "o" if len(panel.x) <= 12 else None
-        axes.plot(panel.x, np.asarray(values, float), color=colour[name], marker=marker, markersize=4)
+        axes.plot(panel.x, np.asarray(values, float), markersize=4, **looks[name])
         if band:
-            axes.fill_between(panel.x, *band, color=colour[name], alpha=0.15, linewidth=0)
+            axes.fill_between(panel.x, *band, color=looks[name]["color"], alpha=0.15, linewidth=0)
     for name, value in panel.vertical.items():
         axes.axvline(value, color="#777", linestyle="--", linewidth=1)
         axes.annotate(name, (value, 1), xycoords=("data", "axes fraction"), xytext=(4, -10), textcoords="offset points")

@@ -61,6 +61,7 @@ class ProgressMeter:
     def update(self, done: int, total: int | None, item: str = "") -> None:
         """Sets the number of finished items, `done`, and of all items, `total` (None if unknown), and shows them."""
         raise_if_interrupted()
+        total = total if total is None or done <= total else None  # a budget can be exceeded
         self.done, self.total, self.item = done, total, printable(item)
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, item=self.item)

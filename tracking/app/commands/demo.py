@@ -61,6 +61,7 @@ def demo(options: DemoOptions) -> CommandResult:
     from sim.io.files.own_files import refuse_foreign_file
     from sim.io.source import open_source
     from sim.workers.pool import WorkerOptions
+    from tracking.app.replay_page.page import theme
 
     start, out, quick = time.monotonic(), options.out, options.quick
     page = option_parsing.output_folder(out) / "index.html"
@@ -92,14 +93,14 @@ def demo(options: DemoOptions) -> CommandResult:
         rows = (row for row in compared.to_arrow(key).to_pylist() if row["first"] is not None)
         cells += [[f"{row['run']}, from {word}", *(number(k, row[k] or math.nan) for k in COLUMNS)] for row in rows]
     frames = scenes[0].length or 0
-    films = [
+    films = "".join(
         VIDEO.format(
             video=escape(f"pages/pixels/{name}.mp4"), start=0.4 * frames / scenes[0].fps, tracker=name,
             page=escape(page.relative_to(out).as_posix()),
         ) for name, (page,) in pages.items()
-    ]  # fmt: skip
+    )  # fmt: skip
     text = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
-    words = {"GENERATOR": GENERATOR, "FRAMES": str(frames), "PARTS": "\n".join(parts), "FILMS": "".join(films)}
+    words = {"GENERATOR": GENERATOR, "STYLE": theme(), "FRAMES": str(frames), "PARTS": "\n".join(parts), "FILMS": films}
     write_file(page, re.sub("@@([A-Z]+)@@", lambda found: words[found[1]], text).encode())
     lines = [table("", ["tracker"], COLUMNS, cells)]
     lines += [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]

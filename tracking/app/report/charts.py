@@ -67,11 +67,9 @@ def _curves(curves: Curves, by: str) -> Any:
         if one["break"] is not None and (at := one["break"]["at"]) is not None:
             height = np.interp(at, np.array(curves.values)[order], data["mean"][order])
             parts.append(plot.scatter([at], [height], size=15, marker="x", line_width=3, **look))
-        tips = [("", name), (curves.axis, "@x"), (by, "@mean{0.000}")]
-        plot.add_tools(HoverTool(renderers=[dots], tooltips=tips))
+        plot.add_tools(HoverTool(renderers=[dots], tooltips=[("", name), (curves.axis, "@x"), (by, "@mean{0.000}")]))
         items.append((name, parts))
-    legend = Legend(items=items, click_policy="hide", orientation="horizontal", ncols=2)
-    plot.add_layout(legend, "below")
+    plot.add_layout(Legend(items=items, click_policy="hide", orientation="horizontal", ncols=2), "below")
     return plot
 
 
