@@ -132,7 +132,7 @@ from tracking.papers.group_pda.from_pixels import (
     update_histograms,
 )
 from tracking.papers.group_pda.group_bank import GroupBank
-from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, GroupChanges, fall_apart, whole_groups
+from tracking.papers.group_pda.merging_and_splitting import GroupChanges, fall_apart, whole_groups
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters, scale_parameters
 from tracking.running.image_scale import required
 
@@ -164,7 +164,7 @@ class GroupPda:
         """
         self.context = context
         self.bank, self.ids = GroupBank.empty(), GroupIds()
-        self.changes, self.duplicates = GroupChanges(), DuplicateGroups()
+        self.changes = GroupChanges()
         self.pixels = None if context.background is None else ForegroundPoints(self.config, context)
         if self.pixels is not None:
             self.context = context.replace(px_per_m=self.pixels.scale)
@@ -205,7 +205,6 @@ class GroupPda:
         events = list(remove_lost(bank, scaled, t))
         if points is not None:
             self._measure(points, weights, scaled, t)
-        self.duplicates.step(bank, scaled, t)
         events += self.changes.step(bank, scaled, t)
         events += confirm(bank, scaled, t, self.ids)
         return self._report(frame, events, scaled, self._outline(detections))

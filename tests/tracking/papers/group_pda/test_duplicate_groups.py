@@ -8,11 +8,7 @@ import pytest
 from sim.types import Array, Tracks
 from tests import painted
 from tests.painted import TALL, Person
-from tests.tracking.papers.group_pda.test_association_kernels import bank
 from tests.tracking.papers.group_pda.test_tracker import track
-from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, merged
-from tracking.papers.group_pda.scaled_parameters import scale_parameters
 from tracking.papers.group_pda.tracker import GroupPda
 
 FPS = 10.0
@@ -41,26 +37,6 @@ def test_who_is_hidden_for_a_moment_has_his_id_afterwards() -> None:
     last = [track(meeting(-0.2, 0.2, seed, frames=80))[-1] for seed in range(12)]
     assert all(t.id.tolist() == [1, 2] for t in last)
     assert sum(np.sign(t.pos[:, 0]).tolist() == [1, -1] for t in last) >= 11
-
-
-def test_the_order_of_groups_does_not_restart_the_clock() -> None:
-    """Rows of the bank change places when groups split or merge."""
-    scaled, lost = scale_parameters(GroupPdaConfig(coast_time=1.0), FPS, 1.0), []
-    for reorder in (False, True):
-        duplicates, two = DuplicateGroups(), bank(size=np.ones(2), extent=np.tile(0.1 * np.eye(2), (2, 1, 1)))
-        two.own_people[:] = [1.0, 0.0]
-        for k in range(20):
-            two.last_seen[:] = k / FPS
-            duplicates.step(two, scaled, k / FPS)
-            if (two.last_seen < k / FPS).any():
-                lost.append(k)
-                break
-            if reorder and k == 5:
-                turned = merged(two, np.array([0]))
-                two.keep(np.array([False, True]))
-                two.add(turned)
-                two.own_people[:] = [0.0, 1.0]
-    assert lost == [10, 10]
 
 
 SCALE = TALL / 1.7
