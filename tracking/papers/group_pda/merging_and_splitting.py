@@ -3,11 +3,9 @@
 Merging (sec. 3.1, 3.2): which groups are near with like velocities, for how long, and their union. Input: the bank of
 groups after the update of a frame; output: the bank with merged groups, and the events. The relation R_x holds for two
 groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
-components of groups under R_x; each becomes one group. With `corrections` there is evidence over time
-(ours), as of a Markov chain of two states: a moment speaks for one group the more, the smaller the difference of
-velocities is beside `merge_velocity`, on the mean of two steps, and against it if people of both are more than 1.5 m
-apart. Since the onset, when the sum was least, it must have grown by `merge_time`. Without, velocities are alike if the
-regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
+components of groups under R_x; each becomes one group. With `corrections` (ours) it must hold for `merge_time`, of
+velocities that differ by less than `merge_velocity`, on the mean of two steps, and of people at most 1.5 m apart.
+Without, velocities are alike if the regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
 
 Splitting (sec. 3.3, 4.2): a group without feasible associations for `split_time` falls apart. An association (a set of
 points that may be a group's) is feasible if its points form one group under the group constraint G_y
@@ -258,8 +256,8 @@ def _onset(bank: GroupBank, pair: Pair, moments: list[PairMoment], scaled: Scale
         rows = np.array([int(np.flatnonzero(bank.id == id)[0]) for id in pair])
         overlap = regions_overlap(bank.x[rows, 2:], bank.P[rows, 2:, 2:], c.gate)  # SR_v
         return moments[-1] if overlap[0, 1] else None
-    k, evidence = merge_onset(moments, c.merge_velocity)
-    return moments[k] if evidence >= c.merge_time - 1e-9 else None
+    k, lasting = merge_onset(moments, c.merge_velocity)
+    return moments[k] if lasting >= c.merge_time - 1e-9 else None
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:

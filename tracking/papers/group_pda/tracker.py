@@ -80,17 +80,17 @@ Departures. Those marked (c) are off with `corrections` off.
   groups the largest, then the oldest. Paper: none. Why: tracks need ids.
 - walking out: a new group within reach (2 m/s) of a member is a part of its group and as old, (c) with its velocity;
   without corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
-- like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`. Paper: SR_v
-  overlap. Why: P does not measure likeness; people sway with each step.
+- like velocities, (c): they differ by less than `merge_velocity` on the mean of two steps. Paper: SR_v overlap. Why: P
+  does not measure likeness; people sway with each step.
 - SR_v, without corrections: of the updated velocity, with the gate's γ. Paper: of the predicted one; its size is not
   stated. Why: Fig. 1 merges after the update.
 - near groups, (c): people at most 1.5 m apart, too; from pixels by centroids and extents. Paper: regions overlap. Why:
   no merge after a split.
-- merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) once the evidence of the
-  last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing groups.
+- merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) once they have been near
+  with like velocities for `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing groups.
 - enter: so is a merge reported if at most one of the groups was there 1 s before. Paper: none. Why: they came together.
-- duplicates: of two groups or parts whose regions overlap, with less than 55 % of their people measured for
-  `coast_time`, the one with the smaller share of own people is lost. Paper: none. Why: hidden groups follow others.
+- hidden, (c): a group or part whose points are all more probably others' is predicted only, and coasts. Paper: groups
+  share points. Why: hidden groups follow others.
 - reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
   search region. Why: lost groups are guesses.
 - onsets: dated back. Paper: none. Why: decisions lag.
@@ -143,8 +143,8 @@ class GroupPda:
     """The tracker `group-pda`: groups of people tracked as wholes, from points or from foreground pixels.
 
     State: config, which may be replaced between two frames; bank, the groups; ids, which gives the next id; changes,
-    the past of pairs that may merge or split; duplicates, the clocks of duplicate groups; pixels: grid points and
-    background model, None from points; plane: "ground" or "image"; context. All but config exist after `reset` only.
+    the past of pairs that may merge or split; pixels: grid points and background model, None from points; plane:
+    "ground" or "image"; context. All but config exist after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
@@ -183,8 +183,7 @@ class GroupPda:
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
-        Order: predict; remove lost groups and duplicates of the frame before; gate, associate, update, fall apart (Fig.
-        1), births; duplicates; split, merge; confirm.
+        Order: predict; remove lost groups; gate, associate, update, fall apart (Fig. 1), births; split, merge; confirm.
         From points `detections.pos` is used (x, y), from pixels `frame.image`. A frame without them (None), and from
         pixels one with too much foreground, is predicted only; before the first detections the Tracks are empty. A
         config that has replaced `config` since the last frame holds from this frame on; the groups stay.

@@ -8,7 +8,11 @@ import pytest
 from sim.types import Array, Tracks
 from tests import painted
 from tests.painted import TALL, Person
+from tests.tracking.papers.group_pda.test_association_kernels import bank
 from tests.tracking.papers.group_pda.test_tracker import track
+from tracking.papers.group_pda.association import associate, claimed, gated_distances, search_regions
+from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.papers.group_pda.scaled_parameters import scale_parameters
 from tracking.papers.group_pda.tracker import GroupPda
 
 FPS = 10.0
@@ -37,6 +41,21 @@ def test_who_is_hidden_for_a_moment_has_his_id_afterwards() -> None:
     last = [track(meeting(-0.2, 0.2, seed, frames=80))[-1] for seed in range(12)]
     assert all(t.id.tolist() == [1, 2] for t in last)
     assert sum(np.sign(t.pos[:, 0]).tolist() == [1, -1] for t in last) >= 11
+
+
+def test_a_group_whose_only_point_is_more_probably_anothers_is_predicted_only() -> None:
+    scaled, t, point = scale_parameters(GroupPdaConfig(), FPS, 1.0), 1.0, np.zeros((1, 2))
+    two = bank(
+        size=np.ones(2), x=np.array([[0.0, 0, 1, 0], [0.3, 0, 1, 0]]), P=np.tile(0.1 * np.eye(4), (2, 1, 1)),
+        extent=np.tile(0.1 * np.eye(2), (2, 1, 1)),
+    )  # fmt: skip
+    before, region = two.x.copy(), search_regions(two, scaled)
+    claims = claimed(point, np.ones(1), gated_distances(two, point, region, scaled), t)
+    mine = associate(two, claims, region, np.zeros((2, 1)), scaled, t)
+    assert claims.claimants.tolist() == [2]
+    assert mine.tolist() == [[True], [False]]
+    assert two.last_seen.tolist() == [t, 0.0]
+    assert two.x[1].tolist() == before[1].tolist()
 
 
 SCALE = TALL / 1.7
