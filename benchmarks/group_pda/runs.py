@@ -25,6 +25,7 @@ from sim.types import Sequence as Recording
 from sim.workers.pool import process_pool
 from tracking.detect import background
 from tracking.detect.background_training import Trained, train
+from tracking.papers.group_pda import merging_and_splitting
 from tracking.papers.group_pda import tracker as group_pda
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import GroupBank
@@ -132,6 +133,14 @@ def tracked(sequence: Recording, variants: Iterable[Variant], mode: DetectionMod
     return found
 
 
+likeness = merging_and_splitting.likeness
+
+
+def unbroken(moments: list[merging_and_splitting.PairMoment], alike: float) -> Array:
+    """Replaces `likeness`: a moment speaks for one group with all its time, or takes back all before."""
+    return np.where(likeness(moments, alike) > 0, 1.0, -1e3)
+
+
 def evenly(bank: GroupBank, points: Array, *others: object) -> Array:
     """Replaces `place_density`: nothing is known of members' places."""
     del others
@@ -139,6 +148,7 @@ def evenly(bank: GroupBank, points: Array, *others: object) -> Array:
 
 
 REPLACED: Mapping[str, Replacement] = {
+    "evidence over time: an unbroken time in its place": (merging_and_splitting, "likeness", unbroken),
     "members' places in shared points": (group_pda, "place_density", evenly),
 }
 

@@ -43,7 +43,7 @@ class GroupPdaConfig(BackgroundSettings):
     merge_velocity: float = param(0.5, (0.05, 3.0), "m/s",
         "groups and parts whose velocities differ by less may be one (ours, in place of SR_v)")
     merge_time: float = param(0.5, (0.0, 3.0), "s",
-        "time for which groups are near with like velocities before they merge (ours)")
+        "evidence at which groups merge: time for which they are near, with equal velocities (ours)")
     split_time: float = param(0.5, (0.0, 3.0), "s",
         "time without a feasible association, less the measured frames in it, after which a group falls apart")
     confirm_time: float = param(0.3, (0.0, 3.0), "s",

@@ -3,9 +3,11 @@
 Merging (sec. 3.1, 3.2): which groups are near with like velocities, for how long, and their union. Input: the bank of
 groups after the update of a frame; output: the bank with merged groups, and the events. The relation R_x holds for two
 groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
-components of groups under R_x; each becomes one group. With `corrections` (ours) it must hold for `merge_time`, of
-velocities that differ by less than `merge_velocity`, on the mean of two steps, and of people at most 1.5 m apart.
-Without, velocities are alike if the regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
+components of groups under R_x; each becomes one group. With `corrections` there is evidence over time
+(ours), as of a Markov chain of two states: a moment speaks for one group the more, the smaller the difference of
+velocities is beside `merge_velocity`, on the mean of two steps, and against it if people of both are more than 1.5 m
+apart. Since the onset, when the sum was least, it must have grown by `merge_time`. Without, velocities are alike if the
+regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
 
 Splitting (sec. 3.3, 4.2): a group without feasible associations for `split_time` falls apart. An association (a set of
 points that may be a group's) is feasible if its points form one group under the group constraint G_y
@@ -63,23 +65,26 @@ class PairMoment(NamedTuple):
 
 
 def merge_onset(moments: list[PairMoment], alike: float) -> tuple[int, float]:
-    """Returns the index of the last moment in which two groups were not yet near with velocities that differ by less
-    than `alike`, m/s, or 0, and the time since then, s."""
-    apart = [m.gap > MERGE_DISTANCE for m in moments] | (walking_differences(moments) >= alike)
-    k = int(np.flatnonzero(apart).max(initial=0))
-    return k, moments[-1].t - moments[k].t
-
-
-def walking_differences(moments: list[PairMoment]) -> Array:
-    """Returns the difference of the velocities of two groups, averaged over two steps, (K,), m/s, at K moments.
-
-    Before the first moment, the two are taken to have moved with the velocity that the filter then had.
-    """
+    """Returns the index of the moment since which two groups are most probably one, and the evidence for it, s."""
     t = np.array([m.t for m in moments])
+    total = np.concatenate([[0.0], np.cumsum(likeness(moments, alike)[1:] * np.diff(t))])
+    k = len(total) - 1 - int(total[::-1].argmin())
+    return k, float(total[-1] - total[k])
+
+
+def likeness(moments: list[PairMoment], alike: float) -> Array:
+    """Returns how much each of K moments is evidence that two groups are one, (K,): -1 (against) to 1 (for).
+
+    It is for one group if people of both are near and the velocities, averaged over two steps, differ by less than
+    `alike`, m/s; else against it. Before the first moment, the two are taken to have moved with the velocity that the
+    filter then had.
+    """
+    t, gap = np.array([m.t for m in moments]), np.array([m.gap for m in moments])
     before = np.linspace(-2 * WALK_TIME, 0, BEFORE, endpoint=False)
     came = moments[0].way + before[:, None] * moments[0].velocity
     way = np.concatenate([came, np.array([m.way for m in moments])])
-    return chords(np.concatenate([t[0] + before, t]), way, WALK_TIME)[BEFORE:]
+    differ = chords(np.concatenate([t[0] + before, t]), way, WALK_TIME)[BEFORE:]
+    return np.where(gap > MERGE_DISTANCE, -1.0, np.maximum(1 - np.square(differ / alike), -1.0))
 
 
 def windows(t: Array, half: float) -> tuple[Ints, Ints]:
@@ -256,8 +261,8 @@ def _onset(bank: GroupBank, pair: Pair, moments: list[PairMoment], scaled: Scale
         rows = np.array([int(np.flatnonzero(bank.id == id)[0]) for id in pair])
         overlap = regions_overlap(bank.x[rows, 2:], bank.P[rows, 2:, 2:], c.gate)  # SR_v
         return moments[-1] if overlap[0, 1] else None
-    k, lasting = merge_onset(moments, c.merge_velocity)
-    return moments[k] if lasting >= c.merge_time - 1e-9 else None
+    k, evidence = merge_onset(moments, c.merge_velocity)
+    return moments[k] if evidence >= c.merge_time - 1e-9 else None
 
 
 def merged(bank: GroupBank, rows: Ints) -> GroupBank:

@@ -80,14 +80,14 @@ Departures. Those marked (c) are off with `corrections` off.
   groups the largest, then the oldest. Paper: none. Why: tracks need ids.
 - walking out: a new group within reach (2 m/s) of a member is a part of its group and as old, (c) with its velocity;
   without corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
-- like velocities, (c): they differ by less than `merge_velocity` on the mean of two steps. Paper: SR_v overlap. Why: P
-  does not measure likeness; people sway with each step.
+- like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`. Paper: SR_v
+  overlap. Why: P does not measure likeness; people sway with each step.
 - SR_v, without corrections: of the updated velocity, with the gate's γ. Paper: of the predicted one; its size is not
   stated. Why: Fig. 1 merges after the update.
 - near groups, (c): people at most 1.5 m apart, too; from pixels by centroids and extents. Paper: regions overlap. Why:
   no merge after a split.
-- merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) once they have been near
-  with like velocities for `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing groups.
+- merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) once the evidence of the
+  last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing groups.
 - enter: so is a merge reported if at most one of the groups was there 1 s before. Paper: none. Why: they came together.
 - hidden, (c): a group or part whose points are all more probably others' is predicted only, and coasts. Paper: groups
   share points. Why: hidden groups follow others.
