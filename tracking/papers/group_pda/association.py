@@ -104,22 +104,27 @@ def associate(
     bank: GroupBank, claims: PointClaims, region: Array, log_ratio: Array, scaled: ScaledParameters, t: float
 ) -> Bools:
     """Updates the groups of the bank in place by their associations (sec. 4.1 to 4.3) and returns the points that they
-    have, (G, M); a point is one group's at most."""
+    have, (G, M); a point is one group's at most.
+
+    A group whose points are all more probably others' is only predicted: it is hidden (ours)."""
     log_density = point_log_density(bank.size, region, claims, log_ratio)
+    x, P = bank.x.copy(), bank.P.copy()
     state, chosen = kernels.associate(
         claims.points, claims.weights, claims.d2, log_ratio, claims.owner, claims.claimants,
         shares(log_density, np.isfinite(log_density)), t - claims.last_seen, region,
         bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,
     )  # fmt: skip
-    has_new_point = (chosen & (claims.last_seen >= t)).any(1)  # more than missed members
+    mine = chosen & (np.arange(len(bank))[:, None] == shares(log_density, chosen).argmax(0)) if len(bank) else chosen
+    its = mine if scaled.config.corrections else chosen
+    has_new_point = (its & (claims.last_seen >= t)).any(1)  # more than missed members
     measured, null = (state == kernels.MEASURED) & has_new_point, state == kernels.NULL
+    hidden = (state == kernels.MEASURED) & ~has_new_point
+    bank.x[hidden], bank.P[hidden] = x[hidden], P[hidden]
     bank.last_seen[measured | null] = t
     bank.measured_time[measured] += scaled.dt
     shorter = np.maximum(bank.null_time - scaled.dt * measured, 0.0)
     bank.null_time = np.where(null, bank.null_time + scaled.dt, shorter)
-    share = shares(log_density, chosen)
-    bank.own_people = share @ claims.weights
-    return chosen & (np.arange(len(bank))[:, None] == share.argmax(0)) if len(bank) else chosen
+    return mine
 
 
 def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio: Array) -> Array:

@@ -40,11 +40,10 @@ class GroupBank:
     covariance of the members' positions about the centroid; size (G,): N, people. id (G,): NO_ID = -1 for a tentative
     group; a part has one of its own. first_seen (G,): time of the first points, of a part those of its group; last_seen
     (G,): of the last points. measured_time (G,): total time measured. null_time (G,): time without a feasible
-    association, less measured frames in it. own_people (G,): people of the group expected among its points of this
-    frame. unshared (G, 3): time and velocity when, last, no other group could have its points. parent (G,): id of the
-    group that the row is a part of, or NO_ID if it is no part (see merging_and_splitting). colour_hist (G, C): people
-    by colour; C = 0 without colours. members: a MemberPlaces of each group. recent_points: of each group, a list of
-    (time, points (K, 2)) of the last seconds.
+    association, less measured frames in it. unshared (G, 3): time and velocity when, last, no other group could have
+    its points. parent (G,): id of the group that the row is a part of, or NO_ID if it is no part (see
+    merging_and_splitting). colour_hist (G, C): people by colour; C = 0 without colours. members: a MemberPlaces of each
+    group. recent_points: of each group, a list of (time, points (K, 2)) of the last seconds.
     """
 
     x: Array
@@ -56,7 +55,6 @@ class GroupBank:
     last_seen: Array
     measured_time: Array
     null_time: Array
-    own_people: Array
     unshared: Array
     parent: Ints
     colour_hist: Array
@@ -69,7 +67,7 @@ class GroupBank:
         none, ids = np.zeros(0), np.zeros(0, np.int64)
         four = np.zeros((0, 4))
         return cls(
-            four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none, none,
+            four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none,
             np.zeros((0, 3)), ids, np.zeros((0, colour_bins)), [], [],
         )  # fmt: skip
 
@@ -150,6 +148,6 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
     zero, now = np.zeros(count), np.full(count, t)
     return GroupBank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, NO_ID),
-        now, now.copy(), zero + scaled.dt, zero, people.copy(), np.zeros((count, 3)), np.full(count, NO_ID),
+        now, now.copy(), zero + scaled.dt, zero, np.zeros((count, 3)), np.full(count, NO_ID),
         np.zeros((count, scaled.colour_bins)), members, [[] for _ in range(count)],
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Merging and splitting of `group-pda`'s groups, the onsets of both, and groups that follow the same people.
+"""Merging and splitting of `group-pda`'s groups, and the onsets of both.
 
 Merging (sec. 3.1, 3.2): which groups are near with like velocities, for how long, and their union. Input: the bank of
 groups after the update of a frame; output: the bank with merged groups, and the events. The relation R_x holds for two
@@ -22,10 +22,6 @@ Onsets (ours): when an event that is known now began. The onset of a split is me
 divided among the parts. Distances are metres on the ground (in an image depth is stretched to it). The distances and
 velocities of the truth's rules come from sim.truth.merge_split_rules. Lengths are in the unit of the points (m on the
 ground or px), times in s.
-
-Of two groups that follow the same people the one with the smaller share of people of its own becomes lost (ours).
-Groups that share points are each measured by all of them. Without this rule a group that is hidden or has left would
-follow another one for ever. For `coast_time` that is allowed, as hidden people come out again.
 """
 
 from __future__ import annotations
@@ -285,7 +281,7 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     one = np.array([heir])  # a copy, not a view
     return GroupBank(
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
-        bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1), size[None],
+        bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1),
         np.array([[bank.last_seen[rows].max(), *x[2:]]]), bank.parent[one],
         bank.colour_hist[rows].sum(0, keepdims=True),
         [MemberPlaces(offset, last_seen, known)], [pooled_points([bank.recent_points[r] for r in rows.tolist()])],
@@ -354,49 +350,6 @@ def fall_apart(
     bank.add(parts)
 
 
-LEAST_MEASURED = 0.55  # Two groups may be one and the same if a smaller share of their people together is measured.
-
-
-def may_be_one(bank: GroupBank, i: int, j: int) -> bool:
-    """Returns True if so few people of the groups in rows i and j of the bank are measured that the two may be one
-    group."""
-    return bool(LEAST_MEASURED * (bank.size[i] + bank.size[j]) > bank.own_people[i] + bank.own_people[j])
-
-
-class DuplicateGroups:
-    """Finds pairs of groups that follow the same people.
-
-    State: clock, a dict: the time, s, by pair of ids (the smaller first) of groups whose search regions overlap.
-    A time grows in frames in which the two may be the same group and falls in the others; at 0, or once the regions do
-    not overlap, the pair is dropped.
-    """
-
-    def __init__(self) -> None:
-        self.clock: dict[tuple[int, int], float] = {}
-
-    def step(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
-        """Advances the clocks by a frame, at time t (s), and makes one group lost of each pair whose clock has passed
-        `coast_time`."""
-        rows = np.flatnonzero(bank.confirmed & (bank.last_seen >= t))
-        rows = rows[np.argsort(bank.id[rows])]
-        pairs = {(int(bank.id[i]), int(bank.id[j])): (i, j) for i, j in _overlapping(bank, rows, scaled.config.gate)}
-        clock = {}
-        for ids, (i, j) in pairs.items():
-            clock[ids] = self.clock.get(ids, 0.0) + (scaled.dt if may_be_one(bank, i, j) else -scaled.dt)
-        self.clock = {ids: s for ids, s in clock.items() if s > 0}
-        for ids in [ids for ids, s in self.clock.items() if s > scaled.config.coast_time + 1e-9]:
-            if ids not in self.clock:
-                continue  # one of them has just become lost
-            row = _with_fewer_own(bank, *pairs[ids])
-            bank.last_seen[row] = t - scaled.config.coast_time - 1e-6
-            self.clock = {pair: s for pair, s in self.clock.items() if bank.id[row] not in pair}
-
-
 def _overlapping(bank: GroupBank, rows: Ints, gate: float) -> Iterator[tuple[int, int]]:
     near = regions_overlap(bank.x[rows, :2], bank.extent[rows], gate)
     return ((int(rows[i]), int(rows[j])) for i, j in np.argwhere(np.triu(near, 1)).tolist())
-
-
-def _with_fewer_own(bank: GroupBank, i: int, j: int) -> int:
-    share: Array = bank.own_people[[i, j]] / bank.size[[i, j]]
-    return min((i, j), key=lambda row: (share[0] if row == i else share[1], -bank.first_seen[row], -bank.id[row]))

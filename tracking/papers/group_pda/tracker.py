@@ -89,8 +89,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) once the evidence of the
   last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing groups.
 - enter: so is a merge reported if at most one of the groups was there 1 s before. Paper: none. Why: they came together.
-- duplicates: of two groups or parts whose regions overlap, with less than 55 % of their people measured for
-  `coast_time`, the one with the smaller share of own people is lost. Paper: none. Why: hidden groups follow others.
+- hidden, (c): a group or part whose points are all more probably others' is predicted only, and coasts. Paper: groups
+  share points. Why: hidden groups follow others.
 - reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
   search region. Why: lost groups are guesses.
 - onsets: dated back. Paper: none. Why: decisions lag.
@@ -132,7 +132,7 @@ from tracking.papers.group_pda.from_pixels import (
     update_histograms,
 )
 from tracking.papers.group_pda.group_bank import GroupBank
-from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, GroupChanges, fall_apart, whole_groups
+from tracking.papers.group_pda.merging_and_splitting import GroupChanges, fall_apart, whole_groups
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters, scale_parameters
 from tracking.running.image_scale import required
 
@@ -143,8 +143,8 @@ class GroupPda:
     """The tracker `group-pda`: groups of people tracked as wholes, from points or from foreground pixels.
 
     State: config, which may be replaced between two frames; bank, the groups; ids, which gives the next id; changes,
-    the past of pairs that may merge or split; duplicates, the clocks of duplicate groups; pixels: grid points and
-    background model, None from points; plane: "ground" or "image"; context. All but config exist after `reset` only.
+    the past of pairs that may merge or split; pixels: grid points and background model, None from points; plane:
+    "ground" or "image"; context. All but config exist after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
@@ -164,7 +164,7 @@ class GroupPda:
         """
         self.context = context
         self.bank, self.ids = GroupBank.empty(), GroupIds()
-        self.changes, self.duplicates = GroupChanges(), DuplicateGroups()
+        self.changes = GroupChanges()
         self.pixels = None if context.background is None else ForegroundPoints(self.config, context)
         if self.pixels is not None:
             self.context = context.replace(px_per_m=self.pixels.scale)
@@ -183,8 +183,7 @@ class GroupPda:
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the groups and events of the frame, as Tracks with unit "group"; updates all groups.
 
-        Order: predict; remove lost groups and duplicates of the frame before; gate, associate, update, fall apart (Fig.
-        1), births; duplicates; split, merge; confirm.
+        Order: predict; remove lost groups; gate, associate, update, fall apart (Fig. 1), births; split, merge; confirm.
         From points `detections.pos` is used (x, y), from pixels `frame.image`. A frame without them (None), and from
         pixels one with too much foreground, is predicted only; before the first detections the Tracks are empty. A
         config that has replaced `config` since the last frame holds from this frame on; the groups stay.
@@ -205,7 +204,6 @@ class GroupPda:
         events = list(remove_lost(bank, scaled, t))
         if points is not None:
             self._measure(points, weights, scaled, t)
-        self.duplicates.step(bank, scaled, t)
         events += self.changes.step(bank, scaled, t)
         events += confirm(bank, scaled, t, self.ids)
         return self._report(frame, events, scaled, self._outline(detections))

@@ -10,8 +10,8 @@ from tests import painted
 from tests.painted import TALL, Person
 from tests.tracking.papers.group_pda.test_association_kernels import bank
 from tests.tracking.papers.group_pda.test_tracker import track
+from tracking.papers.group_pda.association import associate, claimed, gated_distances, search_regions
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, merged
 from tracking.papers.group_pda.scaled_parameters import scale_parameters
 from tracking.papers.group_pda.tracker import GroupPda
 
@@ -43,24 +43,19 @@ def test_who_is_hidden_for_a_moment_has_his_id_afterwards() -> None:
     assert sum(np.sign(t.pos[:, 0]).tolist() == [1, -1] for t in last) >= 11
 
 
-def test_the_order_of_groups_does_not_restart_the_clock() -> None:
-    """Rows of the bank change places when groups split or merge."""
-    scaled, lost = scale_parameters(GroupPdaConfig(coast_time=1.0), FPS, 1.0), []
-    for reorder in (False, True):
-        duplicates, two = DuplicateGroups(), bank(size=np.ones(2), extent=np.tile(0.1 * np.eye(2), (2, 1, 1)))
-        two.own_people[:] = [1.0, 0.0]
-        for k in range(20):
-            two.last_seen[:] = k / FPS
-            duplicates.step(two, scaled, k / FPS)
-            if (two.last_seen < k / FPS).any():
-                lost.append(k)
-                break
-            if reorder and k == 5:
-                turned = merged(two, np.array([0]))
-                two.keep(np.array([False, True]))
-                two.add(turned)
-                two.own_people[:] = [0.0, 1.0]
-    assert lost == [10, 10]
+def test_a_group_whose_only_point_is_more_probably_anothers_is_predicted_only() -> None:
+    scaled, t, point = scale_parameters(GroupPdaConfig(), FPS, 1.0), 1.0, np.zeros((1, 2))
+    two = bank(
+        size=np.ones(2), x=np.array([[0.0, 0, 1, 0], [0.3, 0, 1, 0]]), P=np.tile(0.1 * np.eye(4), (2, 1, 1)),
+        extent=np.tile(0.1 * np.eye(2), (2, 1, 1)),
+    )  # fmt: skip
+    before, region = two.x.copy(), search_regions(two, scaled)
+    claims = claimed(point, np.ones(1), gated_distances(two, point, region, scaled), t)
+    mine = associate(two, claims, region, np.zeros((2, 1)), scaled, t)
+    assert claims.claimants.tolist() == [2]
+    assert mine.tolist() == [[True], [False]]
+    assert two.last_seen.tolist() == [t, 0.0]
+    assert two.x[1].tolist() == before[1].tolist()
 
 
 SCALE = TALL / 1.7
