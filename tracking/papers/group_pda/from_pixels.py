@@ -15,6 +15,8 @@ that the point stands for, because neighbouring pixels have like colours.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT
@@ -26,17 +28,57 @@ from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.scaled_parameters import COLOUR_BINS, ScaledParameters
 from tracking.running.image_scale import required
 
+MOST_GROWTH = 0.7  # Largest change of the scale from the middle of the image to its upper or lower edge, as a share.
+LEAST_GROWTH = 1e-9  # per px: stands for none.
 WIDTH_PER_HEIGHT = 0.3  # Width over height of a person in the image if there is no camera.
 GRID = 0.1  # m: distance of the points of the grid.
 LEAST_SINE_TILT = 0.2  # Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured.
+
+
+class FlatView(NamedTuple):
+    """A map from the image to a plane in which people have one size, m: its local scale is that of people's middles.
+
+    middle (2,): of the image, px, the plane's origin. scale: px per m there. growth: share of it by which the scale
+    grows per px downwards.
+    """
+
+    middle: Array
+    scale: float
+    growth: float
+
+    @property
+    def rate(self) -> float:
+        """Rate per m, towards the camera, at which the logarithm of the scale grows."""
+        return self.scale * self.growth
+
+    def growths(self, uv: Array) -> Array:
+        """Returns the scale (M,) at image points uv (M, 2), px, over that in the middle."""
+        return np.maximum(1 + self.growth * (uv[:, 1] - self.middle[1]), 1 - MOST_GROWTH)
+
+    def flat(self, uv: Array) -> Array:
+        """Returns the places (M, 2) in the plane, m, of image points uv (M, 2), px."""
+        local = self.growths(uv)
+        return np.column_stack([(uv[:, 0] - self.middle[0]) / (self.scale * local), np.log(local) / self.rate])
+
+    def image(self, places: Array) -> Array:
+        """Returns the image points (M, 2), px, of places (M, 2) in the plane, m."""
+        local = np.exp(self.rate * places[:, 1])
+        return self.middle + np.column_stack([self.scale * local * places[:, 0], (local - 1) / self.growth])
+
+    def jacobian(self, places: Array) -> Array:
+        """Returns the derivatives (M, 2, 2) of `image` at places (M, 2), px per m."""
+        local = self.scale * np.exp(self.rate * places[:, 1])
+        found = local[:, None, None] * np.eye(2)
+        found[:, 0, 1] = local * self.rate * places[:, 0]
+        return found
 
 
 class ForegroundPoints:
     """Foreground pixels on a grid as points, each a share of a person.
 
     State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
-    is nan, learned from lone people in its background sample. step: px between the grid's points. person (2,): width
-    and height of a person in the image, px.
+    is nan, learned from lone people in its background sample. step: px between the grid's points. view: the plane of
+    the points. person (2,): width and height of a person there, m.
 
     The context must have a background sample (else AssertionError). Raises InputError if the scale is neither known nor
     learned, if it is zero or negative, or if the sample cannot be used.
@@ -50,23 +92,24 @@ class ForegroundPoints:
             self.foreground.learn_person_size(PersonSize(context), context.background)
         self.scale = required(self.foreground.px_per_m)
         self.step = max(1, round(GRID * self.scale))
-        self.person = _person(context.camera, self.scale)
+        self.view = flat_view(context.camera, self.foreground.shape, self.scale)
+        self.person = _person(context.camera, self.scale) / self.view.scale
 
     def follow(self, config: GroupPdaConfig) -> None:
         """Replaces the config: settings of the background model change; what the model learned and the scale stay."""
         self.config = config
         self.foreground.follow(config)
 
-    @property
-    def people_per_point(self) -> float:
-        """The people, a share below 1 as a rule, that one grid point stands for: area of a grid cell over that of a
-        person's ellipse."""
-        return float(self.step**2 / (np.pi / 4 * self.person.prod()))
+    def people(self, uv: Array) -> Array:
+        """Returns the people (M,), shares below 1 as a rule, that grid points uv (M, 2), px, stand for: area of a grid
+        cell over that of a person's ellipse."""
+        side = self.step / (self.view.scale * self.view.growths(uv))
+        return np.asarray(np.square(side) / (np.pi / 4 * self.person.prod()))
 
     @property
     def body_cov(self) -> Array:
-        """Covariance (2, 2), px^2, of one person's pixels: those of a filled ellipse, its semi-axes squared over 4."""
-        return np.asarray(np.eye(2) * np.square(self.person / 4), np.float64)
+        """Covariance (2, 2), m^2, of one person's pixels: those of a filled ellipse, its semi-axes squared over 4."""
+        return np.asarray(np.diag(np.square(self.person / 4)), np.float64)
 
     def points(self, image: Image, outlines: list[Array]) -> Array | None:
         """Returns the grid points (M, 2) u, v in px that are foreground; None if too much is foreground."""
@@ -86,6 +129,20 @@ def sine_tilt(camera: Camera | None) -> float:
     """Returns the sine of the camera's downward tilt, the factor by which depth on the ground is shortened in the
     image."""
     return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_SINE_TILT))
+
+
+def flat_view(camera: Camera | None, shape: tuple[int, ...], scale: float) -> FlatView:
+    """Returns the map for an image of H x W px; the scale, px per m, is the same everywhere without a pinhole camera,
+    and if the image's middle is near the horizon."""
+    middle = np.array(shape[1::-1]) / 2
+    if camera is None or camera.kind == "top":
+        return FlatView(middle, scale, LEAST_GROWTH)
+    high, (down, steep) = camera.position[2] - PERSON_HEIGHT / 2, -camera.rotation[1:, 2]
+    sine = steep + down * (middle[1] - camera.centre_px[1]) / camera.focal_px[1]  # of the line of sight's tilt
+    if sine < LEAST_SINE_TILT or high <= 0:
+        return FlatView(middle, scale, LEAST_GROWTH)
+    growth = np.clip(down / camera.focal_px[1] / sine, LEAST_GROWTH, MOST_GROWTH / middle[1])
+    return FlatView(middle, float(camera.focal_px[0] * sine / high), float(growth))
 
 
 def _person(camera: Camera | None, scale: float) -> Array:

@@ -100,6 +100,7 @@ Departures. Those marked (c) are off with `corrections` off.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -219,18 +220,30 @@ class GroupPda:
         bank = whole_groups(self.bank, np.flatnonzero(seen))
         rows = np.argsort(bank.id)
         # The places on their own hull suffice, and are few.
-        corners = convex_hulls([bank.positions(r) for r in rows.tolist()])
+        corners = convex_hulls([self._reported(bank.positions(r)) for r in rows.tolist()])
         hulls = convex_hulls([(c[:, None] + outline).reshape(-1, 2) for c in corners])
-        x, size = bank.x[rows], bank.size[rows] / scaled.kernel_rules[kernels.DETECT_PROB]
-        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], bank.extent[rows], size, hulls)
-        return whole_group_tracks(frame, self.plane, self.context.fps, groups, bank.P[rows], events)
+        x, P, extent = bank.x[rows], bank.P[rows], bank.extent[rows]
+        if self.pixels is not None:
+            J = self.pixels.view.jacobian(x[:, :2])
+            JJ = np.kron(np.eye(2), J)
+            x = np.hstack([self._reported(x[:, :2]), np.einsum("gij,gj->gi", J, x[:, 2:])])
+            P, extent = JJ @ P @ np.swapaxes(JJ, 1, 2), J @ extent @ np.swapaxes(J, 1, 2)
+            events = [replace(e, pos=tuple(self._reported(np.array([e.pos]))[0].tolist())) for e in events]
+        size = bank.size[rows] / scaled.kernel_rules[kernels.DETECT_PROB]
+        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], extent, size, hulls)
+        return whole_group_tracks(frame, self.plane, self.context.fps, groups, P, events)
+
+    def _reported(self, places: Array) -> Array:
+        return places if self.pixels is None else self.pixels.view.image(places)
 
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
         if self.pixels is not None:
             found = None if frame.image is None else self.pixels.points(frame.image, self.outlines())
             if found is not None and frame.image is not None and self.config.appearance > 0:
                 self.colours = colour_bins(frame.image, found)
-            return found, np.full(0 if found is None else len(found), self.pixels.people_per_point)
+            if found is None:
+                return None, np.zeros(0)
+            return self.pixels.view.flat(found), self.pixels.people(found)
         if detections is None:
             return None, np.zeros(0)
         self.plane = "image" if detections.plane == "image" else "ground"
@@ -255,7 +268,7 @@ class GroupPda:
         """
         bank, cell = self.bank, self._outline(None)
         rows = np.flatnonzero(bank.confirmed).tolist()
-        return [(bank.positions(r)[:, None] + cell).reshape(-1, 2) for r in rows]
+        return [(self._reported(bank.positions(r))[:, None] + cell).reshape(-1, 2) for r in rows]
 
     def _no_tracks(self, frame: Frame) -> Tracks:
         none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
@@ -265,9 +278,8 @@ class GroupPda:
         if self.scaled is not None and self.scaled.config is self.config:
             return self.scaled
         if self.pixels is not None:
-            p, scale = self.pixels, self.context.px_per_m
-            sine = sine_tilt(self.context.camera)
-            self.scaled = scale_parameters(self.config, self.context.fps, scale, p.body_cov, sine)
+            sine, rate = sine_tilt(self.context.camera), self.pixels.view.rate
+            self.scaled = scale_parameters(self.config, self.context.fps, 1.0, self.pixels.body_cov, sine, rate)
             return self.scaled
         scale = required(self.context.px_per_m) if self.plane == "image" else 1.0
         sine = sine_tilt(self.context.camera) if self.plane == "image" else 1.0
