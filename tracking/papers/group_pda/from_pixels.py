@@ -28,57 +28,58 @@ from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.scaled_parameters import COLOUR_BINS, ScaledParameters
 from tracking.running.image_scale import required
 
-MOST_GROWTH = 0.7  # Largest change of the scale from the middle of the image to its upper or lower edge, as a share.
-LEAST_GROWTH = 1e-9  # per px: stands for none.
+MOST_GROWTH = 0.7  # Largest change of the scale from the middle of the image to its upper edge, as a share.
+ROWS = 9  # Rows of the image for which the size of people is computed; between them it is interpolated.
 WIDTH_PER_HEIGHT = 0.3  # Width over height of a person in the image if there is no camera.
 GRID = 0.1  # m: distance of the points of the grid.
 LEAST_SINE_TILT = 0.2  # Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured.
 
 
-class FlatView(NamedTuple):
-    """A map from the image to a plane in which people have one size, m: its local scale is that of people's middles.
+class GroundView(NamedTuple):
+    """The image of people's middles: a map between image points, px, and places on the ground, m, seen from the camera.
 
-    middle (2,): of the image, px, the plane's origin. scale: px per m there. growth: share of it by which the scale
-    grows per px downwards.
+    middle (2,): of the image, px, the origin of the places; y points to the camera. scale: px per m across there.
+    growth: share of it by which the scale grows per px downwards. sine: of the tilt of the line of sight there, by
+    which depth is shortened.
     """
 
     middle: Array
     scale: float
     growth: float
+    sine: float
 
-    @property
-    def rate(self) -> float:
-        """Rate per m, towards the camera, at which the logarithm of the scale grows."""
-        return self.scale * self.growth
-
-    def growths(self, uv: Array) -> Array:
-        """Returns the scale (M,) at image points uv (M, 2), px, over that in the middle."""
-        return np.maximum(1 + self.growth * (uv[:, 1] - self.middle[1]), 1 - MOST_GROWTH)
-
-    def flat(self, uv: Array) -> Array:
-        """Returns the places (M, 2) in the plane, m, of image points uv (M, 2), px."""
-        local = self.growths(uv)
-        return np.column_stack([(uv[:, 0] - self.middle[0]) / (self.scale * local), np.log(local) / self.rate])
+    def places(self, uv: Array) -> Array:
+        """Returns the places (M, 2), m, of image points uv (M, 2), px."""
+        growth = np.maximum(1 + self.growth * (uv[:, 1:] - self.middle[1]), 1 - MOST_GROWTH)
+        return np.asarray((uv - self.middle) / (self.scale * growth * np.array([1, self.sine])))
 
     def image(self, places: Array) -> Array:
-        """Returns the image points (M, 2), px, of places (M, 2) in the plane, m."""
-        local = np.exp(self.rate * places[:, 1])
-        return self.middle + np.column_stack([self.scale * local * places[:, 0], (local - 1) / self.growth])
+        """Returns the image points (M, 2), px, of places (M, 2), m."""
+        return np.asarray(self.middle + self._growth(places) * places * self.scale * np.array([1, self.sine]))
 
     def jacobian(self, places: Array) -> Array:
         """Returns the derivatives (M, 2, 2) of `image` at places (M, 2), px per m."""
-        local = self.scale * np.exp(self.rate * places[:, 1])
-        found = local[:, None, None] * np.eye(2)
-        found[:, 0, 1] = local * self.rate * places[:, 0]
+        growth, depth = self._growth(places)[:, 0], self.scale * self.sine
+        found = (self.scale * growth)[:, None, None] * np.eye(2)
+        found[:, 0, 1] = places[:, 0] * self.scale * self.growth * depth * growth**2
+        found[:, 1, 1] = depth * growth**2
         return found
+
+    def _growth(self, places: Array) -> Array:
+        """Returns the scale (M, 1) at places over that in the middle; beyond the horizon a large one."""
+        return np.asarray(1 / np.maximum(1 - self.growth * self.scale * self.sine * places[:, 1:], 0.1))
 
 
 class ForegroundPoints:
-    """Foreground pixels on a grid as points, each a share of a person.
+    """Foreground pixels on a grid as points, each a share of a person, put where the middle of that person is.
+
+    A run of foreground along a column of the image shows people one behind the other: it reaches from the head of the
+    last to the feet of the first. Their middles lie from half a person below its upper end to half a person above its
+    lower end. So the points of a run are those of the run, shrunk about its middle by a person's height.
 
     State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
-    is nan, learned from lone people in its background sample. step: px between the grid's points. view: the plane of
-    the points. person (2,): width and height of a person there, m.
+    is nan, learned from lone people in its background sample. step: px between the grid's points. view: from the image
+    to the ground. rows (K,), person (K, 2): width and height, px, of a person whose middle is in that row.
 
     The context must have a background sample (else AssertionError). Raises InputError if the scale is neither known nor
     learned, if it is zero or negative, or if the sample cannot be used.
@@ -92,37 +93,58 @@ class ForegroundPoints:
             self.foreground.learn_person_size(PersonSize(context), context.background)
         self.scale = required(self.foreground.px_per_m)
         self.step = max(1, round(GRID * self.scale))
-        self.view = flat_view(context.camera, self.foreground.shape, self.scale)
-        self.person = _person(context.camera, self.scale) / self.view.scale
+        self.view = ground_view(context.camera, self.foreground.shape, self.scale)
+        self.rows, self.person = _people(context.camera, self.view, self.scale)
 
     def follow(self, config: GroupPdaConfig) -> None:
         """Replaces the config: settings of the background model change; what the model learned and the scale stay."""
         self.config = config
         self.foreground.follow(config)
 
-    def people(self, uv: Array) -> Array:
-        """Returns the people (M,), shares below 1 as a rule, that grid points uv (M, 2), px, stand for: area of a grid
-        cell over that of a person's ellipse."""
-        side = self.step / (self.view.scale * self.view.growths(uv))
-        return np.asarray(np.square(side) / (np.pi / 4 * self.person.prod()))
-
     @property
     def body_cov(self) -> Array:
-        """Covariance (2, 2), m^2, of one person's pixels: those of a filled ellipse, its semi-axes squared over 4."""
-        return np.asarray(np.diag(np.square(self.person / 4)), np.float64)
+        """Covariance (2, 2), m^2, of one person's points, as of a filled ellipse, its semi-axes squared over 4."""
+        wide = float(np.interp(self.view.middle[1], self.rows, self.person[:, 0])) / self.view.scale
+        return np.asarray(np.eye(2) * (wide / 4) ** 2, np.float64)
 
-    def points(self, image: Image, outlines: list[Array]) -> Array | None:
-        """Returns the grid points (M, 2) u, v in px that are foreground; None if too much is foreground."""
+    def points(self, image: Image, outlines: list[Array]) -> tuple[Array, Array, Array] | None:
+        """Returns pixels (M, 2) u, v in px, where on the ground (M, 2) their people are, m, and the people (M,) that
+        each stands for: the area about it over that of a person's ellipse. None if too much is foreground."""
         seen = self.foreground.segment(image)
         self.foreground.adapt(seen, convex_areas(self.foreground.shape, outlines))
-        return grid_points(seen.mask, self.step) if seen.plausible else None
+        if not seen.plausible:
+            return None
+        u, top, bottom = column_runs(seen.mask, self.step)
+        middle, length = (top + bottom) / 2, bottom - top
+        wide, high = self._person_at(middle).T
+        count = np.maximum(np.rint(length / self.step).astype(np.int64), 1)
+        run = np.repeat(np.arange(len(u)), count)
+        share = (np.arange(len(run)) - (np.cumsum(count) - count)[run] + 0.5) / count[run] - 0.5
+        pixels = np.column_stack([u[run], middle[run] + share * length[run]])
+        middles = np.column_stack([u[run], middle[run] + share * np.maximum(length - high, 0.0)[run]])
+        weights = (length * self.step / (np.pi / 4 * wide * high) / count)[run]
+        return pixels, self.view.places(middles), weights
+
+    def outline(self, places: Array) -> Array:
+        """Returns the corners (4 M, 2), px, of what the points of people at places (M, 2), m, cover of the image."""
+        middle = self.view.image(places)
+        size = np.column_stack([np.full(len(places), self.step), self._person_at(middle[:, 1])[:, 1]])
+        return np.asarray((middle[:, None] + SQUARE * size[:, None] / 2).reshape(-1, 2))
+
+    def _person_at(self, row: Array) -> Array:
+        return np.column_stack([np.interp(row, self.rows, size) for size in self.person.T])
 
 
-def grid_points(mask: Bools, step: int) -> Array:
-    """Returns u, v (M, 2) in px of the centres of the foreground pixels on a grid of every `step`-th pixel, by rows."""
+SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+
+
+def column_runs(mask: Bools, step: int) -> tuple[Array, Array, Array]:
+    """Returns the middle u (R,) and the upper and lower ends v (R,), px, of the runs of foreground in every `step`-th
+    column, by columns."""
     first = step // 2
-    v, u = np.nonzero(mask[first::step, first::step])
-    return np.asarray(np.stack([u, v], 1) * float(step) + (first + 0.5), np.float64)
+    edges = np.diff(np.pad(mask[:, first::step].T.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    (column, top), (_, bottom) = np.nonzero(edges > 0), np.nonzero(edges < 0)
+    return column * float(step) + (first + 0.5), top.astype(float), bottom.astype(float)
 
 
 def sine_tilt(camera: Camera | None) -> float:
@@ -131,33 +153,36 @@ def sine_tilt(camera: Camera | None) -> float:
     return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_SINE_TILT))
 
 
-def flat_view(camera: Camera | None, shape: tuple[int, ...], scale: float) -> FlatView:
-    """Returns the map for an image of H x W px; the scale, px per m, is the same everywhere without a pinhole camera,
+def ground_view(camera: Camera | None, shape: tuple[int, ...], scale: float) -> GroundView:
+    """Returns the view for an image of H x W px; its scale, px per m, is the same everywhere without a pinhole camera,
     and if the image's middle is near the horizon."""
     middle = np.array(shape[1::-1]) / 2
     if camera is None or camera.kind == "top":
-        return FlatView(middle, scale, LEAST_GROWTH)
+        return GroundView(middle, scale, 0.0, 1.0)
     high, (down, steep) = camera.position[2] - PERSON_HEIGHT / 2, -camera.rotation[1:, 2]
-    sine = steep + down * (middle[1] - camera.centre_px[1]) / camera.focal_px[1]  # of the line of sight's tilt
+    sine = float(steep + down * (middle[1] - camera.centre_px[1]) / camera.focal_px[1])
     if sine < LEAST_SINE_TILT or high <= 0:
-        return FlatView(middle, scale, LEAST_GROWTH)
-    growth = np.clip(down / camera.focal_px[1] / sine, LEAST_GROWTH, MOST_GROWTH / middle[1])
-    return FlatView(middle, float(camera.focal_px[0] * sine / high), float(growth))
+        return GroundView(middle, scale, 0.0, LEAST_SINE_TILT)
+    growth = float(min(down / camera.focal_px[1] / sine, MOST_GROWTH / middle[1]))
+    return GroundView(middle, float(camera.focal_px[0] * sine / high), growth, sine)
 
 
-def _person(camera: Camera | None, scale: float) -> Array:
-    if camera is None:
-        return scale * PERSON_HEIGHT * np.array([WIDTH_PER_HEIGHT, 1.0])
+def _people(camera: Camera | None, view: GroundView, scale: float) -> tuple[Array, Array]:
     from sim.scene.body import person_boxes
     from sim.scene.camera import to_ground
 
-    middle = to_ground(camera, np.array([camera.image], float) / 2)
-    turns = np.radians([0.0, 45.0, 90.0, 135.0])
-    if not np.isfinite(middle).all():
-        return _person(None, scale)
-    place = np.column_stack([np.repeat(middle, len(turns), 0), np.zeros(len(turns))])
+    rows = np.linspace(0, 2 * view.middle[1], ROWS)
+    usual = np.tile(scale * PERSON_HEIGHT * np.array([WIDTH_PER_HEIGHT, 1.0]), (ROWS, 1))
+    if camera is None:
+        return rows, usual
+    ground = to_ground(camera, np.column_stack([np.full(ROWS, view.middle[0]), rows]), PERSON_HEIGHT / 2)
+    seen = np.isfinite(ground).all(1)
+    turns = np.tile(np.radians([0.0, 45.0, 90.0, 135.0]), int(seen.sum()))
+    place = np.column_stack([np.repeat(ground[seen], 4, 0), np.zeros(len(turns))])
     tall, wide, deep = (np.full(len(turns), size) for size in (PERSON_HEIGHT, SHOULDERS, DEPTH))
-    return np.asarray(person_boxes(camera, place, turns, tall, wide, deep)[:, 2:].mean(0))
+    size = person_boxes(camera, place, turns, tall, wide, deep)[:, 2:].reshape(-1, 4, 2).mean(1)
+    whole = np.isfinite(size).all(1)
+    return (rows[seen][whole], size[whole]) if whole.any() else (rows, usual)
 
 
 LEVELS = 4  # Levels of each of the three channels: LEVELS cubed is COLOUR_BINS.

@@ -226,8 +226,7 @@ def _split_into(bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledPa
     parts = sorted(parts, key=lambda rows: (group not in bank.id[rows], -bank.size[rows].sum()))
     recent = pooled_points([bank.recent_points[r] for rows in parts for r in rows.tolist()])
     two = [np.concatenate([_latest_points(bank, r) for r in rows.tolist()]) for rows in parts[:2]]
-    metres = scaled.metres_at(np.concatenate(two).mean(0))
-    onset, place = split_onset(recent, two, metres, scaled.body_cov, t)
+    onset, place = split_onset(recent, two, scaled.metres_per_unit, scaled.body_cov, t)
     heads = [rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]] for rows in parts]
     for rows, head in zip(parts, heads, strict=True):
         bank.parent[rows], bank.parent[head] = bank.id[head], NO_ID
@@ -294,8 +293,7 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
 
 
 def _moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float) -> PairMoment:
-    metres = scaled.metres_at((bank.x[a, :2] + bank.x[b, :2]) / 2)
-    way, v = ((bank.x[b, k : k + 2] - bank.x[a, k : k + 2]) * metres for k in (0, 2))
+    way, v = ((bank.x[b, k : k + 2] - bank.x[a, k : k + 2]) * scaled.metres_per_unit for k in (0, 2))
     w = bank.size[[a, b]] / bank.size[[a, b]].sum()
     return PairMoment(t, way, v, w @ bank.x[[a, b], :2], _gap(bank, a, b, way, scaled))
 
@@ -316,7 +314,7 @@ def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) 
     n, n0 = bank.size[row], scaled.constraint.strength
     factor = scaled.kernel_rules[GATE_FACTOR]
     people = ((n + n0) * factor * bank.extent[row] - n0 * scaled.constraint.prior) / n - scaled.body_cov
-    along = scaled.metres_at(bank.x[row, :2]) * way / max(float(np.hypot(*way)), 1e-9)
+    along = scaled.metres_per_unit * way / max(float(np.hypot(*way)), 1e-9)
     return float(np.sqrt(max(along @ people @ along, 0.0)))
 
 

@@ -52,27 +52,17 @@ class ScaledParameters:
     Q: Array
     from_pixels: bool
     metres_per_unit: Array
-    rate: float
     body_cov: Array
     colour_bins: int
 
 
-    def metres_at(self, place: Array) -> Array:
-        """Returns metres on the ground (2,) per unit along x and y at a place (2,) in the unit of the points."""
-        return self.metres_per_unit * np.array([1, np.exp(-self.rate * place[1])])
-
-
 def scale_parameters(
-    config: GroupPdaConfig, fps: float, scale: float, body_cov: Array | None = None, sine_tilt: float = 1.0,
-    rate: float = 0.0,
+    config: GroupPdaConfig, fps: float, scale: float, body_cov: Array | None = None, sine_tilt: float = 1.0
 ) -> ScaledParameters:
     """Returns the parameters for a frame rate `fps` (frames per s) and a scale in units of the points per metre."""
     c, dt, pixels = config, 1 / fps, body_cov is not None
     point_sd = scale * (c.pixel_noise if pixels else c.point_noise)
-    prior = (scale * c.person_spread) ** 2 * np.eye(2)
-    if body_cov is not None:
-        import os
-        prior = prior * np.array([1, sine_tilt])**2 * float(os.environ.get("PRIOR","1")) + body_cov
+    prior = (scale * c.person_spread) ** 2 * np.eye(2) + (0.0 if body_cov is None else body_cov)
     link = 2 * scale * (c.pixel_radius if pixels else c.radius)
     factor = gate_factor(c.gate) if c.corrections else 1.0
     least = LEAST_PEOPLE if pixels and c.corrections else 0.0
@@ -91,7 +81,6 @@ def scale_parameters(
         Q=Q * (scale * c.accel_noise) ** 2 / dt,
         from_pixels=pixels,
         metres_per_unit=np.array([1, 1 / sine_tilt]) / scale,
-        rate=rate,
         body_cov=np.zeros((2, 2)) if body_cov is None else body_cov,
         colour_bins=COLOUR_BINS if pixels and c.appearance > 0 else 0,
     )

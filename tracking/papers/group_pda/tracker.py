@@ -126,6 +126,7 @@ from tracking.papers.group_pda.association import (
 from tracking.papers.group_pda.births_and_losses import add_newborns, confirm, expected_members, remove_lost
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.from_pixels import (
+    SQUARE,
     ForegroundPoints,
     colour_bins,
     colour_density,
@@ -136,8 +137,6 @@ from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, GroupChanges, fall_apart, whole_groups
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters, scale_parameters
 from tracking.running.image_scale import required
-
-SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 class GroupPda:
@@ -209,7 +208,7 @@ class GroupPda:
         self.duplicates.step(bank, scaled, t)
         events += self.changes.step(bank, scaled, t)
         events += confirm(bank, scaled, t, self.ids)
-        return self._report(frame, events, scaled, self._outline(detections))
+        return self._report(frame, events, scaled, self._about(detections))
 
     def _report(self, frame: Frame, events: list[WholeGroupEvent], scaled: ScaledParameters, outline: Array) -> Tracks:
         """Returns the confirmed groups measured within the last `report_coast` s, by id.
@@ -219,31 +218,28 @@ class GroupPda:
         seen = self.bank.confirmed & (frame.t - self.bank.last_seen <= self.config.report_coast + 1e-9)
         bank = whole_groups(self.bank, np.flatnonzero(seen))
         rows = np.argsort(bank.id)
-        # The places on their own hull suffice, and are few.
-        corners = convex_hulls([self._reported(bank.positions(r)) for r in rows.tolist()])
-        hulls = convex_hulls([(c[:, None] + outline).reshape(-1, 2) for c in corners])
+        hulls = [self._outline(bank.positions(r), outline) for r in rows.tolist()]
         x, P, extent = bank.x[rows], bank.P[rows], bank.extent[rows]
         if self.pixels is not None:
-            J = self.pixels.view.jacobian(x[:, :2])
-            JJ = np.kron(np.eye(2), J)
-            x = np.hstack([self._reported(x[:, :2]), np.einsum("gij,gj->gi", J, x[:, 2:])])
-            P, extent = JJ @ P @ np.swapaxes(JJ, 1, 2), J @ extent @ np.swapaxes(J, 1, 2)
-            events = [replace(e, pos=tuple(self._reported(np.array([e.pos]))[0].tolist())) for e in events]
+            view = self.pixels.view
+            J = view.jacobian(x[:, :2])
+            both = np.kron(np.eye(2), J)
+            P, extent = both @ P @ np.swapaxes(both, 1, 2), J @ extent @ np.swapaxes(J, 1, 2)
+            x = np.hstack([view.image(x[:, :2]), np.einsum("gij,gj->gi", J, x[:, 2:])])
+            events = [replace(e, pos=tuple(view.image(np.array([e.pos]))[0].tolist())) for e in events]
         size = bank.size[rows] / scaled.kernel_rules[kernels.DETECT_PROB]
-        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], extent, size, hulls)
+        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], extent, size, convex_hulls(hulls))
         return whole_group_tracks(frame, self.plane, self.context.fps, groups, P, events)
-
-    def _reported(self, places: Array) -> Array:
-        return places if self.pixels is None else self.pixels.view.image(places)
 
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
         if self.pixels is not None:
             found = None if frame.image is None else self.pixels.points(frame.image, self.outlines())
-            if found is not None and frame.image is not None and self.config.appearance > 0:
-                self.colours = colour_bins(frame.image, found)
-            if found is None:
+            if found is None or frame.image is None:
                 return None, np.zeros(0)
-            return self.pixels.view.flat(found), self.pixels.people(found)
+            pixels, points, weights = found
+            if self.config.appearance > 0:
+                self.colours = colour_bins(frame.image, pixels)
+            return points, weights
         if detections is None:
             return None, np.zeros(0)
         self.plane = "image" if detections.plane == "image" else "ground"
@@ -252,9 +248,14 @@ class GroupPda:
             points = below_heads(points, detections.box, camera)
         return points, np.ones(len(points))
 
-    def _outline(self, detections: Detections | None) -> Array:
+    def _outline(self, places: Array, about: Array) -> Array:
         if self.pixels is not None:
-            return SQUARE * self.pixels.step / 2
+            return self.pixels.outline(places)
+        # The places on their own hull suffice, and are few.
+        (corners,) = convex_hulls([places])
+        return np.asarray((corners[:, None] + about).reshape(-1, 2))
+
+    def _about(self, detections: Detections | None) -> Array:
         if self.plane == "ground":
             return FOOTPRINT
         if detections is not None and detections.box is not None and len(detections.box):
@@ -266,9 +267,8 @@ class GroupPda:
 
         From points they are the corners of footprints or usual boxes, in the unit of the points.
         """
-        bank, cell = self.bank, self._outline(None)
-        rows = np.flatnonzero(bank.confirmed).tolist()
-        return [(self._reported(bank.positions(r))[:, None] + cell).reshape(-1, 2) for r in rows]
+        bank, about = self.bank, self._about(None)
+        return [self._outline(bank.positions(r), about) for r in np.flatnonzero(bank.confirmed).tolist()]
 
     def _no_tracks(self, frame: Frame) -> Tracks:
         none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
@@ -278,8 +278,7 @@ class GroupPda:
         if self.scaled is not None and self.scaled.config is self.config:
             return self.scaled
         if self.pixels is not None:
-            sine, rate = sine_tilt(self.context.camera), self.pixels.view.rate
-            self.scaled = scale_parameters(self.config, self.context.fps, 1.0, self.pixels.body_cov, sine, rate)
+            self.scaled = scale_parameters(self.config, self.context.fps, 1.0, self.pixels.body_cov)
             return self.scaled
         scale = required(self.context.px_per_m) if self.plane == "image" else 1.0
         sine = sine_tilt(self.context.camera) if self.plane == "image" else 1.0
