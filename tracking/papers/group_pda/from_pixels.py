@@ -40,13 +40,18 @@ class GroundView(NamedTuple):
 
     middle (2,): of the image, px, the origin of the places; y points to the camera. scale: px per m across there.
     growth: share of it by which the scale grows per px downwards. sine: of the tilt of the line of sight there, by
-    which depth is shortened.
+    which depth is shortened. lean: share by which upright lines come nearer to each other per px downwards.
     """
 
     middle: Array
     scale: float
     growth: float
     sine: float
+    lean: float
+
+    def upright(self, across: Array, row: Array) -> Array:
+        """Returns u, px, in the rows v, px, of the images of upright lines `across` px from the middle in its row."""
+        return np.asarray(self.middle[0] + across * (1 - self.lean * (row - self.middle[1])))
 
     def places(self, uv: Array) -> Array:
         """Returns the places (M, 2), m, of image points uv (M, 2), px."""
@@ -73,8 +78,8 @@ class GroundView(NamedTuple):
 class ForegroundPoints:
     """Foreground pixels on a grid as points, each a share of a person, put where the middle of that person is.
 
-    A run of foreground along a column of the image shows people one behind the other: it reaches from the head of the
-    last to the feet of the first. Their middles lie from half a person below its upper end to half a person above its
+    A run of foreground along the image of an upright line shows people one behind the other: it reaches from the head
+    of the last to the feet of the first. Their middles lie from half a person below its upper end to half a person above its
     lower end. So the points of a run are those of the run, shrunk about its middle by a person's height.
 
     State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
@@ -95,6 +100,7 @@ class ForegroundPoints:
         self.step = max(1, round(GRID * self.scale))
         self.view = ground_view(context.camera, self.foreground.shape, self.scale)
         self.rows, self.person = _people(context.camera, self.view, self.scale)
+        self.lines = _lines(self.view, self.foreground.shape, self.step)
 
     def follow(self, config: GroupPdaConfig) -> None:
         """Replaces the config: settings of the background model change; what the model learned and the scale stay."""
@@ -114,15 +120,18 @@ class ForegroundPoints:
         self.foreground.adapt(seen, convex_areas(self.foreground.shape, outlines))
         if not seen.plausible:
             return None
-        u, top, bottom = column_runs(seen.mask, self.step)
+        line, top, bottom = upright_runs(seen.mask, self.view, self.lines)
         middle, length = (top + bottom) / 2, bottom - top
         wide, high = self._person_at(middle).T
         count = np.maximum(np.rint(length / self.step).astype(np.int64), 1)
-        run = np.repeat(np.arange(len(u)), count)
+        run = np.repeat(np.arange(len(line)), count)
         share = (np.arange(len(run)) - (np.cumsum(count) - count)[run] + 0.5) / count[run] - 0.5
-        pixels = np.column_stack([u[run], middle[run] + share * length[run]])
-        middles = np.column_stack([u[run], middle[run] + share * np.maximum(length - high, 0.0)[run]])
-        weights = (length * self.step / (np.pi / 4 * wide * high) / count)[run]
+        pixels, middles = (
+            np.column_stack([self.view.upright(line[run], row), row])
+            for row in (middle[run] + share * part[run] for part in (length, np.maximum(length - high, 0.0)))
+        )
+        area = length * self.step * (1 - self.view.lean * (middle - self.view.middle[1]))
+        weights = (area / (np.pi / 4 * wide * high) / count)[run]
         return pixels, self.view.places(middles), weights
 
     def outline(self, places: Array) -> Array:
@@ -138,13 +147,21 @@ class ForegroundPoints:
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
-def column_runs(mask: Bools, step: int) -> tuple[Array, Array, Array]:
-    """Returns the middle u (R,) and the upper and lower ends v (R,), px, of the runs of foreground in every `step`-th
-    column, by columns."""
-    first = step // 2
-    edges = np.diff(np.pad(mask[:, first::step].T.astype(np.int8), ((0, 0), (1, 1))), axis=1)
-    (column, top), (_, bottom) = np.nonzero(edges > 0), np.nonzero(edges < 0)
-    return column * float(step) + (first + 0.5), top.astype(float), bottom.astype(float)
+def upright_runs(mask: Bools, view: GroundView, lines: Array) -> tuple[Array, Array, Array]:
+    """Returns which of the upright lines (C,), px from the middle, the R runs of foreground lie on, (R,), and their
+    upper and lower ends v (R,), px."""
+    row = np.arange(len(mask))[:, None]
+    column = np.floor(view.upright(lines, row + 0.5)).astype(np.int64)
+    inside = (column >= 0) & (column < mask.shape[1])
+    seen = mask[row, np.where(inside, column, 0)] & inside
+    edges = np.diff(np.pad(seen.T.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    (line, top), (_, bottom) = np.nonzero(edges > 0), np.nonzero(edges < 0)
+    return lines[line], top.astype(float), bottom.astype(float)
+
+
+def _lines(view: GroundView, shape: tuple[int, ...], step: int) -> Array:
+    farthest = view.middle[0] / (1 - view.lean * view.middle[1])
+    return np.arange(-farthest, farthest, step) + step / 2
 
 
 def sine_tilt(camera: Camera | None) -> float:
@@ -158,13 +175,14 @@ def ground_view(camera: Camera | None, shape: tuple[int, ...], scale: float) -> 
     and if the image's middle is near the horizon."""
     middle = np.array(shape[1::-1]) / 2
     if camera is None or camera.kind == "top":
-        return GroundView(middle, scale, 0.0, 1.0)
+        return GroundView(middle, scale, 0.0, 1.0, 0.0)
     high, (down, steep) = camera.position[2] - PERSON_HEIGHT / 2, -camera.rotation[1:, 2]
     sine = float(steep + down * (middle[1] - camera.centre_px[1]) / camera.focal_px[1])
     if sine < LEAST_SINE_TILT or high <= 0:
-        return GroundView(middle, scale, 0.0, LEAST_SINE_TILT)
+        return GroundView(middle, scale, 0.0, LEAST_SINE_TILT, 0.0)
     growth = float(min(down / camera.focal_px[1] / sine, MOST_GROWTH / middle[1]))
-    return GroundView(middle, float(camera.focal_px[0] * sine / high), growth, sine)
+    lean = float(min(steep / down / camera.focal_px[1], MOST_GROWTH / middle[1]))
+    return GroundView(middle, float(camera.focal_px[0] * sine / high), growth, sine, lean)
 
 
 def _people(camera: Camera | None, view: GroundView, scale: float) -> tuple[Array, Array]:
