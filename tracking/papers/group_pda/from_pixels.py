@@ -28,7 +28,8 @@ from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.scaled_parameters import COLOUR_BINS, ScaledParameters
 from tracking.running.image_scale import required
 
-MOST_GROWTH = 0.7  # Largest change of the scale from the middle of the image to its upper edge, as a share.
+# Largest change of the scale, and of the spacing of upright lines, from the image's middle to its edge, as a share.
+MOST_GROWTH = 0.7
 ROWS = 9  # Rows of the image for which the size of people is computed; between them it is interpolated.
 WIDTH_PER_HEIGHT = 0.3  # Width over height of a person in the image if there is no camera.
 GRID = 0.1  # m: distance of the points of the grid.
@@ -49,9 +50,13 @@ class GroundView(NamedTuple):
     sine: float
     lean: float
 
-    def upright(self, across: Array, row: Array) -> Array:
-        """Returns u, px, in the rows v, px, of the images of upright lines `across` px from the middle in its row."""
-        return np.asarray(self.middle[0] + across * (1 - self.lean * (row - self.middle[1])))
+    def spacing(self, row: Array | float) -> Array:
+        """Returns the distance (M,) of upright lines in rows v (M,), px, over that in the middle row."""
+        return np.asarray(1 - self.lean * (row - self.middle[1]))
+
+    def along(self, u: Array, row: Array | float, other: Array | float) -> Array:
+        """Returns u (M,), px, in `other` rows, of the upright lines through image points u, `row`, px."""
+        return np.asarray(self.middle[0] + (u - self.middle[0]) * self.spacing(other) / self.spacing(row))
 
     def places(self, uv: Array) -> Array:
         """Returns the places (M, 2), m, of image points uv (M, 2), px."""
@@ -79,8 +84,8 @@ class ForegroundPoints:
     """Foreground pixels on a grid as points, each a share of a person, put where the middle of that person is.
 
     A run of foreground along the image of an upright line shows people one behind the other: it reaches from the head
-    of the last to the feet of the first. Their middles lie from half a person below its upper end to half a person above its
-    lower end. So the points of a run are those of the run, shrunk about its middle by a person's height.
+    of the last to the feet of the first. Their middles lie from half a person below its upper end to half a person
+    above its lower end. So its points are those of the run, shrunk about its middle by a person's height.
 
     State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
     is nan, learned from lone people in its background sample. step: px between the grid's points. view: from the image
@@ -126,32 +131,29 @@ class ForegroundPoints:
         count = np.maximum(np.rint(length / self.step).astype(np.int64), 1)
         run = np.repeat(np.arange(len(line)), count)
         share = (np.arange(len(run)) - (np.cumsum(count) - count)[run] + 0.5) / count[run] - 0.5
-        pixels, middles = (
-            np.column_stack([self.view.upright(line[run], row), row])
-            for row in (middle[run] + share * part[run] for part in (length, np.maximum(length - high, 0.0)))
-        )
-        area = length * self.step * (1 - self.view.lean * (middle - self.view.middle[1]))
+        left = np.maximum(length - high, 0.0)
+        rows = np.floor(middle[run] + share * length[run]) + 0.5, middle[run] + share * left[run]
+        pixels, middles = (np.column_stack([self.view.along(line[run], self.view.middle[1], v), v]) for v in rows)
+        area = length * self.step * self.view.spacing(middle)
         weights = (area / (np.pi / 4 * wide * high) / count)[run]
         return pixels, self.view.places(middles), weights
 
     def outline(self, places: Array) -> Array:
         """Returns the corners (4 M, 2), px, of what the points of people at places (M, 2), m, cover of the image."""
-        middle = self.view.image(places)
-        size = np.column_stack([np.full(len(places), self.step), self._person_at(middle[:, 1])[:, 1]])
-        return np.asarray((middle[:, None] + SQUARE * size[:, None] / 2).reshape(-1, 2))
+        u, row = self.view.image(places).T
+        half = self._person_at(row)[:, 1] / 2
+        ends = [(self.view.along(u, row, end), end) for end in (row - half, row + half)]
+        return np.concatenate([np.column_stack([x + k * self.step / 2, end]) for x, end in ends for k in (-1, 1)])
 
     def _person_at(self, row: Array) -> Array:
         return np.column_stack([np.interp(row, self.rows, size) for size in self.person.T])
 
 
-SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-
-
 def upright_runs(mask: Bools, view: GroundView, lines: Array) -> tuple[Array, Array, Array]:
-    """Returns which of the upright lines (C,), px from the middle, the R runs of foreground lie on, (R,), and their
-    upper and lower ends v (R,), px."""
+    """Returns which of the upright lines, u (C,), px, in the middle row, the R runs of foreground lie on, (R,), and
+    their upper and lower ends v (R,), px."""
     row = np.arange(len(mask))[:, None]
-    column = np.floor(view.upright(lines, row + 0.5)).astype(np.int64)
+    column = np.floor(view.along(lines, view.middle[1], row + 0.5)).astype(np.int64)
     inside = (column >= 0) & (column < mask.shape[1])
     seen = mask[row, np.where(inside, column, 0)] & inside
     edges = np.diff(np.pad(seen.T.astype(np.int8), ((0, 0), (1, 1))), axis=1)
@@ -160,8 +162,8 @@ def upright_runs(mask: Bools, view: GroundView, lines: Array) -> tuple[Array, Ar
 
 
 def _lines(view: GroundView, shape: tuple[int, ...], step: int) -> Array:
-    farthest = view.middle[0] / (1 - view.lean * view.middle[1])
-    return np.arange(-farthest, farthest, step) + step / 2
+    left, right = view.along(np.array([0.0, shape[1]]), float(shape[0]), view.middle[1])
+    return np.arange(left, right, step) + step / 2
 
 
 def sine_tilt(camera: Camera | None) -> float:
@@ -180,8 +182,8 @@ def ground_view(camera: Camera | None, shape: tuple[int, ...], scale: float) -> 
     sine = float(steep + down * (middle[1] - camera.centre_px[1]) / camera.focal_px[1])
     if sine < LEAST_SINE_TILT or high <= 0:
         return GroundView(middle, scale, 0.0, LEAST_SINE_TILT, 0.0)
-    growth = float(min(down / camera.focal_px[1] / sine, MOST_GROWTH / middle[1]))
-    lean = float(min(steep / down / camera.focal_px[1], MOST_GROWTH / middle[1]))
+    ratios = np.array([down / sine, steep / max(down, 1e-9)]) / camera.focal_px[1]
+    growth, lean = np.clip(ratios, 0, MOST_GROWTH / middle[1]).tolist()
     return GroundView(middle, float(camera.focal_px[0] * sine / high), growth, sine, lean)
 
 

@@ -31,8 +31,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - F, Q: constant velocity, white acceleration, per root second. Paper: not stated. Why: any frame rate.
 - search region of the gate, and distances that order shared points: by Σ, P and a point's variance; (c) wider in
   infeasible time. Paper: Σ, as in merges here. Why: few points give a small Σ.
-- extents: with 1/N, shrunk by `spread_weight` to a prior: `person_spread`, from pixels one person's; (c) corrected for
-  the gate. Paper: sample covariance. Why: few people; with 1/N eq. 3.1 is exact.
+- extents: with 1/N, shrunk by `spread_weight` to a prior: `person_spread`, from pixels with a person's width; (c)
+  corrected for the gate. Paper: sample covariance. Why: few people; with 1/N eq. 3.1 is exact.
 - G_x in G_y: repeated until nothing changes. Paper: applied once. Why: joined regions overlap others.
 - noise, (c): from pixels, components below 0.25 people do not count in G_y. Paper: all count. Why: specks of
   foreground.
@@ -60,8 +60,10 @@ Departures. Those marked (c) are off with `corrections` off.
   before a split. Why: occlusion.
 - hidden feet: with boxes and a camera not overhead, points whose feet another box may hide are put no further than
   below heads at 1.5 m. Paper: points as they are. Why: hidden feet displace points.
-- pixels: foreground of tracking.detect on a grid of 0.1 m, each a share of a person. Paper: all of an unnamed
-  background subtraction, each counts one. Why: N in people; speed.
+- pixels: foreground of tracking.detect on a grid of 0.1 m, each a share of a person, put where on the ground that
+  person's middle is: the runs along the images of upright lines, less a person's height. Paper: all of an unnamed
+  background subtraction, each counts one, in px. Why: N in people; speed; near and far people are alike, and who
+  stands behind is apart.
 - too much foreground: predicted only. Paper: none. Why: the light has changed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
   similar groups cross.
@@ -94,8 +96,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
   search region. Why: lost groups are guesses.
 - onsets: dated back. Paper: none. Why: decisions lag.
-- depth in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px. Why:
-  oblique views.
+- depth of boxes in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px.
+  Why: oblique views.
 """
 
 from __future__ import annotations
@@ -126,7 +128,6 @@ from tracking.papers.group_pda.association import (
 from tracking.papers.group_pda.births_and_losses import add_newborns, confirm, expected_members, remove_lost
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.from_pixels import (
-    SQUARE,
     ForegroundPoints,
     colour_bins,
     colour_density,
@@ -137,6 +138,8 @@ from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.merging_and_splitting import DuplicateGroups, GroupChanges, fall_apart, whole_groups
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters, scale_parameters
 from tracking.running.image_scale import required
+
+SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 
 
 class GroupPda:
