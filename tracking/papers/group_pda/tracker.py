@@ -271,7 +271,8 @@ class GroupPda:
         From points they are the corners of footprints or usual boxes, in the unit of the points.
         """
         bank, about = self.bank, self._about(None)
-        return [self._outline(bank.positions(r), about) for r in np.flatnonzero(bank.confirmed).tolist()]
+        places = [bank.positions(r) for r in np.flatnonzero(bank.confirmed).tolist()]
+        return [self._outline(p, about) for p in places if len(p)]  # a part may have none of its group's places
 
     def _no_tracks(self, frame: Frame) -> Tracks:
         none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
