@@ -153,7 +153,8 @@ def upright_runs(mask: Bools, view: GroundView, lines: Array) -> tuple[Array, Ar
     """Returns which of the upright lines, u (C,), px, in the middle row, the R runs of foreground lie on, (R,), and
     their upper and lower ends v (R,), px."""
     row = np.arange(len(mask))[:, None]
-    column = np.floor(view.along(lines, view.middle[1], row + 0.5)).astype(np.int64)
+    centre: Array = row + 0.5
+    column = np.floor(view.along(lines, view.middle[1], centre)).astype(np.int64)
     inside = (column >= 0) & (column < mask.shape[1])
     seen = mask[row, np.where(inside, column, 0)] & inside
     edges = np.diff(np.pad(seen.T.astype(np.int8), ((0, 0), (1, 1))), axis=1)
