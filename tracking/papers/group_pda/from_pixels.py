@@ -15,7 +15,7 @@ that the point stands for, because neighbouring pixels have like colours.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,11 +50,11 @@ class GroundView(NamedTuple):
     sine: float
     lean: float
 
-    def spacing(self, row: Array | float) -> Array:
+    def spacing(self, row: Any) -> Array:
         """Returns the distance (M,) of upright lines in rows v (M,), px, over that in the middle row."""
         return np.asarray(1 - self.lean * (row - self.middle[1]))
 
-    def along(self, u: Array, row: Array | float, other: Array | float) -> Array:
+    def along(self, u: Array, row: Any, other: Any) -> Array:
         """Returns u (M,), px, in `other` rows, of the upright lines through image points u, `row`, px."""
         return np.asarray(self.middle[0] + (u - self.middle[0]) * self.spacing(other) / self.spacing(row))
 
@@ -89,7 +89,8 @@ class ForegroundPoints:
 
     State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
     is nan, learned from lone people in its background sample. step: px between the grid's points. view: from the image
-    to the ground. rows (K,), person (K, 2): width and height, px, of a person whose middle is in that row.
+    to the ground. rows (K,), person (K, 2): width and height, px, of a person whose middle is in that row. lines (C,),
+    columns (H, C): of `upright_lines`.
 
     The context must have a background sample (else AssertionError). Raises InputError if the scale is neither known nor
     learned, if it is zero or negative, or if the sample cannot be used.
@@ -105,7 +106,7 @@ class ForegroundPoints:
         self.step = max(1, round(GRID * self.scale))
         self.view = ground_view(context.camera, self.foreground.shape, self.scale)
         self.rows, self.person = _people(context.camera, self.view, self.scale)
-        self.lines = _lines(self.view, self.foreground.shape, self.step)
+        self.lines, self.columns = upright_lines(self.view, self.foreground.shape, self.step)
 
     def follow(self, config: GroupPdaConfig) -> None:
         """Replaces the config: settings of the background model change; what the model learned and the scale stay."""
@@ -125,7 +126,7 @@ class ForegroundPoints:
         self.foreground.adapt(seen, convex_areas(self.foreground.shape, outlines))
         if not seen.plausible:
             return None
-        line, top, bottom = upright_runs(seen.mask, self.view, self.lines)
+        line, top, bottom = upright_runs(seen.mask, self.columns)
         middle, length = (top + bottom) / 2, bottom - top
         wide, high = self._person_at(middle).T
         count = np.maximum(np.rint(length / self.step).astype(np.int64), 1)
@@ -133,7 +134,9 @@ class ForegroundPoints:
         share = (np.arange(len(run)) - (np.cumsum(count) - count)[run] + 0.5) / count[run] - 0.5
         left = np.maximum(length - high, 0.0)
         rows = np.floor(middle[run] + share * length[run]) + 0.5, middle[run] + share * left[run]
-        pixels, middles = (np.column_stack([self.view.along(line[run], self.view.middle[1], v), v]) for v in rows)
+        pixels, middles = (
+            np.column_stack([self.view.along(self.lines[line[run]], self.view.middle[1], v), v]) for v in rows
+        )
         area = length * self.step * self.view.spacing(middle)
         weights = (area / (np.pi / 4 * wide * high) / count)[run]
         return pixels, self.view.places(middles), weights
@@ -149,22 +152,23 @@ class ForegroundPoints:
         return np.column_stack([np.interp(row, self.rows, size) for size in self.person.T])
 
 
-def upright_runs(mask: Bools, view: GroundView, lines: Array) -> tuple[Array, Array, Array]:
-    """Returns which of the upright lines, u (C,), px, in the middle row, the R runs of foreground lie on, (R,), and
-    their upper and lower ends v (R,), px."""
-    row = np.arange(len(mask))[:, None]
-    centre: Array = row + 0.5
-    column = np.floor(view.along(lines, view.middle[1], centre)).astype(np.int64)
-    inside = (column >= 0) & (column < mask.shape[1])
-    seen = mask[row, np.where(inside, column, 0)] & inside
+def upright_lines(view: GroundView, shape: tuple[int, ...], step: int) -> tuple[Array, Ints]:
+    """Returns u (C,), px, of upright lines in the middle row of an image of H x W px, `step` px apart there, and the
+    column (H, C) of each line's pixel in each row, -1 outside the image."""
+    left, right = view.along(np.array([0.0, shape[1]]), float(shape[0]), view.middle[1])
+    lines, row = np.arange(left, right, step) + step / 2, np.arange(shape[0])[:, None] + 0.5
+    column = np.floor(view.middle[0] + (lines - view.middle[0]) * view.spacing(row)).astype(np.int64)
+    return lines, np.where((column >= 0) & (column < shape[1]), column, -1)
+
+
+def upright_runs(mask: Bools, column: Ints) -> tuple[Ints, Array, Array]:
+    """Returns the lines (R,) on which the R runs of foreground lie, and their upper and lower ends v (R,), px.
+
+    mask (H, W); column (H, C): of each line's pixel in each row, -1 outside the image."""
+    seen = np.pad(mask, ((0, 0), (0, 1)))[np.arange(len(mask))[:, None], column]
     edges = np.diff(np.pad(seen.T.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     (line, top), (_, bottom) = np.nonzero(edges > 0), np.nonzero(edges < 0)
-    return lines[line], top.astype(float), bottom.astype(float)
-
-
-def _lines(view: GroundView, shape: tuple[int, ...], step: int) -> Array:
-    left, right = view.along(np.array([0.0, shape[1]]), float(shape[0]), view.middle[1])
-    return np.arange(left, right, step) + step / 2
+    return line, top.astype(float), bottom.astype(float)
 
 
 def sine_tilt(camera: Camera | None) -> float:

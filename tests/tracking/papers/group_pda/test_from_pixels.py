@@ -12,7 +12,7 @@ from sim.scene.body import PERSON_HEIGHT
 from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Tracks
 from tests import painted
-from tracking.papers.group_pda.from_pixels import ground_view, upright_runs
+from tracking.papers.group_pda.from_pixels import ground_view, upright_lines, upright_runs
 from tracking.papers.group_pda.tracker import GroupPda
 
 
@@ -70,6 +70,9 @@ def test_the_view_finds_people_on_the_ground_and_upright_lines() -> None:
     slope = np.stack([(view.image(places + d) - view.image(places - d)) / 2e-6 for d in step], 2)
     np.testing.assert_allclose(view.jacobian(places), slope, rtol=1e-6, atol=1e-6)
     np.testing.assert_allclose(view.along(feet[:, 0], feet[:, 1], heads[:, 1]), heads[:, 0])
+    lines, columns = upright_lines(view, (480, 640), 4)
+    (line,) = np.flatnonzero(np.abs(lines - 320) <= 2)[:1]
     mask = np.zeros((480, 640), bool)
-    mask[100:150, 320:324] = mask[200:230, 320:324] = True
-    np.testing.assert_allclose(upright_runs(mask, view, np.array([321.0])), [[321] * 2, [100, 200], [150, 230]])
+    for top, bottom in ((100, 150), (200, 230)):
+        mask[np.arange(top, bottom), columns[top:bottom, line]] = True
+    np.testing.assert_array_equal(upright_runs(mask, columns), [[line] * 2, [100, 200], [150, 230]])
