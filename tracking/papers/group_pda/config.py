@@ -23,7 +23,7 @@ class GroupPdaConfig(BackgroundSettings):
     radius: float = param(0.52, (0.1, 2.0), "m",
         "from points: r of the region round a point; points nearer than 2 r are linked (R_0, sec. 3.3)", sees="points")
     person_spread: float = param(0.3, (0.05, 1.0), "m",
-        "from points: standard deviation of the prior that extents are shrunk to (ours)", "log", sees="points")
+        "standard deviation of the prior that extents are shrunk to (ours)", "log")
     spread_weight: float = param(3.0, (0.1, 20.0), "people", "weight of that prior, in people (ours)", "log")
     accel_noise: float = param(0.5, (0.05, 5.0), "m/s^1.5",
         "standard deviation of the centroid's white acceleration, per root second", "log")

@@ -15,6 +15,8 @@ that the point stands for, because neighbouring pixels have like colours.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT
@@ -26,17 +28,69 @@ from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.scaled_parameters import COLOUR_BINS, ScaledParameters
 from tracking.running.image_scale import required
 
+# Largest change of the scale, and of the spacing of upright lines, from the image's middle to its edge, as a share.
+MOST_GROWTH = 0.7
+ROWS = 9  # Rows of the image for which the size of people is computed; between them it is interpolated.
 WIDTH_PER_HEIGHT = 0.3  # Width over height of a person in the image if there is no camera.
 GRID = 0.1  # m: distance of the points of the grid.
 LEAST_SINE_TILT = 0.2  # Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured.
 
 
+class GroundView(NamedTuple):
+    """The image of people's middles: a map between image points, px, and places on the ground, m, seen from the camera.
+
+    middle (2,): of the image, px, the origin of the places; y points to the camera. scale: px per m across there.
+    growth: share of it by which the scale grows per px downwards. sine: of the tilt of the line of sight there, by
+    which depth is shortened. lean: share by which upright lines come nearer to each other per px downwards.
+    """
+
+    middle: Array
+    scale: float
+    growth: float
+    sine: float
+    lean: float
+
+    def spacing(self, row: Any) -> Array:
+        """Returns the distance (M,) of upright lines in rows v (M,), px, over that in the middle row."""
+        return np.asarray(1 - self.lean * (row - self.middle[1]))
+
+    def along(self, u: Array, row: Any, other: Any) -> Array:
+        """Returns u (M,), px, in `other` rows, of the upright lines through image points u, `row`, px."""
+        return np.asarray(self.middle[0] + (u - self.middle[0]) * self.spacing(other) / self.spacing(row))
+
+    def places(self, uv: Array) -> Array:
+        """Returns the places (M, 2), m, of image points uv (M, 2), px."""
+        growth = np.maximum(1 + self.growth * (uv[:, 1:] - self.middle[1]), 1 - MOST_GROWTH)
+        return np.asarray((uv - self.middle) / (self.scale * growth * np.array([1, self.sine])))
+
+    def image(self, places: Array) -> Array:
+        """Returns the image points (M, 2), px, of places (M, 2), m."""
+        return np.asarray(self.middle + self._growth(places) * places * self.scale * np.array([1, self.sine]))
+
+    def jacobian(self, places: Array) -> Array:
+        """Returns the derivatives (M, 2, 2) of `image` at places (M, 2), px per m."""
+        growth, depth = self._growth(places)[:, 0], self.scale * self.sine
+        found = (self.scale * growth)[:, None, None] * np.eye(2)
+        found[:, 0, 1] = places[:, 0] * self.scale * self.growth * depth * growth**2
+        found[:, 1, 1] = depth * growth**2
+        return found
+
+    def _growth(self, places: Array) -> Array:
+        """Returns the scale (M, 1) at places over that in the middle; beyond the horizon a large one."""
+        return np.asarray(1 / np.maximum(1 - self.growth * self.scale * self.sine * places[:, 1:], 0.1))
+
+
 class ForegroundPoints:
-    """Foreground pixels on a grid as points, each a share of a person.
+    """Foreground pixels on a grid as points, each a share of a person, put where the middle of that person is.
+
+    A run of foreground along the image of an upright line shows people one behind the other: it reaches from the head
+    of the last to the feet of the first. Their middles lie from half a person below its upper end to half a person
+    above its lower end. So its points are those of the run, shrunk about its middle by a person's height.
 
     State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
-    is nan, learned from lone people in its background sample. step: px between the grid's points. person (2,): width
-    and height of a person in the image, px.
+    is nan, learned from lone people in its background sample. step: px between the grid's points. view: from the image
+    to the ground. rows (K,), person (K, 2): width and height, px, of a person whose middle is in that row. lines (C,),
+    columns (H, C): of `upright_lines`.
 
     The context must have a background sample (else AssertionError). Raises InputError if the scale is neither known nor
     learned, if it is zero or negative, or if the sample cannot be used.
@@ -50,7 +104,9 @@ class ForegroundPoints:
             self.foreground.learn_person_size(PersonSize(context), context.background)
         self.scale = required(self.foreground.px_per_m)
         self.step = max(1, round(GRID * self.scale))
-        self.person = _person(context.camera, self.scale)
+        self.view = ground_view(context.camera, self.foreground.shape, self.scale)
+        self.rows, self.person = _people(context.camera, self.view, self.scale)
+        self.lines, self.columns = upright_lines(self.view, self.foreground.shape, self.step)
 
     def follow(self, config: GroupPdaConfig) -> None:
         """Replaces the config: settings of the background model change; what the model learned and the scale stay."""
@@ -58,28 +114,61 @@ class ForegroundPoints:
         self.foreground.follow(config)
 
     @property
-    def people_per_point(self) -> float:
-        """The people, a share below 1 as a rule, that one grid point stands for: area of a grid cell over that of a
-        person's ellipse."""
-        return float(self.step**2 / (np.pi / 4 * self.person.prod()))
-
-    @property
     def body_cov(self) -> Array:
-        """Covariance (2, 2), px^2, of one person's pixels: those of a filled ellipse, its semi-axes squared over 4."""
-        return np.asarray(np.eye(2) * np.square(self.person / 4), np.float64)
+        """Covariance (2, 2), m^2, of one person's points, as of a filled ellipse, its semi-axes squared over 4."""
+        wide = float(np.interp(self.view.middle[1], self.rows, self.person[:, 0])) / self.view.scale
+        return np.asarray(np.eye(2) * (wide / 4) ** 2, np.float64)
 
-    def points(self, image: Image, outlines: list[Array]) -> Array | None:
-        """Returns the grid points (M, 2) u, v in px that are foreground; None if too much is foreground."""
+    def points(self, image: Image, outlines: list[Array]) -> tuple[Array, Array, Array] | None:
+        """Returns pixels (M, 2) u, v in px, where on the ground (M, 2) their people are, m, and the people (M,) that
+        each stands for: the area about it over that of a person's ellipse. None if too much is foreground."""
         seen = self.foreground.segment(image)
         self.foreground.adapt(seen, convex_areas(self.foreground.shape, outlines))
-        return grid_points(seen.mask, self.step) if seen.plausible else None
+        if not seen.plausible:
+            return None
+        line, top, bottom = upright_runs(seen.mask, self.columns)
+        middle, length = (top + bottom) / 2, bottom - top
+        wide, high = self._person_at(middle).T
+        count = np.maximum(np.rint(length / self.step).astype(np.int64), 1)
+        run = np.repeat(np.arange(len(line)), count)
+        share = (np.arange(len(run)) - (np.cumsum(count) - count)[run] + 0.5) / count[run] - 0.5
+        left = np.maximum(length - high, 0.0)
+        rows = np.floor(middle[run] + share * length[run]) + 0.5, middle[run] + share * left[run]
+        pixels, middles = (
+            np.column_stack([self.view.along(self.lines[line[run]], self.view.middle[1], v), v]) for v in rows
+        )
+        area = length * self.step * self.view.spacing(middle)
+        weights = (area / (np.pi / 4 * wide * high) / count)[run]
+        return pixels, self.view.places(middles), weights
+
+    def outline(self, places: Array) -> Array:
+        """Returns the corners (4 M, 2), px, of what the points of people at places (M, 2), m, cover of the image."""
+        u, row = self.view.image(places).T
+        half = self._person_at(row)[:, 1] / 2
+        ends = [(self.view.along(u, row, end), end) for end in (row - half, row + half)]
+        return np.concatenate([np.column_stack([x + k * self.step / 2, end]) for x, end in ends for k in (-1, 1)])
+
+    def _person_at(self, row: Array) -> Array:
+        return np.column_stack([np.interp(row, self.rows, size) for size in self.person.T])
 
 
-def grid_points(mask: Bools, step: int) -> Array:
-    """Returns u, v (M, 2) in px of the centres of the foreground pixels on a grid of every `step`-th pixel, by rows."""
-    first = step // 2
-    v, u = np.nonzero(mask[first::step, first::step])
-    return np.asarray(np.stack([u, v], 1) * float(step) + (first + 0.5), np.float64)
+def upright_lines(view: GroundView, shape: tuple[int, ...], step: int) -> tuple[Array, Ints]:
+    """Returns u (C,), px, of upright lines in the middle row of an image of H x W px, `step` px apart there, and the
+    column (H, C) of each line's pixel in each row, -1 outside the image."""
+    left, right = view.along(np.array([0.0, shape[1]]), float(shape[0]), view.middle[1])
+    lines, row = np.arange(left, right, step) + step / 2, np.arange(shape[0])[:, None] + 0.5
+    column = np.floor(view.middle[0] + (lines - view.middle[0]) * view.spacing(row)).astype(np.int64)
+    return lines, np.where((column >= 0) & (column < shape[1]), column, -1)
+
+
+def upright_runs(mask: Bools, column: Ints) -> tuple[Ints, Array, Array]:
+    """Returns the lines (R,) on which the R runs of foreground lie, and their upper and lower ends v (R,), px.
+
+    mask (H, W); column (H, C): of each line's pixel in each row, -1 outside the image."""
+    seen = np.pad(mask, ((0, 0), (0, 1)))[np.arange(len(mask))[:, None], column]
+    edges = np.diff(np.pad(seen.T.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    (line, top), (_, bottom) = np.nonzero(edges > 0), np.nonzero(edges < 0)
+    return line, top.astype(float), bottom.astype(float)
 
 
 def sine_tilt(camera: Camera | None) -> float:
@@ -88,19 +177,37 @@ def sine_tilt(camera: Camera | None) -> float:
     return 1.0 if camera is None else float(max(-camera.rotation[2, 2], LEAST_SINE_TILT))
 
 
-def _person(camera: Camera | None, scale: float) -> Array:
-    if camera is None:
-        return scale * PERSON_HEIGHT * np.array([WIDTH_PER_HEIGHT, 1.0])
+def ground_view(camera: Camera | None, shape: tuple[int, ...], scale: float) -> GroundView:
+    """Returns the view for an image of H x W px; its scale, px per m, is the same everywhere without a pinhole camera,
+    and if the image's middle is near the horizon."""
+    middle = np.array(shape[1::-1]) / 2
+    if camera is None or camera.kind == "top":
+        return GroundView(middle, scale, 0.0, 1.0, 0.0)
+    high, (down, steep) = camera.position[2] - PERSON_HEIGHT / 2, -camera.rotation[1:, 2]
+    sine = float(steep + down * (middle[1] - camera.centre_px[1]) / camera.focal_px[1])
+    if sine < LEAST_SINE_TILT or high <= 0:
+        return GroundView(middle, scale, 0.0, LEAST_SINE_TILT, 0.0)
+    ratios = np.array([down / sine, steep / max(down, 1e-9)]) / camera.focal_px[1]
+    growth, lean = np.clip(ratios, 0, MOST_GROWTH / middle[1]).tolist()
+    return GroundView(middle, float(camera.focal_px[0] * sine / high), growth, sine, lean)
+
+
+def _people(camera: Camera | None, view: GroundView, scale: float) -> tuple[Array, Array]:
     from sim.scene.body import person_boxes
     from sim.scene.camera import to_ground
 
-    middle = to_ground(camera, np.array([camera.image], float) / 2)
-    turns = np.radians([0.0, 45.0, 90.0, 135.0])
-    if not np.isfinite(middle).all():
-        return _person(None, scale)
-    place = np.column_stack([np.repeat(middle, len(turns), 0), np.zeros(len(turns))])
+    rows = np.linspace(0, 2 * view.middle[1], ROWS)
+    usual = np.tile(scale * PERSON_HEIGHT * np.array([WIDTH_PER_HEIGHT, 1.0]), (ROWS, 1))
+    if camera is None:
+        return rows, usual
+    ground = to_ground(camera, np.column_stack([np.full(ROWS, view.middle[0]), rows]), PERSON_HEIGHT / 2)
+    seen = np.isfinite(ground).all(1)
+    turns = np.tile(np.radians([0.0, 45.0, 90.0, 135.0]), int(seen.sum()))
+    place = np.column_stack([np.repeat(ground[seen], 4, 0), np.zeros(len(turns))])
     tall, wide, deep = (np.full(len(turns), size) for size in (PERSON_HEIGHT, SHOULDERS, DEPTH))
-    return np.asarray(person_boxes(camera, place, turns, tall, wide, deep)[:, 2:].mean(0))
+    size = person_boxes(camera, place, turns, tall, wide, deep)[:, 2:].reshape(-1, 4, 2).mean(1)
+    whole = np.isfinite(size).all(1)
+    return (rows[seen][whole], size[whole]) if whole.any() else (rows, usual)
 
 
 LEVELS = 4  # Levels of each of the three channels: LEVELS cubed is COLOUR_BINS.

@@ -62,7 +62,7 @@ def scale_parameters(
     """Returns the parameters for a frame rate `fps` (frames per s) and a scale in units of the points per metre."""
     c, dt, pixels = config, 1 / fps, body_cov is not None
     point_sd = scale * (c.pixel_noise if pixels else c.point_noise)
-    prior = (scale * c.person_spread) ** 2 * np.eye(2) if body_cov is None else body_cov
+    prior = (scale * c.person_spread) ** 2 * np.eye(2) + (0.0 if body_cov is None else body_cov)
     link = 2 * scale * (c.pixel_radius if pixels else c.radius)
     factor = gate_factor(c.gate) if c.corrections else 1.0
     least = LEAST_PEOPLE if pixels and c.corrections else 0.0

@@ -31,8 +31,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - F, Q: constant velocity, white acceleration, per root second. Paper: not stated. Why: any frame rate.
 - search region of the gate, and distances that order shared points: by Σ, P and a point's variance; (c) wider in
   infeasible time. Paper: Σ, as in merges here. Why: few points give a small Σ.
-- extents: with 1/N, shrunk by `spread_weight` to a prior: `person_spread`, from pixels one person's; (c) corrected for
-  the gate. Paper: sample covariance. Why: few people; with 1/N eq. 3.1 is exact.
+- extents: with 1/N, shrunk by `spread_weight` to a prior: `person_spread`, from pixels with a person's width; (c)
+  corrected for the gate. Paper: sample covariance. Why: few people; with 1/N eq. 3.1 is exact.
 - G_x in G_y: repeated until nothing changes. Paper: applied once. Why: joined regions overlap others.
 - noise, (c): from pixels, components below 0.25 people do not count in G_y. Paper: all count. Why: specks of
   foreground.
@@ -60,8 +60,10 @@ Departures. Those marked (c) are off with `corrections` off.
   before a split. Why: occlusion.
 - hidden feet: with boxes and a camera not overhead, points whose feet another box may hide are put no further than
   below heads at 1.5 m. Paper: points as they are. Why: hidden feet displace points.
-- pixels: foreground of tracking.detect on a grid of 0.1 m, each a share of a person. Paper: all of an unnamed
-  background subtraction, each counts one. Why: N in people; speed.
+- pixels: foreground of tracking.detect on a grid of 0.1 m, each a share of a person, put where on the ground that
+  person's middle is: the runs along the images of upright lines, less a person's height. Paper: all of an unnamed
+  background subtraction, each counts one, in px. Why: N in people; speed; near and far people are alike, and who
+  stands behind is apart.
 - too much foreground: predicted only. Paper: none. Why: the light has changed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
   similar groups cross.
@@ -94,12 +96,13 @@ Departures. Those marked (c) are off with `corrections` off.
 - reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
   search region. Why: lost groups are guesses.
 - onsets: dated back. Paper: none. Why: decisions lag.
-- depth in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px. Why:
-  oblique views.
+- depth of boxes in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px.
+  Why: oblique views.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -206,7 +209,7 @@ class GroupPda:
             self._measure(points, weights, scaled, t)
         events += self.changes.step(bank, scaled, t)
         events += confirm(bank, scaled, t, self.ids)
-        return self._report(frame, events, scaled, self._outline(detections))
+        return self._report(frame, events, scaled, self._about(detections))
 
     def _report(self, frame: Frame, events: list[WholeGroupEvent], scaled: ScaledParameters, outline: Array) -> Tracks:
         """Returns the confirmed groups measured within the last `report_coast` s, by id.
@@ -216,19 +219,28 @@ class GroupPda:
         seen = self.bank.confirmed & (frame.t - self.bank.last_seen <= self.config.report_coast + 1e-9)
         bank = whole_groups(self.bank, np.flatnonzero(seen))
         rows = np.argsort(bank.id)
-        # The places on their own hull suffice, and are few.
-        corners = convex_hulls([bank.positions(r) for r in rows.tolist()])
-        hulls = convex_hulls([(c[:, None] + outline).reshape(-1, 2) for c in corners])
-        x, size = bank.x[rows], bank.size[rows] / scaled.kernel_rules[kernels.DETECT_PROB]
-        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], bank.extent[rows], size, hulls)
-        return whole_group_tracks(frame, self.plane, self.context.fps, groups, bank.P[rows], events)
+        hulls = [self._outline(bank.positions(r), outline) for r in rows.tolist()]
+        x, P, extent = bank.x[rows], bank.P[rows], bank.extent[rows]
+        if self.pixels is not None:
+            view = self.pixels.view
+            J = view.jacobian(x[:, :2])
+            both = np.kron(np.eye(2), J)
+            P, extent = both @ P @ np.swapaxes(both, 1, 2), J @ extent @ np.swapaxes(J, 1, 2)
+            x = np.hstack([view.image(x[:, :2]), np.einsum("gij,gj->gi", J, x[:, 2:])])
+            events = [replace(e, pos=tuple(view.image(np.array([e.pos]))[0].tolist())) for e in events]
+        size = bank.size[rows] / scaled.kernel_rules[kernels.DETECT_PROB]
+        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], extent, size, convex_hulls(hulls))
+        return whole_group_tracks(frame, self.plane, self.context.fps, groups, P, events)
 
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
         if self.pixels is not None:
             found = None if frame.image is None else self.pixels.points(frame.image, self.outlines())
-            if found is not None and frame.image is not None and self.config.appearance > 0:
-                self.colours = colour_bins(frame.image, found)
-            return found, np.full(0 if found is None else len(found), self.pixels.people_per_point)
+            if found is None or frame.image is None:
+                return None, np.zeros(0)
+            pixels, points, weights = found
+            if self.config.appearance > 0:
+                self.colours = colour_bins(frame.image, pixels)
+            return points, weights
         if detections is None:
             return None, np.zeros(0)
         self.plane = "image" if detections.plane == "image" else "ground"
@@ -237,9 +249,14 @@ class GroupPda:
             points = below_heads(points, detections.box, camera)
         return points, np.ones(len(points))
 
-    def _outline(self, detections: Detections | None) -> Array:
+    def _outline(self, places: Array, about: Array) -> Array:
         if self.pixels is not None:
-            return SQUARE * self.pixels.step / 2
+            return self.pixels.outline(places)
+        # The places on their own hull suffice, and are few.
+        (corners,) = convex_hulls([places])
+        return np.asarray((corners[:, None] + about).reshape(-1, 2))
+
+    def _about(self, detections: Detections | None) -> Array:
         if self.plane == "ground":
             return FOOTPRINT
         if detections is not None and detections.box is not None and len(detections.box):
@@ -251,9 +268,9 @@ class GroupPda:
 
         From points they are the corners of footprints or usual boxes, in the unit of the points.
         """
-        bank, cell = self.bank, self._outline(None)
-        rows = np.flatnonzero(bank.confirmed).tolist()
-        return [(bank.positions(r)[:, None] + cell).reshape(-1, 2) for r in rows]
+        bank, about = self.bank, self._about(None)
+        places = [bank.positions(r) for r in np.flatnonzero(bank.confirmed).tolist()]
+        return [self._outline(p, about) for p in places if len(p)]  # a part may have none of its group's places
 
     def _no_tracks(self, frame: Frame) -> Tracks:
         none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
@@ -263,9 +280,7 @@ class GroupPda:
         if self.scaled is not None and self.scaled.config is self.config:
             return self.scaled
         if self.pixels is not None:
-            p, scale = self.pixels, self.context.px_per_m
-            sine = sine_tilt(self.context.camera)
-            self.scaled = scale_parameters(self.config, self.context.fps, scale, p.body_cov, sine)
+            self.scaled = scale_parameters(self.config, self.context.fps, 1.0, self.pixels.body_cov)
             return self.scaled
         scale = required(self.context.px_per_m) if self.plane == "image" else 1.0
         sine = sine_tilt(self.context.camera) if self.plane == "image" else 1.0

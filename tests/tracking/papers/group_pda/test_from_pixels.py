@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.types import Tracks
+from sim.scene.body import PERSON_HEIGHT
+from sim.scene.camera import camera_rotation, project
+from sim.types import Camera, Tracks
 from tests import painted
+from tracking.papers.group_pda.from_pixels import ground_view, upright_lines, upright_runs
 from tracking.papers.group_pda.tracker import GroupPda
 
 
@@ -48,3 +51,28 @@ def test_two_who_part_split() -> None:
 def test_without_a_scale_and_without_anybody_it_is_asked_for(scale: float) -> None:
     with pytest.raises(InputError, match=r"context\.px_per_m"):
         watch(scale, painted.sample(np.random.default_rng(0)))
+
+
+def test_the_view_finds_people_on_the_ground_and_upright_lines() -> None:
+    """Distances on the ground are those of the people whose middles are seen; heads and feet lie on one line."""
+    image, position = (640, 480), np.array([3.0, -2.0, 7.0])
+    rotation = camera_rotation(math.radians(40), 0.3)
+    camera = Camera("pinhole", image, (500.0, 500.0), (320.0, 240.0), position, rotation)
+    view = ground_view(camera, (480, 640, 3), 38.0)
+    ground = position[:2] + np.array([[0.0, 8.0], [1.5, 8.0], [-3.0, 12.0], [2.0, 6.0]])
+    heights = (PERSON_HEIGHT / 2, 0.0, PERSON_HEIGHT)
+    middle, feet, heads = (project(camera, np.column_stack([ground, np.full(4, z)]))[0] for z in heights)
+    places = view.places(middle)
+    apart = [np.hypot(*(p[:, None] - p).T) for p in (places, ground)]
+    np.testing.assert_allclose(apart[0], apart[1], atol=1e-9)
+    np.testing.assert_allclose(view.image(places), middle)
+    step = 1e-6 * np.eye(2)
+    slope = np.stack([(view.image(places + d) - view.image(places - d)) / 2e-6 for d in step], 2)
+    np.testing.assert_allclose(view.jacobian(places), slope, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(view.along(feet[:, 0], feet[:, 1], heads[:, 1]), heads[:, 0])
+    lines, columns = upright_lines(view, (480, 640), 4)
+    (line,) = np.flatnonzero(np.abs(lines - 320) <= 2)[:1]
+    mask = np.zeros((480, 640), bool)
+    for top, bottom in ((100, 150), (200, 230)):
+        mask[np.arange(top, bottom), columns[top:bottom, line]] = True
+    np.testing.assert_array_equal(upright_runs(mask, columns), [[line] * 2, [100, 200], [150, 230]])
