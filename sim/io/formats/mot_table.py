@@ -117,15 +117,15 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 
 # meaning of a column, and the names it may have
 NAMES = {
-    "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_index"),
+    "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_num", "frame_index", "frame_idx"),
     "time": ("t", "t_s", "time", "time_s", "timestamp"),
-    "id": ("id", "track_id", "trackid", "person_id", "ped_id", "target_id"),
+    "id": ("id", "track_id", "trackid", "tracker_id", "person_id", "ped_id", "target_id", "object_id", "agent_id"),
     "score": ("score", "conf", "confidence"),
     "class": ("class", "class_id", "cls", "category", "category_id", "object_category"),
-    "left": ("left", "bb_left", "box_left_px", "xmin", "x1"),
-    "top": ("top", "bb_top", "box_top_px", "ymin", "y1"),
-    "right": ("right", "xmax", "x2"),
-    "bottom": ("bottom", "ymax", "y2"),
+    "left": ("left", "bb_left", "box_left_px", "xmin", "x_min", "x1"),
+    "top": ("top", "bb_top", "box_top_px", "ymin", "y_min", "y1"),
+    "right": ("right", "xmax", "x_max", "x2"),
+    "bottom": ("bottom", "ymax", "y_max", "y2"),
     "width": ("width", "w", "bb_width", "box_width_px"),
     "height": ("height", "h", "bb_height", "box_height_px"),
     "cx": ("cx", "xc", "x_center", "center_x"),
@@ -312,6 +312,8 @@ def table_of_rows(
     if rows.values.shape[1] == GROUND_COLUMNS:
         # A text of positions: no box, confidence 1, z = 0.
         box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
+    if group is not None:
+        rows.reject(group < -1, "groups from 0, or -1 for alone", "correct the group")
     table = MotTable(rows, frame, id, box, rest, group)
     rows.require_bounds(frame, length)
     flat, boxed = (table.box[:, 2:] <= 0).any(axis=1), ~table.without_box()

@@ -166,3 +166,12 @@ def test_the_warning_of_score_and_its_remedy(tmp_path, capsys):
     text.write_text("frame,id,x1,y1,x2,y2,score\n" + text.read_text())
     high, told = score(capsys, folder, text, "--box-scale", "2")
     assert (high, told) == (pytest.approx(1, abs=1e-3), "")
+
+
+@pytest.mark.parametrize("shift", [-1, 0, 1])
+def test_tracks_that_are_a_frame_off(shift):
+    rows = walk()
+    found = seen(rows)
+    moved = found[:, 0] + shift
+    text = likely_misreading(truth_of(rows), tracks_of(moved[moved > 0], found[moved > 0, 1], found[moved > 0, 2:]))
+    assert (f"with {-shift:+d} on their frame numbers" in text) == (shift != 0), text
