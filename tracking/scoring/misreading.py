@@ -128,7 +128,7 @@ def _shifted(true: Side, est: Side) -> str:
     best = max(fit, key=fit.__getitem__)
     if best == 0 or 1 - fit[best] > CLOSER * (1 - fit[0]):
         return ""
-    words = f"tracks overlap labels by {fit[0]:.2f} (mean IoU), with {best:+d} on their frame numbers by {fit[best]:.2f}"
+    words = f"mean IoU with labels {fit[0]:.2f}; with {best:+d} on their frame numbers the tracks have {fit[best]:.2f}"
     return f"{words}: number the frames of both alike, unless these tracks lag by a frame"
 
 
