@@ -1,4 +1,4 @@
-"""Why hardly any tracked person matches a label: other columns, another scale, shifted frames, or another sequence.
+"""Why few tracked people match labels, or not exactly: other columns, another scale, shifted frames, another sequence.
 
 Boxes that other programs wrote as corners, as centres, or in pictures of another size are read as left, top, width,
 height without an error, and score nearly 0. `likely_misreading` tries other readings of the same numbers on some
@@ -24,6 +24,7 @@ NONE = 0.02  # Share of matching boxes below which there is a warning, whatever 
 CLEARLY = 0.3  # Share by which another reading must match more boxes.
 ABOUT = 0.85  # A simpler reading is preferred if it matches at least this part of what another one does.
 PAIRS = 20_000  # Most pairs of boxes that are looked at, unless one frame has more.
+CLOSER, ENOUGH = 0.8, 50  # Tracks of so many boxes are a frame off if there 1 - IoU is below this part of what it is.
 SPREAD = 0.25  # Least ratio of the extents of both sides, lest positions that shrink to the origin match labels there.
 SHIFTS = (1, -1, 2, -2, 5, -5, 10, -10)
 RATES = (2, 3, 4, 5, 6, 10, 12, 15, 25, 30)
@@ -80,7 +81,8 @@ class Side:
 def likely_misreading(
     truth: Truth, tracks: SequenceOf[Tracks], size: tuple[int, int] | None = None, files: bool = True
 ) -> str:
-    """Returns a warning if hardly any tracked person matches a label though both sides have people, else "".
+    """Returns a warning if hardly any tracked person matches a label though both sides have people, or if people match
+    labels of the next or the last frame more exactly, else "".
 
     size: width and height of the pictures, px, None if unknown. files: False if the tracks are arrays, for which the
     remedies of files are of no use.
@@ -95,7 +97,7 @@ def likely_misreading(
         some = _some(together, true, est)
         share = _share(*some)
         if share >= FEW:
-            return ""
+            return _shifted(true, est)
         found += _other_columns(*some, size, truth.px_per_m)
     found += _other_frames(true, est)
     most = max((-reading[1] for reading in found), default=0.0)
@@ -115,6 +117,21 @@ def likely_misreading(
     return f"{words}.{tried} Check the columns, and that these are tracks of this very sequence"
 
 
+def _shifted(true: Side, est: Side) -> str:
+    """Returns a warning if the tracks lie on the labels of the next or the last frame more exactly, else ""."""
+    fit = dict[int, float]()
+    for k in (0, 1, -1):
+        labels, moved = _moved(true, est, est.rows.frame + k)
+        pairs, overlap = box_pairs(labels.rows, moved.rows, labels.boxes, moved.boxes), np.zeros(len(moved.rows))
+        np.maximum.at(overlap, pairs.j, pairs.s)
+        fit[k] = float(overlap.mean()) if len(overlap) >= ENOUGH else 0.0
+    best = max(fit, key=fit.__getitem__)
+    if best == 0 or 1 - fit[best] > CLOSER * (1 - fit[0]):
+        return ""
+    words = f"mean IoU with labels {fit[0]:.2f}; with {best:+d} on their frame numbers the tracks have {fit[best]:.2f}"
+    return f"{words}: number the frames of both alike, unless these tracks lag by a frame"
+
+
 def _comparable(truth: Truth, tracks: SequenceOf[Tracks]) -> tuple[Side, Side] | None:
     some = [t for t in tracks if len(t.id)]
     if not len(truth.frame) or not some or some[0].unit == "group":
@@ -130,6 +147,11 @@ def _comparable(truth: Truth, tracks: SequenceOf[Tracks]) -> tuple[Side, Side] |
         return None
     true, est = (side.keep(np.asarray(np.isfinite(side.values).all(axis=1))) for side in sides)
     return (true, est) if len(true.rows) and len(est.rows) else None
+
+
+def _moved(true: Side, est: Side, frame: Ints) -> tuple[Side, Side]:
+    moved = Side(FrameRows(frame, est.rows.id), est.values)
+    return _some(np.intersect1d(true.rows.frame, frame), true, moved)
 
 
 def _some(frames: Ints, true: Side, est: Side) -> tuple[Side, Side]:
@@ -174,9 +196,6 @@ def _other_frames(true: Side, est: Side) -> Iterator[Reading]:
     maps = {f"with {k:+d} on frame numbers": frame + k for k in sorted({*SHIFTS, *ends} - {0}, key=abs)}
     maps |= {f"with frames numbered 1, {1 + n}, {1 + 2 * n}, …": (frame - 1) * n + 1 for n in RATES}
     for place, (words, numbers) in enumerate(maps.items(), 1):
-        kept = (numbers >= 1) & (numbers <= labelled[-1])
-        moved = Side(FrameRows(numbers[kept], est.rows.id[kept]), est.values[kept])
-        common = np.intersect1d(labelled, moved.rows.frame)
-        if len(common) and 2 * kept.sum() >= len(frame):
-            share = _share(*_some(common, true, moved))
+        if 2 * ((numbers >= 1) & (numbers <= labelled[-1])).sum() >= len(frame):
+            share = _share(*_moved(true, est, numbers))
             yield 1 + place / 1000, -share, words, "number the frames of both alike"  # the least shift of equal ones

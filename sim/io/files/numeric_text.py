@@ -85,7 +85,7 @@ def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
 
 @dataclass(frozen=True)
 class TextRows:
-    """The rows of a text: its lines that are neither blank nor comments. Commas or blanks separate the cells."""
+    """The rows of a text: its lines that are neither blank nor comments. Commas, semicolons or blanks part cells."""
 
     file: Path
     text: tuple[str, ...]  # of each row
@@ -93,8 +93,8 @@ class TextRows:
 
     @property
     def separator(self) -> str | None:
-        """The separator of cells: a comma if the first row has one, else None, which means blanks."""
-        return "," if self.text and "," in self.text[0] else None
+        """The separator of cells: a comma, else a semicolon, if the first row has one, else None: blanks."""
+        return next((mark for mark in ",;" if self.text and mark in self.text[0]), None)
 
     def cells(self) -> Iterator[list[str]]:
         """Yields the cells of each row as a list of texts."""
@@ -139,14 +139,13 @@ class TextRows:
 
     def _first_bad(self, fits: Container[int], use: list[int] | None) -> InputError:
         width = len(next(self.cells()))
-        for number, line, cells in zip(self.line, self.text, self.cells(), strict=True):
+        for number, cells in zip(self.line, self.cells(), strict=True):
             read = [cells[k] for k in use] if use is not None and len(cells) in fits else cells
             bad = [repr(cell.strip()) for cell in read if not is_number_text(cell)]
             if bad or len(cells) not in fits:
                 got, expected = f"{len(cells)} columns", f"{width} columns, as in the first line"
                 got, expected = (bad[0], "a number") if bad else (got, expected)
-                remedy = f"remove the lines that begin with #, and {NAME_THEM}" if line.startswith("#") else CORRECT
-                return InputError(file=self.file, place=f"line {number}", got=got, expected=expected, remedy=remedy)
+                return InputError(file=self.file, place=f"line {number}", got=got, expected=expected, remedy=CORRECT)
         return InputError(file=self.file, got="unreadable numbers", expected="rows of numbers", remedy="check the file")
 
 

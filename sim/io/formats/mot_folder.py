@@ -187,10 +187,10 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         labelled_sequence("mot text", path, path.stem, rate, length, truth, options.scale, **of_boxes.given()),
         camera=options.camera,
     )
+    mot_text.require_classes(table, of_boxes.person_class)
     if not (table.id == -1).all():
         options.reject(path, "a text of people with ids", "it is for detections", "min_score")
         return sequence
-    mot_text.require_classes(table, of_boxes.person_class)
     found = mot_text.detections_of_table(table, of_boxes)
 
     def frames() -> Iterator[Frame]:

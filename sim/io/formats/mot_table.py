@@ -20,7 +20,7 @@ from typing import NoReturn
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.numeric_text import CORRECT, NumericTable, TextRows, is_number_text, read_rows
+from sim.io.files.numeric_text import CORRECT, NAME_THEM, NumericTable, TextRows, is_number_text, read_rows
 from sim.io.formats.options import BoxScale
 from sim.types import Array, Bools, Ints
 
@@ -117,15 +117,15 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 
 # meaning of a column, and the names it may have
 NAMES = {
-    "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_index"),
+    "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_num", "frame_index", "frame_idx"),
     "time": ("t", "t_s", "time", "time_s", "timestamp"),
-    "id": ("id", "track_id", "trackid", "person_id", "ped_id", "target_id"),
+    "id": ("id", "track_id", "trackid", "tracker_id", "person_id", "ped_id", "target_id", "object_id", "agent_id"),
     "score": ("score", "conf", "confidence"),
     "class": ("class", "class_id", "cls", "category", "category_id", "object_category"),
-    "left": ("left", "bb_left", "box_left_px", "xmin", "x1"),
-    "top": ("top", "bb_top", "box_top_px", "ymin", "y1"),
-    "right": ("right", "xmax", "x2"),
-    "bottom": ("bottom", "ymax", "y2"),
+    "left": ("left", "bb_left", "box_left_px", "xmin", "x_min", "x1"),
+    "top": ("top", "bb_top", "box_top_px", "ymin", "y_min", "y1"),
+    "right": ("right", "xmax", "x_max", "x2"),
+    "bottom": ("bottom", "ymax", "y_max", "y2"),
     "width": ("width", "w", "bb_width", "box_width_px"),
     "height": ("height", "h", "bb_height", "box_height_px"),
     "cx": ("cx", "xc", "x_center", "center_x"),
@@ -158,13 +158,9 @@ EXPECTED = (
 
 def column_names(text: TextRows) -> list[str] | None:
     """Returns the column names in a text's first line, in lower case; None if it has a number, and so no names."""
-    line = text.text[0] if text.text else ""
-    if ";" in line:
-        got, expected = line[:80], "columns apart by commas, blanks or tabs"
-        remedy = "replace the semicolons, and write decimals with a point"
-        raise InputError(file=text.file, place="line 1", got=got, expected=expected, remedy=remedy)
+    line = text.text[0].lstrip("# ") if text.text else ""  # numpy.savetxt writes # before its header
     cells = [cell.strip().strip('"').lower() for cell in line.split(text.separator)]
-    return cells if any(cells) and not line.startswith("#") and not any(map(is_number_text, cells)) else None
+    return cells if any(cells) and not any(map(is_number_text, cells)) else None
 
 
 def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> tuple[NumericTable, Ints | None]:
@@ -184,8 +180,9 @@ def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> 
             _refuse(text.file, names)
         if meaning is not None and not (words and meaning == "class"):
             found[meaning] = k
-    count = len(names)
-    rows = text.numbers((count,), first=1, layout="those that line 1 names", use=list(found.values()))
+    if found.keys().isdisjoint(("frame", "time")):
+        _refuse(text.file, names)
+    rows = text.numbers((len(names),), first=1, layout="those that line 1 names", use=list(found.values()))
     column: dict[str, Column] = dict(zip(found, rows.values.T, strict=False))
     if words:
         classes, code = np.unique(words, return_inverse=True)
@@ -194,8 +191,6 @@ def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> 
         column["frame"] = frames_at(column.pop("time")).astype(float)
         seen = column["frame"] > 0
         rows, column = replace(rows, line=rows.line[seen]), {name: v[seen] for name, v in column.items()}
-    if "frame" not in column:
-        _refuse(text.file, names)
     columns = _in_order(column, {axis: names[found[axis]].partition("_")[2] for axis in "xy" if axis in column})
     if columns is None:
         _refuse(text.file, names)
@@ -245,7 +240,7 @@ def _in_order(column: dict[str, Column], units: dict[str, str]) -> list[Column] 
 
 def _refuse(path: Path, names: list[str]) -> NoReturn:
     got = f"columns {','.join(names)}"
-    raise InputError(file=path, place="line 1", got=got, expected=EXPECTED, remedy="rename the columns")
+    raise InputError(file=path, place="line 1", got=got, expected=EXPECTED, remedy=NAME_THEM)
 
 
 GROUND_COLUMNS = 4  # columns of a text of ground positions alone: frame, id, x, y
@@ -312,6 +307,8 @@ def table_of_rows(
     if rows.values.shape[1] == GROUND_COLUMNS:
         # A text of positions: no box, confidence 1, z = 0.
         box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
+    if group is not None:
+        rows.reject(group < -1, "groups from 0, or -1 for alone", "correct the group")
     table = MotTable(rows, frame, id, box, rest, group)
     rows.require_bounds(frame, length)
     flat, boxed = (table.box[:, 2:] <= 0).any(axis=1), ~table.without_box()

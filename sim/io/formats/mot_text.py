@@ -154,7 +154,9 @@ CLASSES = range(1, 14)  # classes of MOTChallenge. A text with another class has
 def unscored_rows(table: MotTable, people: Bools, name: str, person_class: Classes | None) -> Unscored | None:
     """Returns the labelled rows with a box where the flags people (N,) are False, sorted by frame; None without any."""
     found = classes_of(table, person_class is not None)
-    usual = not table.rows.classes and table.rest.shape[1] <= LABEL_COLUMNS and person_class in (None, PEDESTRIANS)
+    # 0 is no class of MOTChallenge's labels, but people in the texts of many trackers: --class 0,1 is for both.
+    usual = {*(person_class or PEDESTRIANS)} - {"0"} == {*PEDESTRIANS} and not table.rows.classes
+    usual = usual and table.rest.shape[1] <= LABEL_COLUMNS
     distractor = np.zeros_like(people)
     if found is not None and usual and np.isin(found, CLASSES).all():
         mot20 = any(each.startswith(MOT20) for each in (name, table.rows.file.resolve().parent.parent.name))
@@ -192,7 +194,6 @@ def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
             got, expected = f"0 in all {len(keep)} rows, which leaves nobody", "another flag than 0 for people"
             remedy = "write 1 in column 7 of rows that count"
             raise InputError(file=file, place="column 7", got=got, expected=expected, remedy=remedy)
-    require_classes(table, person_class)
     return of_class(table, keep, person_class)
 
 
@@ -217,7 +218,7 @@ def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bool
     others = [f"{n} rows of class {each}" for each, n in zip(name, counts, strict=True) if n]
     said, people_are = ", ".join(others[:SHOWN]) + ", …" * (len(others) > SHOWN), " or ".join(wanted)
     if not people.any():
-        remedy = "name the classes of people with --class"
+        remedy = "name the classes of people with --class, those of labels and tracks, as 0,1"
         raise InputError(file=file, place="classes", got=said, expected=f"people, of class {people_are}", remedy=remedy)
     if others and person_class is None:
         text = f"{file}: {said} are left out; people are class {people_are} (--class says otherwise)"
@@ -373,7 +374,6 @@ def truth_of_table(
         labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip
     if table.group is not None:
-        table.rows.reject(table.group < -1, "groups from 0, or -1 for alone", "correct the group")
         return _labelled(truth, table.group[order], table.rows.file)
     path = group_file(table.rows.file)
     return _labelled(truth, labels_of(path, id), path) if is_present(path) else truth

@@ -25,8 +25,9 @@ from sim.arrays import repeated_ids
 from sim.io.files import tables
 from sim.io.files.atomic import lock_folder, replace_sealed
 from sim.io.files.tables import Column, Count, Rate, columns_of, table_bytes
+from sim.io.formats import people_texts
 from sim.io.formats.labels import centres, chords
-from sim.io.formats.mot_table import read_table, require_pixels
+from sim.io.formats.mot_table import read_table, require_pixels, table_of_rows
 from sim.io.formats.mot_text import ground_positions, of_class, reject_duplicate_ids, require_metres, unit_scores
 from sim.io.formats.options import BoxScale, Classes
 from sim.io.store import group_files
@@ -226,12 +227,15 @@ def upright_boxes(camera: Camera, pos: Array) -> Array:
 def read_track_text(
     path: Path, fps: float, length: int | None, person_class: Classes | None = None, box_scale: BoxScale | None = None
 ) -> list[Tracks]:
-    """Returns the tracks of a MOTChallenge text, one Tracks per frame from 1 to `length`, sorted by id.
+    """Returns the tracks of a text of MOTChallenge or KITTI, one Tracks per frame from 1 to `length`, sorted by id.
 
     length: None: to the last frame in the file. person_class: only rows of these classes are read; None: people.
-    box_scale: factors of x and y that make the boxes pixels.
+    box_scale: factors of x and y that make the boxes pixels. A column of groups makes them the tracker's own.
     """
-    table = read_table(path, length=length, boxless=True, box_scale=box_scale)
+    if people_texts.layout_of(path) == "kitti":
+        table = table_of_rows(people_texts.LAYOUTS["kitti"](path, fps)[0], length, box_scale=box_scale)
+    else:
+        table = read_table(path, length=length, boxless=True, box_scale=box_scale)
     require_pixels(table.rows, table.boxes())
     if not len(table.frame):
         if length is None:
@@ -256,13 +260,15 @@ def read_track_text(
     box = None if table.without_box().any() else table.box[order]
     score = unit_scores(table.scores())[0][order]
     plane: Plane = "image" if ground is None else "ground"
+    group = np.full(len(order), -1, np.int64) if table.group is None else table.group[order]
     vel, count = chords(frame, id, pos, fps), length or int(frame.max(initial=0))
     cuts = np.searchsorted(frame, np.arange(1, count + 2)).tolist()
 
     @lru_cache(maxsize=1)  # most frames of sparse texts are empty: they share their arrays
     def arrays(a: int, b: int) -> tuple[Any, ...]:
-        some = (id[a:b], np.full(b - a, -1, np.int64), pos[a:b], vel[a:b], np.full((b - a, 4, 4), np.nan))
-        return *some, None if box is None else box[a:b], score[a:b]
+        some = (id[a:b], group[a:b], pos[a:b], vel[a:b], np.full((b - a, 4, 4), np.nan))
+        nobody = table.group is not None and (group[a:b] < 0).all()  # Of a frame with groups they follow from `group`.
+        return *some, None if box is None else box[a:b], score[a:b], Groups.none() if nobody else None
 
     frames = enumerate(pairwise(cuts))
     return [Tracks(k + 1, k / fps, plane, "person", *arrays(a, b)) for k, (a, b) in frames]

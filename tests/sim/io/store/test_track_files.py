@@ -106,6 +106,19 @@ def test_text_alone(tmp_path):
         assert np.array_equal(known, b.groups.id)
 
 
+def test_groups_in_a_column_of_a_text_are_the_tracker_s_own(tmp_path):
+    (tmp_path / "x.csv").write_text("frame,id,x,y,group\n1,1,0,0,-1\n2,1,0,0,4\n2,2,1,0,4\n")
+    first, second = read_tracks(tmp_path / "x.csv")
+    assert len(first.groups.id) == 0, "nobody is in a group, which is no reason to derive groups"
+    assert second.group.tolist() == [4, 4]
+
+
+def test_a_text_of_kitti(tmp_path):
+    (tmp_path / "0.txt").write_text("0 5 Pedestrian 0 0 -10 10 20 40 60 -1 -1 -1 -1 -1 -1 -10 0.9\n")
+    (tracks,) = read_tracks(tmp_path / "0.txt")
+    assert (tracks.id.tolist(), tracks.box.tolist()) == ([5], [[10, 20, 30, 40]])
+
+
 def test_seven_columns_are_boxes_in_the_image(tmp_path):
     (tmp_path / "x.txt").write_text("1,5,10,20,30,40,0.5\n3,5,14,20,30,40,0.5\n")
     first, empty, last = read_tracks(tmp_path / "x.txt", fps=10.0)
