@@ -35,8 +35,8 @@ class ReportHistory:
 def check_tracks(tracks: Any, index: int, tracker: str, sequence: str, history: ReportHistory | None = None) -> Tracks:
     """Returns a copy of the tracks of frame `index`, checked, with optional fields filled in.
 
-    tracker, sequence: their names, for messages. history: what it reported in earlier frames, which is updated; None means nothing.
-    Raises WorkError, with the first fault, if the tracks are wrong.
+    tracker, sequence: their names, for messages. history: what it reported in earlier frames, which is updated; None
+    means nothing. Raises WorkError, with the first fault, if the tracks are wrong.
     """
     if isinstance(tracks, Tracks):
         tracks = _filled(tracks)

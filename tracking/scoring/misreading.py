@@ -25,7 +25,7 @@ CLEARLY = 0.3  # Share by which another reading must match more boxes.
 ABOUT = 0.85  # A simpler reading is preferred if it matches at least this part of what another one does.
 PAIRS = 20_000  # Most pairs of boxes that are looked at, unless one frame has more.
 SPREAD = 0.25  # Least ratio of the extents of both sides, lest positions that shrink to the origin match labels there.
-SHIFT = 10  # Most frames by which all numbers of frames are shifted.
+SHIFTS = range(-10, 11)
 RATES = (2, 3, 4, 5, 6, 10, 12, 15, 25, 30)
 SCALES = (1 / 3, 0.5, 2 / 3, 0.75, 0.8, 1.25, 4 / 3, 1.5, 2.0, 2.25, 3.0, 4.0)
 # Sides in px of square pictures that detectors stretch a picture to; 1: shares of the picture.
@@ -171,7 +171,7 @@ def _other_columns(true: Side, est: Side, size: tuple[int, int] | None, px_per_m
 def _other_frames(true: Side, est: Side) -> Iterator[Reading]:
     frame, labelled = est.rows.frame, true.rows.frame
     ends = {int(labelled[0] - frame[0]), int(labelled[-1] - frame[-1])}
-    maps = {f"with {k:+d} on frame numbers": frame + k for k in sorted({*range(-SHIFT, SHIFT + 1), *ends} - {0}, key=abs)}
+    maps = {f"with {k:+d} on frame numbers": frame + k for k in sorted({*SHIFTS, *ends} - {0}, key=abs)}
     maps |= {f"with frames numbered 1, {1 + n}, {1 + 2 * n}, …": (frame - 1) * n + 1 for n in RATES}
     for place, (words, numbers) in enumerate(maps.items(), 1):
         kept = (numbers >= 1) & (numbers <= labelled[-1])
