@@ -50,9 +50,11 @@ def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None 
     try:
         return model.model_validate(plain(table), strict=True)
     except ValidationError as error:
-        found = list(error.errors(include_url=False))
+        problems = list(error.errors(include_url=False))
+    # A list of wrong items counts as too short, too.
+    found = [e for e in problems if e["type"] != "too_short"] or problems
     # Unknown keys come first, because a misspelt key explains a missing one.
-    first = min(found, key=lambda e: (e["type"] != "unknown_key", e["type"] == "too_short" and len(found) > 1))
+    first = min(found, key=lambda e: e["type"] != "unknown_key")
     path = tuple(s for k, s in enumerate(first["loc"]) if s not in TAGS and not (k == 2 and first["loc"][0] == "event"))
     more = f" ({len(found) - 1} more problem{'s' * (len(found) > 2)})" if len(found) > 1 else ""
     path, got, expected, remedy = _words(first, path)

@@ -76,7 +76,7 @@ class PreparedTracker:
             check_detections(detections, self.tracker.needs)
         with self._naming("step()", f"{self.sequence.name}, frame {frame.index}"):
             tracks = self.tracker.step(frame, detections)
-        return check_tracks(tracks, frame.index, self.name, self.history)
+        return check_tracks(tracks, frame.index, self.name, self.sequence.name, self.history)
 
     @contextmanager
     def _naming(self, part: str, place: str) -> Iterator[None]:

@@ -32,11 +32,11 @@ class ReportHistory:
         self.ids.clear()
 
 
-def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory | None = None) -> Tracks:
+def check_tracks(tracks: Any, index: int, tracker: str, sequence: str, history: ReportHistory | None = None) -> Tracks:
     """Returns a copy of the tracks of frame `index`, checked, with optional fields filled in.
 
-    tracker: its name, for messages. history: what it reported in earlier frames, which is updated; None means nothing.
-    Raises WorkError, with the first fault, if the tracks are wrong.
+    tracker, sequence: their names, for messages. history: what it reported in earlier frames, which is updated; None
+    means nothing. Raises WorkError, with the first fault, if the tracks are wrong.
     """
     if isinstance(tracks, Tracks):
         tracks = _filled(tracks)
@@ -44,7 +44,7 @@ def check_tracks(tracks: Any, index: int, tracker: str, history: ReportHistory |
     if fault:
         got, expected = fault
         remedy = "correct the tracker's step()"
-        raise WorkError(file=tracker, place=f"frame {index}", got=got, expected=expected, remedy=remedy)
+        raise WorkError(file=tracker, place=f"{sequence}, frame {index}", got=got, expected=expected, remedy=remedy)
     return tracks.copy()  # type: ignore[no-any-return]
 
 

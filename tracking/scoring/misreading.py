@@ -26,7 +26,7 @@ ABOUT = 0.85  # A simpler reading is preferred if it matches at least this part 
 PAIRS = 20_000  # Most pairs of boxes that are looked at, unless one frame has more.
 CLOSER, ENOUGH = 0.8, 50  # Tracks of so many boxes are a frame off if there 1 - IoU is below this part of what it is.
 SPREAD = 0.25  # Least ratio of the extents of both sides, lest positions that shrink to the origin match labels there.
-SHIFTS = (1, -1, 2, -2, 5, -5, 10, -10)
+SHIFTS = range(-10, 11)
 RATES = (2, 3, 4, 5, 6, 10, 12, 15, 25, 30)
 SCALES = (1 / 3, 0.5, 2 / 3, 0.75, 0.8, 1.25, 4 / 3, 1.5, 2.0, 2.25, 3.0, 4.0)
 # Sides in px of square pictures that detectors stretch a picture to; 1: shares of the picture.

@@ -144,6 +144,7 @@ def test_strict(path: Path, setting: str, place: str, got: str, expected: str, r
     assert got in error.got
     assert expected in error.expected
     assert remedy in error.remedy
+    assert "more problem" not in error.remedy
 
 
 def test_syntax_error_has_its_line(tmp_path: Path) -> None:

@@ -169,7 +169,7 @@ def test_one_plane_in_a_run_and_again_in_the_next():
 
     tracker = Turncoat()
     tracker.turn = 4
-    with pytest.raises(WorkError, match="Turncoat: frame 4: got plane 'ground'"):
+    with pytest.raises(WorkError, match="Turncoat: made, frame 4: got plane 'ground'"):
         track(tracker, source())
     ready = prepare(Turncoat(), source())
     for turn in (1, 0):  # after a reset it may be another one

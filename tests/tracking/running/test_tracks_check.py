@@ -33,13 +33,13 @@ def answer(index=3, ids=(1, 2), **changes):
 
 
 def check(made, history=None):
-    return check_tracks(made, made.index, "mine.py:Mine", history)
+    return check_tracks(made, made.index, "mine.py:Mine", "s", history)
 
 
 def refused(made, words, history=None):
     with pytest.raises(WorkError, match=words) as caught:
         check(made, history)
-    assert str(caught.value).startswith(f"mine.py:Mine: frame {made.index}")
+    assert str(caught.value).startswith(f"mine.py:Mine: s, frame {made.index}")
 
 
 WRONG_GROUPS = [
@@ -78,8 +78,8 @@ WRONG_ANSWERS = [
 @pytest.mark.parametrize(("changes", "words"), WRONG_ANSWERS)
 def test_wrong_answers_name_tracker_frame_and_fault(changes, words):
     with pytest.raises(WorkError, match=words) as caught:
-        check_tracks(answer(**changes), 3, "mine.py:Mine")
-    assert str(caught.value).startswith("mine.py:Mine: frame 3")
+        check_tracks(answer(**changes), 3, "mine.py:Mine", "s")
+    assert str(caught.value).startswith("mine.py:Mine: s, frame 3")
 
 
 def test_when_an_event_was_told_is_filled_in():
@@ -125,11 +125,11 @@ def test_trackers_of_groups():
 
 
 def test_right_answers_pass():
-    assert check_tracks(answer(), 3, "x").id.tolist() == [1, 2]
-    assert len(check_tracks(answer(ids=()), 3, "x").id) == 0
-    assert check_tracks(answer(score=np.zeros(0)), 3, "x").score.tolist() == [1.0, 1.0]
+    assert check_tracks(answer(), 3, "x", "s").id.tolist() == [1, 2]
+    assert len(check_tracks(answer(ids=()), 3, "x", "s").id) == 0
+    assert check_tracks(answer(score=np.zeros(0)), 3, "x", "s").score.tolist() == [1.0, 1.0]
     with pytest.raises(WorkError, match="NoneType"):
-        check_tracks(None, 3, "x")
+        check_tracks(None, 3, "x", "s")
 
 
 def test_a_tracker_may_use_its_arrays_again():

@@ -94,6 +94,7 @@ def test_shares_of_the_picture():
 RENUMBERED = [
     (lambda frame: frame + 1, "with -1 on frame numbers, 100% would"),
     (lambda frame: frame - 1, "with +1 on frame numbers, 100% would"),
+    (lambda frame: (frame + 2) % FRAMES + 1, "with -3 on frame numbers"),
     (lambda frame: frame - 20, "with +20 on frame numbers, 100% would"),
     (lambda frame: (frame - 1) / 5 + 1, "with frames numbered 1, 6, 11, …"),
 ]
