@@ -124,7 +124,7 @@ def test_a_point_in_no_region_belongs_to_nobody(away: float, hidden: int, owner:
     """Its sphere overlaps those of the group's points, and its velocity is the group's (eq. 8). The region of a hidden
     group grows, with `hidden`, the number of frames."""
     (step,) = together(walkers(0, 12, [1, 5, 1], [0, 0, 0], 1))
-    config = StereoConfig(point_covariance=False)
+    config = StereoConfig(point_covariance=False, radius=0.8)
     motion = space_group.motion_model(config, 1 / FPS)
     group = space_group.newborn(step, PLACE, motion, 0.0)
     for _ in range(hidden):
