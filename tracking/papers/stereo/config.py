@@ -49,7 +49,7 @@ class StereoConfig(BackgroundSettings):
         "v of eq. 5: measurement noise of a group's mean beside that of its points, as points come and go", "log")
     density_width: float = param(0.15, (0.05, 20.0), "m",
         "from pixels: kernel of the density by whose inverse features count in the mean (ours)", "log", sees="pixels")
-    radius: float = param(0.8, (0.1, 2.0), "m",
+    radius: float = param(0.5, (0.1, 2.0), "m",
         "from pixels: radius of a feature's sphere; features 2 r apart are linked (eq. 12)", sees="pixels")
     point_radius: float = param(0.75, (0.1, 2.0), "m",
         "from points: radius of a point's sphere; points 2 r apart are linked (eq. 12)", sees="points")

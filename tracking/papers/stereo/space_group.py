@@ -15,10 +15,10 @@ Data association (sec. 3.3): which group each point belongs to.
     (y_i - xi_j)' S^-1 (y_i - xi_j) < gamma                  search region of group j (eq. 8)
     m_total = p(y_i | xi_j, P_xi)^k_p p(lambda_i | v_j, P_v)^k_v            (eqs 9 to 11)
 
-Each point belongs to the group with the largest m_total among those in whose region it lies. With `point_covariance` S
-is the sum of the group's spread Sigma, the covariance P of its centroid and that of the point, C_i. Without it S is
-Sigma, as in the paper. P_xi and P_v are the blocks of S for positions and velocities. Departures are listed in
-`tracker`.
+Each point belongs to the group with the largest m_total among those in whose region it lies. S is the sum of the
+group's spread Sigma and the covariance P of its centroid, and with `point_covariance` that of the point, C_i. P grows
+while a group is hidden, so that it finds its points again. P_xi and P_v are the blocks of S for positions and
+velocities. Departures are listed in `tracker`.
 """
 
 from __future__ import annotations
@@ -242,7 +242,7 @@ def associated(groups: Sequence[SpaceGroup], points: SpacePoints, config: Stereo
     if not groups or not len(points):
         return np.full(len(points), -1)
     x = np.stack([g.ekf.x[:, 0] for g in groups])
-    own = np.stack([g.spread + g.ekf.P if config.point_covariance else g.spread for g in groups])
+    own = np.stack([g.spread + g.ekf.P for g in groups])
     total = np.full((len(groups), len(points)), -np.inf)
     g, m = _in_reach(x, own, points, config)
     d2, position = _log_density(points.pos[m] - x[g][:, POS], own[g], points.cov[m], POS, config)

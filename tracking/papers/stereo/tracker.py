@@ -14,9 +14,10 @@ covariance of its points' positions and velocities; N, the number of its points.
     new groups: points whose spheres overlap               eq. 12              group_life
     merging by the full state, weighted by N               eqs 13 to 15        group_life
 
-C_y is the covariance of the points' positions y and velocities lambda. S is Sigma in the paper; here P and the point's
-covariance are added (`point_covariance`). Spheres have the radius `radius`; groups merge whose regions of X overlap
-(`merge_gate`). The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in tracking.detect.
+C_y is the covariance of the points' positions y and velocities lambda. S is Sigma + P, of the members and of the
+filter, with the point's covariance added (`point_covariance`). Spheres have the radius `radius`; groups merge whose
+regions of X overlap (`merge_gate`). The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in
+tracking.detect.
 
 Readings: eq. 6 is printed with y for x, and takes world for camera coordinates; here f contains the camera's pose and
 the image's centre. A feature has the covariance J^-1 R J^-T, with the Jacobian J of (u, v, d) and R from `pixel_noise`
@@ -54,8 +55,8 @@ Departures. Without a parameter that switches it off, one holds in the preset `p
   people and the edge of the picture hide legs, so that the mean height changes; the result is the middle of bodies.
 - errors of points: added in eqs 8 to 10, taken off C_y (`point_covariance`); R, first P and density have them always.
   Paper: none. Why: depth is uncertain.
-- P and Σ: P of the filter, Σ of the members; search regions and eqs 9, 10 use both (`point_covariance`), merging Σ.
-  Paper: one covariance. Why: a member is no centroid.
+- P and Σ: P of the filter, Σ of the members; search regions and eqs 9, 10 use their sum, merging Σ. Paper: Σ in eqs 7
+  and 8, P in 9 and 10, both the tracker's covariance. Why: a member is no centroid; where a hidden group is, is unsure.
 - merged P: that of the weighted mean, sum of n² P_i. Paper: one covariance, eq. 15. Why: P is of the centroid.
 - Σ: shrunk to a prior (`spread_weight`) of `person_spread` and 0.25 m/s; C_y divides by n; 1e-6 is added to its
   diagonal. Paper: sample covariance. Why: few points in six dimensions.
@@ -83,7 +84,7 @@ Departures. Without a parameter that switches it off, one holds in the preset `p
 - background: adapts, but not where people are, except for ghosts and in frames with too much foreground
   (`background`). Paper: not stated. Why: light changes.
 - points as input: linked between frames, at most 2 m/s and 3 `point_noise` off; used at once, one is enough; Z is their
-  place; velocity 0 when new; spheres of `point_radius`, 0.75 m in the preset, too. Paper: none. Why: other detectors.
+  place; velocity 0 when new; spheres of `point_radius`. Paper: none. Why: other detectors.
 """
 
 from __future__ import annotations

@@ -119,12 +119,16 @@ def test_hidden_legs_do_not_lift_a_group() -> None:
         assert low < tracks[-1].pos[0, 2] < high
 
 
-@pytest.mark.parametrize(("away", "owner"), [(0.9, 0), (1.4, -1)])
-def test_a_point_in_no_region_belongs_to_nobody(away: float, owner: int) -> None:
-    """Its sphere overlaps those of the group's points, and its velocity is the group's (eq. 8)."""
-    (step,) = together(walkers(0, 12, [1, 5, 1], [1, 0, 0], 1))
-    config = StereoConfig()
-    group = space_group.newborn(step, PLACE, space_group.motion_model(config, 1 / FPS), 0.0)
+@pytest.mark.parametrize(("away", "hidden", "owner"), [(0.9, 0, 0), (1.4, 0, -1), (1.4, 40, 0)])
+def test_a_point_in_no_region_belongs_to_nobody(away: float, hidden: int, owner: int) -> None:
+    """Its sphere overlaps those of the group's points, and its velocity is the group's (eq. 8). The region of a hidden
+    group grows, with `hidden`, the number of frames."""
+    (step,) = together(walkers(0, 12, [1, 5, 1], [0, 0, 0], 1))
+    config = StereoConfig(point_covariance=False, radius=0.8)
+    motion = space_group.motion_model(config, 1 / FPS)
+    group = space_group.newborn(step, PLACE, motion, 0.0)
+    for _ in range(hidden):
+        space_group.predict(group, motion)
     cov = 4e-4 * np.eye(3)[None]
     point = SpacePoints(np.array([99]), group.pos[None] + [away, 0, 0], cov, group.ekf.x[None, VEL, 0], 25 * cov)
     assert sphere_groups(np.concatenate([step.pos, point.pos]), config.radius, 1).tolist() == [0] * 13
