@@ -88,12 +88,15 @@ def label_people(
                 state.present[p] = since
         now = slice(int(cuts[t]), int(cuts[t + 1]))
         switched = list(zip(*(getattr(links, k)[now].tolist() for k in ("a", "b", "on")), strict=True))
+        removed = now.start + np.flatnonzero(~links.on[now] & links.sure[now])
+        parted = list(zip(links.a[removed].tolist(), links.b[removed].tolist(), strict=True))
         old = state.identities.groups
         changes = state.step(t, _dated(state, t, switched, motion), arrival, shown)
         shown = state.identities.name(t, _together_now(found, t, state), shown)
         for g, people in shown.items():
             group[t:until, sorted(people)] = g
-        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in changes)
+        sure = [c for c in changes if c.kind not in ("split", "dissolve") or any({*p} <= {*c.members} for p in parted)]
+        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in sure)
         events += [e for e in told if e is not None]
     return _without_singles(frame, group[frame, column]), events
 

@@ -21,6 +21,7 @@ ABSENT = -2  # Label of a person who is absent; -1 is a person alone.
 # A switched link: its people a, b, True if switched on, first frame of the stretch that caused it.
 LinkSwitch = tuple[int, int, bool, int]
 SEARCHED = 20.0  # s before the report in which the onset of a change is looked for.
+LAG = 6.0  # s: what becomes known later is no event: standing near each other tells less and less.
 BRIDGED = 0.5  # s: gaps in a stretch that do not end it.
 LOOK_BACK = 20  # Frames before an event's start in which its position is looked for.
 
@@ -77,7 +78,8 @@ def event_of_change(
         start = min((motion.onset(a, b, t, joins=joins) for a, b in combinations(parts.sets, 2)), default=t)
     # people who were together when they were first seen neither met nor came: no event
     known = {"enter": arrival, "merge": parts.since + arrival, "form": parts.since + arrival}
-    if start <= known.get(change.kind, -1):
+    late = change.kind not in ("enter", "leave") and t - start > frames_of(LAG, motion.fps)
+    if late or start <= known.get(change.kind, -1):
         return None
     end = start if change.kind in ("enter", "leave") else t
     return _event(change, start, end, t, motion.pos)
