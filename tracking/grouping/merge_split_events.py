@@ -66,9 +66,12 @@ class Parts:
 def event_of_change(
     change: GroupChange, t: int, parts: Parts, motion: TrackedMotion, arrival: int
 ) -> GroupEvent | None:
-    """Returns the event of a change that became known in frame t. It is None for a merge or form within `arrival`
-    frames of the first frame with all parts, and for an enter as soon after the first frame of all: they were together from
-    the start. It is None also for a merge or form that became known more than 6 s after its onset."""
+    """Returns the event of a change that became known in frame t.
+
+    It is None for a merge or form within `arrival` frames of the first frame with all parts, and for an enter as soon
+    after the first frame of all: these people were together from the start. It is None also for a merge or form that
+    became known more than 6 s after its onset.
+    """
     # a group leaves when its last two people were seen, or its last one
     if change.kind == "leave":
         seen = np.isfinite(motion.pos[: t + 1, change.members, 0]).sum(axis=1)
