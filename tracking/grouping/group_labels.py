@@ -87,13 +87,16 @@ def label_people(
             else:
                 state.present[p] = since
         now = slice(int(cuts[t]), int(cuts[t + 1]))
-        switched = list(zip(*(getattr(links, k)[now].tolist() for k in ("a", "b", "on")), strict=True))
+        switched = list(zip(*(getattr(links, k)[now].tolist() for k in ("a", "b", "on", "sure")), strict=True))
         old = state.identities.groups
         changes = state.step(t, _dated(state, t, switched, motion), arrival, shown)
         shown = state.identities.name(t, _together_now(found, t, state), shown)
         for g, people in shown.items():
             group[t:until, sorted(people)] = g
-        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in changes)
+        # who parts without ever having been together was linked by mistake: no event
+        parted = [{a, b} for a, b, on, sure in switched if sure and not on]
+        sure = [c for c in changes if c.kind not in ("split", "dissolve") or any(p <= {*c.members} for p in parted)]
+        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in sure)
         events += [e for e in told if e is not None]
     return _without_singles(frame, group[frame, column]), events
 
@@ -116,14 +119,14 @@ def _together_now(found: FoundGroups, t: int, state: LinkedPeople) -> Iterable[P
 
 
 def _dated(
-    state: LinkedPeople, t: int, switched: Iterable[tuple[int, int, bool]], motion: TrackedMotion
+    state: LinkedPeople, t: int, switched: Iterable[tuple[int, int, bool, bool]], motion: TrackedMotion
 ) -> list[LinkSwitch]:
     """Returns the links switched in frame t with the frame in which the two came together."""
     # only links of people in no group yet may enter; the onset of the others is not needed
     grouped = {p for people in state.identities.groups.values() for p in people}
     return [
         (a, b, on, motion.onset(frozenset([a]), frozenset([b]), t, joins=True) if on and not {a, b} <= grouped else t)
-        for a, b, on in switched
+        for a, b, on, _ in switched
     ]
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from scenarios.loading.toml_files import parse
 from sim.truth.merge_split_rules import frames_of, runs, stretches
 from sim.types import Array, Bools, Ints
-from tracking.grouping.belief import KIND, UNSEEN, Belief, default_belief, pair_beliefs
+from tracking.grouping.belief import KIND, UNSEEN, Belief, PairBeliefs, default_belief, pair_beliefs
 from tracking.grouping.link_rule import LinkRule, Links, find_links
 from tracking.grouping.pair_evidence import frames_per_step, in_steps, step_positions
 from tracking.grouping.tracks_table import TracksTable
@@ -90,7 +90,7 @@ def belief_groups(
     if not events:
         return FoundGroups(None, now, size)
     lasting = groups_of_steps(shape, *pairs, log_odds, UNSEEN, belief.stay, belief.come)
-    return FoundGroups(_links(lasting, size), now, size)
+    return FoundGroups(_links(lasting, size, found), now, size)
 
 
 def groups_now(table: TracksTable, fps: float, belief: Belief) -> Ints:
@@ -106,8 +106,9 @@ def _gain(log_odds: Array | float, belief: Belief) -> Array:
     return np.asarray(1 / (1 + np.exp(-np.asarray(log_odds))) - belief.threshold)
 
 
-def _links(label: Ints, size: int) -> Links:
-    """Returns all switches of links: any two people of one label (S, P) are linked."""
+def _links(label: Ints, size: int, found: PairBeliefs) -> Links:
+    """Returns all switches of links: any two people of one label (S, P) are linked. A removal is sure if the pair's
+    log-odds, summed over the time of the link, are positive."""
     when, person = np.nonzero(label >= 0)
     steps, people = label.shape
     group = when * people + label[when, person]
@@ -118,12 +119,17 @@ def _links(label: Ints, size: int) -> Links:
     both, when = low * people + high, t[i]
     order = np.lexsort((when, both))
     both, first, last = stretches(both[order], when[order], 1)
+    row = (found.a * people + found.b) * steps + found.step
+    order = np.argsort(row)
+    total, row = np.append(0.0, np.cumsum(found.log_odds[order, 1])), row[order]
+    begin, end = (np.searchsorted(row, both * steps + at) for at in (first, last + 1))
     ends = last + 1 < steps
     t, both = np.concatenate([first, last[ends] + 1]), np.concatenate([both, both[ends]])
     on = np.arange(len(t)) < len(first)
+    sure = np.append(on[: len(first)], (total[end] > total[begin])[ends])
     order = np.lexsort((both, t))
-    t, both, on = t[order], both[order], on[order]
-    return Links(t * size, both // people, both % people, on)
+    t, both = t[order], both[order]
+    return Links(t * size, both // people, both % people, on[order], sure[order])
 
 
 def _missed(pair: Ints, step: Ints, seen: Bools, reported: Bools, memory: int) -> tuple[Ints, Ints]:

@@ -64,6 +64,8 @@ class Links:
     a: Ints
     b: Ints
     on: Bools  # (L,): True if the link is set, False if it is removed
+    # sure (L,): False if a link is removed against which its evidence speaks, all in all: the two were never together
+    sure: Bools
 
 
 def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, fps: float, rule: LinkRule) -> Links:
@@ -96,7 +98,7 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
     columns = [np.concatenate([np.zeros(0, np.int64), *(f[k] for f in found)]) for k in range(3)]
     order = np.lexsort((columns[1], columns[0]))
     t, pair, on = (c[order] for c in columns)
-    return Links(t, pair // people, pair % people, on.astype(bool))
+    return Links(t, pair // people, pair % people, on.astype(bool), np.ones(len(t), bool))
 
 
 def _switches(

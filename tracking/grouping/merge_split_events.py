@@ -21,6 +21,7 @@ ABSENT = -2  # Label of a person who is absent; -1 is a person alone.
 # A switched link: its people a, b, True if switched on, first frame of the stretch that caused it.
 LinkSwitch = tuple[int, int, bool, int]
 SEARCHED = 20.0  # s before the report in which the onset of a change is looked for.
+LAG = 6.0  # s after its onset in which a merge must become known: standing on near each other tells little new.
 BRIDGED = 0.5  # s: gaps in a stretch that do not end it.
 LOOK_BACK = 20  # Frames before an event's start in which its position is looked for.
 
@@ -65,9 +66,12 @@ class Parts:
 def event_of_change(
     change: GroupChange, t: int, parts: Parts, motion: TrackedMotion, arrival: int
 ) -> GroupEvent | None:
-    """Returns the event of a change that became known in frame t. It is None for a merge or
-    form within `arrival` frames of the first frame with all parts, and for an enter as soon after the first frame of
-    all: these people were together from the start."""
+    """Returns the event of a change that became known in frame t.
+
+    It is None for a merge or form within `arrival` frames of the first frame with all parts, and for an enter as soon
+    after the first frame of all: these people were together from the start. It is None also for a merge or form that
+    became known more than 6 s after its onset.
+    """
     # a group leaves when its last two people were seen, or its last one
     if change.kind == "leave":
         seen = np.isfinite(motion.pos[: t + 1, change.members, 0]).sum(axis=1)
@@ -76,7 +80,8 @@ def event_of_change(
         joins = change.kind not in ("split", "dissolve")
         start = min((motion.onset(a, b, t, joins=joins) for a, b in combinations(parts.sets, 2)), default=t)
     # people who were together when they were first seen neither met nor came: no event
-    known = {"enter": arrival, "merge": parts.since + arrival, "form": parts.since + arrival}
+    joined = max(parts.since + arrival, t - 1 - frames_of(LAG, motion.fps))
+    known = {"enter": arrival, "merge": joined, "form": joined}
     if start <= known.get(change.kind, -1):
         return None
     end = start if change.kind in ("enter", "leave") else t

@@ -5,6 +5,7 @@ import pytest
 
 from sim.types import GroupEvent, Groups, Tracks
 from tests.reference_sense import paced
+from tracking.grouping import merge_split_events
 from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.grouping.link_rule import LinkRule
 
@@ -82,6 +83,23 @@ def test_split_after_two_seconds_apart():
     """0.69 + 0.4 (t - 5) > 2.5 from t > 9.525 s: first in frame 97, for 2 s in frame 116."""
     made = derive(tracks(leaving()), FPS, rule=RULE)
     assert events(made) == [(116, "split", 97, (1,), (-1, 1), (1, 2, 3))]
+
+
+@pytest.mark.parametrize(("lag", "told"), [(1.5, [(129, "merge", 114)]), (1.4, [])])
+def test_a_merge_that_becomes_known_too_late_is_no_event(monkeypatch, lag, told):
+    monkeypatch.setattr(merge_split_events, "LAG", lag)
+    made = derive(tracks(joining()), FPS, rule=RULE)
+    assert [e[:3] for e in events(made)] == told
+    assert made[128].group.tolist() == [1, 1, 1], "the groups know it all the same"
+
+
+@pytest.mark.parametrize(("together", "told"), [(0, []), (2, ["dissolve"])])
+def test_who_was_together_by_mistake_parts_without_an_event(together, told):
+    """Two who part at 0.7 m/s, at once, or after 2 s side by side: both are linked at first."""
+    parting = [paced((12, (1, 0))), paced((together, (1, 0)), (12 - together, (1, 0.7)), start=(0, 0.7))]
+    made = derive(tracks(parting), FPS)
+    assert made[0].group.tolist() == [1, 1]
+    assert [e[1] for e in events(made)] == told
 
 
 def naming(own):
