@@ -196,9 +196,8 @@ def _made_up_people() -> Sequence:
     def frames() -> Iterator[Frame]:
         for k in range(16):
             pos = np.array([[k / 3 - 3.0, 0.0], [k / 3 - 2.75, 0.0], [3.0 - k / 3, 2.0]])
-            yield Frame(
-                k + 1, k / fps, picture(90 + 7 * k, 230 - 7 * k), None, Detections(k + 1, k / fps, "ground", pos)
-            )
+            lefts = 90 + 7 * k, 230 - 7 * k, *(20, 30, 40) * (k > 7)  # the last three touch: new people in one blob
+            yield Frame(k + 1, k / fps, picture(*lefts), None, Detections(k + 1, k / fps, "ground", pos))
 
     return Sequence(
         "made-up", fps, 16, frames, image_size=camera.image, camera=camera, has_images=True, has_detections=True,
