@@ -88,9 +88,7 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
     other = [key for key in wanted if stored.get(key) != wanted[key]]
     if other:
         short = ({**values, "scenario_hash": values["scenario_hash"][:8]} for values in (stored, wanted))
-        got, expected = (
-            ", ".join(f"{key.removesuffix('_hash')} {values.get(key)}" for key in other) for values in short
-        )
+        got, expected = (", ".join(f"{k.removesuffix('_hash')} {values.get(k)}" for k in other) for values in short)
         remedy = "choose another --out, or delete that folder"
         raise InputError(file=folder, got=f"a sequence of {got}", expected=expected, remedy=remedy)
     return manifest

@@ -176,8 +176,7 @@ def _result(
         "seeds": [
             {"seed": seed, "fails": fails[seed], "scores": dict(outcome.scores)} for seed, outcome in outcomes.items()
         ],
-        "command": _command(out, scene, setup), "file": out,
-        "page": out.with_suffix(".html"),
+        "command": _command(out, scene, setup), "file": out, "page": out.with_suffix(".html"),
     }  # fmt: skip
     return CommandResult(data, _text(data))
 
