@@ -84,13 +84,13 @@ def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
         raise error.replaced(remedy="delete that folder, or choose another --out") from None
     scenario = dump(job.entry.scenario)
     wanted = {**identity(scenario, job.seed, job.entry.repeat, job.streams, job.images), "stride": job.stride}
-    other = [
-        key.removesuffix("_hash") for key in wanted if manifest.get(key, 1 if key == "stride" else None) != wanted[key]
-    ]
+    stored = {"stride": 1} | manifest
+    other = [key for key in wanted if stored.get(key) != wanted[key]]
     if other:
-        got = f"a sequence that differs in {', '.join(other)}"
-        expected = "the same scenario, version, streams and images, or an empty place"
-        raise InputError(file=folder, got=got, expected=expected, remedy="choose another --out, or delete that folder")
+        short = ({**values, "scenario_hash": values["scenario_hash"][:8]} for values in (stored, wanted))
+        got, expected = (", ".join(f"{k.removesuffix('_hash')} {values.get(k)}" for k in other) for values in short)
+        remedy = "choose another --out, or delete that folder"
+        raise InputError(file=folder, got=f"a sequence of {got}", expected=expected, remedy=remedy)
     return manifest
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -41,6 +42,10 @@ def _from_corners(a: Array) -> Array:
     return np.concatenate([a[:, :2], a[:, 2:] - a[:, :2]], axis=1)
 
 
+def _in_metres(columns: list[int], metres: float, a: Array) -> Array:
+    return a[:, columns] * metres
+
+
 # Left, top, width, height from four columns, or x, y in m from two, by the names of the columns in a header line. The
 # first of four and of two are those of files without one.
 BOX_ORDERS: dict[str, Callable[[Array], Array]] = {
@@ -52,11 +57,9 @@ BOX_ORDERS: dict[str, Callable[[Array], Array]] = {
     "top,left,height,width": lambda a: a[:, [1, 0, 3, 2]],
 }
 POSITION_ORDERS: dict[str, Callable[[Array], Array]] = {
-    "x,y": lambda a: a,
-    "y,x": lambda a: a[:, ::-1],
-    "x_cm,y_cm": lambda a: a * 0.01,
-    "x_mm,y_mm": lambda a: a * 0.001,
-    "x_ft,y_ft": lambda a: a * 0.3048,
+    ",".join(f"{axis}{unit}" for axis in axes): partial(_in_metres, columns, metres)
+    for unit, metres in (("", 1.0), ("_cm", 0.01), ("_mm", 0.001), ("_ft", 0.3048), ("_km", 1000.0))
+    for axes, columns in (("xy", [0, 1]), ("yx", [1, 0]))
 }
 
 

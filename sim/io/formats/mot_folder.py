@@ -108,7 +108,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         raise InputError(file=path, got=got, expected=expected, remedy=remedy)
     if beyond:
         warnings.warn(f"{path}: {len(beyond)} pictures beyond frame {length} (seqLength) are not read", stacklevel=2)
-    seen = pictures.first_size() if images else None
+    seen = pictures.first_size() if images or info.image_size is None else None
     size = info.image_size or seen
     if seen is not None and size != seen:
         got, expected = "{} × {}".format(*size or ()), "{} × {}, the size of the pictures".format(*seen)
@@ -135,7 +135,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
             yield frame.replace(image=picture, right=beside)
 
     def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
-        return pictures.read(wanted, seen if images else pictures.first_size())
+        return pictures.read(wanted, seen or pictures.first_size())
 
     def truth() -> Truth:
         table = read_table(gt, length=length, boxless=True)

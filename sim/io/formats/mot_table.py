@@ -113,7 +113,7 @@ def size_doubt(box: Array, size: tuple[int, int]) -> str:
 Column = np.ndarray[tuple[int], np.dtype[np.float64]]
 
 # units that may end the names of positions, as x_cm,y_cm, in m
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "km": 1000.0}
 
 # meaning of a column, and the names it may have
 NAMES = {

@@ -122,6 +122,7 @@ def test_no_warning_for_weak_trackers(share):
 WRONG_POSITIONS = [
     (lambda p: p * 100, "frame,id,x_cm,y_cm,"), (lambda p: p * 1000, "frame,id,x_mm,y_mm,"),
     (lambda p: p[:, ::-1], "read as y,x"), (lambda p: p * 40, "give positions in m"),
+    (lambda p: p / 1000, "frame,id,x_km,y_km,"), (lambda p: p[:, ::-1] * 100, "frame,id,y_cm,x_cm,"),
 ]  # fmt: skip
 
 

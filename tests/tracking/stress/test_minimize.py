@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import get_args
@@ -227,18 +228,28 @@ group = [
 
 
 def test_end_to_end(tmp_path, monkeypatch, capsys) -> None:
+    def warning(*given):
+        warnings.warn("odd groups", stacklevel=1)
+        return tracked(*given)
+
+    tracked = TrackerSetup.run
+    monkeypatch.setattr(TrackerSetup, "run", warning)
     monkeypatch.chdir(tmp_path)
     Path("scene.toml").write_text(SCENE)
     line = ["minimize", "scene.toml", "--tracker", "blob", "--seed", "6", "--confirm", "0", "--while"]
     assert run([*line, "fragment", "--out", "small.toml"]) == 0
-    assert re.search(r"3 people → [12], 6 s → 2, 1 pillars → 0", capsys.readouterr().out)
+    printed = capsys.readouterr()
+    assert re.search(r"3 people → [12], 6 s → 2, 1 pillars → 0", printed.out)
+    assert "odd groups" not in printed.err
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
     small = load("small.toml")
     assert len(small.group) == 1
     assert ("sensor", "detect_prob") in [piece.path for piece in difficulties(small)[:2]]
     assert "</html>" in Path("small.html").read_text()
     command, *_ = Path("small.toml").read_text().splitlines()
     assert run(command.removeprefix("# flockscope ").split()) == 0
-    assert run(["track", "blob", "small-data", "--out", "small-tracks", "--detections", "file"]) == 0
+    assert run(["track", "blob", "small-data", "--out", "small-tracks"]) == 0
     (sequence,) = answer(capsys, "errors", "small-data", "small-tracks")["sequences"]
     assert "fragment" in {error["kind"] for error in sequence["errors"]}
     assert "got HOTA = 0." in refused(capsys, *line, "HOTA<0.01", "--out", "other.toml", code=1)

@@ -10,7 +10,7 @@ import os
 import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
 from html import escape
 from itertools import zip_longest
@@ -31,13 +31,14 @@ from tracking.running import tracker_registry
 from tracking.running.run import TrackingRun
 from tracking.scoring.catalogue import CATALOGUE
 
-SCENES = ("merge", "split", "cross", "queue", "party", "mixed")
+SCENES = ("merge", "split", "cross", "queue")
 SEEDS = range(40_000, 40_002)
 QUICK_SCENES, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
 QUICK_TRACKERS = ("blob", "group-pda")  # one that reports people, one that reports groups
 PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)  # The scene that is rendered and tracked from its pictures.
 
-QUICK_PIXEL_SETTINGS = ("camera.fps=5", "camera.image=[480,360]")  # What --quick changes in that scene.
+PIXEL_SETTINGS = ("duration=12",)  # The group has split by then.
+QUICK_PIXEL_SETTINGS = ("camera.fps=5", "camera.image=[480,360]")
 
 VIDEO = """<figure><video src="{video}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
 <figcaption><a href="{page}"><code>{tracker}</code></a></figcaption></figure>"""
@@ -60,24 +61,22 @@ def demo(options: DemoOptions) -> CommandResult:
     from sim.io.files.atomic import write_file
     from sim.io.files.own_files import refuse_foreign_file
     from sim.io.source import open_source
-    from sim.workers.pool import WorkerOptions
     from tracking.app.replay_page.page import theme
 
     start, out, quick = time.monotonic(), options.out, options.quick
     page = option_parsing.output_folder(out) / "index.html"
     refuse_foreign_file(page)
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
-    workers = 1 if quick else os.cpu_count() or 1
-    with _compiled_ahead() if quick else nullcontext(_tracked) as tracked:
+    settings = QUICK_PIXEL_SETTINGS if quick else PIXEL_SETTINGS
+    with _compiled_ahead() as compiled:
         with ProgressMeter("generate") as meter:
-            count = WorkerOptions(workers)
-            folders = generate(names, seeds, out / "data", workers=count, progress=meter.update, streams=())
-            settings = QUICK_PIXEL_SETTINGS if quick else ()
+            folders = generate(names, seeds, out / "data", progress=meter.update, streams=())
             (rendered,) = generate(
                 [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
             )  # fmt: skip
         trackers = QUICK_TRACKERS if quick else tracker_registry.names()
-        runs = _runs(_jobs(out, trackers, folders, rendered, quick), workers, tracked)
+        jobs = _jobs(out, trackers, folders, rendered, quick)
+        runs = _runs(compiled(jobs), len(jobs), 1 if quick else os.cpu_count() or 1)
     sequences, scenes = [open_source(folder)[0] for folder in folders], open_source(rendered)
     given: dict[str, dict[str, list[TrackingRun]]] = {"points": {}, "boxes": {}, "pixels": {}}
     for job in sorted(runs, key=lambda job: trackers.index(job.tracker)):
@@ -114,20 +113,17 @@ def _jobs(out: Path, trackers: Iterable[str], folders: list[Path], rendered: Pat
     image_jobs = [
         _TrackJob(name, "image", [rendered], tracks / f"{name}-image", pictures / f"{name}.mp4") for name in of_pixels
     ]
-    half = len(names) // 2
-    file_jobs = [_TrackJob(name, "file", folders, tracks / name) for name in (*names[half:], *names[:half])]
+    file_jobs = [_TrackJob(name, "file", folders, tracks / name) for name in reversed(names)]
     # Neighbours are of different trackers: two that run at once need not compile the same.
     return [job for two in zip_longest(image_jobs, file_jobs) for job in two if job is not None]
 
 
-def _runs(
-    jobs: list[_TrackJob], workers: int, tracked: Callable[[_TrackJob], list[TrackingRun]]
-) -> dict[_TrackJob, list[TrackingRun]]:
-    from sim.workers.pool import results_in_order, start_workers
+def _runs(jobs: Iterable[_TrackJob], count: int, workers: int) -> dict[_TrackJob, list[TrackingRun]]:
+    from sim.workers.pool import start_workers
 
     runs = {}
-    with ProgressMeter("track", len(jobs)) as meter, start_workers(workers) as run:
-        for job, found in zip(jobs, results_in_order(run, tracked, jobs), strict=True):
+    with ProgressMeter("track", count) as meter, start_workers(workers) as run:
+        for job, found in run(_tracked, jobs):
             runs[job] = found
             meter.step(f"{job.tracker}{' from pixels' if job.overlay else ''}")
     return runs
@@ -148,24 +144,25 @@ def _tracked(job: _TrackJob) -> list[TrackingRun]:
 
 
 @contextmanager
-def _compiled_ahead() -> Iterator[Callable[[_TrackJob], list[TrackingRun]]]:
-    """Compiles the kernels of QUICK_TRACKERS in another process; yields `_tracked`, which waits for those that it
-    needs."""
+def _compiled_ahead() -> Iterator[Callable[[Iterable[_TrackJob]], Iterator[_TrackJob]]]:
+    """Compiles the kernels of QUICK_TRACKERS in another process; yields a function that yields jobs, each when those
+    that it needs are compiled."""
     from sim.workers.pool import WorkerProcess
 
     # With one processor it would only take longer, as the process imports everything again.
     worker, compiling = WorkerProcess(), list(QUICK_TRACKERS) if (os.cpu_count() or 1) > 1 else []
 
-    def tracked(job: _TrackJob) -> list[TrackingRun]:
-        while job.tracker in compiling:
-            del compiling[0]
-            worker.receive()
-        return _tracked(job)
+    def compiled(jobs: Iterable[_TrackJob]) -> Iterator[_TrackJob]:
+        for job in jobs:
+            while job.tracker in compiling:
+                del compiling[0]
+                worker.receive()
+            yield job
 
     try:
         for tracker in compiling:
             worker.send(_compile, tracker)
-        yield tracked
+        yield compiled
     finally:
         worker.terminate()
         worker.join()
@@ -200,9 +197,8 @@ def _made_up_people() -> Sequence:
     def frames() -> Iterator[Frame]:
         for k in range(16):
             pos = np.array([[k / 3 - 3.0, 0.0], [k / 3 - 2.75, 0.0], [3.0 - k / 3, 2.0]])
-            yield Frame(
-                k + 1, k / fps, picture(90 + 7 * k, 230 - 7 * k), None, Detections(k + 1, k / fps, "ground", pos)
-            )
+            lefts = 90 + 7 * k, 230 - 7 * k, *(20, 30, 40) * (k > 7)  # the last three touch: new people in one blob
+            yield Frame(k + 1, k / fps, picture(*lefts), None, Detections(k + 1, k / fps, "ground", pos))
 
     return Sequence(
         "made-up", fps, 16, frames, image_size=camera.image, camera=camera, has_images=True, has_detections=True,

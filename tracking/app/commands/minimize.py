@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -137,9 +138,13 @@ def _write(out: Path, search: Search, scene: Scene, setup: TrackerSetup) -> Scen
     """Writes the smallest scene as a scenario file, and returns it as it is read again."""
     about = f"{scene.scenario.name} made small: {setup.tracker} has {search.failure.text}"
     small = search.smallest.model_copy(update={"about": about})
-    command = generate_command(str(out), scene.seed, (), f"{out.stem}-data")
-    write_file(out, f"# {command}\n{dump(small, defaults=False)}".encode())
+    write_file(out, f"# {_command(out, scene, setup)}\n{dump(small, defaults=False)}".encode())
     return load(out)
+
+
+def _command(out: Path, scene: Scene, setup: TrackerSetup) -> str:
+    streams = ",".join(streams_for(setup.tracker, setup.detections)) or "none"
+    return f"{generate_command(str(out), scene.seed, (), f'{out.stem}-data')} --streams {streams}"
 
 
 def _write_page(path: Path, setup: TrackerSetup, failure: Failure, sequence: Sequence) -> None:
@@ -149,7 +154,8 @@ def _write_page(path: Path, setup: TrackerSetup, failure: Failure, sequence: Seq
     if failure.kind == CRASH:
         write_page(sequence, Run(), path)
         return
-    tracks = setup.run(sequence)
+    with warnings.catch_warnings(action="ignore", category=UserWarning):  # as in the search
+        tracks = setup.run(sequence)
     errors = shown_errors(sequence, tracks).errors
     own = (one.error.start for one in errors if one.error.kind == failure.kind)
     write_page(sequence, Run(tracks, errors, setup.tracker), path, start=next(own, 1))
@@ -170,8 +176,7 @@ def _result(
         "seeds": [
             {"seed": seed, "fails": fails[seed], "scores": dict(outcome.scores)} for seed, outcome in outcomes.items()
         ],
-        "command": generate_command(str(out), scene.seed, (), f"{out.stem}-data"), "file": out,
-        "page": out.with_suffix(".html"),
+        "command": _command(out, scene, setup), "file": out, "page": out.with_suffix(".html"),
     }  # fmt: skip
     return CommandResult(data, _text(data))
 

@@ -57,10 +57,10 @@ class TrackedPeople:
         confirmed (N,)      True if confirmed; else the track is tentative
         measured (N,)       True if measured in this frame
         view_low, view_high (2,)   corners x, y of the field of view, px; inf and -inf before it is known
-    detectable (N,): probability that a person who exists and is shown is measured in this frame; unseen_time: s,
-    BIRTH_RATE times it is the expected number of people in view without a track; px_per_m: the image's scale; from
-    pixels that of the frame. Also config, context, dynamics (the nominal filter), top (True from straight above), and
-    what `follow` derives.
+    detect_prob: that of the config, 0 in a frame that was not observed; detectable (N,): probability that a person who
+    exists and is shown is measured in this frame; unseen_time: s, BIRTH_RATE times it is the expected number of people
+    in view without a track; px_per_m: the image's scale; from pixels that of the frame. Also config, context, dynamics
+    (the nominal filter), top (True from straight above), and what `follow` derives.
     """
 
     # Axis of the tracks in each column of the table.
@@ -91,12 +91,14 @@ class TrackedPeople:
         frames = int(np.ceil(config.coast_time * self.context.fps - 1e-6))
         self.death_rho = track_uncertainty.after_misses(dynamics, frames - 1)
 
-    def predict(self) -> None:
-        """Predicts all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence."""
+    def predict(self, observed: bool = True) -> None:
+        """Predicts all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence.
+        observed: False if nobody looks at this frame, so that nobody is detectable in it."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
         self.rho[:] = self.compute_rho()
         self.states[:] = self.transition @ self.states
-        self.detectable = self.config.detect_prob * self.visible_shares()
+        self.detect_prob = observed * self.config.detect_prob
+        self.detectable = self.detect_prob * self.visible_shares()
 
     def compute_rho(self) -> Array:
         """Returns rho (N,) of all tracks as predicted: sqrt|S| over its asymptote, S the innovation covariance; 1 in
@@ -195,7 +197,7 @@ class TrackedPeople:
         double = c.clutter_rate * DOUBLES * (density * owned).sum(1)
         if len(z) or len(self.id):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
-            self.unseen_time = stay * (1 - c.detect_prob) * self.unseen_time + self.dynamics.dt
+            self.unseen_time = stay * (1 - self.detect_prob) * self.unseen_time + self.dynamics.dt
         return np.asarray(new / (new + c.clutter_rate + double))
 
     def delete_tracks(self, t: float) -> None:
@@ -289,12 +291,12 @@ class TrackedEllipses(TrackedPeople):
         rate = ANGLE_RATE * (HEADING if self.top else 1.0)
         self.angle_var_per_step = np.radians(rate) ** 2 * dynamics.dt
 
-    def predict(self) -> None:
+    def predict(self, observed: bool = True) -> None:
         """Predicts all tracks one frame ahead, in place (eqs 1, 2), and computes their uncertainty rho; directions
         stay, their variances grow."""
         kalman.predict(self.nominal, self.dynamics.dt, self.q)
         self.angle[kalman.DIRECTION_VAR] += self.angle_var_per_step
-        super().predict()
+        super().predict(observed)
 
     def compute_rho(self) -> Array:
         """Returns rho (N,) of all tracks: sqrt|S| over its asymptote, S the innovation covariance by the nominal

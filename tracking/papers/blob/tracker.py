@@ -42,8 +42,8 @@ switches it off, one holds in the preset `paper`, too.
 - several boxes or blobs of one track, with "rho": the nearest counts. Paper: all are assigned (frame 367), not how.
   Why: a filter takes one.
 - places: with a camera on the ground, not of tracks above the horizon. Paper: px. Why: scenes are in m.
-- `management`: by an existence probability (existence); a track below 0.5 is tentative again. Paper: ρ. Why: rates hold
-  at any frame rate and detector.
+- `management`: by an existence probability (existence), of which a frame that nobody observed is no evidence; a track
+  below 0.5 is tentative again. Paper: ρ. Why: rates hold at any frame rate and detector.
 - association: one to one, most likely, against false and new boxes. Paper: nearest gated track. Why: a wide gate must
   not win.
 - scores of boxes: likelihood ratios, learned from the existence of the boxes' tracks. Paper: none. Why: any unit.
@@ -89,7 +89,7 @@ Departures from pixels only:
 - sizes (`split`): return to those of a person at that place. Paper: free. Why: templates measure none.
 - ρ: of a nominal covariance without θ. Paper: of the filter. Why: noise must not count.
 - report from pixels: boxes, by the usual ratio to ellipses. Paper: ellipses. Why: scores need boxes.
-- too much foreground (`background`): all tracks are missed, none starts. Paper: none. Why: light has changed.
+- too much foreground (`background`): nobody is observed, and no track starts. Paper: none. Why: light has changed.
 - background: adapts where no confirmed track is, ghosts anywhere (`background`). Paper: trained once. Why: light
   changes.
 """

@@ -44,7 +44,7 @@ class BoxUpdater:
         people = self.people
         if len(z):
             image_scale.required(people.px_per_m)
-        people.predict()
+        people.predict(observed=detections is not None)
         if people.by_existence:
             kalman.fade_rates(people.bank[:, :, 2:], np.exp(-people.dynamics.dt / SIZE_RATE_TIME))
         people.widen_view(z)

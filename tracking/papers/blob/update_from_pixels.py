@@ -107,9 +107,9 @@ class PixelUpdater:
         """Updates the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used."""
         people, foreground = self.people, self.foreground
         people.px_per_m = foreground.scale
-        people.predict()
-        people.widen_view(np.zeros((0, 4)))
         seen = None if frame.image is None else foreground.segment(frame.image)
+        people.predict(observed=seen is not None and seen.plausible)
+        people.widen_view(np.zeros((0, 4)))
         if seen is None or not seen.plausible:
             if seen is not None:
                 foreground.adapt(seen, self._protected())

@@ -202,12 +202,12 @@ def test_a_dead_link_is_a_lost_frame(tmp_path):
 
 
 def test_pictures_cost_nothing_where_nobody_asks(tmp_path, monkeypatch):
-    path = folder(tmp_path / "a", ["000001.jpg", "000002.jpg"])
+    path = folder(tmp_path / "a", ["000001.jpg", "000002.jpg"], ini="imWidth=96\nimHeight=64\n")
     monkeypatch.setattr(pictures, "read_picture", None)
     (sequence,) = open_source(path, images=False)
     assert not sequence.has_images
     assert [f.image for f in sequence] == [None, None]
-    assert sequence.image_size is None
+    assert sequence.image_size == SIZE
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".png", ".bmp", ".tif"])
@@ -232,6 +232,7 @@ def test_another_size_is_one_line(tmp_path):
     path = folder(tmp_path / "a", [f"{k:06d}.jpg" for k in range(1, 5)])
     cv2.imwrite(str(path / "img1/000003.jpg"), picture(0, (48, 32)))
     (sequence,) = open_source(path, images=True)
+    assert sequence.image_size == open_source(path, images=False)[0].image_size == SIZE
     with pytest.raises(InputError, match=r"000003.jpg: got 48×32 px; expected 96×64 px"):
         list(sequence)
     (path / "seqinfo.ini").write_text("[Sequence]\nframeRate=10\nimWidth=960\nimHeight=640\n")

@@ -9,6 +9,7 @@ from scenarios.errors import InputError
 from sim.types import Context, Detections, Frame
 from tests.painted import ids
 from tests.reference_sense import above, pinhole
+from tracking.papers.blob import existence
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
 
@@ -90,6 +91,15 @@ def test_a_long_absence_ends_the_track_and_ids_are_not_reused(config):
     made = run(frames, config)
     assert len(ids(made)) == 2
     assert not set(made[19].id) & set(made[-1].id)
+
+
+def test_a_frame_that_nobody_observed_is_no_evidence():
+    tracker = Blob()
+    run([at((100, 200))] * 20, tracker=tracker)
+    before = tracker.people.existence()
+    for k in range(20, 40):
+        tracker.step(Frame(k + 1, k / FPS), None)
+    assert tracker.people.existence() == pytest.approx(before * np.exp(-2 / existence.LIFETIME))
 
 
 def test_crossing_people_keep_their_ids():
