@@ -1,7 +1,7 @@
 """Tells what a file is: ours, a stranger's of the same name, or a side file that an operating system put there.
 
-JSON files of ours have keys that only we write, Parquet tables our metadata. Pages, PNG pictures and MP4 videos name
-the program that made them. Side files are ignored by readers of folders.
+JSON files of ours have keys that only we write, Parquet tables our metadata. Pages, PNG pictures, MP4 videos and the
+first line of TOML files name the program that made them. Side files are ignored by readers of folders.
 
 Output paths: the only place where a name becomes a part of a path.
 
@@ -75,7 +75,7 @@ def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
         if path.suffix in (".html", ".png"):
             with path.open("rb") as file:
                 return (PAGE if path.suffix == ".html" else SOFTWARE) in file.read(HEAD)
-        kinds = {".parquet": tables.is_own_table, ".mp4": _video}
+        kinds = {".parquet": tables.is_own_table, ".mp4": _video, ".toml": _toml}
         return path.suffix in kinds and kinds[path.suffix](path)
     except (InputError, OSError, ValueError):
         return None
@@ -86,6 +86,11 @@ def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
     if path.exists() and not is_ours(path, marks):
         got, expected = "a file that flockscope did not write", "its own file, or none"
         raise InputError(file=path, got=got, expected=expected, remedy="move it away, or choose another --out")
+
+
+def _toml(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.readline(HEAD).startswith(b"# " + GENERATOR.encode())
 
 
 def _video(path: Path) -> bool:

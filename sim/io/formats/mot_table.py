@@ -201,7 +201,13 @@ def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> 
         columns[0] = columns[0] + 1
         warnings.warn(f"{text.file}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
     rows = replace(rows, values=np.stack(columns, axis=1))
-    return rows, replace(rows, values=column["group"][:, None]).integers(0, "group") if "group" in column else None
+    if "group" not in column:
+        return rows, None
+    group = replace(rows, values=column["group"][:, None]).integers(0, "group")
+    if len(group) and group[0] <= 0 and (group == group[0]).all():
+        who = "nobody is in a group" if group[0] < 0 else "all are one group"
+        warnings.warn(f"{text.file}: group is {group[0]} in all rows: {who}. Leave an unused column out", stacklevel=4)
+    return rows, group
 
 
 def _words_for_classes(text: TextRows, names: list[str]) -> tuple[int, list[str]]:

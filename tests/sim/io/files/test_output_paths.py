@@ -86,6 +86,7 @@ FILES = [
     ("x.html", PAGE, True), ("x.html", b"", False),
     ("x.png", own_files.marked_png(png()), True), ("x.png", png(), False), ("x.png", b"", False),
     ("x.mp4", b"flockscope", False), ("x.mp4", b"", False), ("x.txt", PAGE, False),
+    ("x.toml", b"# flockscope fit\n", True), ("x.toml", b"schema = 1\n# flockscope\n", False),
 ]  # fmt: skip
 
 
