@@ -16,6 +16,7 @@ from functools import partial
 
 import numpy as np
 
+from sim.io.formats.mot_table import UNITS
 from sim.types import Array, Bools, Ints, Tracks, Truth
 from tracking.scoring.candidate_pairs import FOUND, box_pairs
 from tracking.scoring.rows import FrameRows
@@ -57,8 +58,8 @@ BOX_ORDERS: dict[str, Callable[[Array], Array]] = {
     "top,left,height,width": lambda a: a[:, [1, 0, 3, 2]],
 }
 POSITION_ORDERS: dict[str, Callable[[Array], Array]] = {
-    ",".join(f"{axis}{unit}" for axis in axes): partial(_in_metres, columns, metres)
-    for unit, metres in (("", 1.0), ("_cm", 0.01), ("_mm", 0.001), ("_ft", 0.3048), ("_km", 1000.0))
+    ",".join(axis + f"_{unit}" * (unit != "m") for axis in axes): partial(_in_metres, columns, metres)
+    for unit, metres in UNITS.items()
     for axes, columns in (("xy", [0, 1]), ("yx", [1, 0]))
 }
 
@@ -162,11 +163,6 @@ def _comparable(truth: Truth, tracks: SequenceOf[Tracks]) -> tuple[Side, Side] |
     return (true, est) if len(true.rows) and len(est.rows) else None
 
 
-def _moved(true: Side, est: Side, frame: Ints) -> tuple[Side, Side]:
-    moved = Side(FrameRows(frame, est.rows.id), est.values)
-    return _some(np.intersect1d(true.rows.frame, frame), true, moved)
-
-
 def _some(frames: Ints, true: Side, est: Side) -> tuple[Side, Side]:
     a, b = (np.searchsorted(s.rows.frame, [frames, frames + 1]) for s in (true, est))
     pairs = int(((a[1] - a[0]) * (b[1] - b[0])).sum())
@@ -210,6 +206,7 @@ def _other_frames(true: Side, est: Side) -> Iterator[Reading]:
     maps |= {f"with frames numbered 1, {1 + n}, {1 + 2 * n}, …": (frame - 1) * n + 1 for n in RATES}
     for words, numbers in maps.items():
         if 2 * ((numbers >= 1) & (numbers <= labelled[-1])).sum() >= len(frame):
-            sides = _moved(true, est, numbers)
+            moved = Side(FrameRows(numbers, est.rows.id), est.values)
+            sides = _some(np.intersect1d(labelled, numbers), true, moved)
             far = 1 - _overlap(*sides).sum() / max(len(sides[1].rows), 1)
             yield 1 + far / 1000, -_share(*sides), words, "number the frames of both alike"  # the closest of good ones

@@ -42,6 +42,8 @@ GENERATOR = "flockscope"  # the name in the element <meta name="generator"> of a
 HEAD = 1 << 16  # bytes of a page or picture in which our name stands
 PAGE = f'<meta name="generator" content="{GENERATOR}">'.encode()
 
+COMMENT = f"# {GENERATOR} ".encode()  # beginning of our TOML files
+
 IHDR_END = 33  # bytes of a PNG file up to the end of its first chunk
 
 
@@ -56,6 +58,9 @@ def marked_png(picture: bytes) -> bytes:
     """Returns the bytes of a PNG file, `picture`, with the name of flockscope added, by which `is_ours` knows it."""
     return picture[:IHDR_END] + SOFTWARE + picture[IHDR_END:]
 
+
+# what names us in files of each suffix, and the size in bytes of the part that it is in
+IN_HEAD = {".html": (PAGE, HEAD), ".png": (SOFTWARE, HEAD), ".toml": (COMMENT, len(COMMENT))}
 
 # types of the values of keys that a .json file of ours always has, and no other program writes, by key
 Marks = Mapping[str, type]
@@ -72,10 +77,11 @@ def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
         if path.suffix == ".json" and marks:
             found = tables.read_json(path)
             return all(isinstance(found.get(key), kind) for key, kind in marks.items())
-        if path.suffix in (".html", ".png"):
+        if path.suffix in IN_HEAD:
+            mark, size = IN_HEAD[path.suffix]
             with path.open("rb") as file:
-                return (PAGE if path.suffix == ".html" else SOFTWARE) in file.read(HEAD)
-        kinds = {".parquet": tables.is_own_table, ".mp4": _video, ".toml": _toml}
+                return mark in file.read(size)
+        kinds = {".parquet": tables.is_own_table, ".mp4": _video}
         return path.suffix in kinds and kinds[path.suffix](path)
     except (InputError, OSError, ValueError):
         return None
@@ -86,11 +92,6 @@ def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
     if path.exists() and not is_ours(path, marks):
         got, expected = "a file that flockscope did not write", "its own file, or none"
         raise InputError(file=path, got=got, expected=expected, remedy="move it away, or choose another --out")
-
-
-def _toml(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.readline(HEAD).startswith(b"# " + GENERATOR.encode())
 
 
 def _video(path: Path) -> bool:

@@ -201,13 +201,7 @@ def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> 
         columns[0] = columns[0] + 1
         warnings.warn(f"{text.file}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
     rows = replace(rows, values=np.stack(columns, axis=1))
-    if "group" not in column:
-        return rows, None
-    group = replace(rows, values=column["group"][:, None]).integers(0, "group")
-    if len(group) and group[0] <= 0 and (group == group[0]).all():
-        who = "nobody is in a group" if group[0] < 0 else "all are one group"
-        warnings.warn(f"{text.file}: group is {group[0]} in all rows: {who}. Leave an unused column out", stacklevel=4)
-    return rows, group
+    return rows, replace(rows, values=column["group"][:, None]).integers(0, "group") if "group" in column else None
 
 
 def _words_for_classes(text: TextRows, names: list[str]) -> tuple[int, list[str]]:
@@ -315,6 +309,11 @@ def table_of_rows(
         box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
     if group is not None:
         rows.reject(group < -1, "groups from 0, or -1 for alone", "correct the group")
+        if set(group.tolist()) in ({0}, {-1}):
+            who = "all are one group" if group[0] == 0 else "nobody is in a group"
+            warnings.warn(
+                f"{rows.file}: group is {group[0]} in all rows: {who}. Leave an unused column out", stacklevel=4
+            )
     table = MotTable(rows, frame, id, box, rest, group)
     rows.require_bounds(frame, length)
     flat, boxed = (table.box[:, 2:] <= 0).any(axis=1), ~table.without_box()

@@ -34,8 +34,7 @@ COMMANDS = {
     "export parquet": ("export parquet {0}/data --out {1}", "scene-s20000/people.parquet"),
     "export trajnet": ("export trajnet {0}/data --out {1}", "scene-s20000/people.ndjson"),
     "export pedpy": ("export pedpy {0}/data --out {1}", "scene-s20000/people.txt"),
-    "tune": ("tune {2} --suite {0}/scene.toml --check none --trials 1 --out {1}/toy.toml",
-             "toy.json"),
+    "tune": ("tune {2} --suite {0}/scene.toml --check none --trials 1 --out {1}/toy.toml", "toy.json"),
     "fit sensor": ("fit sensor {0}/data --out {1}/mine.toml", "mine.toml"),
     "view": ("view {0}/two --out {1}", "other.html"),
     "view, the film": ("view {0}/two/walk --video beside --out {1}/walk.html", "walk.view.mp4"),
@@ -45,11 +44,11 @@ COMMANDS = {
 }  # fmt: skip
 
 
+# Of some commands a file that resembles theirs; of all others a JSON text.
 LOOKALIKES = {
     "export csv": "kind,start\n",
     "export trajnet": '{"scene": {"id": 0, "p": 1, "s": 780, "e": 810, "fps": 2.5, "tag": [1, []]}}\n',
 }
-"""Of some commands a file that resembles theirs; of all others a JSON text."""
 
 
 @pytest.mark.parametrize("name", COMMANDS)
