@@ -87,9 +87,9 @@ def is_control(character: str) -> bool:
     return unicodedata.category(character) in CONTROL
 
 
-def counted(number: int, noun: str) -> str:
-    """Returns a number with its noun, to which it adds "s" unless the number is 1: "1 frame", "2 frames"."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+def counted(number: int, noun: str, plural: str = "") -> str:
+    """Returns a number with its noun: "1 frame", "2 frames". plural: of the noun; "": with an "s"."""
+    return f"{number} {noun if number == 1 else plural or noun + 's'}"
 
 
 def shortened(text: str, longest: int) -> str:

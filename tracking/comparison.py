@@ -233,7 +233,8 @@ def scorer_of(sequence: Sequence) -> Iterator[Scorer]:
     except IncomparableError as error:
         raise InputError(
             file=sequence.name, place="--similarity", got=str(error), expected="what all sides have",
-            remedy="choose another --similarity, or track from the same detections",
+            remedy="choose another --similarity, or track from detections that are alike: "
+            "if the labels are boxes alone, with -1 for x, y and z in det.txt",
         ) from None  # fmt: skip
     except ValueError as error:
         raise InputError(

@@ -12,7 +12,7 @@ from itertools import count
 from pathlib import Path
 from typing import NoReturn
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, counted
 from scenarios.limits import CELLS, FRAMES, PEOPLE
 from scenarios.loading.toml_files import did_you_mean
 from scenarios.schema.geometry import clearance, door_fits, queue_places
@@ -222,7 +222,7 @@ def _split(event: SplitOrder, key: str, alive: Sizes, gone: dict[str, str]) -> N
     gone[event.group] = event.id
     given = [part.size for part in event.parts if part.size is not None]
     open_parts = len(event.parts) - len(given)
-    has = f"{low:g} people" if low == high else f"{low:g} to {high:g} people"
+    has = counted(int(low), "person", "people") if low == high else f"{low:g} to {high:g} people"
     # Sizes must fit every possible size of the group.
     if sum(given) + open_parts > low or (not open_parts and not low == high == sum(given)):
         got = f"parts of {' + '.join(map(str, given + ['1 or more'] * open_parts))}"
@@ -244,5 +244,5 @@ def _queue(event: QueueOrder, key: str, alive: Sizes, gone: dict[str, str]) -> N
         queued += [name for name in found if name not in queued]
     people = sum(alive[name][1] for name in queued)
     if people < QUEUE_PEOPLE:
-        got = f"{people:g} people in {', '.join(queued)}"
+        got = f"{counted(int(people), 'person', 'people')} in {', '.join(queued)}"
         fail(f"{key}.groups", got, f"at least {QUEUE_PEOPLE} in a queue", "queue more groups, or larger ones")

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, counted
 from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, Stop, group_names
 from scenarios.schema.values import Distribution, Point, Value
 from sim.crowd.formation import to_world, walking
@@ -222,10 +222,11 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
         together = spec.scatter == 0.0 or _apart(group.pos)
         if together and is_free(group.pos, draws.scene, taken if group.enter == 0 else []):
             return
+    people = counted(len(group.members), "person", "people")
     raise InputError(
         file=f"scenario {draws.scenario.name}", place=f"group.{spec.id}.start (seed {draws.seed})",
         got="no free place" if drawn else "a place in a wall, a pillar or another group",
-        expected=f"{len(group.members)} people {START_GAP} m clear of others and {BODY_RADIUS} m of walls",
+        expected=f"{people} {START_GAP} m clear of others and {BODY_RADIUS} m of walls",
         remedy="move the start, widen its distribution, or have fewer people",
     )  # fmt: skip
 

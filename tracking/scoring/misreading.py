@@ -16,6 +16,7 @@ from functools import partial
 
 import numpy as np
 
+from sim.io.formats.mot_table import UNITS
 from sim.types import Array, Bools, Ints, Tracks, Truth
 from tracking.scoring.candidate_pairs import FOUND, box_pairs
 from tracking.scoring.rows import FrameRows
@@ -25,7 +26,7 @@ NONE = 0.02  # Share of matching boxes below which there is a warning, whatever 
 CLEARLY = 0.3  # Share by which another reading must match more boxes.
 ABOUT = 0.85  # A simpler reading is preferred if it matches at least this part of what another one does.
 PAIRS = 20_000  # Most pairs of boxes that are looked at, unless one frame has more.
-CLOSER, ENOUGH = 0.8, 50  # Tracks of so many boxes are a frame off if there 1 - IoU is below this part of what it is.
+CLOSER, ENOUGH = 0.8, 50  # Tracks of so many boxes are some frames off if there 1 - IoU is below this part of it here.
 SPREAD = 0.25  # Least ratio of the extents of both sides, lest positions that shrink to the origin match labels there.
 SHIFTS = range(-10, 11)
 RATES = (2, 3, 4, 5, 6, 10, 12, 15, 25, 30)
@@ -57,8 +58,8 @@ BOX_ORDERS: dict[str, Callable[[Array], Array]] = {
     "top,left,height,width": lambda a: a[:, [1, 0, 3, 2]],
 }
 POSITION_ORDERS: dict[str, Callable[[Array], Array]] = {
-    ",".join(f"{axis}{unit}" for axis in axes): partial(_in_metres, columns, metres)
-    for unit, metres in (("", 1.0), ("_cm", 0.01), ("_mm", 0.001), ("_ft", 0.3048), ("_km", 1000.0))
+    ",".join(axis + f"_{unit}" * (unit != "m") for axis in axes): partial(_in_metres, columns, metres)
+    for unit, metres in UNITS.items()
     for axes, columns in (("xy", [0, 1]), ("yx", [1, 0]))
 }
 
@@ -85,7 +86,7 @@ def likely_misreading(
     truth: Truth, tracks: SequenceOf[Tracks], size: tuple[int, int] | None = None, files: bool = True
 ) -> str:
     """Returns a warning if hardly any tracked person matches a label though both sides have people, or if people match
-    labels of the next or the last frame more exactly, else "".
+    labels of other frames, up to 10 away, more exactly, else "".
 
     size: width and height of the pictures, px, None if unknown. files: False if the tracks are arrays, for which the
     remedies of files are of no use.
@@ -100,7 +101,7 @@ def likely_misreading(
         some = _some(together, true, est)
         share = _share(*some)
         if share >= FEW:
-            return _shifted(true, est)
+            return _shifted(true, some[1])
         found += _other_columns(*some, size, truth.px_per_m)
     found += _other_frames(true, est)
     most = max((-reading[1] for reading in found), default=0.0)
@@ -121,18 +122,28 @@ def likely_misreading(
 
 
 def _shifted(true: Side, est: Side) -> str:
-    """Returns a warning if the tracks lie on the labels of the next or the last frame more exactly, else ""."""
-    fit = dict[int, float]()
-    for k in (0, 1, -1):
-        labels, moved = _moved(true, est, est.rows.frame + k)
-        pairs, overlap = box_pairs(labels.rows, moved.rows, labels.boxes, moved.boxes), np.zeros(len(moved.rows))
-        np.maximum.at(overlap, pairs.j, pairs.s)
-        fit[k] = float(overlap.mean()) if len(overlap) >= ENOUGH else 0.0
-    best = max(fit, key=fit.__getitem__)
-    if best == 0 or 1 - fit[best] > CLOSER * (1 - fit[0]):
-        return ""
-    words = f"mean IoU with labels {fit[0]:.2f}; with {best:+d} on their frame numbers the tracks have {fit[best]:.2f}"
-    return f"{words}: number the frames of both alike, unless these tracks lag by a frame"
+    """Returns a warning if the tracks lie on labels of up to 10 frames away more exactly, else "". true: all labels."""
+    near = np.add.outer(np.unique(est.rows.frame), SHIFTS)
+    true = true.keep(np.isin(true.rows.frame, near))
+    now, best, words = _overlap(true, est), CLOSER, ""
+    for k in sorted(SHIFTS, key=abs):
+        then = _overlap(true, Side(FrameRows(est.rows.frame + k, est.rows.id), est.values))
+        both = np.isfinite(now + then)
+        if both.sum() < ENOUGH:
+            continue
+        a, b = float(now[both].mean()), float(then[both].mean())
+        if 1 - b < best * (1 - a):
+            best = (1 - b) / (1 - a)
+            words = f"mean IoU with labels {a:.2f}; with {k:+d} on their frame numbers the tracks have {b:.2f}"
+    return words and f"{words}: number the frames of both alike, unless the tracks lag or lie beside the people"
+
+
+def _overlap(true: Side, est: Side) -> Array:
+    """Returns the greatest IoU of each of the S tracked boxes with a label, (S,); nan in frames without labels."""
+    pairs = box_pairs(true.rows, est.rows, true.boxes, est.boxes)
+    found = np.where(np.isin(est.rows.frame, true.rows.frame), 0.0, np.nan)
+    np.maximum.at(found, pairs.j, pairs.s)
+    return found
 
 
 def _comparable(truth: Truth, tracks: SequenceOf[Tracks]) -> tuple[Side, Side] | None:
@@ -150,11 +161,6 @@ def _comparable(truth: Truth, tracks: SequenceOf[Tracks]) -> tuple[Side, Side] |
         return None
     true, est = (side.keep(np.asarray(np.isfinite(side.values).all(axis=1))) for side in sides)
     return (true, est) if len(true.rows) and len(est.rows) else None
-
-
-def _moved(true: Side, est: Side, frame: Ints) -> tuple[Side, Side]:
-    moved = Side(FrameRows(frame, est.rows.id), est.values)
-    return _some(np.intersect1d(true.rows.frame, frame), true, moved)
 
 
 def _some(frames: Ints, true: Side, est: Side) -> tuple[Side, Side]:
@@ -198,7 +204,9 @@ def _other_frames(true: Side, est: Side) -> Iterator[Reading]:
     ends = {int(labelled[0] - frame[0]), int(labelled[-1] - frame[-1])}
     maps = {f"with {k:+d} on frame numbers": frame + k for k in sorted({*SHIFTS, *ends} - {0}, key=abs)}
     maps |= {f"with frames numbered 1, {1 + n}, {1 + 2 * n}, …": (frame - 1) * n + 1 for n in RATES}
-    for place, (words, numbers) in enumerate(maps.items(), 1):
+    for words, numbers in maps.items():
         if 2 * ((numbers >= 1) & (numbers <= labelled[-1])).sum() >= len(frame):
-            share = _share(*_moved(true, est, numbers))
-            yield 1 + place / 1000, -share, words, "number the frames of both alike"  # the least shift of equal ones
+            moved = Side(FrameRows(numbers, est.rows.id), est.values)
+            sides = _some(np.intersect1d(labelled, numbers), true, moved)
+            far = 1 - _overlap(*sides).sum() / max(len(sides[1].rows), 1)
+            yield 1 + far / 1000, -_share(*sides), words, "number the frames of both alike"  # the closest of good ones

@@ -133,7 +133,7 @@ def _in_image(truth: Truth, run: Sequence[Tracks], pixels: bool) -> Sequence[Tra
         return completed(run, truth.fps, truth.px_per_m, camera=truth.camera, scene=truth.scene, pixels=pixels)[0]
     if not boxed(run):
         what = "groups without people" if any(t.unit == "group" for t in run) else "people without boxes"
-        raise IncomparableError(f"runs in the image (px), and one on the ground (m) with {what}")
+        raise IncomparableError(f"labels or runs in the image (px), and one on the ground (m) with {what}")
     return [_track_in_image(t) for t in with_groups(run, truth.fps, truth.px_per_m)]
 
 

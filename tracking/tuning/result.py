@@ -182,7 +182,7 @@ class TuningResult:
             moved = name in old and config.as_dict().get(name) != old[name]
             lines.append(f"{line}  # default {old[name]}" if moved else line)
         packages = ", ".join(f"{name} {version}" for name, version in installed(PACKAGES).items())
-        comments = [*self.lines(chosen), f"versions: {packages}"]
+        comments = ["flockscope tune:", *self.lines(chosen), f"versions: {packages}"]
         return "\n".join([*(f"# {comment}" for comment in comments), *lines, ""])
 
     def as_dict(self) -> dict[str, Any]:

@@ -220,6 +220,7 @@ def _checked_target(out: Path) -> Path:
     if out.suffix != ".toml" or out.is_dir():
         remedy = "choose a name that ends in .toml"
         raise InputError(file=out, place="--out", got=out.name, expected="a file, *.toml", remedy=remedy)
+    refuse_foreign_file(out)
     refuse_foreign_file(out.with_suffix(".json"), RESULT_MARKS)
     return out
 

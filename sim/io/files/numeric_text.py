@@ -62,8 +62,9 @@ class NumericTable:
         """
         span, remedy, most = f"frames from 1 to {length or FRAMES}", "correct the frame", None
         if length is not None:
-            remedy = "correct the frame, or seqLength"
-            most = "check that this text belongs to this recording, and its seqLength"
+            remedy, count = "correct the frame, or seqLength", "number its frames 1, 2, 3, … as those of the recording"
+            most = f"check that this text belongs to this recording, and its seqLength, or {count}"
+            self.reject((frame == 0) & (frame.max(initial=0) >= length), span, count)
         self.reject(frame == 0, span, "add 1 to all frames, if the file counts them from 0")
         self.reject((frame < 1) | (frame > (length or FRAMES)), span, remedy, most)
         # Memory in proportion to the highest frame: frames are checked before.
@@ -93,8 +94,8 @@ class TextRows:
 
     @property
     def separator(self) -> str | None:
-        """The separator of cells: a comma, else a semicolon, if the first row has one, else None: blanks."""
-        return next((mark for mark in ",;" if self.text and mark in self.text[0]), None)
+        """The separator of cells: a semicolon, else a comma, if the first row has one, else None: blanks."""
+        return next((mark for mark in ";," if self.text and mark in self.text[0]), None)
 
     def cells(self) -> Iterator[list[str]]:
         """Yields the cells of each row as a list of texts."""
@@ -139,13 +140,14 @@ class TextRows:
 
     def _first_bad(self, fits: Container[int], use: list[int] | None) -> InputError:
         width = len(next(self.cells()))
-        for number, cells in zip(self.line, self.cells(), strict=True):
+        for number, line, cells in zip(self.line, self.text, self.cells(), strict=True):
             read = [cells[k] for k in use] if use is not None and len(cells) in fits else cells
             bad = [repr(cell.strip()) for cell in read if not is_number_text(cell)]
             if bad or len(cells) not in fits:
                 got, expected = f"{len(cells)} columns", f"{width} columns, as in the first line"
                 got, expected = (bad[0], "a number") if bad else (got, expected)
-                return InputError(file=self.file, place=f"line {number}", got=got, expected=expected, remedy=CORRECT)
+                remedy = f"remove the lines that begin with #, and {NAME_THEM}" if line.startswith("#") else CORRECT
+                return InputError(file=self.file, place=f"line {number}", got=got, expected=expected, remedy=remedy)
         return InputError(file=self.file, got="unreadable numbers", expected="rows of numbers", remedy="check the file")
 
 

@@ -1,7 +1,7 @@
 """Tells what a file is: ours, a stranger's of the same name, or a side file that an operating system put there.
 
-JSON files of ours have keys that only we write, Parquet tables our metadata. Pages, PNG pictures and MP4 videos name
-the program that made them. Side files are ignored by readers of folders.
+JSON files of ours have keys that only we write, Parquet tables our metadata. Pages, PNG pictures, MP4 videos and the
+first line of TOML files name the program that made them. Side files are ignored by readers of folders.
 
 Output paths: the only place where a name becomes a part of a path.
 
@@ -42,6 +42,8 @@ GENERATOR = "flockscope"  # the name in the element <meta name="generator"> of a
 HEAD = 1 << 16  # bytes of a page or picture in which our name stands
 PAGE = f'<meta name="generator" content="{GENERATOR}">'.encode()
 
+COMMENT = f"# {GENERATOR} ".encode()  # beginning of our TOML files
+
 IHDR_END = 33  # bytes of a PNG file up to the end of its first chunk
 
 
@@ -56,6 +58,9 @@ def marked_png(picture: bytes) -> bytes:
     """Returns the bytes of a PNG file, `picture`, with the name of flockscope added, by which `is_ours` knows it."""
     return picture[:IHDR_END] + SOFTWARE + picture[IHDR_END:]
 
+
+# what names us in files of each suffix, and the size in bytes of the part that it is in
+IN_HEAD = {".html": (PAGE, HEAD), ".png": (SOFTWARE, HEAD), ".toml": (COMMENT, len(COMMENT))}
 
 # types of the values of keys that a .json file of ours always has, and no other program writes, by key
 Marks = Mapping[str, type]
@@ -72,9 +77,10 @@ def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
         if path.suffix == ".json" and marks:
             found = tables.read_json(path)
             return all(isinstance(found.get(key), kind) for key, kind in marks.items())
-        if path.suffix in (".html", ".png"):
+        if path.suffix in IN_HEAD:
+            mark, size = IN_HEAD[path.suffix]
             with path.open("rb") as file:
-                return (PAGE if path.suffix == ".html" else SOFTWARE) in file.read(HEAD)
+                return mark in file.read(size)
         kinds = {".parquet": tables.is_own_table, ".mp4": _video}
         return path.suffix in kinds and kinds[path.suffix](path)
     except (InputError, OSError, ValueError):

@@ -309,6 +309,11 @@ def table_of_rows(
         box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
     if group is not None:
         rows.reject(group < -1, "groups from 0, or -1 for alone", "correct the group")
+        if set(group.tolist()) in ({0}, {-1}):
+            who = "all are one group" if group[0] == 0 else "nobody is in a group"
+            warnings.warn(
+                f"{rows.file}: group is {group[0]} in all rows: {who}. Leave an unused column out", stacklevel=4
+            )
     table = MotTable(rows, frame, id, box, rest, group)
     rows.require_bounds(frame, length)
     flat, boxed = (table.box[:, 2:] <= 0).any(axis=1), ~table.without_box()

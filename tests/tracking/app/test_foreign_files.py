@@ -1,4 +1,4 @@
-"""No command replaces a file or folder that it did not write, unless the user names that very file."""
+"""No command replaces a file or folder that it did not write, unless the user names that very page or picture."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ COMMANDS = {
     "export parquet": ("export parquet {0}/data --out {1}", "scene-s20000/people.parquet"),
     "export trajnet": ("export trajnet {0}/data --out {1}", "scene-s20000/people.ndjson"),
     "export pedpy": ("export pedpy {0}/data --out {1}", "scene-s20000/people.txt"),
-    "tune": ("tune {2} --suite {0}/scene.toml --check none --trials 1 --out {1}/toy.toml",
-             "toy.json"),
+    "tune": ("tune {2} --suite {0}/scene.toml --check none --trials 1 --out {1}/toy.toml", "toy.json"),
+    "fit sensor": ("fit sensor {0}/data --out {1}/mine.toml", "mine.toml"),
     "view": ("view {0}/two --out {1}", "other.html"),
     "view, the film": ("view {0}/two/walk --video beside --out {1}/walk.html", "walk.view.mp4"),
     "sheet": ("sheet {0}/two --out {1}", "other.png"),
@@ -44,11 +44,11 @@ COMMANDS = {
 }  # fmt: skip
 
 
+# Of some commands a file that resembles theirs; of all others a JSON text.
 LOOKALIKES = {
     "export csv": "kind,start\n",
     "export trajnet": '{"scene": {"id": 0, "p": 1, "s": 780, "e": 810, "fps": 2.5, "tag": [1, []]}}\n',
 }
-"""Of some commands a file that resembles theirs; of all others a JSON text."""
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -63,7 +63,7 @@ def test_a_file_of_others_stays(name: str, data: Path, tmp_path: Path, capsys: p
     assert [p for p in (tmp_path / "out").rglob("*") if p.is_file()] == [mine]
 
 
-@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in ("replay", "tune", "demo")])
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in ("replay", "tune", "fit sensor", "demo")])
 def test_own_files_are_replaced(name: str, data: Path, tmp_path: Path) -> None:
     line = [word.format(data, tmp_path / "out", TOY) for word in COMMANDS[name][0].split()]
     assert run(line) == run(line) == 0

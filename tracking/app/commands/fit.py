@@ -38,7 +38,7 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     simulated = {name: mean_of_finite(np.array([drawn[name] for drawn in per_seed])) for name in measured}
     people = sum(len(m.match) for m in matched)
     names = ", ".join(printable(recording.name) for recording in recordings)
-    write_file(out, dump_sensor(profile, f"A detector's profile, of {people} labelled people in {names}").encode())
+    write_file(out, dump_sensor(profile, f"flockscope fit sensor: {people} labelled people in {names}").encode())
     lines = [f"{people} labelled people, {sum(len(m.box) for m in matched)} detections in {names}", ""]
     width = max(map(len, measured))
     lines += [f"{'':<{width}}  measured  simulated"]
@@ -135,7 +135,7 @@ def fit_relational(options: FitRelationalOptions) -> CommandResult:
         truths = (truth for _, truth in _simulated(options.names, seeds))
         params = relational.fit_relational(truths, RelationalConfig().speed_ends)
     config = RelationalConfig.from_dict(dict(params), out)
-    write_file(out, config.to_toml().encode())
+    write_file(out, f"# flockscope fit relational\n{config.to_toml()}".encode())
     width, body = max(map(len, params)), config.as_dict()
     lines = [
         f"{name:<{width}}  {np.round(np.array(body[name]), 4)}  {RelationalConfig.known(name).unit}" for name in params

@@ -98,12 +98,11 @@ def read_runs(sequence: Sequence, job: ScoringJob) -> list[TrackingRun]:
 
 
 def score_runs(sequence: Sequence, runs: list[TrackingRun], job: ScoringJob) -> ScoredSequence:
-    """Returns the scores of these runs of one sequence, as the job says; warns if hardly any box matches a label."""
+    """Returns the scores of these runs of one sequence, as the job says; warns of tracks read wrongly."""
     for source, run in zip(job.sources, runs, strict=True):
-        if sequence.truth is not None:
-            text = likely_misreading(sequence.truth, run, sequence.image_size)
-            if text:
-                name = source if isinstance(source, str) else source.path
-                warnings.warn(f"{sequence.name}, {name}: {text}", stacklevel=2)
+        text = "" if sequence.truth is None else likely_misreading(sequence.truth, run, sequence.image_size)
+        if text:
+            name = source if isinstance(source, str) else source.path
+            warnings.warn(f"{sequence.name}, {name}: {text}", stacklevel=2)
     compared = compare_one(sequence, runs, job.similarity, job.group_match, job.blocks, job.oracles)
     return ScoredSequence(compared, [input_summary(run.info) for run in runs])

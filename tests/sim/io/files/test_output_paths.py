@@ -83,9 +83,9 @@ FILES = [
     ("x.json", b'{"a": "t", "b": {}, "c": 1}', True), ("x.json", b'{"a": "t", "b": []}', False),
     ("x.json", b'["a", "b"]', None), ("x.json", b'{"a": "t", "b": {}', None),
     ("x.parquet", table_bytes([Column("a", np.arange(3))], {}), True), ("x.parquet", b"PAR1", None),
-    ("x.html", PAGE, True), ("x.html", b"", False),
+    ("x.html", PAGE, True), ("x.html", b"", False), ("x.toml", b"a = 1\n# flockscope x", False),
     ("x.png", own_files.marked_png(png()), True), ("x.png", png(), False), ("x.png", b"", False),
-    ("x.mp4", b"flockscope", False), ("x.mp4", b"", False), ("x.txt", PAGE, False),
+    ("x.mp4", b"flockscope", False), ("x.mp4", b"", False), ("x.txt", PAGE, False), ("x.toml", b"# flockscope x", True),
 ]  # fmt: skip
 
 

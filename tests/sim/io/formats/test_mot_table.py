@@ -36,6 +36,7 @@ def test_units_of_positions(tmp_path, unit, factor):
 
 WARNED = {
     "frame,id,x,y,place,mood\n1,1,0.5,1,hall,\n2,1,0.6,1,hall,3\n": "line 1: columns that are not used: place, mood",
+    "frame,id,x,y,group\n1,1,0.5,1,0\n2,1,0.6,1,0\n": "group is 0 in all rows: all are one group",
     # as PeTrack writes them: id first, frames from 0, positions in cm
     "id frame x_cm y_cm z\n1 0 50 100 170\n1 1 60 100 170\n": "frames are counted from 0; they are read as frames",
 }
@@ -59,7 +60,7 @@ def test_columns_without_a_name_are_not_used(tmp_path, header, row):
 
 
 UNCLEAR = {
-    "1;7;10,5;20,5;30,5;40,5\n": "line 1: got '1;7;10'; expected a number",
+    "1;7;10,5;20,5;30,5;40,5\n": "line 1: got '10,5'; expected a number",
     "<html>\n": "line 1: got columns <html>",
     "frame,id,u,v,w,h\n1,1,2,3,4,5\n": "line 1: got columns frame,id,u,v,w,h; expected frame ",
     "time,id,x,y,w,h\n1,1,2,3,4,5\n": "line 1: got columns time,id,x,y,w,h; expected frame ",
