@@ -269,8 +269,7 @@ class GroupPda:
         From points they are the corners of footprints or usual boxes, in the unit of the points.
         """
         bank, about = self.bank, self._about(None)
-        places = [bank.positions(r) for r in np.flatnonzero(bank.confirmed).tolist()]
-        return [self._outline(p, about) for p in places if len(p)]  # a part may have none of its group's places
+        return [self._outline(bank.positions(r), about) for r in np.flatnonzero(bank.confirmed).tolist()]
 
     def _no_tracks(self, frame: Frame) -> Tracks:
         none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
@@ -280,7 +279,7 @@ class GroupPda:
         if self.scaled is not None and self.scaled.config is self.config:
             return self.scaled
         if self.pixels is not None:
-            self.scaled = scale_parameters(self.config, self.context.fps, 1.0, self.pixels.body_cov)
+            self.scaled = scale_parameters(self.config, self.context.fps, 1.0, pixels=True)
             return self.scaled
         scale = required(self.context.px_per_m) if self.plane == "image" else 1.0
         sine = sine_tilt(self.context.camera) if self.plane == "image" else 1.0
