@@ -117,7 +117,7 @@ def associate(
     mine = chosen & (np.arange(len(bank))[:, None] == shares(log_density, chosen).argmax(0)) if len(bank) else chosen
     its = mine if scaled.config.corrections else chosen
     has_new_point = (its & (claims.last_seen >= t)).any(1)  # more than missed members
-    measured, null = (state == kernels.MEASURED) & has_new_point, state == kernels.NULL
+    measured, null = (state == kernels.MEASURED) & has_new_point, (state == kernels.NULL) & has_new_point
     hidden = (state == kernels.MEASURED) & ~has_new_point
     bank.x[hidden], bank.P[hidden] = x[hidden], P[hidden]
     bank.last_seen[measured | null] = t

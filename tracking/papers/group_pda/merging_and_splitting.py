@@ -53,7 +53,7 @@ class PairMoment(NamedTuple):
 
     t: s. way, velocity (2,): from a's centroid to b's, m on the ground, and b's velocity less a's, as filtered, m/s.
     middle (2,): mean of the centroids, weighted by people, in the unit of the points. gap: distance of their nearest
-    people, m; negative if, from pixels, they overlap.
+    people, m.
     """
 
     t: float
@@ -291,7 +291,7 @@ def _moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float)
     way, v = ((bank.x[b, k : k + 2] - bank.x[a, k : k + 2]) * scaled.metres_per_unit for k in (0, 2))
     w = bank.size[[a, b]] / bank.size[[a, b]].sum()
     gap = _nearest(*(bank.positions(row) * scaled.metres_per_unit for row in (a, b)))
-    return PairMoment(t, way, v, w @ bank.x[[a, b], :2], gap + scaled.body_width)
+    return PairMoment(t, way, v, w @ bank.x[[a, b], :2], gap)
 
 
 def _nearest(here: Array, there: Array) -> float:
@@ -324,7 +324,7 @@ def fall_apart(
     parts.recent_points[largest], parts.unshared[:] = bank.recent_points[row], bank.unshared[row]
     places, members = bank.positions(row), bank.members[row]
     of = group[cKDTree(points).query(places)[1]]
-    for k in np.unique(of).tolist():  # a part without one keeps its own points
+    for k in np.unique(of[of >= 0]).tolist():  # a part without one keeps its own points
         offset = places[of == k] - parts.x[k, :2]
         parts.members[k] = MemberPlaces(offset, members.last_seen[of == k], members.known[of == k])
     if bank.id[row] != NO_ID:

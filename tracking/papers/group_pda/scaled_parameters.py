@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array
-from tracking.detect.person_size import WIDTH
 from tracking.filters import kalman
 from tracking.filters.components import Constraint
 from tracking.papers.group_pda import association_mass_kernels as kernels
@@ -39,7 +38,7 @@ class ScaledParameters:
     measured position. kernel_rules (18,): the array `rules` of the kernels (gates, priors, noises). F, Q (4, 4):
     transition and process noise covariance of x, y, vx, vy, eq. 2.3. from_pixels: True if the points are foreground
     pixels, not people. metres_per_unit (2,): metres on the ground per unit along x and along y (depth in an image).
-    body_width: what a person's points extend over, 0 from points, m. colour_bins: bins of colour histograms (64),
+    colour_bins: bins of colour histograms (64),
     0 if colours are not used.
     """
 
@@ -53,7 +52,6 @@ class ScaledParameters:
     Q: Array
     from_pixels: bool
     metres_per_unit: Array
-    body_width: float
     colour_bins: int
 
 
@@ -82,7 +80,6 @@ def scale_parameters(
         Q=Q * (scale * c.accel_noise) ** 2 / dt,
         from_pixels=pixels,
         metres_per_unit=np.array([1, 1 / sine_tilt]) / scale,
-        body_width=WIDTH if pixels else 0.0,
         colour_bins=COLOUR_BINS if pixels and c.appearance > 0 else 0,
     )
 
