@@ -9,7 +9,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.scene.body import PERSON_HEIGHT
-from sim.scene.camera import camera_rotation, project
+from sim.scene.camera import camera_rotation, misaligned, project
 from sim.types import Camera, Tracks
 from tests import painted
 from tracking.papers.group_pda.from_pixels import ground_view, upright_lines, upright_runs
@@ -53,11 +53,12 @@ def test_without_a_scale_and_without_anybody_it_is_asked_for(scale: float) -> No
         watch(scale, painted.sample(np.random.default_rng(0)))
 
 
-def test_the_view_finds_people_on_the_ground_and_upright_lines() -> None:
+@pytest.mark.parametrize(("roll", "down"), [(0.0, 0.0), (0.1, 15.0)])
+def test_the_view_finds_people_on_the_ground_and_upright_lines(roll: float, down: float) -> None:
     """Distances on the ground are those of the people whose middles are seen; heads and feet lie on one line."""
     image, position = (640, 480), np.array([3.0, -2.0, 7.0])
     rotation = camera_rotation(math.radians(40), 0.3)
-    camera = Camera("pinhole", image, (500.0, 500.0), (320.0, 240.0), position, rotation)
+    camera = misaligned(Camera("pinhole", image, (500.0, 500.0), (320.0, 240.0), position, rotation), roll, down)
     view = ground_view(camera, (480, 640, 3), 38.0)
     ground = position[:2] + np.array([[0.0, 8.0], [1.5, 8.0], [-3.0, 12.0], [2.0, 6.0]])
     heights = (PERSON_HEIGHT / 2, 0.0, PERSON_HEIGHT)
@@ -66,6 +67,9 @@ def test_the_view_finds_people_on_the_ground_and_upright_lines() -> None:
     apart = [np.hypot(*(p[:, None] - p).T) for p in (places, ground)]
     np.testing.assert_allclose(apart[0], apart[1], atol=1e-9)
     np.testing.assert_allclose(view.image(places), middle)
+    above_the_horizon, behind = np.array([[320.0, -2000.0]]), position[None, :2] - 20 * rotation[2, :2]
+    assert np.isfinite(view.places(above_the_horizon)).all()
+    assert view.image(behind)[0, 1] > 480
     step = 1e-6 * np.eye(2)
     slope = np.stack([(view.image(places + d) - view.image(places - d)) / 2e-6 for d in step], 2)
     np.testing.assert_allclose(view.jacobian(places), slope, rtol=1e-6, atol=1e-6)
