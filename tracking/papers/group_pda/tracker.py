@@ -31,8 +31,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - F, Q: constant velocity, white acceleration, per root second. Paper: not stated. Why: any frame rate.
 - search region of the gate, and distances that order shared points: by Σ, P and a point's variance; (c) wider in
   infeasible time. Paper: Σ, as in merges here. Why: few points give a small Σ.
-- extents: with 1/N, shrunk by `spread_weight` to a prior: `person_spread`, from pixels with a person's width; (c)
-  corrected for the gate. Paper: sample covariance. Why: few people; with 1/N eq. 3.1 is exact.
+- extents: with 1/N, shrunk by `spread_weight` to a prior, `person_spread`; (c) corrected for the gate. Paper: sample
+  covariance. Why: few people; with 1/N eq. 3.1 is exact.
 - G_x in G_y: repeated until nothing changes. Paper: applied once. Why: joined regions overlap others.
 - noise, (c): from pixels, components below 0.25 people do not count in G_y. Paper: all count. Why: specks of
   foreground.
@@ -86,8 +86,7 @@ Departures. Those marked (c) are off with `corrections` off.
   overlap. Why: P does not measure likeness; people sway with each step.
 - SR_v, without corrections: of the updated velocity, with the gate's γ. Paper: of the predicted one; its size is not
   stated. Why: Fig. 1 merges after the update.
-- near groups, (c): people at most 1.5 m apart, too; from pixels by centroids and extents. Paper: regions overlap. Why:
-  no merge after a split.
+- near groups, (c): people at most 1.5 m apart, too. Paper: regions overlap. Why: no merge after a split.
 - merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) once the evidence of the
   last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing groups.
 - enter: so is a merge reported if at most one of the groups was there 1 s before. Paper: none. Why: they came together.
