@@ -50,13 +50,10 @@ def add_newborns(
         d2 = np.square(points[group == k][:, None] - place).sum(2).min(0)
         d2[d2 > reach**2] = np.inf
         if np.isfinite(d2.min()):
-            _set_parent(born, k, bank, int(np.flatnonzero(bank.id == of[d2.argmin()])[0]), scaled)
+            row = int(np.flatnonzero(bank.id == of[d2.argmin()])[0])
+            born.parent[k], born.first_seen[k] = bank.group[row], bank.first_seen[row]
+            born.move_with(k, bank, row, scaled)
     bank.add(born)
-
-
-def _set_parent(born: GroupBank, k: int, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
-    born.parent[k], born.first_seen[k] = bank.group[row], bank.first_seen[row]
-    born.move_with(k, bank, row, scaled)
 
 
 def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[WholeGroupEvent]:

@@ -33,8 +33,8 @@ MOST_LEAN = 0.7  # Largest change of the spacing of upright lines from the image
 ROWS = 9  # Rows of the image for which the size of people is computed; between them it is interpolated.
 WIDTH_PER_HEIGHT = 0.3  # Width over height of a person in the image if there is no camera.
 GRID = 0.1  # m: distance of the points of the grid.
-# Least sine of the tilt of a line of sight (of the camera for boxes): along the ground depth cannot be measured.
-LEAST_SINE_TILT = 0.2
+LEAST_FALL = 0.1  # m per m of depth, of a line of sight that falls less: near the horizon depth cannot be measured.
+LEAST_SINE_TILT = 0.2  # Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured.
 LEAST_DEPTH = 1.0  # m: places nearer to the camera are shown as at this depth.
 
 
@@ -61,7 +61,7 @@ class GroundView(NamedTuple):
     def places(self, uv: Array) -> Array:
         """Returns the places (M, 2), m, of image points uv (M, 2), px; near the horizon at a finite distance."""
         eye, sight = rays(self.camera, uv)
-        reach = (eye[:, 2:] - PERSON_HEIGHT / 2) / np.maximum(-sight[:, 2:], LEAST_SINE_TILT)
+        reach = (eye[:, 2:] - PERSON_HEIGHT / 2) / np.maximum(-sight[:, 2:], LEAST_FALL)
         return np.asarray(eye[:, :2] + reach * sight[:, :2])
 
     def image(self, places: Array) -> Array:
@@ -73,7 +73,9 @@ class GroundView(NamedTuple):
 
     def jacobian(self, places: Array) -> Array:
         """Returns the derivatives (M, 2, 2) of `image` at places (M, 2), px per m."""
-        return np.linalg.inv(ground_jacobian(self.camera, self.image(places), PERSON_HEIGHT / 2))
+        return np.asarray(
+            np.linalg.inv(ground_jacobian(self.camera, self.image(places), PERSON_HEIGHT / 2)), np.float64
+        )
 
 
 class ForegroundPoints:

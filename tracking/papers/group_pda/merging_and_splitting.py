@@ -324,7 +324,7 @@ def fall_apart(
     parts.recent_points[largest], parts.unshared[:] = bank.recent_points[row], bank.unshared[row]
     places, members = bank.positions(row), bank.members[row]
     of = group[cKDTree(points).query(places)[1]]
-    for k in np.unique(of[of >= 0]).tolist():  # a part without one keeps its own points
+    for k in range(len(parts)):
         offset = places[of == k] - parts.x[k, :2]
         parts.members[k] = MemberPlaces(offset, members.last_seen[of == k], members.known[of == k])
     if bank.id[row] != NO_ID:

@@ -249,10 +249,9 @@ class GroupPda:
         return points, np.ones(len(points))
 
     def _outline(self, places: Array, about: Array) -> Array:
+        (corners,) = convex_hulls([places])  # they suffice, and are few
         if self.pixels is not None:
-            return self.pixels.outline(places)
-        # The places on their own hull suffice, and are few.
-        (corners,) = convex_hulls([places])
+            return self.pixels.outline(corners)
         return np.asarray((corners[:, None] + about).reshape(-1, 2))
 
     def _about(self, detections: Detections | None) -> Array:

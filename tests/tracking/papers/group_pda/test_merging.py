@@ -49,10 +49,3 @@ def test_parts_of_a_group_keep_the_places_of_its_members() -> None:
     fall_apart(one, 0, points, np.ones(3), scaled, 5.0, GroupIds())
     assert np.sort(np.concatenate([one.positions(k) for k in range(2)]), 0) == pytest.approx(np.sort(places.offset, 0))
     assert sorted(m.last_seen.tolist() for m in one.members) == [[5.0, 3.9], [5.0, 5.0]]
-
-
-def test_a_part_without_a_place_of_its_group_keeps_its_own_points() -> None:
-    scaled, points = scale_parameters(GroupPdaConfig(), FPS, 1.0), np.array([[0.0, 0.0], [4.0, 0.0]])
-    one = bank(size=np.array([2.0]), x=np.zeros((1, 4)))
-    fall_apart(one, 0, points, np.ones(2), scaled, 5.0, GroupIds())
-    assert sorted(one.positions(k).tolist() for k in range(2)) == [[[0.0, 0.0]], [[4.0, 0.0]]]
