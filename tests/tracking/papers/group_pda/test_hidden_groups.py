@@ -34,6 +34,7 @@ def test_who_has_left_does_not_follow_the_other_for_ever(seed: int, offset: floa
     made = track(meeting(0.0, np.inf, seed, offset))
     assert [len(t.id) for t in made[-20:]] == [1] * 20
     assert made[20].id.tolist() == [1, 2]
+    assert [e.kind for t in made for e in t.events] == ["enter", "enter", "leave"]
 
 
 def test_who_is_hidden_for_a_moment_has_his_id_afterwards() -> None:
