@@ -83,7 +83,8 @@ class ForegroundPoints:
 
     A run of foreground along the image of an upright line shows people one behind the other: it reaches from the head
     of the last to the feet of the first. Their middles lie from half a person below its upper end to half a person
-    above its lower end. So its points are those of the run, shrunk about its middle by a person's height.
+    above its lower end. So its points are those of the run, shrunk about its middle by a person's height. Two runs that
+    are no longer than a person together are pieces of one person, and have one middle.
 
     State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
     is nan, learned from lone people in its background sample. step: px between the grid's points. view: from the image
@@ -128,7 +129,8 @@ class ForegroundPoints:
         run = np.repeat(np.arange(len(line)), count)
         share = (np.arange(len(run)) - (np.cumsum(count) - count)[run] + 0.5) / count[run] - 0.5
         left = np.maximum(length - high, 0.0)
-        rows = np.floor(middle[run] + share * length[run]) + 0.5, middle[run] + share * left[run]
+        whole = with_other_pieces(line, top, bottom, high).mean(0)
+        rows = np.floor(middle[run] + share * length[run]) + 0.5, whole[run] + share * left[run]
         pixels, middles = (np.column_stack([self.view.along(self.lines[line[run]], self.view.row, v), v]) for v in rows)
         area = length * self.step * self.view.spacing(middle)
         weights = (area / (np.pi / 4 * wide * high) / count)[run]
@@ -162,6 +164,15 @@ def upright_runs(mask: Bools, column: Ints) -> tuple[Ints, Array, Array]:
     edges = np.diff(np.pad(seen.T.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     (line, top), (_, bottom) = np.nonzero(edges > 0), np.nonzero(edges < 0)
     return line, top.astype(float), bottom.astype(float)
+
+
+def with_other_pieces(line: Ints, top: Array, bottom: Array, high: Array) -> Array:
+    """Returns upper and lower ends (2, R) of the R runs of `upright_runs`, px; of two next to each other that are no
+    longer than a person in all, high (R,), those of both: they are pieces of one person."""
+    pieces = (line[1:] == line[:-1]) & (bottom[1:] - top[:-1] <= high[1:])
+    ends = np.stack([top, bottom])
+    ends[0, 1:][pieces], ends[1, :-1][pieces] = top[:-1][pieces], bottom[1:][pieces]
+    return ends
 
 
 def sine_tilt(camera: Camera | None) -> float:

@@ -12,7 +12,7 @@ from sim.scene.body import PERSON_HEIGHT
 from sim.scene.camera import camera_rotation, misaligned, project
 from sim.types import Camera, Tracks
 from tests import painted
-from tracking.papers.group_pda.from_pixels import ground_view, upright_lines, upright_runs
+from tracking.papers.group_pda.from_pixels import ground_view, upright_lines, upright_runs, with_other_pieces
 from tracking.papers.group_pda.tracker import GroupPda
 
 
@@ -79,4 +79,7 @@ def test_the_view_finds_people_on_the_ground_and_upright_lines(roll: float, down
     mask = np.zeros((480, 640), bool)
     for top, bottom in ((100, 150), (200, 230)):
         mask[np.arange(top, bottom), columns[top:bottom, line]] = True
-    np.testing.assert_array_equal(upright_runs(mask, columns), [[line] * 2, [100, 200], [150, 230]])
+    runs = upright_runs(mask, columns)
+    np.testing.assert_array_equal(runs, [[line] * 2, [100, 200], [150, 230]])
+    for high, ends in ((130.0, [[100, 100], [230, 230]]), (129.0, [[100, 200], [150, 230]])):
+        np.testing.assert_array_equal(with_other_pieces(*runs, np.full(2, high)), ends)
