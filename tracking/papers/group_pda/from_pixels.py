@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT, person_boxes
-from sim.scene.camera import ground_jacobian, project, rays
+from sim.scene.camera import ground_jacobian, project, rays, to_ground
 from sim.types import Array, Bools, Camera, Context, Image, Ints
 from tracking.detect.foreground import Foreground, convex_areas
 from tracking.detect.person_size import DEPTH, SHOULDERS, PersonSize
@@ -103,11 +103,8 @@ class ForegroundPoints:
             self.foreground.learn_person_size(PersonSize(context), context.background)
         self.scale = required(self.foreground.px_per_m)
         self.step = max(1, round(GRID * self.scale))
-        camera = context.camera
-        if camera is not None and camera.kind == "pinhole" and camera.position[2] <= PERSON_HEIGHT / 2:
-            camera = None  # it sees people's middles from below
-        self.view = ground_view(camera, self.foreground.shape, self.scale)
-        self.rows, self.person = _people(camera, self.view, self.scale)
+        self.view = ground_view(context.camera, self.foreground.shape, self.scale)
+        self.rows, self.person = _people(context.camera, self.view, self.scale)
         self.lines, self.columns = upright_lines(self.view, self.foreground.shape, self.step)
 
     def follow(self, config: GroupPdaConfig) -> None:
@@ -182,10 +179,11 @@ def sine_tilt(camera: Camera | None) -> float:
 
 
 def ground_view(camera: Camera | None, shape: tuple[int, ...], scale: float) -> GroundView:
-    """Returns the view for an image of H x W px. Without a pinhole camera its scale, px per m, is the same everywhere;
-    such a camera must be above people's middles."""
+    """Returns the view for an image of H x W px. Its scale, px per m, is the same everywhere without a pinhole camera,
+    and if the image's middle is near the horizon or the camera below people's middles."""
     high, wide = shape[:2]
-    if camera is None or camera.kind == "top":
+    fall = 0.0 if camera is None else -float(rays(camera, np.array([[wide, high]]) / 2)[1][0, 2])
+    if camera is None or camera.kind == "top" or fall < LEAST_SINE_TILT or camera.position[2] <= PERSON_HEIGHT / 2:
         above, down = np.array([0.0, 0.0, PERSON_HEIGHT + LEAST_DEPTH]), np.diag([1.0, -1.0, -1.0])
         flat = Camera("top", (wide, high), (1.0, 1.0), (wide / 2, high / 2), above, down, px_per_m=scale)
         return GroundView(flat, high / 2, wide / 2, 0.0)
@@ -200,12 +198,12 @@ def _people(camera: Camera | None, view: GroundView, scale: float) -> tuple[Arra
     usual = np.tile(scale * PERSON_HEIGHT * np.array([WIDTH_PER_HEIGHT, 1.0]), (ROWS, 1))
     if camera is None:
         return rows, usual
-    ground = np.repeat(view.places(np.column_stack([np.full(ROWS, camera.centre_px[0]), rows])), 4, 0)
+    ground = to_ground(camera, np.column_stack([np.full(ROWS, camera.centre_px[0]), rows]), PERSON_HEIGHT / 2)
     turns = np.tile(np.radians([0.0, 45.0, 90.0, 135.0]), ROWS)
+    place = np.insert(np.repeat(ground, 4, 0), 2, 0.0, axis=1)
     tall, wide, deep = (np.full(len(turns), size) for size in (PERSON_HEIGHT, SHOULDERS, DEPTH))
-    boxes = person_boxes(camera, np.insert(ground, 2, 0.0, axis=1), turns, tall, wide, deep)
-    size = boxes[:, 2:].reshape(ROWS, 4, 2).mean(1)
-    whole = np.isfinite(size).all(1)  # in front of the camera
+    size = person_boxes(camera, place, turns, tall, wide, deep)[:, 2:].reshape(ROWS, 4, 2).mean(1)
+    whole = np.isfinite(size).all(1)  # on the ground, in front of the camera
     return (rows[whole], size[whole]) if whole.any() else (rows, usual)
 
 
