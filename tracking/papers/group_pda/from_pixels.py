@@ -33,7 +33,7 @@ MOST_LEAN = 0.7  # Largest change of the spacing of upright lines from the image
 ROWS = 9  # Rows of the image for which the size of people is computed; between them it is interpolated.
 WIDTH_PER_HEIGHT = 0.3  # Width over height of a person in the image if there is no camera.
 GRID = 0.1  # m: distance of the points of the grid.
-LEAST_FALL = 0.1  # m per m of depth, of a line of sight that falls less: near the horizon depth cannot be measured.
+LEAST_FALL = 0.1  # m per m of depth: a line of sight that falls less is taken to fall so much.
 LEAST_SINE_TILT = 0.2  # Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured.
 LEAST_DEPTH = 1.0  # m: places nearer to the camera are shown as at this depth.
 
