@@ -80,8 +80,9 @@ Departures. Those marked (c) are off with `corrections` off.
   Why: others' people stay out.
 - ids: the part that was largest when the group fell apart keeps the id, after its loss the largest left; of merged
   groups the largest, then the oldest. Paper: none. Why: tracks need ids.
-- walking out: a new group within reach (2 m/s) of a member is a part of its group and as old, (c) with its velocity;
-  without corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
+- walking out: a new group within reach of a member (2 m/s; from pixels at least R_0's) is a part of its group and as
+  old, (c) with its velocity; without corrections it splits off once confirmed. Paper: a new group. Why: splits without
+  shared points.
 - like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`. Paper: SR_v
   overlap. Why: P does not measure likeness; people sway with each step.
 - SR_v, without corrections: of the updated velocity, with the gate's γ. Paper: of the predicted one; its size is not

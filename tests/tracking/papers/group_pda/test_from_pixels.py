@@ -12,7 +12,11 @@ from sim.scene.body import PERSON_HEIGHT
 from sim.scene.camera import camera_rotation, misaligned, project
 from sim.types import Camera, Tracks
 from tests import painted
+from tests.tracking.papers.group_pda.test_association_kernels import bank
+from tracking.papers.group_pda.births_and_losses import add_newborns, expected_members
+from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.from_pixels import ground_view, upright_lines, upright_runs, with_other_pieces
+from tracking.papers.group_pda.scaled_parameters import scale_parameters
 from tracking.papers.group_pda.tracker import GroupPda
 
 
@@ -83,3 +87,10 @@ def test_the_view_finds_people_on_the_ground_and_upright_lines(roll: float, down
     np.testing.assert_array_equal(runs, [[line] * 2, [100, 200], [150, 230]])
     for high, ends in ((130.0, [[100, 100], [230, 230]]), (129.0, [[100, 200], [150, 230]])):
         np.testing.assert_array_equal(with_other_pieces(*runs, np.full(2, high)), ends)
+
+
+def test_a_new_group_that_is_linked_with_a_member_is_a_part_of_its_group() -> None:
+    scaled = scale_parameters(GroupPdaConfig(), 10.0, 1.0, pixels=True)
+    one, apart = bank(size=np.ones(1)), np.array([[0.9 * scaled.constraint.link, 0.0]])
+    add_newborns(one, apart, np.ones(1), expected_members(one, scaled, 0.0), scaled, 0.0)
+    assert one.parent[1] == one.id[0]
