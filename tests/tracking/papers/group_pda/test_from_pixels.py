@@ -90,7 +90,7 @@ def test_the_view_finds_people_on_the_ground_and_upright_lines(roll: float, down
 
 
 def test_a_new_group_that_is_linked_with_a_member_is_a_part_of_its_group() -> None:
-    scaled = scale_parameters(GroupPdaConfig(), 10.0, 1.0, pixels=True)
+    scaled = scale_parameters(GroupPdaConfig(appearance=0.0), 10.0, 1.0, pixels=True)
     one, apart = bank(size=np.ones(1)), np.array([[0.9 * scaled.constraint.link, 0.0]])
     add_newborns(one, apart, np.ones(1), expected_members(one, scaled, 0.0), scaled, 0.0)
     assert one.parent[1] == one.id[0]
