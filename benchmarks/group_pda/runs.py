@@ -20,15 +20,19 @@ from benchmarks.support.replaced_code import Replacement, replaced_code
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import Entry
 from sim.sequence import simulate
-from sim.types import Array, DetectionMode, Image, Tracks, Truth
+from sim.types import Array, Bools, DetectionMode, Image, Tracks, Truth
 from sim.types import Sequence as Recording
 from sim.workers.pool import process_pool
 from tracking.detect import background
 from tracking.detect.background_training import Trained, train
+from tracking.grouping.whole_groups import GroupIds
 from tracking.papers.group_pda import merging_and_splitting
 from tracking.papers.group_pda import tracker as group_pda
+from tracking.papers.group_pda.association import PointClaims, associate
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.group_bank import GroupBank
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
+from tracking.papers.group_pda.merging_and_splitting import fall_apart
+from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 from tracking.running.run import TrackingRun, track
 from tracking.scoring import evaluate
 from tracking.scoring.people_comparison import in_one_plane
@@ -147,9 +151,28 @@ def evenly(bank: GroupBank, points: Array, *others: object) -> Array:
     return np.ones((len(bank), len(points)))
 
 
+def without_hiding(
+    bank: GroupBank, claims: PointClaims, region: Array, ratio: Array, scaled: ScaledParameters, t: float
+) -> Bools:
+    """Replaces `associate`: groups whose points are all more probably others' are measured by them."""
+    shared = replace(scaled, config=replace(scaled.config, corrections=False))  # the kernels' rules stay
+    return associate(bank, claims, region, ratio, shared, t)
+
+
+def forgetful(
+    bank: GroupBank, row: int, points: Array, weights: Array, scaled: ScaledParameters, t: float, ids: GroupIds
+) -> None:
+    """Replaces `fall_apart`: parts have the members that were measured in this frame alone."""
+    seen = bank.members[row].last_seen >= t
+    bank.members[row] = MemberPlaces(*(value[seen] for value in bank.members[row]))
+    fall_apart(bank, row, points, weights, scaled, t, ids)
+
+
 REPLACED: Mapping[str, Replacement] = {
     "evidence over time: an unbroken time in its place": (merging_and_splitting, "likeness", unbroken),
     "members' places in shared points": (group_pda, "place_density", evenly),
+    "hidden groups": (group_pda, "associate", without_hiding),
+    "hidden members in parts": (group_pda, "fall_apart", forgetful),
 }
 
 

@@ -24,7 +24,8 @@ from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.stats import mean_interval, paired
 
 SCENES = ("merge", "split", "cross", "queue", "side-by-side")
-ABLATED = ("merge", "split", "cross", "cross-same-speed", "pass-by", "queue", "party")
+DENSE = ("cross-dense", "pass-by-dense")  # Of the suite `standard`.
+ABLATED = ("merge", "split", "cross", "cross-same-speed", "pass-by", "queue", "party", *DENSE)
 HEADLINE = ("merge_TP", "merge_FN", "split_TP", "split_FN")
 Column = Callable[[Sequence[Row]], str]
 WITHOUT: Mapping[str, Mapping[str, object]] = {
@@ -95,7 +96,9 @@ def decisions(given: argparse.Namespace) -> Any:
         *(Variant(name, given.tracker, params) for name, params in WITHOUT.items()),
         *(Variant(name, given.tracker, replaced=name) for name in REPLACED),
     )
-    found = gathered([entry for name in names for entry in resolve(name, given.set)], given, variants)
+    dense = [entry for entry in resolve("standard", given.set) if entry.name in DENSE and entry.name in names]
+    entries = [entry for name in names if name not in DENSE for entry in resolve(name, given.set)]
+    found = gathered(entries + dense, given, variants)
     pooled = {v.name: [row for rows in found.values() for row in rows[v.name]] for v in variants}
     for scene, rows in {"all": pooled, **(found if given.each else {})}.items():
         default = values(rows["default"], DECIDED)

@@ -12,8 +12,7 @@ split a group.
 A group remembers the places of its points (`MemberPlaces`), not whose points they are. From points, a place without any
 point near it in this frame is a missed member. It is added as a point that only its group may have, for `carry_time`
 after its last measurement. Then, until `coast_time`, its place stays the group's but is no point: whoever is hidden for
-longer still belongs to the group, but would displace it. From pixels nobody is added; only the group's convex hull is
-kept, which is reported while the group coasts.
+longer still belongs to the group, but would displace it. From pixels nobody is added.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.geometry.hull_kernels import convex_hulls
 from sim.scene.camera import to_ground
 from sim.types import Array, Bools, Camera, Ints
 from tracking.papers.group_pda import association_kernels as kernels
@@ -117,7 +115,7 @@ def associate(
     mine = chosen & (np.arange(len(bank))[:, None] == shares(log_density, chosen).argmax(0)) if len(bank) else chosen
     its = mine if scaled.config.corrections else chosen
     has_new_point = (its & (claims.last_seen >= t)).any(1)  # more than missed members
-    measured, null = (state == kernels.MEASURED) & has_new_point, state == kernels.NULL
+    measured, null = (state == kernels.MEASURED) & has_new_point, (state == kernels.NULL) & has_new_point
     hidden = (state == kernels.MEASURED) & ~has_new_point
     bank.x[hidden], bank.P[hidden] = x[hidden], P[hidden]
     bank.last_seen[measured | null] = t
@@ -219,20 +217,16 @@ def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: Sca
         if not (exclusive[row] & (claims.claimants > 1)).any():
             bank.unshared[row] = t, *bank.x[row, 2:]
         offset = mine - bank.x[row, :2]
-        if not scaled.from_pixels:
-            known = any_within(offset, bank.members[row].offset, scaled.scale * scaled.config.carry_reach)
-            parts = zip((offset, last_seen, known), _hidden_members(bank, row, claims.points, scaled, t), strict=True)
-            bank.members[row] = MemberPlaces(*map(np.concatenate, parts))
-            continue
-        (offset,) = convex_hulls([offset])
-        bank.members[row] = MemberPlaces(offset, np.full(len(offset), t), np.ones(len(offset), bool))
+        known = any_within(offset, bank.members[row].offset, scaled.scale * scaled.config.carry_reach)
+        parts = zip((offset, last_seen, known), _hidden_members(bank, row, claims.points, scaled, t), strict=True)
+        bank.members[row] = MemberPlaces(*map(np.concatenate, parts))
 
 
 def _hidden_members(bank: GroupBank, row: int, points: Array, scaled: ScaledParameters, t: float) -> MemberPlaces:
     c, past = scaled.config, bank.members[row]
     age = t - past.last_seen
     hidden = past.known & (age > c.carry_time + 1e-9) & (age <= c.coast_time + 1e-9) & (c.carry_time > 0)
-    hidden &= ~any_within(bank.positions(row), points, scaled.scale * c.carry_reach)
+    hidden &= ~any_within(bank.positions(row), points, scaled.scale * c.carry_reach) & (not scaled.from_pixels)
     return MemberPlaces(past.offset[hidden], past.last_seen[hidden], past.known[hidden])
 
 

@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.scene.body import PERSON_HEIGHT
+from sim.scene.body import PERSON_HEIGHT, person_boxes
+from sim.scene.camera import ground_jacobian, project, rays, to_ground
 from sim.types import Array, Bools, Camera, Context, Image, Ints
 from tracking.detect.foreground import Foreground, convex_areas
 from tracking.detect.person_size import DEPTH, SHOULDERS, PersonSize
@@ -28,56 +29,53 @@ from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.scaled_parameters import COLOUR_BINS, ScaledParameters
 from tracking.running.image_scale import required
 
-# Largest change of the scale, and of the spacing of upright lines, from the image's middle to its edge, as a share.
-MOST_GROWTH = 0.7
+MOST_LEAN = 0.7  # Largest change of the spacing of upright lines from the image's middle to its edge, as a share.
 ROWS = 9  # Rows of the image for which the size of people is computed; between them it is interpolated.
 WIDTH_PER_HEIGHT = 0.3  # Width over height of a person in the image if there is no camera.
 GRID = 0.1  # m: distance of the points of the grid.
+LEAST_FALL = 0.1  # m per m of depth: a line of sight that falls less is taken to fall so much.
 LEAST_SINE_TILT = 0.2  # Lower bound of `sine_tilt`: in a view along the ground depth cannot be measured.
+LEAST_DEPTH = 1.0  # m: places nearer to the camera are shown as at this depth.
 
 
 class GroundView(NamedTuple):
-    """The image of people's middles: a map between image points, px, and places on the ground, m, seen from the camera.
+    """A map between image points, px, and the places on the ground, m, of the people whose middles are seen there.
 
-    middle (2,): of the image, px, the origin of the places; y points to the camera. scale: px per m across there.
-    growth: share of it by which the scale grows per px downwards. sine: of the tilt of the line of sight there, by
-    which depth is shortened. lean: share by which upright lines come nearer to each other per px downwards.
+    camera: without lens distortion; without one, one that looks straight down. row: the image's middle row. foot: u,
+    px, where upright lines meet. lean: share by which they come nearer to each other per px downwards.
     """
 
-    middle: Array
-    scale: float
-    growth: float
-    sine: float
+    camera: Camera
+    row: float
+    foot: float
     lean: float
 
     def spacing(self, row: Any) -> Array:
         """Returns the distance (M,) of upright lines in rows v (M,), px, over that in the middle row."""
-        return np.asarray(1 - self.lean * (row - self.middle[1]))
+        return np.asarray(1 - self.lean * (row - self.row))
 
     def along(self, u: Array, row: Any, other: Any) -> Array:
         """Returns u (M,), px, in `other` rows, of the upright lines through image points u, `row`, px."""
-        return np.asarray(self.middle[0] + (u - self.middle[0]) * self.spacing(other) / self.spacing(row))
+        return np.asarray(self.foot + (u - self.foot) * self.spacing(other) / self.spacing(row))
 
     def places(self, uv: Array) -> Array:
-        """Returns the places (M, 2), m, of image points uv (M, 2), px."""
-        growth = np.maximum(1 + self.growth * (uv[:, 1:] - self.middle[1]), 1 - MOST_GROWTH)
-        return np.asarray((uv - self.middle) / (self.scale * growth * np.array([1, self.sine])))
+        """Returns the places (M, 2), m, of image points uv (M, 2), px; near the horizon at a finite distance."""
+        eye, sight = rays(self.camera, uv)
+        reach = (eye[:, 2:] - PERSON_HEIGHT / 2) / np.maximum(-sight[:, 2:], LEAST_FALL)
+        return np.asarray(eye[:, :2] + reach * sight[:, :2])
 
     def image(self, places: Array) -> Array:
         """Returns the image points (M, 2), px, of places (M, 2), m."""
-        return np.asarray(self.middle + self._growth(places) * places * self.scale * np.array([1, self.sine]))
+        ahead, middles = self.camera.rotation[2], np.insert(places, 2, PERSON_HEIGHT / 2, axis=1)
+        short = np.maximum(LEAST_DEPTH - (middles - self.camera.position) @ ahead, 0.0)
+        middles[:, :2] += short[:, None] * ahead[:2] / max(float(ahead[:2] @ ahead[:2]), 1e-9)
+        return project(self.camera, middles)[0]
 
     def jacobian(self, places: Array) -> Array:
         """Returns the derivatives (M, 2, 2) of `image` at places (M, 2), px per m."""
-        growth, depth = self._growth(places)[:, 0], self.scale * self.sine
-        found = (self.scale * growth)[:, None, None] * np.eye(2)
-        found[:, 0, 1] = places[:, 0] * self.scale * self.growth * depth * growth**2
-        found[:, 1, 1] = depth * growth**2
-        return found
-
-    def _growth(self, places: Array) -> Array:
-        """Returns the scale (M, 1) at places over that in the middle; beyond the horizon a large one."""
-        return np.asarray(1 / np.maximum(1 - self.growth * self.scale * self.sine * places[:, 1:], 0.1))
+        return np.asarray(
+            np.linalg.inv(ground_jacobian(self.camera, self.image(places), PERSON_HEIGHT / 2)), np.float64
+        )
 
 
 class ForegroundPoints:
@@ -85,7 +83,8 @@ class ForegroundPoints:
 
     A run of foreground along the image of an upright line shows people one behind the other: it reaches from the head
     of the last to the feet of the first. Their middles lie from half a person below its upper end to half a person
-    above its lower end. So its points are those of the run, shrunk about its middle by a person's height.
+    above its lower end. So its points are those of the run, shrunk about its middle by a person's height. Two runs that
+    are no longer than a person together are pieces of one person, and have one middle.
 
     State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
     is nan, learned from lone people in its background sample. step: px between the grid's points. view: from the image
@@ -113,12 +112,6 @@ class ForegroundPoints:
         self.config = config
         self.foreground.follow(config)
 
-    @property
-    def body_cov(self) -> Array:
-        """Covariance (2, 2), m^2, of one person's points, as of a filled ellipse, its semi-axes squared over 4."""
-        wide = float(np.interp(self.view.middle[1], self.rows, self.person[:, 0])) / self.view.scale
-        return np.asarray(np.eye(2) * (wide / 4) ** 2, np.float64)
-
     def points(self, image: Image, outlines: list[Array]) -> tuple[Array, Array, Array] | None:
         """Returns pixels (M, 2) u, v in px, where on the ground (M, 2) their people are, m, and the people (M,) that
         each stands for: the area about it over that of a person's ellipse. None if too much is foreground."""
@@ -133,10 +126,9 @@ class ForegroundPoints:
         run = np.repeat(np.arange(len(line)), count)
         share = (np.arange(len(run)) - (np.cumsum(count) - count)[run] + 0.5) / count[run] - 0.5
         left = np.maximum(length - high, 0.0)
-        rows = np.floor(middle[run] + share * length[run]) + 0.5, middle[run] + share * left[run]
-        pixels, middles = (
-            np.column_stack([self.view.along(self.lines[line[run]], self.view.middle[1], v), v]) for v in rows
-        )
+        whole = with_other_pieces(line, top, bottom, high).mean(0)
+        rows = np.floor(middle[run] + share * length[run]) + 0.5, whole[run] + share * left[run]
+        pixels, middles = (np.column_stack([self.view.along(self.lines[line[run]], self.view.row, v), v]) for v in rows)
         area = length * self.step * self.view.spacing(middle)
         weights = (area / (np.pi / 4 * wide * high) / count)[run]
         return pixels, self.view.places(middles), weights
@@ -155,9 +147,9 @@ class ForegroundPoints:
 def upright_lines(view: GroundView, shape: tuple[int, ...], step: int) -> tuple[Array, Ints]:
     """Returns u (C,), px, of upright lines in the middle row of an image of H x W px, `step` px apart there, and the
     column (H, C) of each line's pixel in each row, -1 outside the image."""
-    left, right = view.along(np.array([0.0, shape[1]]), float(shape[0]), view.middle[1])
-    lines, row = np.arange(left, right, step) + step / 2, np.arange(shape[0])[:, None] + 0.5
-    column = np.floor(view.middle[0] + (lines - view.middle[0]) * view.spacing(row)).astype(np.int64)
+    ends = [view.along(np.array([0.0, shape[1]]), row, view.row) for row in (0.0, float(shape[0]))]
+    lines, row = np.arange(np.min(ends), np.max(ends), step) + step / 2, np.arange(shape[0])[:, None] + 0.5
+    column = np.floor(view.along(lines, view.row, row)).astype(np.int64)
     return lines, np.where((column >= 0) & (column < shape[1]), column, -1)
 
 
@@ -171,6 +163,15 @@ def upright_runs(mask: Bools, column: Ints) -> tuple[Ints, Array, Array]:
     return line, top.astype(float), bottom.astype(float)
 
 
+def with_other_pieces(line: Ints, top: Array, bottom: Array, high: Array) -> Array:
+    """Returns upper and lower ends (2, R) of the R runs of `upright_runs`, px; of two next to each other that are no
+    longer than a person in all, high (R,), those of both: they are pieces of one person."""
+    pieces = (line[1:] == line[:-1]) & (bottom[1:] - top[:-1] <= high[1:])
+    ends = np.stack([top, bottom])
+    ends[0, 1:][pieces], ends[1, :-1][pieces] = top[:-1][pieces], bottom[1:][pieces]
+    return ends
+
+
 def sine_tilt(camera: Camera | None) -> float:
     """Returns the sine of the camera's downward tilt, the factor by which depth on the ground is shortened in the
     image."""
@@ -178,36 +179,32 @@ def sine_tilt(camera: Camera | None) -> float:
 
 
 def ground_view(camera: Camera | None, shape: tuple[int, ...], scale: float) -> GroundView:
-    """Returns the view for an image of H x W px; its scale, px per m, is the same everywhere without a pinhole camera,
-    and if the image's middle is near the horizon."""
-    middle = np.array(shape[1::-1]) / 2
-    if camera is None or camera.kind == "top":
-        return GroundView(middle, scale, 0.0, 1.0, 0.0)
-    high, (down, steep) = camera.position[2] - PERSON_HEIGHT / 2, -camera.rotation[1:, 2]
-    sine = float(steep + down * (middle[1] - camera.centre_px[1]) / camera.focal_px[1])
-    if sine < LEAST_SINE_TILT or high <= 0:
-        return GroundView(middle, scale, 0.0, LEAST_SINE_TILT, 0.0)
-    ratios = np.array([down / sine, steep / max(down, 1e-9)]) / camera.focal_px[1]
-    growth, lean = np.clip(ratios, 0, MOST_GROWTH / middle[1]).tolist()
-    return GroundView(middle, float(camera.focal_px[0] * sine / high), growth, sine, lean)
+    """Returns the view for an image of H x W px. Its scale, px per m, is the same everywhere without a pinhole camera,
+    and if the image's middle is near the horizon or the camera below people's middles."""
+    high, wide = shape[:2]
+    fall = 0.0 if camera is None else -float(rays(camera, np.array([[wide, high]]) / 2)[1][0, 2])
+    if camera is None or camera.kind == "top" or fall < LEAST_SINE_TILT or camera.position[2] <= PERSON_HEIGHT / 2:
+        above, down = np.array([0.0, 0.0, PERSON_HEIGHT + LEAST_DEPTH]), np.diag([1.0, -1.0, -1.0])
+        flat = Camera("top", (wide, high), (1.0, 1.0), (wide / 2, high / 2), above, down, px_per_m=scale)
+        return GroundView(flat, high / 2, wide / 2, 0.0)
+    (u, v), (fx, fy), (side, down, steep) = camera.centre_px, camera.focal_px, -camera.rotation[:, 2]
+    steep = max(steep, 1e-3)
+    lean = np.clip(steep / (fy * down + (v - high / 2) * steep), 0, 2 * MOST_LEAN / high)
+    return GroundView(camera.replace(radial=0.0), high / 2, float(u + fx * side / steep), float(lean))
 
 
 def _people(camera: Camera | None, view: GroundView, scale: float) -> tuple[Array, Array]:
-    from sim.scene.body import person_boxes
-    from sim.scene.camera import to_ground
-
-    rows = np.linspace(0, 2 * view.middle[1], ROWS)
+    rows = np.linspace(0, 2 * view.row, ROWS)
     usual = np.tile(scale * PERSON_HEIGHT * np.array([WIDTH_PER_HEIGHT, 1.0]), (ROWS, 1))
     if camera is None:
         return rows, usual
-    ground = to_ground(camera, np.column_stack([np.full(ROWS, view.middle[0]), rows]), PERSON_HEIGHT / 2)
-    seen = np.isfinite(ground).all(1)
-    turns = np.tile(np.radians([0.0, 45.0, 90.0, 135.0]), int(seen.sum()))
-    place = np.column_stack([np.repeat(ground[seen], 4, 0), np.zeros(len(turns))])
+    ground = to_ground(camera, np.column_stack([np.full(ROWS, camera.centre_px[0]), rows]), PERSON_HEIGHT / 2)
+    turns = np.tile(np.radians([0.0, 45.0, 90.0, 135.0]), ROWS)
+    place = np.insert(np.repeat(ground, 4, 0), 2, 0.0, axis=1)
     tall, wide, deep = (np.full(len(turns), size) for size in (PERSON_HEIGHT, SHOULDERS, DEPTH))
-    size = person_boxes(camera, place, turns, tall, wide, deep)[:, 2:].reshape(-1, 4, 2).mean(1)
-    whole = np.isfinite(size).all(1)
-    return (rows[seen][whole], size[whole]) if whole.any() else (rows, usual)
+    size = person_boxes(camera, place, turns, tall, wide, deep)[:, 2:].reshape(ROWS, 4, 2).mean(1)
+    whole = np.isfinite(size).all(1)  # on the ground, in front of the camera
+    return (rows[whole], size[whole]) if whole.any() else (rows, usual)
 
 
 LEVELS = 4  # Levels of each of the three channels: LEVELS cubed is COLOUR_BINS.

@@ -20,7 +20,7 @@ LISTS = ("members", "recent_points")  # Fields of GroupBank that are lists, not 
 
 
 class MemberPlaces(NamedTuple):
-    """Where a group's K members were measured last: their points, or, from pixels, the convex hull of the points.
+    """Where a group's K members, or their pixels, were measured last.
 
     offset (K, 2): from the group's centroid, in the unit of the points; last_seen (K,): time, s; known (K,) bool: True
     if a member was measured near that place before, so that it may stand in when it is missed (see `remember` in

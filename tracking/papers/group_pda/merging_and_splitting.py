@@ -38,7 +38,6 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition, regions_overlap
 from tracking.grouping.link_rule import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
-from tracking.papers.group_pda.association_mass_kernels import GATE_FACTOR
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
@@ -54,7 +53,7 @@ class PairMoment(NamedTuple):
 
     t: s. way, velocity (2,): from a's centroid to b's, m on the ground, and b's velocity less a's, as filtered, m/s.
     middle (2,): mean of the centroids, weighted by people, in the unit of the points. gap: distance of their nearest
-    people, m; negative if, from pixels, they overlap.
+    people, m.
     """
 
     t: float
@@ -102,7 +101,7 @@ def chords(t: Array, d: Array, half: float) -> Array:
 
 
 def split_onset(
-    recent: list[tuple[float, Array]], parts: list[Array], metres_per_unit: Array, body_cov: Array, known: float
+    recent: list[tuple[float, Array]], parts: list[Array], metres_per_unit: Array, known: float
 ) -> tuple[float, Array]:
     """Returns when, in s, a group began to divide into two parts, and its centroid (2,) at that time, in the points'
     unit."""
@@ -113,7 +112,7 @@ def split_onset(
     middle = np.array([p.mean(0) for p in parts]) * metres_per_unit
     way = middle[1] - middle[0]
     way = metres_per_unit * way / max(float(np.hypot(*way)), 1e-9)
-    spread = [max(float(way @ (np.cov(p.T, bias=True) - body_cov) @ way), 0.0) if len(p) > 1 else 0.0 for p in parts]
+    spread = [max(float(way @ np.cov(p.T, bias=True) @ way), 0.0) if len(p) > 1 else 0.0 for p in parts]
     reach = REACH * float(np.sqrt(spread).sum())
     times, apart = [], []
     for t, y in reversed(before):
@@ -222,7 +221,7 @@ def _split_into(bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledPa
     parts = sorted(parts, key=lambda rows: (group not in bank.id[rows], -bank.size[rows].sum()))
     recent = pooled_points([bank.recent_points[r] for rows in parts for r in rows.tolist()])
     two = [np.concatenate([_latest_points(bank, r) for r in rows.tolist()]) for rows in parts[:2]]
-    onset, place = split_onset(recent, two, scaled.metres_per_unit, scaled.body_cov, t)
+    onset, place = split_onset(recent, two, scaled.metres_per_unit, t)
     heads = [rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]] for rows in parts]
     for rows, head in zip(parts, heads, strict=True):
         bank.parent[rows], bank.parent[head] = bank.id[head], NO_ID
@@ -291,27 +290,14 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
 def _moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float) -> PairMoment:
     way, v = ((bank.x[b, k : k + 2] - bank.x[a, k : k + 2]) * scaled.metres_per_unit for k in (0, 2))
     w = bank.size[[a, b]] / bank.size[[a, b]].sum()
-    return PairMoment(t, way, v, w @ bank.x[[a, b], :2], _gap(bank, a, b, way, scaled))
-
-
-def _gap(bank: GroupBank, a: int, b: int, d: Array, scaled: ScaledParameters) -> float:
-    if not scaled.from_pixels:
-        return _nearest(bank.positions(a) * scaled.metres_per_unit, bank.positions(b) * scaled.metres_per_unit)
-    return float(np.hypot(*d)) - REACH * sum(_people_sd(bank, k, d, scaled) for k in (a, b))
+    gap = _nearest(*(bank.positions(row) * scaled.metres_per_unit for row in (a, b)))
+    return PairMoment(t, way, v, w @ bank.x[[a, b], :2], gap)
 
 
 def _nearest(here: Array, there: Array) -> float:
     tree = cKDTree(there, balanced_tree=False, compact_nodes=False)
     most = tree.query(here[::100])[0].min()
     return float(tree.query(here, distance_upper_bound=1.001 * most + 1e-9)[0].min())
-
-
-def _people_sd(bank: GroupBank, row: int, way: Array, scaled: ScaledParameters) -> float:
-    n, n0 = bank.size[row], scaled.constraint.strength
-    factor = scaled.kernel_rules[GATE_FACTOR]
-    people = ((n + n0) * factor * bank.extent[row] - n0 * scaled.constraint.prior) / n - scaled.body_cov
-    along = scaled.metres_per_unit * way / max(float(np.hypot(*way)), 1e-9)
-    return float(np.sqrt(max(along @ people @ along, 0.0)))
 
 
 def _connected(pairs: list[Pair], alone: Iterable[int] = ()) -> list[list[int]]:

@@ -38,7 +38,7 @@ class ScaledParameters:
     measured position. kernel_rules (18,): the array `rules` of the kernels (gates, priors, noises). F, Q (4, 4):
     transition and process noise covariance of x, y, vx, vy, eq. 2.3. from_pixels: True if the points are foreground
     pixels, not people. metres_per_unit (2,): metres on the ground per unit along x and along y (depth in an image).
-    body_cov (2, 2): covariance of one person's pixels, zeros from points. colour_bins: bins of colour histograms (64),
+    colour_bins: bins of colour histograms (64),
     0 if colours are not used.
     """
 
@@ -52,17 +52,16 @@ class ScaledParameters:
     Q: Array
     from_pixels: bool
     metres_per_unit: Array
-    body_cov: Array
     colour_bins: int
 
 
 def scale_parameters(
-    config: GroupPdaConfig, fps: float, scale: float, body_cov: Array | None = None, sine_tilt: float = 1.0
+    config: GroupPdaConfig, fps: float, scale: float, sine_tilt: float = 1.0, pixels: bool = False
 ) -> ScaledParameters:
     """Returns the parameters for a frame rate `fps` (frames per s) and a scale in units of the points per metre."""
-    c, dt, pixels = config, 1 / fps, body_cov is not None
+    c, dt = config, 1 / fps
     point_sd = scale * (c.pixel_noise if pixels else c.point_noise)
-    prior = (scale * c.person_spread) ** 2 * np.eye(2) + (0.0 if body_cov is None else body_cov)
+    prior = (scale * c.person_spread) ** 2 * np.eye(2)
     link = 2 * scale * (c.pixel_radius if pixels else c.radius)
     factor = gate_factor(c.gate) if c.corrections else 1.0
     least = LEAST_PEOPLE if pixels and c.corrections else 0.0
@@ -81,7 +80,6 @@ def scale_parameters(
         Q=Q * (scale * c.accel_noise) ** 2 / dt,
         from_pixels=pixels,
         metres_per_unit=np.array([1, 1 / sine_tilt]) / scale,
-        body_cov=np.zeros((2, 2)) if body_cov is None else body_cov,
         colour_bins=COLOUR_BINS if pixels and c.appearance > 0 else 0,
     )
 

@@ -31,8 +31,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - F, Q: constant velocity, white acceleration, per root second. Paper: not stated. Why: any frame rate.
 - search region of the gate, and distances that order shared points: by Σ, P and a point's variance; (c) wider in
   infeasible time. Paper: Σ, as in merges here. Why: few points give a small Σ.
-- extents: with 1/N, shrunk by `spread_weight` to a prior: `person_spread`, from pixels with a person's width; (c)
-  corrected for the gate. Paper: sample covariance. Why: few people; with 1/N eq. 3.1 is exact.
+- extents: with 1/N, shrunk by `spread_weight` to a prior, `person_spread`; (c) corrected for the gate. Paper: sample
+  covariance. Why: few people; with 1/N eq. 3.1 is exact.
 - G_x in G_y: repeated until nothing changes. Paper: applied once. Why: joined regions overlap others.
 - noise, (c): from pixels, components below 0.25 people do not count in G_y. Paper: all count. Why: specks of
   foreground.
@@ -61,9 +61,9 @@ Departures. Those marked (c) are off with `corrections` off.
 - hidden feet: with boxes and a camera not overhead, points whose feet another box may hide are put no further than
   below heads at 1.5 m. Paper: points as they are. Why: hidden feet displace points.
 - pixels: foreground of tracking.detect on a grid of 0.1 m, each a share of a person, put where on the ground that
-  person's middle is: the runs along the images of upright lines, less a person's height. Paper: all of an unnamed
-  background subtraction, each counts one, in px. Why: N in people; speed; near and far people are alike, and who
-  stands behind is apart.
+  person's middle is: the runs along the images of upright lines, less a person's height; two runs no longer than a
+  person are pieces of one. Paper: all of an unnamed background subtraction, each counts one, in px. Why: N in people;
+  speed; near and far people are alike, and who stands behind is apart.
 - too much foreground: predicted only. Paper: none. Why: the light has changed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
   similar groups cross.
@@ -80,14 +80,14 @@ Departures. Those marked (c) are off with `corrections` off.
   Why: others' people stay out.
 - ids: the part that was largest when the group fell apart keeps the id, after its loss the largest left; of merged
   groups the largest, then the oldest. Paper: none. Why: tracks need ids.
-- walking out: a new group within reach (2 m/s) of a member is a part of its group and as old, (c) with its velocity;
-  without corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
+- walking out: a new group within reach of a member (2 m/s; from pixels at least R_0's) is a part of its group and as
+  old, (c) with its velocity; without corrections it splits off once confirmed. Paper: a new group. Why: splits without
+  shared points.
 - like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`. Paper: SR_v
   overlap. Why: P does not measure likeness; people sway with each step.
 - SR_v, without corrections: of the updated velocity, with the gate's γ. Paper: of the predicted one; its size is not
   stated. Why: Fig. 1 merges after the update.
-- near groups, (c): people at most 1.5 m apart, too; from pixels by centroids and extents. Paper: regions overlap. Why:
-  no merge after a split.
+- near groups, (c): people at most 1.5 m apart, too. Paper: regions overlap. Why: no merge after a split.
 - merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) once the evidence of the
   last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing groups.
 - enter: so is a merge reported if at most one of the groups was there 1 s before. Paper: none. Why: they came together.
@@ -250,10 +250,9 @@ class GroupPda:
         return points, np.ones(len(points))
 
     def _outline(self, places: Array, about: Array) -> Array:
+        (corners,) = convex_hulls([places])  # they suffice, and are few
         if self.pixels is not None:
-            return self.pixels.outline(places)
-        # The places on their own hull suffice, and are few.
-        (corners,) = convex_hulls([places])
+            return self.pixels.outline(corners)
         return np.asarray((corners[:, None] + about).reshape(-1, 2))
 
     def _about(self, detections: Detections | None) -> Array:
@@ -269,8 +268,7 @@ class GroupPda:
         From points they are the corners of footprints or usual boxes, in the unit of the points.
         """
         bank, about = self.bank, self._about(None)
-        places = [bank.positions(r) for r in np.flatnonzero(bank.confirmed).tolist()]
-        return [self._outline(p, about) for p in places if len(p)]  # a part may have none of its group's places
+        return [self._outline(bank.positions(r), about) for r in np.flatnonzero(bank.confirmed).tolist()]
 
     def _no_tracks(self, frame: Frame) -> Tracks:
         none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
@@ -280,7 +278,7 @@ class GroupPda:
         if self.scaled is not None and self.scaled.config is self.config:
             return self.scaled
         if self.pixels is not None:
-            self.scaled = scale_parameters(self.config, self.context.fps, 1.0, self.pixels.body_cov)
+            self.scaled = scale_parameters(self.config, self.context.fps, 1.0, pixels=True)
             return self.scaled
         scale = required(self.context.px_per_m) if self.plane == "image" else 1.0
         sine = sine_tilt(self.context.camera) if self.plane == "image" else 1.0

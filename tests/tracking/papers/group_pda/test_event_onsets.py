@@ -51,7 +51,7 @@ def test_a_split_began_when_the_parts_were_apart_however_noisy_the_last_look() -
             for s, d in zip(t.tolist(), apart.tolist(), strict=True)
         ]
         parts = [past[-1][1][:1], past[-1][1][1:]]
-        found, place = split_onset(past, parts, np.ones(2), np.zeros((2, 2)), t[-1])
+        found, place = split_onset(past, parts, np.ones(2), t[-1])
         assert found >= 2.3
         late += found > 3.1
         assert place == pytest.approx(past[round(found * FPS)][1].mean(0))

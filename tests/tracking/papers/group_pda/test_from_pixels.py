@@ -9,10 +9,14 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.scene.body import PERSON_HEIGHT
-from sim.scene.camera import camera_rotation, project
+from sim.scene.camera import camera_rotation, misaligned, project
 from sim.types import Camera, Tracks
 from tests import painted
-from tracking.papers.group_pda.from_pixels import ground_view, upright_lines, upright_runs
+from tests.tracking.papers.group_pda.test_association_kernels import bank
+from tracking.papers.group_pda.births_and_losses import add_newborns, expected_members
+from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.papers.group_pda.from_pixels import ground_view, upright_lines, upright_runs, with_other_pieces
+from tracking.papers.group_pda.scaled_parameters import scale_parameters
 from tracking.papers.group_pda.tracker import GroupPda
 
 
@@ -53,11 +57,12 @@ def test_without_a_scale_and_without_anybody_it_is_asked_for(scale: float) -> No
         watch(scale, painted.sample(np.random.default_rng(0)))
 
 
-def test_the_view_finds_people_on_the_ground_and_upright_lines() -> None:
+@pytest.mark.parametrize(("roll", "down"), [(0.0, 0.0), (0.1, 15.0)])
+def test_the_view_finds_people_on_the_ground_and_upright_lines(roll: float, down: float) -> None:
     """Distances on the ground are those of the people whose middles are seen; heads and feet lie on one line."""
     image, position = (640, 480), np.array([3.0, -2.0, 7.0])
     rotation = camera_rotation(math.radians(40), 0.3)
-    camera = Camera("pinhole", image, (500.0, 500.0), (320.0, 240.0), position, rotation)
+    camera = misaligned(Camera("pinhole", image, (500.0, 500.0), (320.0, 240.0), position, rotation), roll, down)
     view = ground_view(camera, (480, 640, 3), 38.0)
     ground = position[:2] + np.array([[0.0, 8.0], [1.5, 8.0], [-3.0, 12.0], [2.0, 6.0]])
     heights = (PERSON_HEIGHT / 2, 0.0, PERSON_HEIGHT)
@@ -66,6 +71,9 @@ def test_the_view_finds_people_on_the_ground_and_upright_lines() -> None:
     apart = [np.hypot(*(p[:, None] - p).T) for p in (places, ground)]
     np.testing.assert_allclose(apart[0], apart[1], atol=1e-9)
     np.testing.assert_allclose(view.image(places), middle)
+    above_the_horizon, behind = np.array([[320.0, -2000.0]]), position[None, :2] - 20 * rotation[2, :2]
+    assert np.isfinite(view.places(above_the_horizon)).all()
+    assert view.image(behind)[0, 1] > 480
     step = 1e-6 * np.eye(2)
     slope = np.stack([(view.image(places + d) - view.image(places - d)) / 2e-6 for d in step], 2)
     np.testing.assert_allclose(view.jacobian(places), slope, rtol=1e-6, atol=1e-6)
@@ -75,4 +83,14 @@ def test_the_view_finds_people_on_the_ground_and_upright_lines() -> None:
     mask = np.zeros((480, 640), bool)
     for top, bottom in ((100, 150), (200, 230)):
         mask[np.arange(top, bottom), columns[top:bottom, line]] = True
-    np.testing.assert_array_equal(upright_runs(mask, columns), [[line] * 2, [100, 200], [150, 230]])
+    runs = upright_runs(mask, columns)
+    np.testing.assert_array_equal(runs, [[line] * 2, [100, 200], [150, 230]])
+    for high, ends in ((130.0, [[100, 100], [230, 230]]), (129.0, [[100, 200], [150, 230]])):
+        np.testing.assert_array_equal(with_other_pieces(*runs, np.full(2, high)), ends)
+
+
+def test_a_new_group_that_is_linked_with_a_member_is_a_part_of_its_group() -> None:
+    scaled = scale_parameters(GroupPdaConfig(appearance=0.0), 10.0, 1.0, pixels=True)
+    one, apart = bank(size=np.ones(1)), np.array([[0.9 * scaled.constraint.link, 0.0]])
+    add_newborns(one, apart, np.ones(1), expected_members(one, scaled, 0.0), scaled, 0.0)
+    assert one.parent[1] == one.id[0]

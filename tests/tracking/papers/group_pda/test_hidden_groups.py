@@ -34,6 +34,7 @@ def test_who_has_left_does_not_follow_the_other_for_ever(seed: int, offset: floa
     made = track(meeting(0.0, np.inf, seed, offset))
     assert [len(t.id) for t in made[-20:]] == [1] * 20
     assert made[20].id.tolist() == [1, 2]
+    assert [e.kind for t in made for e in t.events] == ["enter", "enter", "leave"]
 
 
 def test_who_is_hidden_for_a_moment_has_his_id_afterwards() -> None:
@@ -56,6 +57,21 @@ def test_a_group_whose_only_point_is_more_probably_anothers_is_predicted_only() 
     assert mine.tolist() == [[True], [False]]
     assert two.last_seen.tolist() == [t, 0.0]
     assert two.x[1].tolist() == before[1].tolist()
+
+
+def test_an_infeasible_group_without_points_of_its_own_coasts() -> None:
+    scaled, t = scale_parameters(GroupPdaConfig(association="all"), FPS, 1.0), 1.0
+    points = np.array([[-2.0, 0.0], [2.0, 0.0]])
+    three = bank(
+        size=np.ones(3), x=np.array([[-2.0, 0, 0, 0], [2, 0, 0, 0], [0, 0, 0, 0]]), null_time=np.array([0.0, 0, 0.2]),
+        P=np.tile(0.05 * np.eye(4), (3, 1, 1)), extent=np.array([[[0.1]], [[0.1]], [[1.5]]]) * np.eye(2),
+    )  # fmt: skip
+    region = search_regions(three, scaled)
+    claims = claimed(points, np.ones(2), gated_distances(three, points, region, scaled), t)
+    associate(three, claims, region, np.zeros((3, 2)), scaled, t)
+    assert claims.claimants.tolist() == [2, 2]
+    assert three.last_seen.tolist() == [t, t, 0.0]
+    assert three.null_time[2] == pytest.approx(0.2)
 
 
 SCALE = TALL / 1.7
