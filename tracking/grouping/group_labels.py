@@ -94,11 +94,8 @@ def label_people(
         for g, people in shown.items():
             group[t:until, sorted(people)] = g
         parted = {frozenset((a, b)): sure for a, b, on, sure in switched if not on}
-        told = (
-            event_of_change(c, t, parts_of_change(c, old, state), motion, arrival)
-            for c in changes
-            if not corrects(c, parted)
-        )
+        real = [c for c in changes if not corrects(c, parted)]
+        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in real)
         events += [e for e in told if e is not None]
     return _without_singles(frame, group[frame, column]), events
 

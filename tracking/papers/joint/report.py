@@ -19,6 +19,7 @@ from sim.truth.identity import GroupChange, Identities, Members, PersonSet
 from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, GroupEvent, Groups, Ints
 from tracking.grouping.group_labels import part_sets
+from tracking.grouping.link_rule import ARRIVAL
 from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, corrects, event_of_change
 from tracking.papers.joint import partition_labels_kernels
 
@@ -46,7 +47,6 @@ def groups_of(label: Ints) -> list[Ints]:
 # Kinds of events that the tracker reports itself.
 OWN_EVENTS = ("merge", "split", "form", "dissolve", "enter", "leave")
 CHORD = 0.5  # Time over which velocities are measured, s.
-ARRIVAL = 1.0  # s: people who were together so soon after they were first seen arrived together.
 
 
 class ReportedEvents:
