@@ -21,7 +21,7 @@ from sim.types import GroupEvent, Ints
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import FoundGroups
 from tracking.grouping.link_rule import LinkRule
-from tracking.grouping.merge_split_events import LinkSwitch, Parts, TrackedMotion, event_of_change
+from tracking.grouping.merge_split_events import LinkSwitch, Parts, TrackedMotion, corrects, event_of_change
 
 
 @dataclass
@@ -93,10 +93,9 @@ def label_people(
         shown = state.identities.name(t, _together_now(found, t, state), shown)
         for g, people in shown.items():
             group[t:until, sorted(people)] = g
-        # who parts without ever having been together was linked by mistake: no event
-        parted = [{a, b} for a, b, on, sure in switched if sure and not on]
-        sure = [c for c in changes if c.kind not in ("split", "dissolve") or any(p <= {*c.members} for p in parted)]
-        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in sure)
+        parted = {frozenset((a, b)): sure for a, b, on, sure in switched if not on}
+        real = [c for c in changes if not corrects(c, parted)]
+        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in real)
         events += [e for e in told if e is not None]
     return _without_singles(frame, group[frame, column]), events
 

@@ -1,13 +1,14 @@
 """Merge, split, form, dissolve, enter and leave events of groups of tracked people: from changes of their groups.
 
 Two sources: links that a grouping switched (`event_of_change`), or labels that a tracker gave (`events_of_labels`).
+Changes that only correct what was believed are no events: `corrects`, and merges that become known late.
 What a change is called follows from sim.truth.identity.lineage, the same rule as in the truth. People are columns of
 arrays, frames count from 0; in the returned events people are columns + 1, frames count from 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -86,6 +87,14 @@ def event_of_change(
         return None
     end = start if change.kind in ("enter", "leave") else t
     return _event(change, start, end, t, motion.pos)
+
+
+def corrects(change: GroupChange, parted: Mapping[PersonSet, bool]) -> bool:
+    """Returns True if a group falls apart whose people were, by all evidence, never together: it is no event. parted:
+    pairs that are in one group no more, True if the evidence, summed over the time in which they were, speaks for
+    them."""
+    sure = [together for pair, together in parted.items() if pair <= {*change.members}]
+    return change.kind in ("split", "dissolve") and bool(sure) and not any(sure)
 
 
 def events_of_labels(group: Ints, pos: Array) -> list[GroupEvent]:

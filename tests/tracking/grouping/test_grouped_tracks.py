@@ -102,6 +102,14 @@ def test_who_was_together_by_mistake_parts_without_an_event(together, told):
     assert [e[1] for e in events(made)] == told
 
 
+def test_the_ends_of_a_chain_part_when_its_middle_leaves():
+    """Under the rule no link breaks then: A is linked to B and B to C."""
+    chain = [paced((12, (1, 0)), start=(0, y)) for y in (0, 2.8, 1.4)]
+    there = np.ones((len(chain[0][0]), 3), bool)
+    there[60:, 2] = False
+    assert [e[1] for e in events(derive(tracks(chain, there=there), FPS, rule=LinkRule()))] == ["dissolve"]
+
+
 def naming(own):
     """A pair whose tracker names its groups, own (T, 2), from the first frame on, where there is none yet."""
     return [t.replace(groups=Groups.none() if (t.group < 0).all() else None) for t in tracks(side_by_side(), group=own)]

@@ -3,7 +3,7 @@
 The estimate has means of the individuals and one partition for all particles. Group ids follow the identity rule of the
 truth, frame by frame. Onsets of events are dated back by the rules of the truth (ours): a merge or split is reported
 when the partition changes. Its start is the frame in which the parts came together, or parted, in the past that is
-known then.
+known then. Changes that only correct the groups are no events.
 """
 
 from __future__ import annotations
@@ -11,14 +11,16 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
-from sim.truth.identity import GroupChange, Identities, Members
+from sim.truth.identity import GroupChange, Identities, Members, PersonSet
 from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, GroupEvent, Groups, Ints
 from tracking.grouping.group_labels import part_sets
-from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, event_of_change
+from tracking.grouping.link_rule import ARRIVAL
+from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, corrects, event_of_change
 from tracking.papers.joint import partition_labels_kernels
 
 
@@ -45,17 +47,18 @@ def groups_of(label: Ints) -> list[Ints]:
 # Kinds of events that the tracker reports itself.
 OWN_EVENTS = ("merge", "split", "form", "dissolve", "enter", "leave")
 CHORD = 0.5  # Time over which velocities are measured, s.
-ARRIVAL = 1.0  # s: people who were together so soon after they were first seen arrived together.
 
 
 class ReportedEvents:
     """Makes events from changes of the reported groups. State: recent, ids (K,) and positions (K, 2), m, of the last
-    frames; first, by id, the frame (from 0) of each person's first report; frames, their number so far; fps."""
+    frames; first, by id, the frame (from 0) of each person's first report; frames, their number so far; evidence, by
+    pair of ids in one group, the sum of its log-odds in that time; fps."""
 
     def __init__(self, fps: float) -> None:
         self.fps, self.frames = fps, 0
         self.recent: deque[tuple[Ints, Array]] = deque(maxlen=frames_of(SEARCHED, fps) + frames_of(CHORD, fps))
         self.first: dict[int, int] = {}
+        self.evidence: dict[tuple[int, int], float] = {}
 
     def add(self, id: Ints, pos: Array) -> None:
         """Adds a frame: ids (K,) and places (K, 2), m, of the people reported."""
@@ -65,10 +68,12 @@ class ReportedEvents:
         self.frames += 1
 
     def events(
-        self, changes: Iterable[GroupChange], old: Members, new: Members, scale: float
+        self, changes: Iterable[GroupChange], old: Members, new: Members, log_odds: Array, scale: float
     ) -> tuple[GroupEvent, ...]:
-        """Returns the events of the changes of groups in the last frame added; their members are ids of people."""
-        changes = list(changes)
+        """Returns the events of the changes of groups in the last frame added; their members are ids of people.
+        log_odds (K, K): that two of its people belong together. To be called for each frame."""
+        parted = self._parted(new, log_odds)
+        changes = [c for c in changes if not corrects(c, parted)]
         if not changes:
             return ()
         ids, motion = self._motion()
@@ -89,6 +94,12 @@ class ReportedEvents:
                     members=tuple(sorted(ids[p - 1] for p in event.members)), pos=(x * scale, y * scale),
                 ))  # fmt: skip
         return tuple(out)
+
+    def _parted(self, groups: Members, log_odds: Array) -> dict[PersonSet, bool]:
+        row = {person: k for k, person in enumerate(self.recent[-1][0].tolist())}
+        before, pairs = self.evidence, [p for people in groups.values() for p in combinations(sorted(people), 2)]
+        self.evidence = {(a, b): before.get((a, b), 0.0) + float(log_odds[row[a], row[b]]) for a, b in pairs}
+        return {frozenset(pair): before[pair] > 0 for pair in before.keys() - self.evidence.keys()}
 
     def _motion(self) -> tuple[list[int], TrackedMotion]:
         ids = sorted({person for id, _ in self.recent for person in id.tolist()})

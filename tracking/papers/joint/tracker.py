@@ -79,6 +79,8 @@ Departures. A star marks those that stay in the preset `paper`:
 - weights of votes*: before step 2, by the rest, in the preset by w (`algorithm`). Paper: summed over i after step 2.
   Why: no noise of resampling.
 - ids, onsets*: ids of the truth, onsets dated back. Paper: none. Why: as the truth.
+- events that correct groups*: not reported (`tracking.grouping.merge_split_events`). Paper: none. Why: who was in one
+  group by mistake neither met nor parts.
 """
 
 from __future__ import annotations
@@ -227,7 +229,7 @@ class Joint(PointTracker):
         changes = self.identities.step(frame.index, frozenset(id.tolist()), parts)
         self.belief.see(mean[:, :2])
         self.events.add(id, mean[:, :2])
-        events = self.events.events(changes, old, self.identities.groups, self.unit)
+        events = self.events.events(changes, old, self.identities.groups, self.belief.log_odds, self.unit)
         group = report.known_groups(self.identities, id)
         groups = report.no_groups(group)
         score, cov = np.ones(len(id)), cov * self.unit**2

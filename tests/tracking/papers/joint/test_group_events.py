@@ -195,8 +195,9 @@ def test_many_newcomers_join_as_with_a_look_at_all_clusters():
 FPS = 10.0
 
 
-def reported(pos, partitions):
-    """The events of a sequence; pos (T, P, 2), nan where absent; partitions: frame (from 0) to groups, from then on."""
+def reported(pos, partitions, log_odds=1.0):
+    """The events of a sequence; pos (T, P, 2), nan where absent; partitions: frame (from 0) to groups, from then on;
+    log_odds: of all pairs."""
     report, identities, parts, out = ReportedEvents(FPS), Identities(), [], []
     for t, place in enumerate(pos):
         there = np.flatnonzero(np.isfinite(place[:, 0]))
@@ -204,7 +205,7 @@ def reported(pos, partitions):
         old = identities.groups
         changes = identities.step(t + 1, frozenset((there + 11).tolist()), [frozenset(p) for p in parts])
         report.add(there + 11, place[there])
-        out += report.events(changes, old, identities.groups, 2.0)
+        out += report.events(changes, old, identities.groups, np.full((len(there),) * 2, log_odds), 2.0)
     return out
 
 
@@ -222,6 +223,8 @@ def test_merges_and_splits_begin_when_the_rules_of_the_truth_come_true():
     assert 50 <= form.start <= 54, "near since frame 46, and alike in velocity since frame 51"
     assert (dissolve.kind, dissolve.emitted) == ("dissolve", 131)
     assert 90 < dissolve.start < 110
+    doubted = reported(two(gap), {70: [(11, 12)], 130: []}, log_odds=-1.0)
+    assert [e.kind for e in doubted] == ["form"], "who parts was never together"
     assert form.pos[0] == 0
     assert 1.0 <= form.pos[1] <= 2 * 1.5
 
@@ -244,6 +247,6 @@ def test_members_of_an_event_are_those_of_its_parts():
 
 
 def test_what_is_more_than_the_searched_time_ago_is_forgotten():
-    gap = np.concatenate([np.linspace(6, 1, 50), np.ones(400)])
-    (form,) = reported(two(gap), {440: [(11, 12)]})
-    assert form.start > 441 - 21 * FPS
+    gap = np.concatenate([np.ones(50), np.linspace(1, 6, 50), np.full(400, 6)])
+    (dissolve,) = reported(two(gap), {0: [(11, 12)], 440: []})
+    assert dissolve.start > 441 - 21 * FPS
