@@ -71,15 +71,15 @@ def label_people(
     frame: Ints, column: Ints, motion: TrackedMotion, found: FoundGroups, rule: LinkRule | Belief
 ) -> tuple[Ints, list[GroupEvent]]:
     """Returns the group id of each row (R,), from 1, -1 alone, and the membership events in order of `emitted`. frame,
-    column (R,): frame and person of each row, from 0. In events members are columns + 1, frames count from 1."""
-    length = len(motion.pos)
+    column (R,): frame, ascending, and person of each row, from 0. In events members are columns + 1, frames from 1."""
+    length = motion.rows.length
     spells = _spells(frame, column, frames_of(rule.memory, motion.fps), length)
     state, events = LinkedPeople(), []
-    group = np.full(motion.pos.shape[:2], -1, np.int64)
+    group, group_of = np.full(len(frame), -1), np.full(int(column.max(initial=0)) + 1, -1)
     arrival = frames_of(rule.arrival, motion.fps)
     assert found.links is not None
     links, shown, changes_now = found.links, dict[int, PersonSet](), _changes(found)
-    cuts = np.searchsorted(links.frame, np.arange(length + 1))
+    cuts, rows = (np.searchsorted(x, np.arange(length + 1)) for x in (links.frame, frame))
     for t, until in pairwise([*sorted({*spells, *changes_now, *links.frame.tolist()}), length]):
         for p, since in spells.get(t, ()):
             if since is None:
@@ -92,13 +92,17 @@ def label_people(
         changes = state.step(t, _dated(state, t, switched, motion), arrival, shown)
         shown = state.identities.name(t, _together_now(found, t, state), shown)
         for g, people in shown.items():
-            group[t:until, sorted(people)] = g
+            group_of[list(people)] = g
+        lasting = slice(int(rows[t]), int(rows[until]))
+        group[lasting] = group_of[column[lasting]]
+        for people in shown.values():
+            group_of[list(people)] = -1
         # who parts without ever having been together was linked by mistake: no event
         parted = [{a, b} for a, b, on, sure in switched if sure and not on]
         sure = [c for c in changes if c.kind not in ("split", "dissolve") or any(p <= {*c.members} for p in parted)]
         told = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in sure)
         events += [e for e in told if e is not None]
-    return _without_singles(frame, group[frame, column]), events
+    return _without_singles(frame, group), events
 
 
 def _changes(found: FoundGroups) -> list[int]:
