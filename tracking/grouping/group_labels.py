@@ -21,7 +21,7 @@ from sim.types import GroupEvent, Ints
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import FoundGroups
 from tracking.grouping.link_rule import LinkRule
-from tracking.grouping.merge_split_events import LinkSwitch, Parts, TrackedMotion, event_of_change
+from tracking.grouping.merge_split_events import LinkSwitch, Parts, TrackedMotion, event_of_change, frames_of_change
 
 
 @dataclass
@@ -109,16 +109,18 @@ def _changes(found: FoundGroups) -> list[int]:
     """Returns the frames in which it changes who is together now."""
     if found.now is None:
         return []
-    return ((np.flatnonzero((np.diff(found.now, axis=0) != 0).any(axis=1)) + 1) * found.size).tolist()
+    changed = frames_of_change(found.now.step, found.now.person, found.now.group, found.now.shape[0])
+    return [step * found.size for step in changed]
 
 
 def _together_now(found: FoundGroups, t: int, state: LinkedPeople) -> Iterable[PersonSet]:
     """Returns the groups of frame t, without people who are gone."""
     if found.now is None:
         return state.identities.groups.values()
-    parts, label = dict[int, set[int]](), found.now[t // found.size]
-    for p in np.flatnonzero(label >= 0).tolist():
-        parts.setdefault(int(label[p]), set()).update({p} & state.present.keys())
+    parts, step = dict[int, set[int]](), t // found.size
+    rows = slice(*np.searchsorted(found.now.step, (step, step + 1)))
+    for p, g in zip(found.now.person[rows].tolist(), found.now.group[rows].tolist(), strict=True):
+        parts.setdefault(g, set()).update({p} & state.present.keys())
     return [frozenset(people) for people in parts.values() if len(people) > 1]
 
 
