@@ -178,10 +178,8 @@ def pair_probabilities(tracks: Sequence[Tracks], fps: float, px_per_m: float, be
     size = frames_per_step(fps)
     known = found.step * size
     row, frame = runs(known, np.minimum(known + size, table.length))
-    present = np.zeros((table.length, len(table.ids)), bool)
-    present[table.frame, table.column] = True
-    a, b = found.a[row], found.b[row]
-    both = present[frame, a] & present[frame, b]
+    a, b, present = found.a[row], found.b[row], table.frame * len(table.ids) + table.column
+    both = np.isin(frame * len(table.ids) + a, present) & np.isin(frame * len(table.ids) + b, present)
     row, frame, a, b = row[both], frame[both], a[both], b[both]
     order = np.lexsort((b, a, frame))
     probability = 1 / (1 + np.exp(-found.log_odds[row, 0]))

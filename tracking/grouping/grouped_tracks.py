@@ -37,6 +37,7 @@ from tracking.grouping.tracks_table import TracksTable, tabulate
 
 # Kinds of events in which the membership of groups changes.
 MEMBERSHIP_KINDS = frozenset(EVENT_KINDS) - {"cross", "queue"}
+PORTION = 5_000  # Frames worked on together: bounds memory.
 
 
 def with_groups(
@@ -174,8 +175,11 @@ def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
 def groups_in_frames(tracks: Sequence[Tracks], px_per_m: float = 1.0) -> list[Groups]:
     """Returns the groups of each frame that follow from the group ids in `group`, one `Groups` per `Tracks`. Hulls
     enclose the boxes of people in the image, else their footprints; px_per_m scales footprints in the image."""
-    if not tracks:
-        return []
+    portions = (tracks[low : low + PORTION] for low in range(0, len(tracks), PORTION))
+    return [groups for portion in portions for groups in _groups_of_portion(portion, px_per_m)]
+
+
+def _groups_of_portion(tracks: Sequence[Tracks], px_per_m: float) -> list[Groups]:
     frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])
     id, group = np.concatenate([t.id for t in tracks]), np.concatenate([t.group for t in tracks])
     # of people in space x and y, as frames without groups have two coordinates, too

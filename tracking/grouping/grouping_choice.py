@@ -51,15 +51,9 @@ class StepGroups:
 
 
 def groups_of_steps(
-    shape: tuple[int, int],
-    step: Ints,
-    a: Ints,
-    b: Ints,
-    values: Array,
-    unseen: float,
-    stay: float = 0.0,
+    shape: tuple[int, int], step: Ints, a: Ints, b: Ints, values: Array, unseen: float, stay: float = 0.0,
     come: float = 0.0,
-) -> StepGroups:
+) -> StepGroups:  # fmt: skip
     """Returns the groups of each step.
 
     step, a, b, values (R,): one row per pair (a, b) and step, step ascending; pairs without a row have the value
