@@ -2,12 +2,13 @@
 
 First it finds encounters of groups, stretches in which two hulls are within 1.0 m (CROSS_GAP); a hull is the convex
 outline of discs round the members. Then it follows the members of both groups before, during and after each encounter.
-Both come from positions, velocities and group ids, for truth and trackers alike. Arrays are dense, (T, P, ...), one
-column for each person. A person is absent where a position is nan or `present` is False. The id of a person is the
-column + 1; frames of events count from 1.
+Both come from positions, velocities and group ids, for truth and trackers alike. The id of a person is the column + 1;
+frames of events count from 1.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,7 +16,8 @@ from sim.elementary import atan2, dot, length
 from sim.geometry.polygons import FOOTPRINT_RADIUS, footprint_hulls, gap_pairs, pack
 from sim.truth.group_hulls import member_rows
 from sim.truth.merge_split_rules import close_pairs, frames_of, mean_of_present, stretches
-from sim.types import Array, Bools, GroupEvent, Ints
+from sim.truth.motion_rows import MotionRows
+from sim.types import Array, GroupEvent, Ints
 
 CROSS_GAP = 1.0  # m between hulls
 BRIDGE_TIME = 0.5  # s for which hulls may be further apart within one encounter
@@ -23,33 +25,33 @@ CROSS_VELOCITY = 0.6  # m/s: least difference of the mean velocities over the en
 SAME_BEFORE = 2.0  # s before and after the encounter in which the members stay the same
 
 
-def crossings(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
+def crossings(motion: MotionRows, fps: float) -> list[GroupEvent]:
     """Returns a cross event for each crossing of two groups of two or more people, in order of time.
 
-    pos, vel (T, P, 2): m, m/s. present (T, P). group (T, P): group ids, -1 = alone or absent. An encounter is a stretch
-    of time in which two groups' hulls are within 1.0 m; breaks of up to 0.5 s are ignored. It is a crossing if three
-    conditions hold. The mean relative velocity is at least CROSS_VELOCITY (0.6 m/s). The groups change sides. From 2 s
-    before to 2 s after the encounter both keep their members, except for members who leave the scene.
+    An encounter is a stretch of time in which two groups' hulls are within 1.0 m; breaks of up to 0.5 s are ignored. It
+    is a crossing if three conditions hold. The mean relative velocity is at least CROSS_VELOCITY (0.6 m/s). The groups
+    change sides. From 2 s before to 2 s after the encounter both keep their members, except for members who leave the
+    scene.
     """
-    there = present & np.isfinite(pos).all(axis=2)
-    places, speeds = np.where(there[..., None], pos, np.nan), np.where(there[..., None], vel, np.nan)
-    label, margin = np.where(there, group, -1), frames_of(SAME_BEFORE, fps)
-    met = (_crossed(places, speeds, label, *encounter, margin) for encounter in encounters(places, label, fps))
+    margin, people = frames_of(SAME_BEFORE, fps), dict[int, set[int]]()
+    width = int(motion.column.max(initial=0)) + 1
+    for key in np.unique(motion.group * width + motion.column).tolist():
+        people.setdefault(key // width, set()).add(key % width)
+    met = (
+        _crossed(motion, sorted(people[a] | people[b]), first, last, a, b, margin)
+        for first, last, a, b in encounters(motion, fps)
+    )
     return [event for event in met if event is not None]
 
 
-def encounters(pos: Array, group: Ints, fps: float) -> list[tuple[int, int, int, int]]:
-    """Returns (first frame, last frame, id a, id b) of each encounter of two groups; frames from 0, a < b, sorted.
-
-    pos (T, P, 2): m, finite for all members. group (T, P): group ids, -1 = alone or absent.
-    """
-    t, person = np.nonzero(group >= 0)
-    label = group[t, person]
-    rows, start = member_rows(t, person, label)
+def encounters(motion: MotionRows, fps: float) -> list[tuple[int, int, int, int]]:
+    """Returns (first frame, last frame, id a, id b) of each encounter of two groups; frames from 0, a < b, sorted."""
+    t, label = motion.frame, motion.group
+    rows, start = member_rows(t, motion.column, label)
     if not len(start):
         return []
     frame, name, width = t[rows][start], label[rows][start], int(label.max()) + 1
-    i, j = _within_reach(frame, pos[t[rows], person[rows]], start)
+    i, j = _within_reach(frame, motion.pos[rows], start)
     pair, when = name[i] * width + name[j], frame[i]  # sorted by group within a frame: name[i] < name[j]
     order = np.lexsort((when, pair))
     pair, first, last = stretches(pair[order], when[order], 1, frames_of(BRIDGE_TIME, fps))
@@ -75,20 +77,21 @@ def _within_reach(t: Ints, places: Array, start: Ints) -> tuple[Ints, Ints]:
 
 
 def _crossed(
-    pos: Array, vel: Array, group: Ints, first: int, last: int, a: int, b: int, margin: int
+    motion: MotionRows, people: Sequence[int], first: int, last: int, a: int, b: int, margin: int
 ) -> GroupEvent | None:
     """Returns the event of one encounter of groups a and b, from frame `first` to `last` (from 0); None: no crossing.
 
-    pos, vel (T, P, 2), group (T, P): nan and -1 while absent. margin: frames of SAME_BEFORE.
+    people: all who are ever in group a or b. margin: frames of SAME_BEFORE.
     """
-    window = slice(max(first - margin, 0), last + margin + 1)
-    members = [np.flatnonzero(group[first] == name) for name in (a, b)]
-    if not all(_same_members(pos[window], group[window], g, who) for g, who in zip((a, b), members, strict=True)):
+    begin = max(first - margin, 0)
+    pos, vel, group = motion.window(people, begin, min(last + margin + 1, motion.length))
+    members = [np.flatnonzero(group[first - begin] == name) for name in (a, b)]
+    if not all(_same_members(pos, group, g, who) for g, who in zip((a, b), members, strict=True)):
         return None
-    path, other = (mean_of_present(pos[window, who]) for who in members)
-    during = slice(first - window.start, last + 1 - window.start)
+    path, other = (mean_of_present(pos[:, who]) for who in members)
+    during = slice(first - begin, last + 1 - begin)
     apart = other - path
-    relative = mean_of_present(vel[first : last + 1, members[1]]) - mean_of_present(vel[first : last + 1, members[0]])
+    relative = mean_of_present(vel[during, members[1]]) - mean_of_present(vel[during, members[0]])
     relative = relative[np.isfinite(relative).all(axis=1)]
     if not len(relative) or length(relative.sum(axis=0)) / len(relative) < CROSS_VELOCITY:
         return None
@@ -98,8 +101,8 @@ def _crossed(
         return None
     k = during.start + int(np.nanargmin(length(apart[during])))
     x, y = (path[k] + other[k]) / 2
-    people = tuple(sorted((np.concatenate(members) + 1).tolist()))
-    return GroupEvent("cross", first + 1, last + 1, None, (a, b), (a, b), people, (float(x), float(y)))
+    crossed = tuple(people[p] + 1 for p in sorted(np.concatenate(members).tolist()))
+    return GroupEvent("cross", first + 1, last + 1, None, (a, b), (a, b), crossed, (float(x), float(y)))
 
 
 def _same_members(pos: Array, group: Ints, name: int, columns: Ints) -> bool:

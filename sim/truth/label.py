@@ -122,11 +122,11 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
 
 def _events(s: States, found: GroupsAndEvents) -> list[GroupEvent]:
     from sim.truth.crossing_events import crossings
+    from sim.truth.motion_rows import MotionRows
     from sim.truth.queue_detection import queues
 
-    crossed = crossings(s.pos, s.vel, s.present, found.group, s.rate)
-    queued = queues(s.pos, s.vel, s.present, found.group, s.rate)
-    return [*found.events, *crossed, *queued]
+    rows = MotionRows.of_table(s.pos, s.vel, s.present, found.group)
+    return [*found.events, *crossings(rows, s.rate), *queues(rows, s.rate)]
 
 
 def _events_in_frames(

@@ -22,6 +22,7 @@ import numpy as np
 from sim.elementary import atan2, length, unit
 from sim.geometry.polygons import cross
 from sim.truth.merge_split_rules import close_pairs, frames_of, stretches
+from sim.truth.motion_rows import MotionRows
 from sim.types import Array, Bools, GroupEvent, Ints
 
 MIN_SPACING, MAX_SPACING = 0.4, 1.5  # m along the line
@@ -190,21 +191,19 @@ class _FollowedLine:
     moments: int = 0
 
 
-def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> list[GroupEvent]:
+def queues(motion: MotionRows, fps: float) -> list[GroupEvent]:
     """Returns a queue event for each queue, in order of first and last frame.
 
-    pos, vel (T, P, 2): m, m/s. present (T, P). group (T, P): group ids, -1 = alone. A queue is a line (see
-    `queue_shapes`) of waiting people that has at least 3 people for 3 s; it may be lost for up to 1.5 s. A line that
-    moves sideways is no queue. The event starts in the first frame with 3 people and ends in the last frame with 2 in
-    line. Its members are all people who were in the line for at least 1 s. Its position is the middle of the line when
-    it was first found. About 10 frames per s are examined.
+    A queue is a line (see `queue_shapes`) of waiting people that has at least 3 people for 3 s; it may be lost for up
+    to 1.5 s. A line that moves sideways is no queue. The event starts in the first frame with 3 people and ends in the
+    last frame with 2 in line. Its members are all people who were in the line for at least 1 s. Its position is the
+    middle of the line when it was first found. About 10 frames per s are examined.
     """
-    there = present & np.isfinite(pos).all(axis=2)
     stride = max(1, round(fps / MAX_RATE))
     hold, bridge = frames_of(QUEUE_TIME, fps), max(frames_of(BRIDGE_TIME, fps), stride)
     following: list[_FollowedLine] = []
     ended: list[_FollowedLine] = []
-    for t, moments in groupby(_lines(pos, vel, waiting_people(vel, there, fps), stride), key=lambda m: m.t):
+    for t, moments in groupby(_lines(motion, waiting_people(motion, fps), stride), key=lambda m: m.t):
         ended += [f for f in following if t - f.now.t > bridge]
         following = [f for f in following if t - f.now.t <= bridge]
         for moment in moments:
@@ -215,7 +214,7 @@ def queues(pos: Array, vel: Array, present: Bools, group: Ints, fps: float) -> l
         along, aside = abs(f.drift.real) / f.moments, abs(f.drift.imag) / f.moments
         sideways = aside > SIDEWAYS_SPEED and aside > along
         if len(columns) and f.three - f.since + stride >= hold and not sideways:
-            before, after = (_groups_of(group[t, columns[present[t, columns]]]) for t in (f.since, f.now.t))
+            before, after = (_groups_of(motion.group[motion.rows_at(columns, t)]) for t in (f.since, f.now.t))
             people, place = tuple((columns + 1).tolist()), (f.middle.real, f.middle.imag)
             found.append(GroupEvent("queue", f.since + 1, f.now.t + 1, None, before, after, people, place))
     return sorted(found, key=lambda e: (e.start, e.end, e.members))
@@ -226,26 +225,23 @@ def _groups_of(label: Ints) -> tuple[int, ...]:
     return (-1,) * int((label < 0).sum()) + tuple(np.unique(label[label >= 0]).tolist())
 
 
-def waiting_people(vel: Array, there: Bools, fps: float) -> Bools:
-    """Returns flags (T, P): True where a person is present and waits.
+def waiting_people(motion: MotionRows, fps: float) -> Bools:
+    """Returns flags (R,): True where a person waits.
 
-    These are people slower than 0.4 m/s, and people who move for at most 3 s between two such waits. vel (T, P, 2):
-    m/s. there (T, P): True for people present.
+    These are people slower than 0.4 m/s, and people who move for at most 3 s between two such waits.
     """
-    with np.errstate(invalid="ignore"):
-        slow = there & (length(vel) < WAITING_SPEED)
-    p, t = np.nonzero(slow.T)
-    out = np.zeros((len(slow) + 1, slow.shape[1]), np.int64)
-    person, first, last = stretches(p, t, 1, frames_of(ADVANCE_TIME, fps))
-    np.add.at(out, (first, person), 1)
-    np.add.at(out, (last + 1, person), -1)
-    return np.asarray((np.cumsum(out, axis=0)[:-1] > 0) & there)
+    slow = length(motion.vel) < WAITING_SPEED
+    person, first, last = stretches(motion.column[slow], motion.frame[slow], 1, frames_of(ADVANCE_TIME, fps))
+    out = np.zeros(len(slow) + 1, np.int64)
+    out[motion.find(person, first)] += 1
+    out[motion.find(person, last) + 1] -= 1
+    return np.cumsum(out)[:-1] > 0
 
 
-def _lines(pos: Array, vel: Array, waits: Bools, stride: int) -> list[_LineNow]:
-    t, p = np.nonzero(waits[::stride])
-    t *= stride
-    place, speed = pos[t, p], np.nan_to_num(vel[t, p])
+def _lines(motion: MotionRows, waits: Bools, stride: int) -> list[_LineNow]:
+    some = np.flatnonzero(waits & (motion.frame % stride == 0))
+    some = some[np.argsort(motion.frame[some], kind="stable")]
+    t, p, place, speed = motion.frame[some], motion.column[some], motion.pos[some], np.nan_to_num(motion.vel[some])
     made: list[_LineNow] = []
     for rows, count, u, middle in queue_shapes(place, *close_pairs(t, place, MAX_SPACING)):
         within = np.arange(rows.shape[1]) < count[:, None]

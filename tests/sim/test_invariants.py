@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from sim.truth.crossing_events import crossings
 from sim.truth.merge_split_events import groups_and_events
+from sim.truth.motion_rows import MotionRows
 from sim.truth.queue_detection import queues
 from tests.plots import DURATION, crosses, look, merges, scenes, splits
 
@@ -17,12 +18,8 @@ SETTLED = 8.0  # s: what ended so long ago is known, whatever follows
 def measure(scene):
     """Labels (T, P) and events as (kind, start, end, members, how many groups and people alone before, and after)."""
     found = groups_and_events(scene.pos, scene.vel, scene.present, scene.intent, scene.fps)
-    events = [
-        *found.events,
-        *crossings(scene.pos, scene.vel, scene.present, found.group, scene.fps),
-        *queues(scene.pos, scene.vel, scene.present, found.group, scene.fps),
-    ]
-    return found.group, events
+    motion = MotionRows.of_table(scene.pos, scene.vel, scene.present, found.group)
+    return found.group, [*found.events, *crossings(motion, scene.fps), *queues(motion, scene.fps)]
 
 
 def rows(events, name=lambda p: p):

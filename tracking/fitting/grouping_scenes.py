@@ -16,7 +16,7 @@ from scenarios.loading.resolve import Entry, resolve
 from sim.rng import rng
 from sim.sequence import simulate
 from sim.types import Bools, Ints, Truth
-from tracking.grouping.pair_evidence import evidence, frames_per_step, step_positions
+from tracking.grouping.pair_evidence import evidence, frames_per_step, step_rows
 from tracking.tuning.grouping_episodes import SURVEYED, LabelErrors, with_label_errors
 
 SLOW = 2.5  # Frames/s of the slow copy.
@@ -75,8 +75,8 @@ def pair_scene(truth: Truth, seed: int, repeat: int, rough: bool, begin: float) 
     if rough:
         kept &= rng(seed, "label", 0, repeat=repeat).random(len(kept)) >= MISSED
     size = frames_per_step(fps)
-    places, times = step_positions(frame[kept] // every, column[kept], erring.pos[kept], *labels.shape, fps)
-    parts = [(r.pair, r.step, r.a, r.b, r.values.astype(np.float32)) for r in evidence(places, times, size / fps)]
+    seen = step_rows(frame[kept] // every, column[kept], erring.pos[kept], len(labels), fps)
+    parts = [(r.pair, r.step, r.a, r.b, r.values.astype(np.float32)) for r in evidence(seen, size / fps)]
     if not parts:
         return None
     pair, step, a, b, values = (np.concatenate(x) for x in zip(*parts, strict=True))

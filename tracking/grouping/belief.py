@@ -27,7 +27,7 @@ from scenarios.limits import is_number
 from scenarios.loading.toml_files import parse, toml_value
 from sim.truth.merge_split_rules import runs
 from sim.types import Array, Ints, Tracks
-from tracking.grouping.pair_evidence import NAMES, evidence, frames_per_step, step_positions
+from tracking.grouping.pair_evidence import NAMES, StepRows, evidence, frames_per_step, step_rows
 from tracking.grouping.tracks_table import tabulate
 
 FROZEN = Path(__file__).with_name("belief.toml")  # The default belief.
@@ -111,13 +111,10 @@ class PairBeliefs:
     log_odds: Array
 
 
-def pair_beliefs(pos: Array, time: Array, seconds: float, belief: Belief) -> PairBeliefs:
-    """Returns the beliefs of all pairs of P people in the steps in which the two are within 4 m of each other.
-
-    pos (S, P, 2), m, time (S, P), s: mean position and time of each person in each of S steps, nan if not seen.
-    seconds: length of a step, s.
-    """
-    parts = [(rows.step, rows.a, rows.b, belief.log_odds(rows.values)) for rows in evidence(pos, time, seconds)]
+def pair_beliefs(seen: StepRows, seconds: float, belief: Belief) -> PairBeliefs:
+    """Returns the beliefs of all pairs of people in the steps in which the two are within 4 m of each other. seconds:
+    length of a step, s."""
+    parts = [(rows.step, rows.a, rows.b, belief.log_odds(rows.values)) for rows in evidence(seen, seconds)]
     if not parts:
         nobody = np.zeros(0, np.int64)
         return PairBeliefs(nobody, nobody, nobody, np.zeros((0, 2)))
@@ -127,9 +124,7 @@ def pair_beliefs(pos: Array, time: Array, seconds: float, belief: Belief) -> Pai
 def beliefs_of_tracks(frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief) -> PairBeliefs:
     """Returns the beliefs of all pairs of people of a sequence of `length` frames. frame, column (R,), from 0, pos (R,
     2), m: frame, index of the person, and position of each person and frame."""
-    size = frames_per_step(fps)
-    places, times = step_positions(frame, column, pos, length, int(column.max(initial=-1)) + 1, fps)
-    return pair_beliefs(places, times, size / fps, belief)
+    return pair_beliefs(step_rows(frame, column, pos, length, fps), frames_per_step(fps) / fps, belief)
 
 
 @cache
@@ -183,10 +178,8 @@ def pair_probabilities(tracks: Sequence[Tracks], fps: float, px_per_m: float, be
     size = frames_per_step(fps)
     known = found.step * size
     row, frame = runs(known, np.minimum(known + size, table.length))
-    present = np.zeros((table.length, len(table.ids)), bool)
-    present[table.frame, table.column] = True
-    a, b = found.a[row], found.b[row]
-    both = present[frame, a] & present[frame, b]
+    a, b, present = found.a[row], found.b[row], table.frame * len(table.ids) + table.column
+    both = np.isin(frame * len(table.ids) + a, present) & np.isin(frame * len(table.ids) + b, present)
     row, frame, a, b = row[both], frame[both], a[both], b[both]
     order = np.lexsort((b, a, frame))
     probability = 1 / (1 + np.exp(-found.log_odds[row, 0]))

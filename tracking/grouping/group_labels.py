@@ -21,7 +21,14 @@ from sim.types import GroupEvent, Ints
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import FoundGroups
 from tracking.grouping.link_rule import LinkRule
-from tracking.grouping.merge_split_events import LinkSwitch, Parts, TrackedMotion, corrects, event_of_change
+from tracking.grouping.merge_split_events import (
+    LinkSwitch,
+    Parts,
+    TrackedMotion,
+    corrects,
+    event_of_change,
+    frames_of_change,
+)  # fmt: skip
 
 
 @dataclass
@@ -71,15 +78,15 @@ def label_people(
     frame: Ints, column: Ints, motion: TrackedMotion, found: FoundGroups, rule: LinkRule | Belief
 ) -> tuple[Ints, list[GroupEvent]]:
     """Returns the group id of each row (R,), from 1, -1 alone, and the membership events in order of `emitted`. frame,
-    column (R,): frame and person of each row, from 0. In events members are columns + 1, frames count from 1."""
-    length = len(motion.pos)
+    column (R,): frame, ascending, and person of each row, from 0. In events members are columns + 1, frames from 1."""
+    length = motion.rows.length
     spells = _spells(frame, column, frames_of(rule.memory, motion.fps), length)
     state, events = LinkedPeople(), []
-    group = np.full(motion.pos.shape[:2], -1, np.int64)
+    group, group_of = np.full(len(frame), -1), np.full(int(column.max(initial=0)) + 1, -1)
     arrival = frames_of(rule.arrival, motion.fps)
     assert found.links is not None
     links, shown, changes_now = found.links, dict[int, PersonSet](), _changes(found)
-    cuts = np.searchsorted(links.frame, np.arange(length + 1))
+    cuts, rows = (np.searchsorted(x, np.arange(length + 1)) for x in (links.frame, frame))
     for t, until in pairwise([*sorted({*spells, *changes_now, *links.frame.tolist()}), length]):
         for p, since in spells.get(t, ()):
             if since is None:
@@ -92,28 +99,34 @@ def label_people(
         changes = state.step(t, _dated(state, t, switched, motion), arrival, shown)
         shown = state.identities.name(t, _together_now(found, t, state), shown)
         for g, people in shown.items():
-            group[t:until, sorted(people)] = g
+            group_of[list(people)] = g
+        lasting = slice(int(rows[t]), int(rows[until]))
+        group[lasting] = group_of[column[lasting]]
+        for people in shown.values():
+            group_of[list(people)] = -1
         parted = {frozenset((a, b)): sure for a, b, on, sure in switched if not on}
         real = [c for c in changes if not corrects(c, parted)]
         told = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in real)
         events += [e for e in told if e is not None]
-    return _without_singles(frame, group[frame, column]), events
+    return _without_singles(frame, group), events
 
 
 def _changes(found: FoundGroups) -> list[int]:
     """Returns the frames in which it changes who is together now."""
     if found.now is None:
         return []
-    return ((np.flatnonzero((np.diff(found.now, axis=0) != 0).any(axis=1)) + 1) * found.size).tolist()
+    changed = frames_of_change(found.now.step, found.now.person, found.now.group, found.now.shape[0])
+    return [step * found.size for step in changed]
 
 
 def _together_now(found: FoundGroups, t: int, state: LinkedPeople) -> Iterable[PersonSet]:
     """Returns the groups of frame t, without people who are gone."""
     if found.now is None:
         return state.identities.groups.values()
-    parts, label = dict[int, set[int]](), found.now[t // found.size]
-    for p in np.flatnonzero(label >= 0).tolist():
-        parts.setdefault(int(label[p]), set()).update({p} & state.present.keys())
+    parts, step = dict[int, set[int]](), t // found.size
+    rows = slice(*np.searchsorted(found.now.step, (step, step + 1)))
+    for p, g in zip(found.now.person[rows].tolist(), found.now.group[rows].tolist(), strict=True):
+        parts.setdefault(g, set()).update({p} & state.present.keys())
     return [frozenset(people) for people in parts.values() if len(people) > 1]
 
 

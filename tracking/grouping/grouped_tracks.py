@@ -29,7 +29,7 @@ from sim.truth.crossing_events import SAME_BEFORE, crossings
 from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.queue_detection import ADVANCE_TIME, BRIDGE_TIME, queues
-from sim.types import EVENT_KINDS, Bools, GroupEvent, Groups, Tracks
+from sim.types import EVENT_KINDS, GroupEvent, Groups, Tracks
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.grouping_choice import Grouping, default_grouping, find_groups
 from tracking.grouping.merge_split_events import TrackedMotion, events_of_labels
@@ -37,6 +37,7 @@ from tracking.grouping.tracks_table import TracksTable, tabulate
 
 # Kinds of events in which the membership of groups changes.
 MEMBERSHIP_KINDS = frozenset(EVENT_KINDS) - {"cross", "queue"}
+PORTION = 5_000  # Frames worked on together: bounds memory.
 
 
 def with_groups(
@@ -127,7 +128,7 @@ def _grouped(table: TracksTable, named: bool, fps: float, rule: Grouping) -> tup
     if named and (table.group < 0).all():
         return table, []
     found = find_groups(table, fps, rule)
-    motion = TrackedMotion(table.positions(), table.velocities(), fps)
+    motion = TrackedMotion(table.motion(), fps)
     group, events = label_people(table.frame, table.column, motion, found, rule)
     if not named:
         return replace(table, group=group), events
@@ -135,16 +136,14 @@ def _grouped(table: TracksTable, named: bool, fps: float, rule: Grouping) -> tup
     # back.
     other = table.frame[group != table.group]
     equal = int(other[0]) if len(other) else table.length
-    changes = events_of_labels(table.labels(), table.positions()) if len(other) else []
+    changes = events_of_labels(motion.rows) if len(other) else []
     early = [e for e in events if (e.emitted or e.start) <= equal]
     return table, early + [e for e in changes if (e.emitted or e.start) > equal]
 
 
 def _crossings_and_queues(table: TracksTable, fps: float) -> list[GroupEvent]:
-    pos, vel, label = table.positions(), table.velocities(), table.labels()
-    present: Bools = np.isfinite(pos[..., 0])
-    crossed = crossings(pos, vel, present, label, fps)
-    queued = queues(pos, vel, present, label, fps)
+    motion = table.motion()
+    crossed, queued = crossings(motion, fps), queues(motion, fps)
     # a crossing is known once both groups are the same as before for a while, a queue once its people can no longer be
     # advancing and its line no longer be lost
     after_cross, after_queue = frames_of(SAME_BEFORE, fps), frames_of(ADVANCE_TIME, fps) + frames_of(BRIDGE_TIME, fps)
@@ -176,8 +175,11 @@ def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
 def groups_in_frames(tracks: Sequence[Tracks], px_per_m: float = 1.0) -> list[Groups]:
     """Returns the groups of each frame that follow from the group ids in `group`, one `Groups` per `Tracks`. Hulls
     enclose the boxes of people in the image, else their footprints; px_per_m scales footprints in the image."""
-    if not tracks:
-        return []
+    portions = (tracks[low : low + PORTION] for low in range(0, len(tracks), PORTION))
+    return [groups for portion in portions for groups in _groups_of_portion(portion, px_per_m)]
+
+
+def _groups_of_portion(tracks: Sequence[Tracks], px_per_m: float) -> list[Groups]:
     frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])
     id, group = np.concatenate([t.id for t in tracks]), np.concatenate([t.group for t in tracks])
     # of people in space x and y, as frames without groups have two coordinates, too

@@ -19,8 +19,8 @@ from scenarios.loading.toml_files import parse
 from sim.truth.merge_split_rules import frames_of, runs, stretches
 from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import KIND, UNSEEN, Belief, PairBeliefs, default_belief, pair_beliefs
-from tracking.grouping.link_rule import LinkRule, Links, find_links
-from tracking.grouping.pair_evidence import frames_per_step, in_steps, step_positions
+from tracking.grouping.link_rule import CELLS, LinkRule, Links, find_links
+from tracking.grouping.pair_evidence import frames_per_step, step_rows
 from tracking.grouping.tracks_table import TracksTable
 
 
@@ -29,22 +29,32 @@ class FoundGroups:
     """Who belongs together in a sequence: the links between people, from which events follow, and the groups now."""
 
     links: Links | None  # None: not asked for
-    # now (S, P): by step of `size` frames and person the least person of the group, -1 alone; None: as linked
-    now: Ints | None = None
+    now: StepGroups | None = None  # by step of `size` frames; None: as linked
     size: int = 1
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class StepGroups:
+    """The groups of S steps and P people, one row per step and person in a group, sorted by step, then person."""
+
+    shape: tuple[int, int]  # S, P
+    # step, person (R,), from 0; group (R,): the lowest person of the person's group
+    step: Ints
+    person: Ints
+    group: Ints
+
+    def of(self, step: Ints, person: Ints) -> Ints:
+        """Returns the group of people in steps, -1 for people alone; arrays of one shape."""
+        key, wanted = self.step * self.shape[1] + self.person, step * self.shape[1] + person
+        row = np.searchsorted(key, wanted)
+        return np.where(np.append(key, -1)[row] == wanted, np.append(self.group, -1)[row], -1)
+
+
 def groups_of_steps(
-    shape: tuple[int, int],
-    step: Ints,
-    a: Ints,
-    b: Ints,
-    values: Array,
-    unseen: float,
-    stay: float = 0.0,
+    shape: tuple[int, int], step: Ints, a: Ints, b: Ints, values: Array, unseen: float, stay: float = 0.0,
     come: float = 0.0,
-) -> Ints:
-    """Returns for each step and person the lowest person number in the person's group, (S, P), -1 for people alone.
+) -> StepGroups:  # fmt: skip
+    """Returns the groups of each step.
 
     step, a, b, values (R,): one row per pair (a, b) and step, step ascending; pairs without a row have the value
     `unseen`. stay is added to the value of a pair that was in one group in the step before, come is subtracted from
@@ -52,9 +62,19 @@ def groups_of_steps(
     """
     from tracking.grouping.belief_kernels import linked_groups
 
-    label = np.full(shape, -1, np.int64)
-    linked_groups(np.searchsorted(step, np.arange(shape[0] + 1)), a, b, values, unseen, stay, come, label)
-    return label
+    steps, people = shape
+    cut, found = np.searchsorted(step, np.arange(steps + 1)), []
+    size, before = max(1, CELLS // max(people, 1)), np.full(people, -1)
+    for low in range(0, steps, size):
+        # the first row is the step before, which has no rows of pairs here
+        ends = cut[low : low + size + 1]
+        label = np.full((len(ends), people), -1)
+        label[0] = before
+        linked_groups(np.append(ends[0], ends), a, b, values, unseen, stay, come, label)
+        at, person = np.nonzero(label[1:] >= 0)
+        found.append((at + low, person, label[at + 1, person]))
+        before = label[-1]
+    return StepGroups(shape, *(np.concatenate([np.zeros(0, np.int64), *x]) for x in zip(*found, strict=True)))
 
 
 def belief_groups(
@@ -70,14 +90,15 @@ def belief_groups(
     size = frames_per_step(fps)
     people = int(column.max(initial=0)) + 1
     rows = slice(None) if measured is None else measured
-    places, times = step_positions(frame[rows], column[rows], pos[rows], length, people, fps)
-    shape = (len(places), people)
-    found = pair_beliefs(places, times, size / fps, belief)
+    shape = (-(-length // size), people)
+    seen = step_rows(frame[rows], column[rows], pos[rows], length, fps)
+    found = pair_beliefs(seen, size / fps, belief)
     pair = found.a * people + found.b
     order = np.lexsort((found.step, pair))
-    reported = in_steps(frame, column, *shape, size)
+    step = -(-frame // size)
+    reported = np.unique((column * (shape[0] + 1) + step)[step < shape[0]])
     memory = frames_of(belief.memory * fps / size, 1.0)
-    row, at = _missed(pair[order], found.step[order], np.isfinite(places[..., 0]), reported, memory)
+    row, at = _missed(pair[order], found.step[order], seen.column * (shape[0] + 1) + seen.step, reported, shape, memory)
     row = np.concatenate([np.arange(len(pair)), order[row]])
     step = np.concatenate([found.step, at])
     # What cannot be seen changes nothing: such pairs are linked if they were in one group in the step before.
@@ -98,7 +119,7 @@ def groups_now(table: TracksTable, fps: float, belief: Belief) -> Ints:
     The numbers are person numbers, not group ids that last."""
     found = belief_groups(table.frame, table.column, table.pos, table.length, fps, belief, table.seen, events=False)
     assert found.now is not None
-    return found.now[table.frame // found.size, table.column]
+    return found.now.of(table.frame // found.size, table.column)
 
 
 def _gain(log_odds: Array | float, belief: Belief) -> Array:
@@ -106,14 +127,13 @@ def _gain(log_odds: Array | float, belief: Belief) -> Array:
     return np.asarray(1 / (1 + np.exp(-np.asarray(log_odds))) - belief.threshold)
 
 
-def _links(label: Ints, size: int, found: PairBeliefs) -> Links:
-    """Returns all switches of links: any two people of one label (S, P) are linked. A removal is sure if the pair's
-    log-odds, summed over the time of the link, are positive."""
-    when, person = np.nonzero(label >= 0)
+def _links(label: StepGroups, size: int, found: PairBeliefs) -> Links:
+    """Returns all switches of links: any two people of one group are linked. A removal is sure if the pair's log-odds,
+    summed over the time of the link, are positive."""
     steps, people = label.shape
-    group = when * people + label[when, person]
+    group = label.step * people + label.group
     order = np.argsort(group, kind="stable")
-    t, person, group = when[order], person[order], group[order]
+    t, person, group = label.step[order], label.person[order], group[order]
     i, j = runs(np.arange(len(group)) + 1, np.searchsorted(group, group, side="right"))
     low, high = np.minimum(person[i], person[j]), np.maximum(person[i], person[j])
     both, when = low * people + high, t[i]
@@ -132,20 +152,28 @@ def _links(label: Ints, size: int, found: PairBeliefs) -> Links:
     return Links(t * size, both // people, both % people, on[order], sure[order])
 
 
-def _missed(pair: Ints, step: Ints, seen: Bools, reported: Bools, memory: int) -> tuple[Ints, Ints]:
+def _missed(
+    pair: Ints, step: Ints, seen: Ints, reported: Ints, shape: tuple[int, int], memory: int
+) -> tuple[Ints, Ints]:
     """Returns (row, step) of rows that stand for steps in which one of a pair was missed, up to `memory` steps after
-    both were last reported; seen, reported (S, P)."""
-    steps, people = seen.shape
+    both were last reported. seen, reported: column * (S + 1) + step of each person and step, reported sorted. shape:
+    steps S, people P."""
+    steps, people = shape
     a, b = pair // people, pair % people
     last = np.concatenate([np.diff(pair) != 0, [True]])[: len(pair)]
     following = np.where(last, steps, np.append(step[1:], steps)[: len(step)])
-    gone = np.where(reported, steps, np.arange(steps)[:, None])
-    gone = np.minimum.accumulate(gone[::-1])[::-1]  # by step: the next one in which a person is not reported
-    end = np.minimum(following, np.minimum(gone[step, a], gone[step, b]) + memory)
+    final = reported[np.diff(reported, append=-1) != 1]  # the ends of stretches in which a person is reported
+    until = [final[np.searchsorted(final, p * (steps + 1) + step)] for p in (a, b)]
+    gone = np.minimum(*(key % (steps + 1) for key in until)) + 1
+    end = np.minimum(following, gone + memory)
     after = np.minimum(step + 1, steps - 1)
-    row, at = runs(step + 1, np.where(seen[after, a] & seen[after, b], step + 1, end))
+
+    def both_seen(at: Ints, row: Ints) -> Bools:
+        return np.isin(a[row] * (steps + 1) + at, seen) & np.isin(b[row] * (steps + 1) + at, seen)
+
+    row, at = runs(step + 1, np.where(both_seen(after, np.arange(len(pair))), step + 1, end))
     # a pair that is seen again without a row is far apart
-    both = np.cumsum(seen[at, a[row]] & seen[at, b[row]])
+    both = np.cumsum(both_seen(at, row))
     missed = both == np.append(0, both)[np.searchsorted(row, row)]
     return row[missed], at[missed]
 

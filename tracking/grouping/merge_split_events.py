@@ -16,9 +16,9 @@ import numpy as np
 
 from sim.truth.identity import GroupChange, PersonSet, lineage
 from sim.truth.merge_split_rules import HOLD_TIME, frames_of, separation, stretches
-from sim.types import Array, Bools, GroupEvent, Ints
+from sim.truth.motion_rows import MotionRows
+from sim.types import Bools, GroupEvent, Ints
 
-ABSENT = -2  # Label of a person who is absent; -1 is a person alone.
 # A switched link: its people a, b, True if switched on, first frame of the stretch that caused it.
 LinkSwitch = tuple[int, int, bool, int]
 SEARCHED = 20.0  # s before the report in which the onset of a change is looked for.
@@ -29,18 +29,17 @@ LOOK_BACK = 20  # Frames before an event's start in which its position is looked
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedMotion:
-    """The motion of tracked people in T frames."""
+    """The motion of tracked people."""
 
-    # pos, vel (T, P, 2): m, m/s by frame and column, nan where absent or unknown
-    pos: Array
-    vel: Array
+    rows: MotionRows
     fps: float  # frames per second
 
     def onset(self, a: PersonSet, b: PersonSet, t: int, *, joins: bool) -> int:
         """Returns the frame in which two parts came together (joins True) or parted (False), as known in frame t. a, b:
         the parts, sets of columns. Frames count from 0; only the 20 s before t are searched."""
         first = max(0, t + 1 - frames_of(SEARCHED, self.fps))
-        found = separation(self.pos[first : t + 1], self.vel[first : t + 1], *(np.array(sorted(x)) for x in (a, b)))
+        pos, vel, _ = self.rows.window([*sorted(a), *sorted(b)], first, t + 1)
+        found = separation(pos, vel, *np.split(np.arange(len(a) + len(b)), [len(a)]))
         rules = [self._lasting(holds) for holds in (found.split_rule(), found.merge_rule())]
         before, after = rules if joins else rules[::-1]
         begin = int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0
@@ -75,7 +74,7 @@ def event_of_change(
     """
     # a group leaves when its last two people were seen, or its last one
     if change.kind == "leave":
-        seen = np.isfinite(motion.pos[: t + 1, change.members, 0]).sum(axis=1)
+        seen = motion.rows.count(change.members, t + 1)
         start = int(np.flatnonzero(seen >= min(seen.max(), 2))[-1])
     else:
         joins = change.kind not in ("split", "dissolve")
@@ -86,7 +85,7 @@ def event_of_change(
     if start <= known.get(change.kind, -1):
         return None
     end = start if change.kind in ("enter", "leave") else t
-    return _event(change, start, end, t, motion.pos)
+    return _event(change, start, end, t, motion.rows)
 
 
 def corrects(change: GroupChange, parted: Mapping[PersonSet, bool]) -> bool:
@@ -97,25 +96,34 @@ def corrects(change: GroupChange, parted: Mapping[PersonSet, bool]) -> bool:
     return change.kind in ("split", "dissolve") and bool(sure) and not any(sure)
 
 
-def events_of_labels(group: Ints, pos: Array) -> list[GroupEvent]:
-    """Returns the events that follow from changes of the groups of P people in T frames, sorted by time. group (T, P):
-    group id, -1 alone. pos (T, P, 2): m, nan if absent."""
-    there = np.isfinite(pos).all(axis=2)
-    state = np.where(there, group, ABSENT)
-    changed = np.flatnonzero((np.diff(state, axis=0) != 0).any(axis=1)) + 1
-    events, old, before = [], _members(state[0]), _present(state[0])
-    for t in changed.tolist():
-        new, now = _members(state[t]), _present(state[t])
-        changes = lineage(old, new, before, now)
-        events += [_event(c, t - (c.kind == "leave"), t - (c.kind == "leave"), t, pos) for c in changes]
+def events_of_labels(motion: MotionRows) -> list[GroupEvent]:
+    """Returns the events that follow from changes of the groups of people, sorted by time."""
+    order = np.lexsort((motion.column, motion.frame))
+    frame, column, group = motion.frame[order], motion.column[order], motion.group[order]
+    events, old, before = [], dict[int, PersonSet](), frozenset[int]()
+    for t in [0, *frames_of_change(frame, column, group, motion.length)]:
+        rows = slice(*np.searchsorted(frame, (t, t + 1)))
+        new, now = _members(column[rows], group[rows]), frozenset(column[rows].tolist())
+        changes = lineage(old, new, before, now) if t else []
+        events += [_event(c, t - (c.kind == "leave"), t - (c.kind == "leave"), t, motion) for c in changes]
         old, before = new, now
     return events
 
 
-def _event(change: GroupChange, start: int, end: int, t: int, pos: Array) -> GroupEvent:
+def frames_of_change(frame: Ints, column: Ints, group: Ints, length: int) -> list[int]:
+    """Returns the frames from 1 on, below `length`, in which the people, or the group of one, differ from those of the
+    frame before. frame, column, group (R,): one row per person and frame."""
+    kinds, kind = np.unique(column * (int(group.max(initial=0)) + 2) + group + 1, return_inverse=True)
+    key = frame * len(kinds) + kind
+    came, went = ~np.isin(key - len(kinds), key), ~np.isin(key + len(kinds), key)
+    changed = np.union1d(frame[came], frame[went] + 1)
+    return list(changed[(changed > 0) & (changed < length)].tolist())
+
+
+def _event(change: GroupChange, start: int, end: int, t: int, motion: MotionRows) -> GroupEvent:
     """Returns the event of a change, people as columns + 1, frames from 1; start, end, t count from 0."""
     first = max(start - LOOK_BACK, 0)
-    places = pos[first : t + 1, change.members]
+    places = motion.window(change.members, first, t + 1)[0]
     known = np.flatnonzero(np.isfinite(places[..., 0]).sum(axis=1))
     # at the start itself nobody may be seen
     nearest = known[np.abs(known - (start - first)).argmin()]
@@ -126,12 +134,8 @@ def _event(change: GroupChange, start: int, end: int, t: int, pos: Array) -> Gro
     )
 
 
-def _members(state: Ints) -> dict[int, PersonSet]:
+def _members(column: Ints, group: Ints) -> dict[int, PersonSet]:
     found: dict[int, set[int]] = {}
-    for p in np.flatnonzero(state >= 0).tolist():
-        found.setdefault(int(state[p]), set()).add(p)
-    return {g: frozenset(people) for g, people in found.items() if len(people) > 1}
-
-
-def _present(state: Ints) -> PersonSet:
-    return frozenset(np.flatnonzero(state != ABSENT).tolist())
+    for p, g in zip(column.tolist(), group.tolist(), strict=True):
+        found.setdefault(g, set()).add(p)
+    return {g: frozenset(people) for g, people in found.items() if g >= 0 and len(people) > 1}

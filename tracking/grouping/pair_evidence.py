@@ -1,6 +1,6 @@
 """What tells whether two people belong together: their distance and motion over time, in steps.
 
-`step_positions` averages positions over steps of at most 0.4 s, and `evidence` returns one row per pair and step with
+`step_rows` averages positions over steps of at most 0.4 s, and `evidence` returns one row per pair and step with
 the quantities of `QUANTITIES` averaged over the past (`TIMES`), and `NEAR`. Nothing looks ahead. Only positions are
 used: velocities are chords of positions over 0.8 s. Lengths are in m.
 
@@ -61,51 +61,52 @@ def frames_per_step(fps: float) -> int:
     return max(1, int(STEP * fps + 1e-9))
 
 
-def step_positions(frame: Ints, column: Ints, pos: Array, length: int, people: int, fps: float) -> tuple[Array, Array]:
-    """Returns each person's mean position (S, people, 2), m, and time (S, people), s, in each step; nan if not seen.
+@dataclass(frozen=True, slots=True, eq=False)
+class StepRows:
+    """Where people were seen, one row per person and step, sorted by step, then column."""
+
+    step: Ints  # (R,): from 0
+    column: Ints  # (R,): number of the person, from 0
+    pos: Array  # (R, 2): mean position in the step, m
+    time: Array  # (R,): mean time in the step, s
+
+
+def step_rows(frame: Ints, column: Ints, pos: Array, length: int, fps: float) -> StepRows:
+    """Returns each person's mean position and time in each step.
 
     frame, column (R,), from 0, pos (R, 2), m: one row per person and frame. With n = `frames_per_step(fps)`, step s
     ends with frame n s, so that step 0 is frame 0 alone. Frames after the last complete step are left out.
     """
     size = frames_per_step(fps)
-    steps, step = -(-length // size), -(-frame // size)
+    steps, step, people = -(-length // size), -(-frame // size), int(column.max(initial=0)) + 1
     whole = step < steps
-    key = (step * people + column)[whole]
-    count = np.bincount(key, minlength=steps * people)
-    total = np.stack([np.bincount(key, x[whole], steps * people) for x in (*pos.T, frame / fps)], axis=-1)
-    mean = np.full(total.shape, np.nan)
-    np.divide(total, count[:, None], out=mean, where=count[:, None] > 0)
-    by_person = mean.reshape(steps, people, 3)
-    return by_person[..., :2], by_person[..., 2]
+    key, row, count = np.unique((step * people + column)[whole], return_inverse=True, return_counts=True)
+    total = np.stack([np.bincount(row, x[whole], len(key)) for x in (*pos.T, frame / fps)], axis=-1)
+    mean = total / count[:, None]
+    known = np.isfinite(mean[:, 0])
+    key, mean = key[known], mean[known]
+    return StepRows(key // people, key % people, mean[:, :2], mean[:, 2])
 
 
-def in_steps(frame: Ints, column: Ints, steps: int, people: int, size: int) -> Bools:
-    """Returns bool (steps, people): True where a person has a row in one of a step's frames; steps as `step_positions`.
-    frame, column (R,), from 0: of each row. size: frames per step."""
-    step = -(-frame // size)
-    out, whole = np.zeros((steps, people), bool), step < steps
-    out[step[whole], column[whole]] = True
-    return out
-
-
-def step_velocities(pos: Array, time: Array, seconds: float) -> Array:
-    """Returns velocities (S, P, 2), m/s, from a person's earliest position in the last 0.8 s to the present one. They
-    are nan without such a position. pos (S, P, 2), m, time (S, P), s: from `step_positions`; seconds: per step."""
-    vel = np.full_like(pos, np.nan)
-    for steps in range(1, min(max(1, round(CHORD / seconds)), len(pos) - 1) + 1):
-        chord = (pos[steps:] - pos[:-steps]) / (time[steps:] - time[:-steps])[..., None]
-        np.copyto(vel[steps:], chord, where=np.isfinite(chord))
+def step_velocities(seen: StepRows, seconds: float) -> Array:
+    """Returns velocities (R, 2), m/s, from a person's earliest position in the last 0.8 s to the present one. They are
+    nan without such a position. seconds: per step."""
+    vel, people = np.full_like(seen.pos, np.nan), int(seen.column.max(initial=0)) + 1
+    key = seen.step * people + seen.column
+    for steps in range(1, max(1, round(CHORD / seconds)) + 1):
+        before = np.searchsorted(key, key - steps * people)
+        now = np.flatnonzero(key[before] == key - steps * people)
+        before = before[now]
+        vel[now] = (seen.pos[now] - seen.pos[before]) / (seen.time[now] - seen.time[before])[:, None]
     return vel
 
 
-def evidence(pos: Array, time: Array, seconds: float) -> Iterator[PairRows]:
-    """Yields the evidence of all pairs within 4 m, in portions of whole steps, steps ascending. pos (S, P, 2), m, time
-    (S, P), s: from `step_positions`. seconds: length of a step."""
-    vel = step_velocities(pos, time, seconds)
-    step, column = np.nonzero(np.isfinite(pos[..., 0]))
-    place, motion = pos[step, column], vel[step, column]
+def evidence(seen: StepRows, seconds: float) -> Iterator[PairRows]:
+    """Yields the evidence of all pairs within 4 m, in portions of whole steps, steps ascending. seconds: length of a
+    step."""
+    motion, step, column, place = step_velocities(seen, seconds), seen.step, seen.column, seen.pos
     i, j = close_pairs(step, place, REACH)
-    pair = np.unique(column[i] * pos.shape[1] + column[j], return_inverse=True)[1]
+    pair = np.unique(column[i] * (int(column.max(initial=0)) + 1) + column[j], return_inverse=True)[1]
     order = np.lexsort((pair, step[i]))
     i, j, pair = i[order], j[order], pair[order]
     means = ExponentialMeans(int(pair.max(initial=-1)) + 1, seconds)

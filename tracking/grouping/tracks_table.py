@@ -10,6 +10,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.formats.labels import chords
+from sim.truth.motion_rows import MotionRows
 from sim.types import Array, Bools, Ints, Tracks
 
 
@@ -28,24 +29,9 @@ class TracksTable:
     scale: float  # px per m by which pos and vel were divided if the tracks are in the image, else 1
     seen: Bools | None = None  # (R,): False where a person is reported by prediction only; None: all are seen
 
-    def positions(self) -> Array:
-        """Returns positions (T, P, 2): x, y in m by frame (from 0) and column; nan where a person is absent."""
-        return self._dense(self.pos)
-
-    def velocities(self) -> Array:
-        """Returns velocities (T, P, 2): x, y in m/s by frame (from 0) and column; nan where absent or unknown."""
-        return self._dense(self.vel)
-
-    def labels(self) -> Ints:
-        """Returns the tracker's own group ids (T, P) by frame (from 0) and column; -1 for a person alone or absent."""
-        out = np.full((self.length, len(self.ids)), -1, np.int64)
-        out[self.frame, self.column] = self.group
-        return out
-
-    def _dense(self, values: Array) -> Array:
-        out = np.full((self.length, len(self.ids), 2), np.nan)
-        out[self.frame, self.column] = values
-        return out
+    def motion(self) -> MotionRows:
+        """Returns the rows of known position, sorted by person, then frame."""
+        return MotionRows.of(self.frame, self.column, self.pos, self.vel, self.group, self.length)
 
 
 def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float) -> TracksTable:

@@ -76,6 +76,7 @@ def labelled_truth_fields(
     from sim.truth.crossing_events import crossings
     from sim.truth.group_hulls import groups_over_time
     from sim.truth.merge_split_events import groups_and_events
+    from sim.truth.motion_rows import MotionRows
     from sim.truth.queue_detection import queues
 
     metres, speed = pos / px_per_m, vel / px_per_m
@@ -89,9 +90,8 @@ def labelled_truth_fields(
     measured = groups_and_events(places, velocities, present, intent, fps)
     names = _names(measured.group[frame - 1, column], label)
     found = [_named(e, names, people, px_per_m) for e in measured.events]
-    given = np.full((length, len(people)), -1, np.int64)
-    given[frame - 1, column] = label
-    met = crossings(places, velocities, present, given, fps) + queues(places, velocities, present, given, fps)
+    rows = MotionRows.of(frame - 1, column, metres, speed, label, length)
+    met = crossings(rows, fps) + queues(rows, fps)
     found += [_named(e, {}, people, px_per_m) for e in met]
     events = tuple(sorted(found, key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
     near = replace(measured.near, a=people[measured.near.a - 1], b=people[measured.near.b - 1])

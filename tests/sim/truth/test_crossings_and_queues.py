@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sim.truth.crossing_events import crossings, net_crossings
+from sim.truth.motion_rows import MotionRows
 from sim.truth.queue_detection import queues
 
 FPS = 10.0
@@ -19,7 +20,7 @@ def queued(paths, group=None):
     """The queues of people on these paths, all alone unless `group` (P,) says otherwise."""
     pos, vel, present = crowd(paths)
     label = np.full(len(paths), -1) if group is None else np.array(group)
-    return queues(pos, vel, present, np.tile(label, (len(pos), 1)), FPS)
+    return queues(MotionRows.of_table(pos, vel, present, np.tile(label, (len(pos), 1))), FPS)
 
 
 def pair(start, path):
@@ -41,7 +42,8 @@ def groups(*numbers):
 
 def crossed(paths, group=None):
     group = groups(1, 1, 2, 2) if group is None else group
-    return [(e.start, e.end, e.before, e.after, e.members) for e in crossings(*crowd(paths), group, FPS)]
+    rows = MotionRows.of_table(*crowd(paths), group)
+    return [(e.start, e.end, e.before, e.after, e.members) for e in crossings(rows, FPS)]
 
 
 HEAD_ON = pair((0, 5), straight(1)) + pair((10, 5.2), straight(-1))

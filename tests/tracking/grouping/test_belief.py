@@ -11,7 +11,7 @@ from sim.sequence import simulate
 from tests import reference_belief as slow
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
 from tracking.grouping.grouping_choice import belief_groups, groups_of_steps
-from tracking.grouping.pair_evidence import NAMES, evidence
+from tracking.grouping.pair_evidence import NAMES, StepRows, evidence
 
 
 def walk(seed: int, frames: int, people: int):
@@ -34,6 +34,17 @@ def places(seed, frames=30, people=7, seconds=0.2):
     return out
 
 
+def step_rows(pos, time):
+    """The rows of tables pos (S, P, 2), nan if not seen, time (S, P)."""
+    step, column = np.nonzero(np.isfinite(pos[..., 0]))
+    return StepRows(step, column, pos[step, column], time[step, column])
+
+
+def tabled(found):
+    """The group of each step and person, (S, P), -1 alone."""
+    return found.of(*np.indices(found.shape))
+
+
 def times(pos, seconds):
     """Mean times of what was seen in each step: up to half a step earlier than its end."""
     ends = np.arange(len(pos))[:, None] * seconds
@@ -49,7 +60,7 @@ def test_evidence_equals_the_slow_twin(seed, seconds):
     expected = slow.evidence(pos, time, seconds)
     rows = [
         (key, values)
-        for r in evidence(pos, time, seconds)
+        for r in evidence(step_rows(pos, time), seconds)
         for *key, values in zip(r.step.tolist(), r.a.tolist(), r.b.tolist(), r.values, strict=True)
     ]
     assert sorted(tuple(key) for key, _ in rows) == sorted(expected)
@@ -61,7 +72,7 @@ def test_evidence_equals_the_slow_twin(seed, seconds):
 def test_beliefs_equal_the_slow_twin(seed):
     pos, belief = places(seed), default_belief()
     time = times(pos, 0.4)
-    found, expected = pair_beliefs(pos, time, 0.4, belief), slow.beliefs(pos, time, 0.4, belief)
+    found, expected = pair_beliefs(step_rows(pos, time), 0.4, belief), slow.beliefs(pos, time, 0.4, belief)
     keys = zip(found.step.tolist(), found.a.tolist(), found.b.tolist(), strict=True)
     np.testing.assert_allclose(found.log_odds, [expected[key] for key in keys], atol=1e-9)
     assert len(found.log_odds) == len(expected) > 50
@@ -84,7 +95,7 @@ def test_groups_of_steps_are_average_linkage_one_join_at_a_time(seed, stay, come
     kept = (a < b) & (r.random(len(a)) < 0.7)
     step, a, b = step[kept], a[kept], b[kept]
     log_odds = r.normal(0.5, 3, len(a))
-    label = groups_of_steps((steps, people), step, a, b, log_odds, unseen, stay, come)
+    label = tabled(groups_of_steps((steps, people), step, a, b, log_odds, unseen, stay, come))
     before, differ = set(), 0
     for s in range(steps):
         known = {(i, j): x for q, i, j, x in zip(step, a, b, log_odds, strict=True) if q == s}
@@ -104,13 +115,13 @@ def test_a_chain_of_strangers_is_no_group_and_a_stretched_group_is_one():
     a, b = np.array(pairs).T
     chain, stretched = np.array([1.0, -5, -6, 1, -5, 1]), np.array([4.0, 1, -1, 4, 1, 4])
     for log_odds, size in ((chain, 2), (stretched, 4)):
-        label = groups_of_steps((1, 4), np.zeros(6, np.int64), a, b, log_odds, -4.0)
+        label = tabled(groups_of_steps((1, 4), np.zeros(6, np.int64), a, b, log_odds, -4.0))
         assert max(map(len, parts(label[0]))) == size
 
 
 def test_two_pairs_that_are_too_far_apart_for_evidence_are_two_groups():
     step, a, b = [0] * 6 + [1, 1], [0, 0, 0, 1, 1, 2, 0, 2], [1, 2, 3, 2, 3, 3, 1, 3]
-    label = groups_of_steps((2, 4), *map(np.array, (step, a, b)), np.full(8, 5.0), -4.0, 7.0, 1.2)
+    label = tabled(groups_of_steps((2, 4), *map(np.array, (step, a, b)), np.full(8, 5.0), -4.0, 7.0, 1.2))
     assert label.tolist() == [[0, 0, 0, 0], [0, 0, 2, 2]]
 
 
@@ -181,8 +192,8 @@ def test_predictions_neither_link_nor_part(together):
     held, free = (belief_groups(*rows, default_belief(), some) for some in (seen, None))
     assert held.links.on.tolist() == [True] * together
     assert free.links.on.tolist() == [True] + [False] * together
-    assert ((held.now[30:] >= 0) == together).all()
-    assert ((free.now[-1] >= 0) != together).all()
+    assert ((tabled(held.now)[30:] >= 0) == together).all()
+    assert ((tabled(free.now)[-1] >= 0) != together).all()
 
 
 def test_people_who_are_not_measured_in_one_step_form_no_group():
@@ -192,11 +203,11 @@ def test_people_who_are_not_measured_in_one_step_form_no_group():
     frame, column, pos = frame[reported], column[reported], pos[reported] / 4
     seen = (frame > 20) == (column == 1)
     held, free = (belief_groups(frame, column, pos, length, 10.0, default_belief(), some) for some in (seen, None))
-    assert (held.now < 0).all()
-    assert (free.now[-1] == 0).all()
+    assert not len(held.now.step)
+    assert (tabled(free.now)[-1] == 0).all()
 
 
 def test_a_missed_pair_that_was_seen_apart_is_not_together():
     rows = side_by_side([*[1.0] * 30, *[20.0] * 3, *[20.0] * 10])
     seen = (rows[1] == 0) | (rows[0] < 33)
-    assert (belief_groups(*rows, default_belief(), seen).now[30:] < 0).all()
+    assert (tabled(belief_groups(*rows, default_belief(), seen).now)[30:] < 0).all()

@@ -121,8 +121,7 @@ def test_partitions_are_those_of_the_grouping(seed):
     pos, alone = walk[frame, column], np.full(len(frame), -1)
     table = TracksTable(frame, column, column, np.arange(people), pos, np.zeros_like(pos), alone, length, 1.0)
     found = belief_groups(frame, column, pos, length, fps, belief)
-    places = np.where(seen[..., None], walk, np.nan)
-    expected = label_people(frame, column, TrackedMotion(places, np.zeros_like(places), fps), found, belief)[0]
+    expected = label_people(frame, column, TrackedMotion(table.motion(), fps), found, belief)[0]
     made = groups_now(table, fps, belief)
     for t in range(length):
         here = frame == t

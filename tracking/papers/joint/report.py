@@ -17,6 +17,7 @@ import numpy as np
 
 from sim.truth.identity import GroupChange, Identities, Members, PersonSet
 from sim.truth.merge_split_rules import frames_of
+from sim.truth.motion_rows import MotionRows
 from sim.types import Array, GroupEvent, Groups, Ints
 from tracking.grouping.group_labels import part_sets
 from tracking.grouping.link_rule import ARRIVAL
@@ -108,7 +109,8 @@ class ReportedEvents:
             pos[t, np.searchsorted(ids, id)] = place
         chord, vel = frames_of(CHORD, self.fps), np.full_like(pos, np.nan)
         vel[chord:] = (pos[chord:] - pos[:-chord]) * self.fps / chord
-        return ids, TrackedMotion(pos, vel, self.fps)
+        rows = MotionRows.of_table(pos, vel, np.isfinite(pos[..., 0]), np.full(pos.shape[:2], -1))
+        return ids, TrackedMotion(rows, self.fps)
 
 
 def known_groups(identities: Identities, ids: Ints) -> Ints:
