@@ -24,6 +24,8 @@ Unit = Literal["person", "group"]
 DetectionMode = Literal["image", "truth", "file"]
 BACKGROUNDS = 50  # empty frames that precede frame 1 of a simulated sequence
 OWN_BACKGROUND = f"{BACKGROUNDS} empty frames before frame 1"
+# m of a unit of length that the name of a column, as x_cm, may end with
+LENGTH_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "km": 1000.0}
 EVENT_KINDS = ("merge", "split", "cross", "queue", "form", "dissolve", "enter", "leave")
 
 

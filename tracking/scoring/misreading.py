@@ -16,8 +16,7 @@ from functools import partial
 
 import numpy as np
 
-from sim.io.formats.mot_table import UNITS
-from sim.types import Array, Bools, Ints, Tracks, Truth
+from sim.types import LENGTH_UNITS, Array, Bools, Ints, Tracks, Truth
 from tracking.scoring.candidate_pairs import FOUND, box_pairs
 from tracking.scoring.rows import FrameRows
 
@@ -59,7 +58,7 @@ BOX_ORDERS: dict[str, Callable[[Array], Array]] = {
 }
 POSITION_ORDERS: dict[str, Callable[[Array], Array]] = {
     ",".join(axis + f"_{unit}" * (unit != "m") for axis in axes): partial(_in_metres, columns, metres)
-    for unit, metres in UNITS.items()
+    for unit, metres in LENGTH_UNITS.items()
     for axes, columns in (("xy", [0, 1]), ("yx", [1, 0]))
 }
 

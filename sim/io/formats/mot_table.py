@@ -22,7 +22,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.files.numeric_text import CORRECT, NAME_THEM, NumericTable, TextRows, is_number_text, read_rows
 from sim.io.formats.options import BoxScale
-from sim.types import Array, Bools, Ints
+from sim.types import LENGTH_UNITS, Array, Bools, Ints
 
 ENOUGH = 10  # rows that are needed to judge by how their columns vary
 
@@ -112,9 +112,6 @@ def size_doubt(box: Array, size: tuple[int, int]) -> str:
 
 Column = np.ndarray[tuple[int], np.dtype[np.float64]]
 
-# units that may end the names of positions, as x_cm,y_cm, in m
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "km": 1000.0}
-
 # meaning of a column, and the names it may have
 NAMES = {
     "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_num", "frame_index", "frame_idx"),
@@ -131,8 +128,8 @@ NAMES = {
     "cx": ("cx", "xc", "x_center", "center_x"),
     "cy": ("cy", "yc", "y_center", "center_y"),
     "group": ("group", "group_id", "groupid"),
-    "x": ("x", *(f"x_{unit}" for unit in UNITS)),
-    "y": ("y", *(f"y_{unit}" for unit in UNITS)),
+    "x": ("x", *(f"x_{unit}" for unit in LENGTH_UNITS)),
+    "y": ("y", *(f"y_{unit}" for unit in LENGTH_UNITS)),
 }
 
 # columns of which a text has a box, the first four that it has all of
@@ -222,7 +219,7 @@ def _in_order(column: dict[str, Column], units: dict[str, str]) -> list[Column] 
         "class": np.full_like(frame, -1.0),
         "score": np.ones_like(frame),
     } | column
-    ground = [column[axis] * UNITS.get(unit, 1.0) for axis, unit in units.items()]
+    ground = [column[axis] * LENGTH_UNITS.get(unit, 1.0) for axis, unit in units.items()]
     if have >= {"id", "x", "y"} and not have & {"width", "height", "left", "cx"}:
         return [frame, column["id"], *ground]
     form = next((form for form in BOXES if have >= {*form}), None)
