@@ -29,6 +29,7 @@ from tracking.grouping.whole_groups import GroupIds
 from tracking.papers.group_pda import merging_and_splitting
 from tracking.papers.group_pda import tracker as group_pda
 from tracking.papers.group_pda.association import PointClaims, associate
+from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
 from tracking.papers.group_pda.merging_and_splitting import fall_apart
@@ -162,8 +163,8 @@ def without_hiding(
 def forgetful(
     bank: GroupBank, row: int, points: Array, weights: Array, scaled: ScaledParameters, t: float, ids: GroupIds
 ) -> None:
-    """Replaces `fall_apart`: parts have the members that were measured in this frame alone."""
-    seen = bank.members[row].last_seen >= t
+    """Replaces `fall_apart`: parts have the members that are among the points alone."""
+    seen = any_within(bank.positions(row), points, 1e-6)
     bank.members[row] = MemberPlaces(*(value[seen] for value in bank.members[row]))
     fall_apart(bank, row, points, weights, scaled, t, ids)
 
