@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, counted
 from scenarios.limits import COORDINATE, is_number
 from scenarios.loading.toml_files import KeyPath, Table, did_you_mean, place_of
 
@@ -56,7 +56,7 @@ def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None 
     # Unknown keys come first, because a misspelt key explains a missing one.
     first = min(found, key=lambda e: e["type"] != "unknown_key")
     path = tuple(s for k, s in enumerate(first["loc"]) if s not in TAGS and not (k == 2 and first["loc"][0] == "event"))
-    more = f" ({len(found) - 1} more problem{'s' * (len(found) > 2)})" if len(found) > 1 else ""
+    more = f" ({counted(len(found) - 1, 'more problem')})" if len(found) > 1 else ""
     path, got, expected, remedy = _words(first, path)
     raise wrong(path, got, expected, remedy + more)
 

@@ -28,7 +28,7 @@ from tracking.grouping.merge_split_events import (
     corrects,
     event_of_change,
     frames_of_change,
-)  # fmt: skip
+)
 
 
 @dataclass

@@ -27,7 +27,7 @@ ABOUT = 0.85  # A simpler reading is preferred if it matches at least this part 
 PAIRS = 20_000  # Most pairs of boxes that are looked at, unless one frame has more.
 CLOSER, ENOUGH = 0.8, 50  # Tracks of so many boxes are some frames off if there 1 - IoU is below this part of it here.
 SPREAD = 0.25  # Least ratio of the extents of both sides, lest positions that shrink to the origin match labels there.
-SHIFTS = range(-10, 11)
+SHIFTS = sorted((k for k in range(-10, 11) if k), key=abs)
 RATES = (2, 3, 4, 5, 6, 10, 12, 15, 25, 30)
 SCALES = (1 / 3, 0.5, 2 / 3, 0.75, 0.8, 1.25, 4 / 3, 1.5, 2.0, 2.25, 3.0, 4.0)
 # Sides in px of square pictures that detectors stretch a picture to; 1: shares of the picture.
@@ -122,10 +122,10 @@ def likely_misreading(
 
 def _shifted(true: Side, est: Side) -> str:
     """Returns a warning if the tracks lie on labels of up to 10 frames away more exactly, else "". true: all labels."""
-    near = np.add.outer(np.unique(est.rows.frame), SHIFTS)
+    near = np.add.outer(np.unique(est.rows.frame), [0, *SHIFTS])
     true = true.keep(np.isin(true.rows.frame, near))
     now, best, words = _overlap(true, est), CLOSER, ""
-    for k in sorted(SHIFTS, key=abs):
+    for k in SHIFTS:
         then = _overlap(true, Side(FrameRows(est.rows.frame + k, est.rows.id), est.values))
         both = np.isfinite(now + then)
         if both.sum() < ENOUGH:

@@ -38,8 +38,7 @@ class ScaledParameters:
     measured position. kernel_rules (18,): the array `rules` of the kernels (gates, priors, noises). F, Q (4, 4):
     transition and process noise covariance of x, y, vx, vy, eq. 2.3. from_pixels: True if the points are foreground
     pixels, not people. metres_per_unit (2,): metres on the ground per unit along x and along y (depth in an image).
-    colour_bins: bins of colour histograms (64),
-    0 if colours are not used.
+    colour_bins: bins of colour histograms (64), 0 if colours are not used.
     """
 
     config: GroupPdaConfig

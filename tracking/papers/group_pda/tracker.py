@@ -110,7 +110,7 @@ import numpy as np
 from sim.arrays import no_ids
 from sim.geometry.hull_kernels import convex_hulls
 from sim.geometry.polygons import FOOTPRINT
-from sim.types import Array, Bools, Context, Detections, Frame, Groups, Plane, Tracks
+from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Plane, Tracks
 from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, whole_group_tracks
 from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.association import (
@@ -219,7 +219,7 @@ class GroupPda:
         seen = self.bank.confirmed & (frame.t - self.bank.last_seen <= self.config.report_coast + 1e-9)
         bank = whole_groups(self.bank, np.flatnonzero(seen))
         rows = np.argsort(bank.id)
-        hulls = [self._outline(bank.positions(r), outline) for r in rows.tolist()]
+        hulls = convex_hulls(self._outlines(bank, rows, outline))
         x, P, extent = bank.x[rows], bank.P[rows], bank.extent[rows]
         if self.pixels is not None:
             view = self.pixels.view
@@ -229,7 +229,7 @@ class GroupPda:
             x = np.hstack([view.image(x[:, :2]), np.einsum("gij,gj->gi", J, x[:, 2:])])
             events = [replace(e, pos=tuple(view.image(np.array([e.pos]))[0].tolist())) for e in events]
         size = bank.size[rows] / scaled.kernel_rules[kernels.DETECT_PROB]
-        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], extent, size, convex_hulls(hulls))
+        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], extent, size, hulls)
         return whole_group_tracks(frame, self.plane, self.context.fps, groups, P, events)
 
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:
@@ -249,11 +249,12 @@ class GroupPda:
             points = below_heads(points, detections.box, camera)
         return points, np.ones(len(points))
 
-    def _outline(self, places: Array, about: Array) -> Array:
-        (corners,) = convex_hulls([places])  # they suffice, and are few
+    def _outlines(self, bank: GroupBank, rows: Ints, about: Array) -> list[Array]:
+        # The places on their own hull suffice, and are few.
+        corners = convex_hulls([bank.positions(r) for r in rows.tolist()])
         if self.pixels is not None:
-            return self.pixels.outline(corners)
-        return np.asarray((corners[:, None] + about).reshape(-1, 2))
+            return [self.pixels.outline(c) for c in corners]
+        return [(c[:, None] + about).reshape(-1, 2) for c in corners]
 
     def _about(self, detections: Detections | None) -> Array:
         if self.plane == "ground":
@@ -267,8 +268,7 @@ class GroupPda:
 
         From points they are the corners of footprints or usual boxes, in the unit of the points.
         """
-        bank, about = self.bank, self._about(None)
-        return [self._outline(bank.positions(r), about) for r in np.flatnonzero(bank.confirmed).tolist()]
+        return self._outlines(self.bank, np.flatnonzero(self.bank.confirmed), self._about(None))
 
     def _no_tracks(self, frame: Frame) -> Tracks:
         none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
