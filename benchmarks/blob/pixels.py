@@ -1,7 +1,7 @@
 """Mode `pixels` of `benchmarks.blob`: on PETS and on rendered scenes, with parts of the tracker switched off.
 
 Rows "…, no looks": nobody's colours are learned.
-Columns: HOTA, DetA, AssA, MOTA, IDF1 (means over sequences) and frames per second.
+Columns: HOTA, DetA, AssA, MOTA, IDF1 (means over sequences).
 pets: PETS09-S2L1-first200, by IoU of boxes; the background sample spread over the recording, and its first 50 frames.
 With the calibration View_001.xml also by the position on the ground (similarity 1 - d / 2 m, 0.5 at 1 m).
 rendered: scenes of the catalogue under a camera like that of PETS (480 x 360, 7 frames/s, tilts of 15 and 20 degrees,
@@ -74,45 +74,44 @@ def pixels(parts: Sequence[str], pets_folder: Path, seeds: range) -> None:
         above(seeds)
 
 
-def scores_and_speed(
+def mean_scores(
     sequences: Sequence[Recording], params: dict[str, object], similarity: str = "boxes", mode: str = "image"
 ) -> list[str]:
-    """Returns the cells of a row: means of the scores over the sequences, and of the frames per second."""
-    scores, speeds = [], []
+    """Returns the cells of a row: means of the scores over the sequences."""
+    scores = []
     for sequence in sequences:
         run = track("blob", sequence, params=params, detections=mode)  # type: ignore[arg-type]
         assert sequence.truth is not None
         found = tracking.evaluate(sequence.truth, run, similarity=similarity)
         scores.append([found[k] for k in KEYS])
-        speeds.append(run.info["frames_per_second"])
-    return [*(f"{v:.3f}" for v in np.mean(scores, 0)), f"{np.mean(speeds):.0f}"]
+    return [f"{v:.3f}" for v in np.mean(scores, 0)]
 
 
 def pets(folder: Path) -> None:
     for background, ablations in (("spread:50", ABLATIONS), ("first:50", {"blob": {}})):
-        head([f"PETS, background {background}", *KEYS, "frames/s"])
+        head([f"PETS, background {background}", *KEYS])
         sequence = open_source(folder, images=True, background=background)[0]
         ablation_rows([sequence], ablations)
-    head(["PETS with View_001.xml, background spread:50", *KEYS, "frames/s"])
+    head(["PETS with View_001.xml, background spread:50", *KEYS])
     sequence = open_source(folder, images=True, camera=folder / "View_001.xml")[0]
     for similarity in ("boxes", "ground"):
-        row([similarity, *scores_and_speed([sequence], {}, similarity)])
+        row([similarity, *mean_scores([sequence], {}, similarity)])
 
 
 def rendered(seeds: range) -> None:
     for bare in (False, True):
         made = [rendered_scene(name, tilt, seed, bare) for name, tilt in SCENES for seed in seeds]
-        head(["rendered, " + ("bare video" if bare else "camera and empty background"), *KEYS, "frames/s"])
+        head(["rendered, " + ("bare video" if bare else "camera and empty background"), *KEYS])
         ablation_rows(made, ABLATIONS)
 
 
 def ablation_rows(made: Sequence[Recording], ablations: dict[str, dict[str, object]]) -> None:
     """Prints a row for each set of parameters, and one like the first row without looks."""
     for title, params in ablations.items():
-        row([title, *scores_and_speed(made, params)])
+        row([title, *mean_scores(made, params)])
     title, params = next(iter(ablations.items()))
     with replaced_code([NO_LOOKS]):
-        row([f"{title}, no looks", *scores_and_speed(made, params)])
+        row([f"{title}, no looks", *mean_scores(made, params)])
 
 
 def rendered_scene(name: str, tilt: int, seed: int, bare: bool) -> Recording:
@@ -128,11 +127,11 @@ def rendered_scene(name: str, tilt: int, seed: int, bare: bool) -> Recording:
 
 
 def people_who_stand(name: str, clips: dict[str, list[str]], seeds: range) -> None:
-    head([f"{name}, bare video", *KEYS, "frames/s"])
+    head([f"{name}, bare video", *KEYS])
     for title, settings in clips.items():
         made = [encoded(simulate(load(HERE / f"{name}.toml", set=settings), seed)) for seed in seeds]
         ablation_rows([video for video, _ in made], {title: {}})
-    row([f"{title}, picture of the empty place", *scores_and_speed([with_picture(*each) for each in made], {})])
+    row([f"{title}, picture of the empty place", *mean_scores([with_picture(*each) for each in made], {})])
 
 
 def encoded(live: Recording) -> tuple[Recording, Image]:
@@ -165,9 +164,9 @@ def with_picture(video: Recording, empty: Image) -> Recording:
 
 
 def above(seeds: range) -> None:
-    head(["from straight above", *KEYS, "frames/s"])
+    head(["from straight above", *KEYS])
     for title, scenes in ABOVE.items():
         made = [simulate(load(name, set=settings), seed) for name, settings in scenes for seed in seeds]
         for mode, what in (("image", "pixels"), ("file", "boxes")):
             for variant in ("blob", "preset `paper`"):
-                row([f"{title}, {what}, {variant}", *scores_and_speed(made, ABLATIONS[variant], mode=mode)])
+                row([f"{title}, {what}, {variant}", *mean_scores(made, ABLATIONS[variant], mode=mode)])
