@@ -4,10 +4,13 @@ A plot is n people over DURATION seconds: their ways are straight between knots,
 with any frame rate. Parameters are drawn so that no threshold of a rule is met by a hair.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from hypothesis import strategies as st
+
+from sim.truth.merge_split_events import groups_and_events
+from sim.truth.motion_rows import MotionRows
 
 DURATION = 24.0  # s
 APART = 60.0  # m between the plots of a scene
@@ -37,6 +40,14 @@ class Scene:
 
     def but(self, **changed):
         return Scene(**{**self.__dict__, **changed})
+
+
+def measured(pos, vel, present, intent, fps):
+    """Groups and events, with the groups as a table (T, P)."""
+    rows, group = MotionRows.of_table(pos, vel, present, intent), np.full(present.shape, -1)
+    found = groups_and_events(rows, fps)
+    group[rows.frame, rows.column] = found.group
+    return replace(found, group=group)
 
 
 def look(plots, fps, duration=DURATION):

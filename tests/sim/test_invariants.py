@@ -6,10 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.truth.crossing_events import crossings
-from sim.truth.merge_split_events import groups_and_events
 from sim.truth.motion_rows import MotionRows
 from sim.truth.queue_detection import queues
-from tests.plots import DURATION, crosses, look, merges, scenes, splits
+from tests.plots import DURATION, crosses, look, measured, merges, scenes, splits
 
 FPS = 10.0
 SETTLED = 8.0  # s: what ended so long ago is known, whatever follows
@@ -17,7 +16,7 @@ SETTLED = 8.0  # s: what ended so long ago is known, whatever follows
 
 def measure(scene):
     """Labels (T, P) and events as (kind, start, end, members, how many groups and people alone before, and after)."""
-    found = groups_and_events(scene.pos, scene.vel, scene.present, scene.intent, scene.fps)
+    found = measured(scene.pos, scene.vel, scene.present, scene.intent, scene.fps)
     motion = MotionRows.of_table(scene.pos, scene.vel, scene.present, found.group)
     return found.group, [*found.events, *crossings(motion, scene.fps), *queues(motion, scene.fps)]
 
