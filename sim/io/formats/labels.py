@@ -18,8 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
-from scenarios.limits import CELLS
 from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, Frame, GroupEvent, Groups, Ints, Sequence, Truth
 
@@ -27,16 +25,6 @@ from sim.types import Array, Frame, GroupEvent, Groups, Ints, Sequence, Truth
 def centres(box: Array) -> Array:
     """Returns the middles (R, 2) of boxes (R, 4) left, top, width, height."""
     return np.asarray(box[:, :2] + box[:, 2:] / 2)
-
-
-def require_size(path: Path, length: int, id: Ints) -> None:
-    """Raises InputError if `length` times the number of different ids in id (R,) exceeds 20 million."""
-    people = len(np.unique(id))
-    # One mistyped frame number must not fill the memory.
-    if length * people > CELLS:
-        got = f"{length:,} frames with {people:,} people"
-        expected = f"at most {CELLS:,} frames times people"
-        raise InputError(file=path, got=got, expected=expected, remedy="correct the last frame, or cut the recording")
 
 
 def labelled_sequence(

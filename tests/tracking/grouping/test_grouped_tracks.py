@@ -1,11 +1,13 @@
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
 
+from sim.io.formats.labels import labelled_truth_fields
 from sim.types import GroupEvent, Groups, Tracks
 from tests.reference_sense import paced
-from tracking.grouping import merge_split_events
+from tracking.grouping import grouping_choice, link_rule, merge_split_events
 from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.grouping.link_rule import LinkRule
 
@@ -56,6 +58,30 @@ def joining(speed=0.4, near=0.8):
 def leaving():
     """A pair, and one 0.69 m beside it who drifts away at 0.4 m/s from 5 s on."""
     return [*side_by_side(), paced((5, (1, 0)), (15, (1, 0.4)), start=(0, 1.39))]
+
+
+def truth(made):
+    id, pos, vel = (np.concatenate([getattr(t, name) for t in made]) for name in ("id", "pos", "vel"))
+    return labelled_truth_fields(np.arange(1, len(id) + 1), id, id // 2, pos, vel, fps=FPS, length=len(made))
+
+
+@pytest.mark.parametrize("measure", [truth, lambda made: derive(made, FPS, rule=RULE), lambda made: derive(made, FPS)])
+def test_memory_grows_as_what_was_seen(monkeypatch, measure):
+    """Of people who come one after the other, tables of all frames by all people would grow as their square."""
+    for module in (grouping_choice, link_rule):
+        monkeypatch.setattr(module, "CELLS", 1000)
+
+    def peak(people):
+        still, there = np.zeros((20 * people, 2)), np.repeat(np.eye(people, dtype=bool), 20, axis=0)
+        made = tracks([(still, still)] * people, there=there)
+        tracemalloc.start()
+        measure(made)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most
+
+    peak(2)  # imports
+    assert peak(160) < 6 * peak(40)
 
 
 def test_a_pair_is_a_group_once_it_is_acquainted():
