@@ -117,6 +117,13 @@ def test_detections_in_frames_without_labels_are_no_false_alarms() -> None:
     assert 0.5 < got.false.sum() / got.truth.length < 1.5
 
 
+def test_detections_of_other_frames_are_told() -> None:
+    scene = simulate(load("street"), 30_000, streams=())
+    late = scene.truth.replace(frame=scene.truth.frame + 1, length=scene.length + 1, labelled=None)
+    with pytest.warns(UserWarning, match=r"with \+1 on their frame numbers the detections have"):
+        matching.match_sequence(replace(scene, load_truth=lambda: late))
+
+
 def people(count: int = 30, frames: int = 300) -> Truth:
     frame = np.repeat(np.arange(1, frames + 1), count)
     id = np.tile(np.arange(1, count + 1), frames)
