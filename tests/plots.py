@@ -50,6 +50,10 @@ def measured(pos, vel, present, intent, fps):
     return replace(found, group=group)
 
 
+def partition(group):
+    return [{frozenset(np.flatnonzero(row == g).tolist()) for g in set(row.tolist()) - {-1}} for row in group]
+
+
 def look(plots, fps, duration=DURATION):
     """The plots side by side, as seen `fps` times a second."""
     t = np.arange(round(duration * fps)) / fps
@@ -60,9 +64,8 @@ def look(plots, fps, duration=DURATION):
             wanted[t >= since - 1e-9] = numbers
         intent.append(wanted + 100 * number)
         for times, places in plot.knots:
-            pos.append(
-                np.stack([np.interp(t, times, places[:, k]) for k in (0, 1)], axis=1) + np.array([0, APART * number])
-            )
+            way = np.stack([np.interp(t, times, places[:, k]) for k in (0, 1)], axis=1)
+            pos.append(way + np.array([0, APART * number]))
             piece = np.clip(np.searchsorted(times, t + 1e-9, side="right") - 1, 0, len(times) - 2)
             vel.append((np.diff(places, axis=0) / np.diff(times)[:, None])[piece])
     pos, vel = np.stack(pos, axis=1), np.stack(vel, axis=1)

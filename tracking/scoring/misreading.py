@@ -121,8 +121,8 @@ def likely_misreading(
 
 
 def shifted_boxes(truth: Truth, frame: Ints, box: Array) -> str:
-    """Returns a warning if detections lie on labels of up to 10 frames away more exactly, else "". frame (M,), ascending,
-    box (M, 4), px: of detections of labelled people; the truth has boxes."""
+    """Returns a warning if detections lie on labels of up to 10 frames away more exactly, else "". frame (M,),
+    ascending, box (M, 4), px: of detections of labelled people; the truth has boxes."""
     assert truth.box is not None
     true, est = Side(FrameRows(truth.frame, truth.id), truth.box), Side(FrameRows(frame, np.arange(len(frame))), box)
     return _shifted(true, _some(np.unique(frame), true, est)[1], "detections")

@@ -63,9 +63,7 @@ class NumericTable:
         span, remedy, most = f"frames from 1 to {length or FRAMES}", "correct the frame", None
         if length is not None:
             remedy = "correct the frame, or seqLength"
-            count = (
-                "number its frames 1, 2, 3, …, as those of the recording are read, also if it has 0, 10, 20, …"
-            )
+            count = "number its frames 1, 2, 3, …, as those of the recording are read, also if it has 0, 10, 20, …"
             most = f"check that this text belongs to this recording, and its seqLength, or {count}"
             self.reject((frame == 0) & (frame.max(initial=0) >= length), span, count)
         self.reject(frame == 0, span, "add 1 to all frames, if the file counts them from 0")

@@ -1,6 +1,6 @@
 import numpy as np
 
-from tests.plots import measured
+from tests.plots import measured, partition
 from tests.reference_groups import labels
 from tests.reference_sense import paced
 
@@ -79,10 +79,6 @@ def scene(seed, frames=60, people=7, fps=4.0):
         intent[t] = now
     nowhere = ~there[..., None]
     return np.where(nowhere, np.nan, pos), np.where(nowhere, np.nan, vel * 0.4), there, np.where(there, intent, -1), fps
-
-
-def partition(group):
-    return [{frozenset(np.flatnonzero(row == g).tolist()) for g in set(row.tolist()) - {-1}} for row in group]
 
 
 def test_labels_are_those_of_the_rules_read_frame_by_frame():

@@ -19,12 +19,7 @@ from sim.types import Detections, Truth
 from tests.hand_made import with_rows
 from tests.recordings import mot_folder
 from tracking.fitting import detection_matching as matching
-from tracking.fitting.error_correlation import (
-    bivariate_normal_cdf,
-    correlations,
-    fit_memory,
-    miss_correlations,
-)
+from tracking.fitting.error_correlation import bivariate_normal_cdf, correlations, fit_memory, miss_correlations
 from tracking.fitting.error_statistics import error_statistics, miss_runs
 from tracking.fitting.false_alarms import alarm_tracks
 

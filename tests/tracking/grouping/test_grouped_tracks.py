@@ -7,7 +7,7 @@ import pytest
 from sim.io.formats.labels import labelled_truth_fields
 from sim.types import GroupEvent, Groups, Tracks
 from tests.reference_sense import paced
-from tracking.grouping import grouping_choice, link_rule, merge_split_events
+from tracking.grouping import merge_split_events
 from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.grouping.link_rule import LinkRule
 
@@ -26,13 +26,10 @@ def tracks(people, *, scale=1.0, there=None, boxes=False, group=None, vel=True, 
         k = np.flatnonzero(there[t])
         n = len(k)
         box = np.column_stack([pos[t, k] - [5, 10], np.tile([10.0, 20], (n, 1))]) if boxes else None
-        out.append(
-            Tracks(
-                t + 1, t / FPS, "image" if scale != 1 else "ground", "person", ids[k],
-                np.full(n, -1) if group is None else group[t, k], pos[t, k],
-                speed[t, k] if vel else np.full((n, 2), np.nan), np.zeros((n, 4, 4)), box, np.ones(n),
-            )
-        )  # fmt: skip
+        label = np.full(n, -1) if group is None else group[t, k]
+        moves = speed[t, k] if vel else np.full((n, 2), np.nan)
+        known = ids[k], label, pos[t, k], moves, np.zeros((n, 4, 4)), box, np.ones(n)
+        out.append(Tracks(t + 1, t / FPS, "image" if scale != 1 else "ground", "person", *known))
     return out
 
 
@@ -66,10 +63,8 @@ def truth(made):
 
 
 @pytest.mark.parametrize("measure", [truth, lambda made: derive(made, FPS, rule=RULE), lambda made: derive(made, FPS)])
-def test_memory_grows_as_what_was_seen(monkeypatch, measure):
+def test_memory_grows_as_what_was_seen(measure):
     """Of people who come one after the other, tables of all frames by all people would grow as their square."""
-    for module in (grouping_choice, link_rule):
-        monkeypatch.setattr(module, "CELLS", 1000)
 
     def peak(people):
         still, there = np.zeros((20 * people, 2)), np.repeat(np.eye(people, dtype=bool), 20, axis=0)
