@@ -21,8 +21,7 @@ REPEATS = 10_000  # entries that one row of a suite stands for
 INTEGER = 2**63 - 1  # largest whole number in a TOML or JSON file, also with a minus sign
 
 FRAMES = 1_000_000  # frames of a sequence: 11 hours at 25 frames per second
-# frames times people of a sequence that is simulated or has labelled groups, whose motion is held as an array
-CELLS = 20_000_000
+CELLS = 20_000_000  # frames times people of a sequence that is simulated, whose motion is held as an array
 FRAME_RATES = (0.01, 1000.0)  # least and greatest number of frames per second
 PICTURE_SIDE = 16_384  # width or height of a picture, px
 PICTURE_PIXELS = 40_000_000  # width times height of a picture, px; 8K has 33 million

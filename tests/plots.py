@@ -4,10 +4,13 @@ A plot is n people over DURATION seconds: their ways are straight between knots,
 with any frame rate. Parameters are drawn so that no threshold of a rule is met by a hair.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from hypothesis import strategies as st
+
+from sim.truth.merge_split_events import groups_and_events
+from sim.truth.motion_rows import MotionRows
 
 DURATION = 24.0  # s
 APART = 60.0  # m between the plots of a scene
@@ -39,6 +42,18 @@ class Scene:
         return Scene(**{**self.__dict__, **changed})
 
 
+def measured(pos, vel, present, intent, fps):
+    """Groups and events, with the groups as a table (T, P)."""
+    rows, group = MotionRows.of_table(pos, vel, present, intent), np.full(present.shape, -1)
+    found = groups_and_events(rows, fps)
+    group[rows.frame, rows.column] = found.group
+    return replace(found, group=group)
+
+
+def partition(group):
+    return [{frozenset(np.flatnonzero(row == g).tolist()) for g in set(row.tolist()) - {-1}} for row in group]
+
+
 def look(plots, fps, duration=DURATION):
     """The plots side by side, as seen `fps` times a second."""
     t = np.arange(round(duration * fps)) / fps
@@ -49,9 +64,8 @@ def look(plots, fps, duration=DURATION):
             wanted[t >= since - 1e-9] = numbers
         intent.append(wanted + 100 * number)
         for times, places in plot.knots:
-            pos.append(
-                np.stack([np.interp(t, times, places[:, k]) for k in (0, 1)], axis=1) + np.array([0, APART * number])
-            )
+            way = np.stack([np.interp(t, times, places[:, k]) for k in (0, 1)], axis=1)
+            pos.append(way + np.array([0, APART * number]))
             piece = np.clip(np.searchsorted(times, t + 1e-9, side="right") - 1, 0, len(times) - 2)
             vel.append((np.diff(places, axis=0) / np.diff(times)[:, None])[piece])
     pos, vel = np.stack(pos, axis=1), np.stack(vel, axis=1)

@@ -18,8 +18,9 @@ from sim.scene.body import Ellipsoids, Outlines, RecordedBodies, contour, outlin
 from sim.scene.camera import project, px_per_m_at_centre
 from sim.scene.visibility import measure_visibility
 from sim.truth.merge_split_events import GroupsAndEvents
+from sim.truth.motion_rows import MotionRows
 from sim.truth.order_fulfilment import fulfilment
-from sim.types import Array, Camera, GroupEvent, Groups, Ints, Motion, Near, Order, States, Truth
+from sim.types import Array, Camera, GroupEvent, Groups, Ints, Motion, Near, Order, Truth
 
 POINTS = 24  # vertices of each polygon
 INSTANT = 0.02  # s: half the step by which ground velocities become image velocities
@@ -106,13 +107,15 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     people = recorded_bodies(motion)
     truth = bodies(motion, camera, people)
     s = motion.states()
-    found = groups_and_events(s.pos, s.vel, s.present, s.intent, s.rate)
+    rows = MotionRows.of_table(s.pos, s.vel, s.present, s.intent)
+    found, group = groups_and_events(rows, s.rate), np.full(s.present.shape, -1)
+    group[rows.frame, rows.column] = found.group
     shown = FrameTicks.of(truth.length, motion.fps, s.rate, s.present)
-    truth = truth.replace(group=found.group[shown.tick[people.frame - 1], people.id - 1])
+    truth = truth.replace(group=group[shown.tick[people.frame - 1], people.id - 1])
     assert truth.pos is not None
     assert truth.vel is not None
     ground = tuple(groups_over_time(truth.frame, truth.id, truth.group, truth.pos, truth.vel, 1, truth.length))
-    events, orders = _events_in_frames(_events(s, found), motion, found.group, shown)
+    events, orders = _events_in_frames(_events(rows, found, s.rate), motion, group, shown)
     return truth.replace(
         groups=ground, groups_px=None if camera is None else image_groups(truth, ground, camera, people.shapes),
         labelled=np.ones(truth.length, dtype=np.bool_), events=events, near=_near_in_frames(found.near, shown),
@@ -120,13 +123,12 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     )  # fmt: skip
 
 
-def _events(s: States, found: GroupsAndEvents) -> list[GroupEvent]:
+def _events(rows: MotionRows, found: GroupsAndEvents, rate: float) -> list[GroupEvent]:
     from sim.truth.crossing_events import crossings
-    from sim.truth.motion_rows import MotionRows
     from sim.truth.queue_detection import queues
 
-    rows = MotionRows.of_table(s.pos, s.vel, s.present, found.group)
-    return [*found.events, *crossings(rows, s.rate), *queues(rows, s.rate)]
+    rows = replace(rows, group=found.group)
+    return [*found.events, *crossings(rows, rate), *queues(rows, rate)]
 
 
 def _events_in_frames(

@@ -13,72 +13,68 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import chain, combinations, pairwise
 from typing import Literal
 
 import numpy as np
 
 from sim.truth.identity import GroupChange, Identities, PersonSet
 from sim.truth.merge_split_rules import HOLD_TIME, frames_of, holds_for, mean_of_present, separation, strangers
-from sim.types import Array, Bools, GroupEvent, Ints, Near
+from sim.truth.motion_rows import MotionRows, frames_of_change
+from sim.types import GroupEvent, Ints, Near
 
 Rule = Literal["merge", "split"]
 NEVER = np.iinfo(np.int64).max
 
 
-def partitions(
-    pos: Array, vel: Array, present: Bools, intent: Ints, fps: float
-) -> Iterator[tuple[int, list[PersonSet]]]:
+def partitions(motion: MotionRows, fps: float) -> Iterator[tuple[int, list[PersonSet]]]:
     """Yields (t, parts) for frame 0 and for each later frame t (from 0) in which the parts may have changed.
 
-    parts: disjoint sets of columns (person id - 1) that make up all people present, valid until the next t. pos, vel
-    (T, P, 2): m, m/s. present (T, P). intent (T, P): the group a person is meant to belong to, -1 while absent.
+    parts: disjoint sets of columns (person id - 1) that make up all people present, valid until the next t. motion:
+    with the group that a person is meant to belong to.
     """
-    turns = _turns(present, intent)
+    order = np.lexsort((motion.column, motion.frame))
+    frame, column, intent = motion.frame[order], motion.column[order], motion.group[order]
+    # frame 0, and those from which somebody else is present, or meant to be in another group
+    turns = [0, *frames_of_change(frame, column, intent, motion.length)]
     parts: list[PersonSet] = []
-    rules = _RuleTimes(pos, vel, present, intent, frames_of(HOLD_TIME, fps))
+    rules = _RuleTimes(motion, frames_of(HOLD_TIME, fps))
     t, k = 0, 0
-    while t < len(present):
+    while t < motion.length:
         if k < len(turns) and turns[k] == t:
-            parts = rules.enter_and_leave(parts, t)
+            rows = slice(*np.searchsorted(frame, (t, t + 1)))
+            parts = rules.enter_and_leave(parts, dict(zip(column[rows].tolist(), intent[rows].tolist(), strict=True)))
             k += 1
         parts = rules.join_and_divide(parts, t)
         yield t, parts
-        t = min(rules.next_change(parts, t), int(turns[k]) if k < len(turns) else NEVER)
-
-
-def _turns(present: Bools, intent: Ints) -> Ints:
-    """Returns frame 0 and the frames from which somebody else is present, or meant to be in another group."""
-    if not len(present):
-        return np.zeros(0, np.int64)
-    moved = (np.diff(present, axis=0) | (np.diff(intent, axis=0) != 0)).any(axis=1)
-    return np.concatenate([[0], np.flatnonzero(moved) + 1])
+        t = min(rules.next_change(parts, t), turns[k] if k < len(turns) else NEVER)
 
 
 class _RuleTimes:
     """When parts of the crowd will join or divide in one motion.
 
-    State: for each rule and two parts, the frames from which the rule will hold long enough. They are measured once,
-    when both parts exist for the first time, and remain valid while the parts stay the same.
+    State: intent, the group that each person present is meant to belong to now. For each rule and two parts, the frames
+    from which the rule will hold long enough. They are measured once, when both parts exist for the first time, and
+    remain valid while the parts stay the same.
     """
 
-    def __init__(self, pos: Array, vel: Array, present: Bools, intent: Ints, hold: int) -> None:
-        there = present[..., None]
-        self.pos, self.vel = np.where(there, pos, np.nan), np.where(there, vel, np.nan)
-        self.present, self.intent, self.hold = present, intent, hold
+    def __init__(self, motion: MotionRows, hold: int) -> None:
+        self.motion, self.hold = motion, hold
+        self.intent: dict[int, int] = {}
         self._known: dict[tuple[Rule, PersonSet, PersonSet], Ints] = {}
 
-    def enter_and_leave(self, parts: list[PersonSet], t: int) -> list[PersonSet]:
-        """Returns the parts of those present in frame t; people who enter together are one part."""
-        here = frozenset(np.flatnonzero(self.present[t]).tolist())
+    def enter_and_leave(self, parts: list[PersonSet], intent: dict[int, int]) -> list[PersonSet]:
+        """Returns the parts of the people in `intent`, who are present now; people who enter together are one part."""
+        self.intent = intent
+        here = frozenset(intent)
         stay = [part & here for part in parts if part & here]
-        return stay + list(self._by_intent(here - frozenset().union(*stay), t).values())
+        return stay + list(self._by_intent(here - frozenset().union(*stay)).values())
 
-    def _by_intent(self, people: Iterable[int], t: int) -> dict[int, PersonSet]:
-        """Returns the people by the group that they are meant to belong to in frame t."""
+    def _by_intent(self, people: Iterable[int]) -> dict[int, PersonSet]:
+        """Returns the people by the group that they are meant to belong to now."""
         found: dict[int, set[int]] = {}
         for p in sorted(people):
-            found.setdefault(int(self.intent[t, p]), set()).add(p)
+            found.setdefault(self.intent[p], set()).add(p)
         return {g: frozenset(some) for g, some in found.items()}
 
     def join_and_divide(self, parts: list[PersonSet], t: int) -> list[PersonSet]:
@@ -95,14 +91,14 @@ class _RuleTimes:
         """Returns the first frame after t in which parts join or may divide; NEVER if there is none."""
         times = [_first(frames, t + 1) for _, frames in self._meant_to_join(parts, t)]
         for part in parts:
-            times += [_first(self._onsets("split", a, b, t), t + 1) for a, b in self._meant_to_divide(part, t)]
+            times += [_first(self._onsets("split", a, b, t), t + 1) for a, b in self._meant_to_divide(part)]
         return min(times, default=NEVER)
 
     def _meant_to_join(self, parts: list[PersonSet], t: int) -> Iterator[tuple[tuple[PersonSet, PersonSet], Ints]]:
         """Yields ((a, b), frames of the merge rule) for each two parts that are meant to be one group in frame t."""
         meant: dict[int, list[tuple[PersonSet, PersonSet]]] = {}
         for part in parts:
-            g, core = max(self._by_intent(part, t).items(), key=lambda item: len(item[1]))
+            g, core = max(self._by_intent(part).items(), key=lambda item: len(item[1]))
             # A part joins as the group that most of its people are meant to be in; the rule is measured between these.
             if 2 * len(core) > len(part):
                 meant.setdefault(g, []).append((part, core))
@@ -110,36 +106,33 @@ class _RuleTimes:
             for (a, core_a), (b, core_b) in combinations(some, 2):
                 yield (a, b), self._onsets("merge", core_a, core_b, t)
 
-    def _meant_to_divide(self, part: PersonSet, t: int) -> Iterator[tuple[PersonSet, PersonSet]]:
-        return combinations(self._by_intent(part, t).values(), 2) if len(part) > 1 else iter(())
+    def _meant_to_divide(self, part: PersonSet) -> Iterator[tuple[PersonSet, PersonSet]]:
+        return combinations(self._by_intent(part).values(), 2) if len(part) > 1 else iter(())
 
     def _divide(self, part: PersonSet, t: int) -> list[PersonSet]:
         if len(part) == 1:
             return [part]
         # Two subsets stay together, too, if a third one connects them.
-        unsplit = [(a, b) for a, b in self._meant_to_divide(part, t) if _first(self._onsets("split", a, b, t), t) != t]
-        return _connected(list(self._by_intent(part, t).values()), unsplit)
+        unsplit = [(a, b) for a, b in self._meant_to_divide(part) if _first(self._onsets("split", a, b, t), t) != t]
+        return _connected(list(self._by_intent(part).values()), unsplit)
 
     def _onsets(self, rule: Rule, a: PersonSet, b: PersonSet, t: int) -> Ints:
         """Returns the frames, ascending, from which the rule will hold long enough between parts a and b."""
         key = (rule, a, b)
         if key not in self._known:
-            self._known[key] = self._measure(rule, np.array(sorted(a)), np.array(sorted(b)), t)
+            self._known[key] = self._measure(rule, sorted(a), sorted(b), t)
         return self._known[key]
 
-    def _measure(self, rule: Rule, a: Ints, b: Ints, t: int) -> Ints:
-        both = self.present[t:, a].any(axis=1) & self.present[t:, b].any(axis=1)
-        ends = np.flatnonzero(both)
-        if not len(ends):
-            return ends
-        window = slice(t, t + int(ends[-1]) + 1)
-        intent, present = self.intent[window], self.present[window]
-        found = separation(self.pos[window], self.vel[window], a, b)
+    def _measure(self, rule: Rule, a: list[int], b: list[int], t: int) -> Ints:
+        end = min(int(self.motion.last(np.array(part)).max()) for part in (a, b)) + 1
+        pos, vel, intent = self.motion.window(a + b, t, end)
+        first, second = np.split(np.arange(len(a + b)), [len(a)])
+        found = separation(pos, vel, first, second)
         holds = found.merge_rule() if rule == "merge" else found.split_rule()
         # Everybody must be meant to be in one group, or in two.
-        same = intent[:, a, None] == intent[:, None, b]
-        meant = same if rule == "merge" else ~same
-        holds &= (meant | ~(present[:, a, None] & present[:, None, b])).all(axis=(1, 2))
+        one, other = intent[:, first, None], intent[:, None, second]
+        meant = (one == other) if rule == "merge" else (one != other)
+        holds &= (meant | (one < 0) | (other < 0)).all(axis=(1, 2))
         return np.flatnonzero(holds_for(holds, self.hold)) + t
 
 
@@ -161,9 +154,9 @@ def _connected(parts: list[PersonSet], links: list[tuple[PersonSet, PersonSet]])
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroupsAndEvents:
-    """What is measured of the groups in a motion of T frames and P people."""
+    """What is measured of the groups in a motion of R rows."""
 
-    group: Ints  # (T, P) id of each person's group, from 1; -1 for a person who is alone or absent
+    group: Ints  # (R,) id of each person's group, from 1; -1 for a person who is alone
     # merge, split, form, dissolve, enter and leave, in order of the frame in which the group changed; () if none
     events: tuple[GroupEvent, ...]
     # pairs of people who satisfy the merge rule (less than 1.5 m apart, velocities differing by less than 0.5 m/s, for
@@ -171,30 +164,29 @@ class GroupsAndEvents:
     near: Near
 
 
-def groups_and_events(pos: Array, vel: Array, present: Bools, intent: Ints, fps: float) -> GroupsAndEvents:
+def groups_and_events(motion: MotionRows, fps: float) -> GroupsAndEvents:
     """Returns the group ids, the events (all kinds but cross and queue) and the near strangers of a motion.
 
-    pos, vel (T, P, 2): m, m/s, nan while absent. present (T, P). intent (T, P): the group a person is meant to belong
-    to, -1 while absent. Frames of events count from 1, a person's id is the column + 1. A merge, split, form or
-    dissolve starts in the first frame in which its rule holds, and ends when it has held for HOLD_TIME. An enter lies
-    in the group's first frame, a leave in the last frame before the group is gone.
+    motion: `group` is the group that a person is meant to belong to, from 0. Frames of events count from 1, a person's
+    id is the column + 1. A merge, split, form or dissolve starts in the first frame in which its rule holds, and ends
+    when it has held for HOLD_TIME. An enter lies in the group's first frame, a leave in the last frame before the group
+    is gone.
     """
-    group = np.full(present.shape, -1, np.int64)
+    group = np.full(len(motion.frame), -1)
     identities, events = Identities(), []
     hold = frames_of(HOLD_TIME, fps)
-    steps = [*partitions(pos, vel, present, intent, fps), (len(present), [])]
-    for (t, parts), (until, _) in pairwise(steps):
-        here = frozenset(np.flatnonzero(present[t]).tolist())
-        changes = identities.step(t, here, parts)
+    for (t, parts), (until, _) in pairwise(chain(partitions(motion, fps), [(motion.length, [])])):
+        changes = identities.step(t, frozenset().union(*parts), parts)
         for g, people in identities.groups.items():
-            group[t:until, sorted(people)] = g
-        events += [_event(c, t, hold, pos) for c in changes if t > 0]
-    return GroupsAndEvents(group, tuple(events), strangers(pos, vel, present, intent, group, fps))
+            for p in people:
+                group[int(motion.find(p, t)) : int(motion.find(p, until))] = g
+        events += [_event(c, t, hold, motion) for c in changes if t > 0]
+    return GroupsAndEvents(group, tuple(events), strangers(motion, group, fps))
 
 
-def _event(change: GroupChange, t: int, hold: int, pos: Array) -> GroupEvent:
+def _event(change: GroupChange, t: int, hold: int, motion: MotionRows) -> GroupEvent:
     start = t if change.kind == "leave" else t + 1
     end = start if change.kind in ("enter", "leave") else start + hold - 1
-    x, y = mean_of_present(pos[start - 1 : start, list(change.members)])[0]
+    x, y = mean_of_present(motion.window(change.members, start - 1, start)[0])[0]
     people = tuple(p + 1 for p in change.members)
     return GroupEvent(change.kind, start, end, None, change.before, change.after, people, (float(x), float(y)))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.elementary import dot, length
+from sim.truth.motion_rows import MotionRows
 from sim.types import Array, Bools, Ints, Near
 
 MERGE_DISTANCE = 1.5  # m between the nearest members: parts may merge below it
@@ -142,23 +143,22 @@ def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Int
     return pair[start[long]], frame[start[long]], frame[end[long]]
 
 
-def strangers(pos: Array, vel: Array, present: Bools, intent: Ints, group: Ints, fps: float) -> Near:
+def strangers(motion: MotionRows, group: Ints, fps: float) -> Near:
     """Returns the stretches of time in which two people satisfy the merge rule but do not belong together.
 
-    They do not belong together where their intents differ and they are not in one group. pos, vel (T, P, 2): m, m/s.
-    present, intent (T, P): as in `States`. group (T, P): the measured group ids, -1 = alone.
+    They do not belong together where their intents differ and they are not in one group. motion: with the intents as
+    `group`. group (R,): the measured group ids of its rows, -1 = alone.
     """
-    t, p = np.nonzero(present)
-    i, j = close_pairs(t, pos[t, p], MERGE_DISTANCE)
-    t, a, b = t[i], p[i], p[j]
-    differ = length(vel[t, a] - vel[t, b])
+    rows = np.lexsort((motion.column, motion.frame))
+    i, j = (rows[k] for k in close_pairs(motion.frame[rows], motion.pos[rows], MERGE_DISTANCE))
+    differ = length(motion.vel[i] - motion.vel[j])
     # Two people of one group that has not split yet are no strangers.
-    same_group = (group[t, a] >= 0) & (group[t, a] == group[t, b])
-    kept = (differ < MERGE_VELOCITY) & (intent[t, a] != intent[t, b]) & ~same_group
-    t, a, b = t[kept], a[kept], b[kept]
-    pair = a * present.shape[1] + b
+    same_group = (group[i] >= 0) & (group[i] == group[j])
+    kept = (differ < MERGE_VELOCITY) & (motion.group[i] != motion.group[j]) & ~same_group
+    i, j, people = i[kept], j[kept], int(motion.column.max(initial=0)) + 1
+    t, pair = motion.frame[i], motion.column[i] * people + motion.column[j]
     order = np.lexsort((t, pair))
     pair, first, last = stretches(pair[order], t[order], frames_of(HOLD_TIME, fps))
     order = np.lexsort((pair, first))
     pair, first, last = pair[order], first[order], last[order]
-    return Near(first + 1, last + 1, pair // present.shape[1] + 1, pair % present.shape[1] + 1)
+    return Near(first + 1, last + 1, pair // people + 1, pair % people + 1)

@@ -50,6 +50,10 @@ class MotionRows:
         rows = self.find(columns, frame)
         return rows[rows < self.find(columns, frame + 1)]
 
+    def last(self, column: Ints) -> Ints:
+        """Returns the last frame of each person."""
+        return np.asarray(self.frame[self.find(column, self.length) - 1])
+
     def count(self, columns: Sequence[int], end: int) -> Ints:
         """Returns how many of some people are there in each frame up to the last of them before frame `end`."""
         frames = [self.frame[int(self.find(p, 0)) : int(self.find(p, end))] for p in columns]
@@ -65,3 +69,13 @@ class MotionRows:
             t = self.frame[rows] - first
             pos[t, k], vel[t, k], group[t, k] = self.pos[rows], self.vel[rows], self.group[rows]
         return pos, vel, group
+
+
+def frames_of_change(frame: Ints, column: Ints, group: Ints, length: int) -> list[int]:
+    """Returns the frames from 1 on, below `length`, in which the people, or the group of one, differ from those of the
+    frame before. frame, column, group (R,): one row per person and frame."""
+    kinds, kind = np.unique(column * (int(group.max(initial=0)) + 2) + group + 1, return_inverse=True)
+    key = frame * len(kinds) + kind
+    came, went = ~np.isin(key - len(kinds), key), ~np.isin(key + len(kinds), key)
+    changed = np.union1d(frame[came], frame[went] + 1)
+    return list(changed[(changed > 0) & (changed < length)].tolist())

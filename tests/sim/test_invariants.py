@@ -6,10 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.truth.crossing_events import crossings
-from sim.truth.merge_split_events import groups_and_events
 from sim.truth.motion_rows import MotionRows
 from sim.truth.queue_detection import queues
-from tests.plots import DURATION, crosses, look, merges, scenes, splits
+from tests.plots import DURATION, crosses, look, measured, merges, partition, scenes, splits
 
 FPS = 10.0
 SETTLED = 8.0  # s: what ended so long ago is known, whatever follows
@@ -17,7 +16,7 @@ SETTLED = 8.0  # s: what ended so long ago is known, whatever follows
 
 def measure(scene):
     """Labels (T, P) and events as (kind, start, end, members, how many groups and people alone before, and after)."""
-    found = groups_and_events(scene.pos, scene.vel, scene.present, scene.intent, scene.fps)
+    found = measured(scene.pos, scene.vel, scene.present, scene.intent, scene.fps)
     motion = MotionRows.of_table(scene.pos, scene.vel, scene.present, found.group)
     return found.group, [*found.events, *crossings(motion, scene.fps), *queues(motion, scene.fps)]
 
@@ -29,10 +28,6 @@ def rows(events, name=lambda p: p):
         (e.kind, e.start, e.end, tuple(sorted(name(m) for m in e.members)), *s)
         for e, s in zip(events, shape, strict=True)
     )
-
-
-def partition(group):
-    return [{frozenset(np.flatnonzero(row == g).tolist()) for g in set(row.tolist()) - {-1}} for row in group]
 
 
 @settings(max_examples=10, deadline=None)
@@ -74,10 +69,8 @@ def test_place_and_turn_of_the_world_do_not_matter(plots, x, y, degrees, mirror)
     scene = look(plots, FPS)
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turn = np.array([[c, s], [-s, c]]) @ np.diag([1.0, -1.0 if mirror else 1.0])
-    (group, events), (again, turned) = (
-        measure(scene),
-        measure(scene.but(pos=scene.pos @ turn + [x, y], vel=scene.vel @ turn)),
-    )
+    elsewhere = scene.but(pos=scene.pos @ turn + [x, y], vel=scene.vel @ turn)
+    (group, events), (again, turned) = measure(scene), measure(elsewhere)
     assert np.array_equal(group, again)
     exact = abs(degrees / CORNER_DEG - round(degrees / CORNER_DEG)) < 1e-9
     slack = 0 if exact else 1

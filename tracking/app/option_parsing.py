@@ -88,19 +88,6 @@ def toml_values(texts: Iterable[str]) -> dict[str, Any]:
     return {".".join(steps): value for steps, value in map(parse_setting, texts)}
 
 
-def output_file(out: Path, suffix: str, option: str = "--out") -> Path:
-    """Returns `out` if it is a file name with this suffix, and no .toml of others; else raises InputError."""
-    if out.is_dir() or out.suffix.lower() != suffix:
-        got, better = (f"{out}, a folder", out / "page") if out.is_dir() else (str(out), out.with_suffix(""))
-        expected = f"a file that ends in {suffix}"
-        raise InputError(place=option, got=got, expected=expected, remedy=f"write {better}{suffix}")
-    if suffix == ".toml":  # Scenarios and parameters are written by hand, too.
-        from sim.io.files.own_files import refuse_foreign_file
-
-        refuse_foreign_file(out)
-    return out
-
-
 def output_folder(out: Path) -> Path:
     """Returns `out` if it is, or can become, a folder; else raises InputError."""
     existing = next(p for p in (out, *out.parents) if p.exists())

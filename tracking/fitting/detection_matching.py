@@ -8,6 +8,7 @@ first matching is applied to the labelled boxes, and the matching is repeated.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ from sim.scene.visibility import image_size_of_boxes, with_visibility
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth, Unscored
 from tracking.filters.assignment import optimal
 from tracking.scoring.annotated_frames import annotated_frames
+from tracking.scoring.misreading import shifted_boxes
 
 GATE = 0.3  # least overlap of a match
 IGNORED = 0.5  # least overlap of an unmatched detection with an unscored box for the detection to be dropped
@@ -71,7 +73,11 @@ def match_sequence(sequence: Sequence) -> MatchedRecording:
         if wrong:
             raise InputError(file=file, got=got, expected=expected, remedy=remedy)
     assert truth is not None
-    return match_detections(*_annotated(truth, found), sequence.image_size, sequence.camera)
+    made = match_detections(*_annotated(truth, found), sequence.image_size, sequence.camera)
+    shifted = shifted_boxes(made.truth, made.frame[~made.false], made.box[~made.false])
+    if shifted:
+        warnings.warn(f"{file}: {shifted}", stacklevel=2)
+    return made
 
 
 def _annotated(truth: Truth, found: list[Detections]) -> tuple[Truth, list[Detections]]:
@@ -158,6 +164,6 @@ def _covered(frame: Ints, box: Array, unscored: Unscored | None) -> Bools:
     covered = np.zeros(len(box), bool)
     if unscored is not None:
         for index in np.unique(unscored.frame):
-            here, there = np.flatnonzero(frame == index), unscored.frame == index
+            here, there = (slice(*np.searchsorted(f, (index, index + 1))) for f in (frame, unscored.frame))
             covered[here] = (box_iou(box[here, None], unscored.box[there]) >= IGNORED).any(axis=1)
     return covered

@@ -17,6 +17,7 @@ import numpy as np
 
 from sim.truth.identity import GroupChange, Identities, Members, PersonSet
 from sim.truth.merge_split_rules import frames_of, stretches
+from sim.truth.motion_rows import frames_of_change
 from sim.types import GroupEvent, Ints
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import FoundGroups
@@ -27,7 +28,6 @@ from tracking.grouping.merge_split_events import (
     TrackedMotion,
     corrects,
     event_of_change,
-    frames_of_change,
 )
 
 

@@ -8,6 +8,7 @@ also the truth's merge and split rule come from sim.truth.merge_split_rules.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -20,11 +21,12 @@ from sim.truth.merge_split_rules import (
     SPLIT_DISTANCE,
     close_pairs,
     frames_of,
+    runs,
 )
 from sim.types import Array, Bools, Ints
 from tracking.config import Config, param
 
-CELLS = 4_000_000  # Most frames times pairs that are worked on together: bounds memory.
+CELLS = 1_000_000  # Numbers worked on together: bounds memory.
 ARRIVAL = 1.0  # s: a link that began within this time of a track's first frame is an arrival, no merge.
 
 
@@ -80,52 +82,57 @@ def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, f
     speed = np.hypot(*vel.T)
     near &= ~(np.maximum(speed[i], speed[j]) < rule.idle)
     people = int(column.max(initial=0)) + 1
-    pair = column[i] * people + column[j]
-    known = np.unique(pair[near])
-    present = np.zeros((length, people), bool)
-    present[frame, column] = True
-    within = distance <= rule.apart
-    found = []
-    # in portions, as tables of all frames and pairs would not fit in memory
-    size = max(1, CELLS // max(length, 1))
-    for low in range(0, len(known), size):
-        pairs = known[low : low + size]
-        rows = np.flatnonzero((pair >= pairs[0]) & (pair <= pairs[-1]))
-        place = np.searchsorted(pairs, pair[rows])
-        kept = pairs[np.minimum(place, len(pairs) - 1)] == pair[rows]
-        rows, place = rows[kept], place[kept]
-        found.append(_switches(frame[i[rows]], place, near[rows], within[rows], pairs, present, fps, rule))
-    columns = [np.concatenate([np.zeros(0, np.int64), *(f[k] for f in found)]) for k in range(3)]
-    order = np.lexsort((columns[1], columns[0]))
-    t, pair, on = (c[order] for c in columns)
-    return Links(t, pair // people, pair % people, on.astype(bool), np.ones(len(t), bool))
+    # keys of two pairs, or two people, are further apart than the times of the rule
+    span = length + max(frames_of(rule.window, fps), frames_of(rule.patience, fps))
+    key = (column[i] * people + column[j]) * span + frame[i]
+    together, within = np.sort(key[near]), np.sort(key[distance <= rule.apart])
+    found = [
+        _switches(both, _among(together, both), ~_among(within, both), span, fps, rule)
+        for both in _both_seen(np.unique(together // span), np.sort(column * span + frame), people, span)
+    ]
+    key, on = (np.concatenate(x) for x in zip(*found, strict=True))
+    pair, t = key // span, key % span
+    order = np.lexsort((pair, t))
+    t, pair, on = t[order], pair[order], on[order]
+    return Links(t, pair // people, pair % people, on, np.ones(len(t), bool))
 
 
-def _switches(
-    frame: Ints, place: Ints, near: Bools, within: Bools, pairs: Ints, present: Bools, fps: float, rule: LinkRule
-) -> tuple[Ints, Ints, Ints]:
-    """Returns frame, pair and on (1, 0) of the switches (S,) of K pairs; rows (Q,): frames in which they are close."""
-    people = present.shape[1]
-    both = present[:, pairs // people] & present[:, pairs % people]
-    together, far = np.zeros_like(both), both.copy()
-    together[frame, place] = near
-    far[frame[within], place[within]] = False
-    window = frames_of(rule.window, fps)
-    seen, alike = _recent(both, window), _recent(together, window)
-    enough = min(frames_of(rule.acquaintance, fps), window)
-    on = both & (seen >= enough) & (alike >= rule.share * seen) & (alike > 0)
-    off = _recent(far, frames_of(rule.patience, fps)) >= frames_of(rule.patience, fps)
-    t = np.arange(len(both))[:, None]
-    last = np.maximum.accumulate(np.where(on | off, t, -1), axis=0)
-    state = (last >= 0) & np.take_along_axis(on, np.maximum(last, 0), axis=0)
-    before = np.concatenate([np.zeros_like(state[:1]), state[:-1]])
-    when, which = np.nonzero(state != before)
-    return when, pairs[which], state[when, which].astype(np.int64)
+def _both_seen(pairs: Ints, seen: Ints, people: int, span: int) -> Iterator[Ints]:
+    """Yields the keys, pair * span + frame, of all frames in which both of a pair were seen, in portions of whole
+    pairs. seen (R,): person * span + frame of each row, ascending."""
+    a, b = pairs // people, pairs % people
+    begin = np.maximum(*(seen[np.searchsorted(seen, p * span)] % span for p in (a, b)))
+    end = np.minimum(*(seen[np.searchsorted(seen, (p + 1) * span) - 1] % span for p in (a, b)))
+    low, high = np.searchsorted(seen, a * span + begin), np.searchsorted(seen, a * span + end, side="right")
+    portion = np.cumsum(high - low) // CELLS
+    for some in np.split(np.arange(len(pairs)), np.flatnonzero(np.diff(portion)) + 1):
+        k, at = runs(low[some], high[some])
+        k, frame = some[k], seen[at] % span
+        both = _among(seen, b[k] * span + frame)
+        yield pairs[k[both]] * span + frame[both]
 
 
-def _recent(flags: Bools, frames: int) -> Ints:
-    """Returns the number (T, K) of True flags among the last `frames` frames up to each frame."""
-    total = np.cumsum(flags, axis=0)
-    late = np.zeros_like(total)
-    late[frames:] = total[:-frames] if frames < len(total) else 0
-    return np.asarray(total - late)
+def _among(values: Ints, wanted: Ints) -> Bools:
+    """Returns which wanted values (Q,) are among `values`, which ascend."""
+    return np.asarray(np.append(values, -1)[np.searchsorted(values, wanted)] == wanted)
+
+
+def _switches(key: Ints, near: Bools, far: Bools, span: int, fps: float, rule: LinkRule) -> tuple[Ints, Bools]:
+    """Returns key and on of the switches (S,) of pairs. key (Q,): of each pair and frame in which both were seen,
+    ascending; near, far (Q,): whether the pair is near and moves alike, and whether it is apart."""
+    window, patience = frames_of(rule.window, fps), frames_of(rule.patience, fps)
+    seen, alike = _recent(key, np.ones_like(near), window), _recent(key, near, window)
+    on = (seen >= min(frames_of(rule.acquaintance, fps), window)) & (alike >= rule.share * seen) & (alike > 0)
+    off = _recent(key, far, patience) >= patience
+    row, new = np.arange(len(key)), np.diff(key // span, prepend=-1) != 0
+    last = np.maximum.accumulate(np.where(on | off | new, row, 0))
+    state = on[last]
+    before = np.append(False, state)[:-1] & ~new
+    changed = state != before
+    return key[changed], state[changed]
+
+
+def _recent(key: Ints, flags: Bools, frames: int) -> Ints:
+    """Returns the number (Q,) of True flags among the last `frames` frames of each pair up to each row."""
+    total = np.append(0, np.cumsum(flags))
+    return np.asarray(total[1:] - total[np.searchsorted(key, key - frames, side="right")])

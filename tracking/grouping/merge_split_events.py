@@ -16,7 +16,7 @@ import numpy as np
 
 from sim.truth.identity import GroupChange, PersonSet, lineage
 from sim.truth.merge_split_rules import HOLD_TIME, frames_of, separation, stretches
-from sim.truth.motion_rows import MotionRows
+from sim.truth.motion_rows import MotionRows, frames_of_change
 from sim.types import Bools, GroupEvent, Ints
 
 # A switched link: its people a, b, True if switched on, first frame of the stretch that caused it.
@@ -108,16 +108,6 @@ def events_of_labels(motion: MotionRows) -> list[GroupEvent]:
         events += [_event(c, t - (c.kind == "leave"), t - (c.kind == "leave"), t, motion) for c in changes]
         old, before = new, now
     return events
-
-
-def frames_of_change(frame: Ints, column: Ints, group: Ints, length: int) -> list[int]:
-    """Returns the frames from 1 on, below `length`, in which the people, or the group of one, differ from those of the
-    frame before. frame, column, group (R,): one row per person and frame."""
-    kinds, kind = np.unique(column * (int(group.max(initial=0)) + 2) + group + 1, return_inverse=True)
-    key = frame * len(kinds) + kind
-    came, went = ~np.isin(key - len(kinds), key), ~np.isin(key + len(kinds), key)
-    changed = np.union1d(frame[came], frame[went] + 1)
-    return list(changed[(changed > 0) & (changed < length)].tolist())
 
 
 def _event(change: GroupChange, start: int, end: int, t: int, motion: MotionRows) -> GroupEvent:

@@ -120,7 +120,15 @@ def likely_misreading(
     return f"{words}.{tried} Check the columns, and that these are tracks of this very sequence"
 
 
-def _shifted(true: Side, est: Side) -> str:
+def shifted_boxes(truth: Truth, frame: Ints, box: Array) -> str:
+    """Returns a warning if detections lie on labels of up to 10 frames away more exactly, else "". frame (M,),
+    ascending, box (M, 4), px: of detections of labelled people; the truth has boxes."""
+    assert truth.box is not None
+    true, est = Side(FrameRows(truth.frame, truth.id), truth.box), Side(FrameRows(frame, np.arange(len(frame))), box)
+    return _shifted(true, _some(np.unique(frame), true, est)[1], "detections")
+
+
+def _shifted(true: Side, est: Side, what: str = "tracks") -> str:
     """Returns a warning if the tracks lie on labels of up to 10 frames away more exactly, else "". true: all labels."""
     near = np.add.outer(np.unique(est.rows.frame), [0, *SHIFTS])
     true = true.keep(np.isin(true.rows.frame, near))
@@ -133,8 +141,8 @@ def _shifted(true: Side, est: Side) -> str:
         a, b = float(now[both].mean()), float(then[both].mean())
         if 1 - b < best * (1 - a):
             best = (1 - b) / (1 - a)
-            words = f"mean IoU with labels {a:.2f}; with {k:+d} on their frame numbers the tracks have {b:.2f}"
-    return words and f"{words}: number the frames of both alike, unless the tracks lag or lie beside the people"
+            words = f"mean IoU with labels {a:.2f}; with {k:+d} on their frame numbers the {what} have {b:.2f}"
+    return words and f"{words}: number the frames of both alike, unless the {what} lag or lie beside the people"
 
 
 def _overlap(true: Side, est: Side) -> Array:

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenarios.errors import FlockscopeError, InputError, WorkError, counted
 from sim.dataset.generate import LEFT_OUT
-from sim.io.files.own_files import Marks, refuse_foreign_file
+from sim.io.files.own_files import Marks, output_file, refuse_foreign_file
 from sim.types import Tracker
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source
@@ -189,7 +189,8 @@ def _search(options: TuneOptions) -> TuningResult:
 
     plan = search_plan(options)
     progress = options.progress or (lambda finished, trials, text: None)
-    target = None if options.out is None else _checked_target(Path(options.out))
+    most = options.finalists + 1 if len(plan.goals) > 1 else 0
+    target = None if options.out is None else _checked_target(Path(options.out), most)
     storage = options.storage if options.storage is not None or target is None else target.with_suffix(JOURNAL)
     name = options.study or (target.stem if target is not None else "flockscope")
     with (
@@ -216,12 +217,12 @@ def require_optuna(place: str) -> None:
         raise InputError(place=place, got="no optuna", expected="the package optuna", remedy=remedy) from None
 
 
-def _checked_target(out: Path) -> Path:
-    if out.suffix != ".toml" or out.is_dir():
-        remedy = "choose a name that ends in .toml"
-        raise InputError(file=out, place="--out", got=out.name, expected="a file, *.toml", remedy=remedy)
-    refuse_foreign_file(out)
-    refuse_foreign_file(out.with_suffix(".json"), RESULT_MARKS)
+def _checked_target(out: Path, candidates: int) -> Path:
+    """Returns `out` if neither it nor a file beside it that `TuningResult.write` writes is somebody else's. candidates:
+    the most candidates of a front."""
+    refuse_foreign_file(output_file(out, ".toml").with_suffix(".json"), RESULT_MARKS)
+    for k in range(1, candidates + 1):
+        refuse_foreign_file(out.with_suffix(f".front-{k}.toml"))
     return out
 
 

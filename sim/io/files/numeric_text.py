@@ -48,11 +48,11 @@ class NumericTable:
             place = f"{self.unit} {self.line[k]}"
             raise InputError(file=self.file, place=place, got=got, expected=expected, remedy=remedy)
 
-    def integers(self, column: int, name: str) -> Ints:
-        """Returns column `column` (from 0) as integers (N,); InputError for others. name: for the message."""
+    def integers(self, column: int, name: str, most: str | None = None) -> Ints:
+        """Returns column `column` (from 0) as integers (N,); InputError for others. name, most: for the message."""
         v = self.values[:, column]
         wrong = (v != np.round(v)) | (np.abs(v) > LARGEST)
-        self.reject(wrong, f"a whole number within {LARGEST} as {name}", f"correct the {name}")
+        self.reject(wrong, f"a whole number within {LARGEST} as {name}", f"correct the {name}", most)
         return v.astype(np.int64)
 
     def require_bounds(self, frame: Ints, length: int | None = None) -> None:
@@ -62,7 +62,8 @@ class NumericTable:
         """
         span, remedy, most = f"frames from 1 to {length or FRAMES}", "correct the frame", None
         if length is not None:
-            remedy, count = "correct the frame, or seqLength", "number its frames 1, 2, 3, … as those of the recording"
+            remedy = "correct the frame, or seqLength"
+            count = "number its frames 1, 2, 3, …, as those of the recording are read, also if it has 0, 10, 20, …"
             most = f"check that this text belongs to this recording, and its seqLength, or {count}"
             self.reject((frame == 0) & (frame.max(initial=0) >= length), span, count)
         self.reject(frame == 0, span, "add 1 to all frames, if the file counts them from 0")

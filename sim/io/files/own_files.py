@@ -94,6 +94,17 @@ def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
         raise InputError(file=path, got=got, expected=expected, remedy="move it away, or choose another --out")
 
 
+def output_file(out: Path, suffix: str, option: str = "--out") -> Path:
+    """Returns `out` if it is a file name with this suffix, and no .toml of others; else raises InputError."""
+    if out.is_dir() or out.suffix.lower() != suffix:
+        got, better = (f"{out}, a folder", out / "page") if out.is_dir() else (str(out), out.with_suffix(""))
+        expected = f"a file that ends in {suffix}"
+        raise InputError(place=option, got=got, expected=expected, remedy=f"write {better}{suffix}")
+    if suffix == ".toml":  # Scenarios and parameters are written by hand, too.
+        refuse_foreign_file(out)
+    return out
+
+
 def _video(path: Path) -> bool:
     import av
 

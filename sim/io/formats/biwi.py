@@ -18,7 +18,7 @@ from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_rows, read_text
-from sim.io.formats.labels import labelled_sequence, labelled_truth_fields, require_size
+from sim.io.formats.labels import labelled_sequence, labelled_truth_fields
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.types import Ints, Sequence, Truth
 
@@ -95,7 +95,6 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     rows.reject(id < 0, "ids from 0", "correct the id")
     frame = frame_numbers(raw, id)
     rows.require_bounds(frame)
-    require_size(path, int(frame.max()), id)
     expected = "each id once in a frame, also where two frames are nearer than a step"
     rows.reject(repeated_ids(frame, id), expected, CORRECT)
     order = np.lexsort((id, frame))

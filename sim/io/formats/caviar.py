@@ -20,7 +20,7 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, bounded_number, person_ids, xml_root
-from sim.io.formats.labels import CHORD, differentiate, labelled_sequence, labelled_truth_fields, require_size
+from sim.io.formats.labels import CHORD, differentiate, labelled_sequence, labelled_truth_fields
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.scene.visibility import scale_of_all_boxes, scale_of_first_boxes
 from sim.truth.group_hulls import box_groups
@@ -67,7 +67,6 @@ def read_xml(path: Path) -> CaviarRecording:
     table = NumericTable(path, values, values[:, 0].astype(np.int64) - 1, unit="frame")
     frame, id, label_ = (values[:, k].astype(np.int64) for k in range(3))
     table.reject(repeated_ids(frame, id), "each id once in a frame", "remove one of the two")
-    require_size(path, max(listed), id)
     centre, size = values[:, 3:5], values[:, 5:7]
     own = root.find("frame/objectlist/object/hypothesislist") is not None
     return CaviarRecording(

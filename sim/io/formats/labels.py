@@ -18,8 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
-from scenarios.limits import CELLS
 from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, Frame, GroupEvent, Groups, Ints, Sequence, Truth
 
@@ -27,26 +25,6 @@ from sim.types import Array, Frame, GroupEvent, Groups, Ints, Sequence, Truth
 def centres(box: Array) -> Array:
     """Returns the middles (R, 2) of boxes (R, 4) left, top, width, height."""
     return np.asarray(box[:, :2] + box[:, 2:] / 2)
-
-
-def rows_to_grid(frame: Ints, id: Ints, values: Array, length: int) -> Array:
-    """Returns values (R, …), one row per person and frame, as an array (T, P, …); nan where a person has no row.
-
-    frame (R,): from 1 to `length`, which is T. id (R,): each once in a frame. The P people are sorted by id.
-    """
-    out = np.full((length, len(np.unique(id)), *values.shape[1:]), np.nan)
-    out[frame - 1, np.searchsorted(np.unique(id), id)] = values
-    return out
-
-
-def require_size(path: Path, length: int, id: Ints) -> None:
-    """Raises InputError if `length` times the number of different ids in id (R,) exceeds 20 million."""
-    people = len(np.unique(id))
-    # One mistyped frame number must not fill the memory.
-    if length * people > CELLS:
-        got = f"{length:,} frames with {people:,} people"
-        expected = f"at most {CELLS:,} frames times people"
-        raise InputError(file=path, got=got, expected=expected, remedy="correct the last frame, or cut the recording")
 
 
 def labelled_sequence(
@@ -82,15 +60,11 @@ def labelled_truth_fields(
     metres, speed = pos / px_per_m, vel / px_per_m
     people = np.unique(id)
     column = np.searchsorted(people, id)
-    intent = np.full((length, len(people)), -1, np.int64)
-    alone = label.max(initial=0) + 1 + column
-    intent[frame - 1, column] = np.where(label >= 0, label, alone)
-    present = intent >= 0
-    places, velocities = rows_to_grid(frame, id, metres, length), rows_to_grid(frame, id, speed, length)
-    measured = groups_and_events(places, velocities, present, intent, fps)
-    names = _names(measured.group[frame - 1, column], label)
+    intent = np.where(label >= 0, label, label.max(initial=0) + 1 + column)
+    meant, rows = (MotionRows.of(frame - 1, column, metres, speed, g, length) for g in (intent, label))
+    measured = groups_and_events(meant, fps)
+    names = _names(measured.group[meant.find(column, frame - 1)], label)
     found = [_named(e, names, people, px_per_m) for e in measured.events]
-    rows = MotionRows.of(frame - 1, column, metres, speed, label, length)
     met = crossings(rows, fps) + queues(rows, fps)
     found += [_named(e, {}, people, px_per_m) for e in met]
     events = tuple(sorted(found, key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))

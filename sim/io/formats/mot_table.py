@@ -20,6 +20,7 @@ from typing import NoReturn
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, NAME_THEM, NumericTable, TextRows, is_number_text, read_rows
 from sim.io.formats.options import BoxScale
 from sim.types import LENGTH_UNITS, Array, Bools, Ints
@@ -147,6 +148,8 @@ PEOPLE = ("person", "pedestrian")  # words for the class of people
 
 FramesAt = Callable[[Column], Ints]  # frames (N,) from 1 of times (N,), s; 0: of no frame
 
+SECONDS = "if the frames are times in s, write numbers of frames, from 1: time × frames per second + 1"
+
 EXPECTED = (
     "frame (or, for --boxes, t in s) and a box (x,y,w,h, left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), "
     "or frame,id,x,y in m (x_cm,y_cm in cm)"
@@ -178,7 +181,7 @@ def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> 
         if meaning is not None and not (words and meaning == "class"):
             found[meaning] = k
     if found.keys().isdisjoint(("frame", "time")):
-        _refuse(text.file, names)
+        _refuse(text.file, names, NAME_THEM if set(NAMES["time"]).isdisjoint(names) else SECONDS)
     rows = text.numbers((len(names),), first=1, layout="those that line 1 names", use=list(found.values()))
     column: dict[str, Column] = dict(zip(found, rows.values.T, strict=False))
     if words:
@@ -235,9 +238,9 @@ def _in_order(column: dict[str, Column], units: dict[str, str]) -> list[Column] 
     return [frame, column["id"], left, top, w, h, column["score"], *last]
 
 
-def _refuse(path: Path, names: list[str]) -> NoReturn:
+def _refuse(path: Path, names: list[str], remedy: str = NAME_THEM) -> NoReturn:
     got = f"columns {','.join(names)}"
-    raise InputError(file=path, place="line 1", got=got, expected=EXPECTED, remedy=NAME_THEM)
+    raise InputError(file=path, place="line 1", got=got, expected=EXPECTED, remedy=remedy)
 
 
 GROUND_COLUMNS = 4  # columns of a text of ground positions alone: frame, id, x, y
@@ -299,18 +302,17 @@ def table_of_rows(
     group: Ints | None = None,
 ) -> MotTable:  # fmt: skip
     """Returns the MotTable of rows in the columns of a MOTChallenge text. Arguments as for `read_table`."""
-    frame, id, count = rows.integers(0, "frame"), rows.integers(1, "id"), len(rows.line)
+    frame, id, count = rows.integers(0, "frame", SECONDS), rows.integers(1, "id"), len(rows.line)
     box, rest = rows.values[:, 2:6], rows.values[:, 6:]
     if rows.values.shape[1] == GROUND_COLUMNS:
         # A text of positions: no box, confidence 1, z = 0.
         box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
     if group is not None:
         rows.reject(group < -1, "groups from 0, or -1 for alone", "correct the group")
-        if set(group.tolist()) in ({0}, {-1}):
-            who = "all are one group" if group[0] == 0 else "nobody is in a group"
-            warnings.warn(
-                f"{rows.file}: group is {group[0]} in all rows: {who}. Leave an unused column out", stacklevel=4
-            )
+        alone = not repeated_ids(frame[group >= 0], group[group >= 0]).any()
+        if count and (alone or not group.any()):
+            who = "no two people of a frame are in one group" if alone else "all are one group"
+            warnings.warn(f"{rows.file}: column group: {who}. Leave an unused column out", stacklevel=4)
     table = MotTable(rows, frame, id, box, rest, group)
     rows.require_bounds(frame, length)
     flat, boxed = (table.box[:, 2:] <= 0).any(axis=1), ~table.without_box()

@@ -26,7 +26,7 @@ from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.biwi import labels_of
-from sim.io.formats.labels import CHORD, centres, differentiate, labelled_truth_fields, require_size
+from sim.io.formats.labels import CHORD, centres, differentiate, labelled_truth_fields
 from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, require_pixels
 from sim.io.formats.options import BoxOptions, Classes
 from sim.scene.visibility import scale_of_all_boxes
@@ -374,9 +374,9 @@ def truth_of_table(
         labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip
     if table.group is not None:
-        return _labelled(truth, table.group[order], table.rows.file)
+        return _labelled(truth, table.group[order])
     path = group_file(table.rows.file)
-    return _labelled(truth, labels_of(path, id), path) if is_present(path) else truth
+    return _labelled(truth, labels_of(path, id)) if is_present(path) else truth
 
 
 def group_file(path: Path) -> Path:
@@ -384,9 +384,8 @@ def group_file(path: Path) -> Path:
     return path.with_name("groups.txt" if path.name == LABELS else f"{path.stem}.groups.txt")
 
 
-def _labelled(truth: Truth, label: Ints, file: Path) -> Truth:
+def _labelled(truth: Truth, label: Ints) -> Truth:
     """Returns a truth with groups: measured on the ground if all positions are known, else from the boxes' centres."""
-    require_size(file, truth.length, truth.id)
     truth = truth.replace(group=label)
     if not len(label):
         return truth

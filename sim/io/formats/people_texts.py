@@ -27,7 +27,7 @@ from scenarios.limits import FRAME_RATES, is_number
 from scenarios.reading import parse_json
 from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_nan, read_rows, read_text
 from sim.io.formats.biwi import frame_numbers
-from sim.io.formats.labels import labelled_sequence, require_size
+from sim.io.formats.labels import labelled_sequence
 from sim.io.formats.mot_table import table_of_rows
 from sim.io.formats.mot_text import truth_of_table
 from sim.io.formats.options import RecordingOptions
@@ -76,7 +76,6 @@ def open_text(path: Path, layout: str, options: RecordingOptions) -> Sequence:
     table = table_of_rows(rows, boxless=True)
     rows.reject(table.id < 0, "ids from 0", "correct the id")
     length = int(table.frame.max())
-    require_size(path, length, table.id)
 
     def truth() -> Truth:
         return truth_of_table(table, path.stem, rate, length, options.scale)

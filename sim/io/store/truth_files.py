@@ -6,7 +6,8 @@ is written only for a truth with boxes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
@@ -90,21 +91,21 @@ def has_box(box: Array) -> Bools:
 def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
     """Returns a MOTChallenge text: of each row frame, id, box and the cells `rest`; an unknown box is -1,-1,-1,-1."""
     lines = []
-    rows = zip(frame.tolist(), id.tolist(), box.tolist(), has_box(box).tolist(), rest, strict=True)
-    for f, i, (left, top, width, height), boxed, end in rows:
+    # rows of arrays: lists of all their numbers would need more memory than the text
+    for f, i, (left, top, width, height), boxed, end in zip(frame, id, box, has_box(box), rest, strict=True):
         corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed else "-1,-1,-1,-1"
         lines.append(f"{f},{i},{corner},{end}\n")
     return "".join(lines).encode()
 
 
-def score_and_place(score: Array, place: Array | None) -> list[str]:
-    """Returns the cells conf, x, y, z of R MOT lines. place (R, 3): positions in m, nan or None if unknown."""
+def score_and_place(score: Array, place: Array | None) -> Iterator[str]:
+    """Yields the cells conf, x, y, z of R MOT lines. place (R, 3): positions in m, nan or None if unknown."""
     places = np.full((len(score), 3), np.nan) if place is None else place
-    return [f"{s:.4f},{_cells(xyz)}" for s, xyz in zip(score.tolist(), places.tolist(), strict=True)]
+    return (f"{s:.4f},{_cells(xyz)}" for s, xyz in zip(score, places, strict=True))
 
 
-def _cells(xyz: list[float]) -> str:
-    if not np.isfinite(xyz).all():
+def _cells(xyz: Array) -> str:
+    if not all(map(math.isfinite, xyz)):
         return "-1,-1,-1"
     x, y, z = (f"{v:.3f}" for v in xyz)
     return f"{x},{y},{z if z != '-1.000' else '-1.001'}"  # z = -1 would mean unknown

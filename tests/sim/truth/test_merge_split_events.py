@@ -1,6 +1,6 @@
 import numpy as np
 
-from sim.truth.merge_split_events import groups_and_events
+from tests.plots import measured, partition
 from tests.reference_groups import labels
 from tests.reference_sense import paced
 
@@ -33,9 +33,9 @@ def merging(speed, near):
 
 
 def test_merge_no_earlier_than_intent_and_not_without():
-    m = groups_and_events(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), (150, (3, 3, 3, 3)), frames=200), FPS)
+    m = measured(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), (150, (3, 3, 3, 3)), frames=200), FPS)
     assert [e.start for e in m.events] == [150]
-    m = groups_and_events(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), frames=200), FPS)
+    m = measured(*merging(0.4, 0.8), meant((1, (1, 1, 2, 2)), frames=200), FPS)
     assert m.events == ()
     assert m.near.a.tolist() == [2]
     assert m.near.b.tolist() == [3]
@@ -45,8 +45,8 @@ def test_merge_no_earlier_than_intent_and_not_without():
 def test_a_stretch_cut_off_by_the_end_does_not_count():
     pos, vel, there = merging(0.4, 0.8)
     want = meant((1, (1, 1, 2, 2)), (50, (3, 3, 3, 3)), frames=200)
-    assert len(groups_and_events(pos[:133], vel[:133], there[:133], want[:133], FPS).events) == 1
-    assert len(groups_and_events(pos[:132], vel[:132], there[:132], want[:132], FPS).events) == 0
+    assert len(measured(pos[:133], vel[:133], there[:133], want[:133], FPS).events) == 1
+    assert len(measured(pos[:132], vel[:132], there[:132], want[:132], FPS).events) == 0
 
 
 def test_who_enters_together_counts_from_the_first_frame():
@@ -54,7 +54,7 @@ def test_who_enters_together_counts_from_the_first_frame():
     there[:20, 1:3] = False
     there[:40, 3] = False
     there[80:, 1:] = False
-    m = groups_and_events(pos, vel, there, np.where(there, [1, 2, 2, 2], -1), FPS)
+    m = measured(pos, vel, there, np.where(there, [1, 2, 2, 2], -1), FPS)
     assert summary(m.events) == [("enter", 21, 21, (), (1,), (2, 3)), ("leave", 80, 80, (1,), (), (2, 3, 4))]
     assert (m.group[20:40, 1:3] == 1).all()
     assert (m.group[40:80, 1:] == 1).all()
@@ -81,15 +81,11 @@ def scene(seed, frames=60, people=7, fps=4.0):
     return np.where(nowhere, np.nan, pos), np.where(nowhere, np.nan, vel * 0.4), there, np.where(there, intent, -1), fps
 
 
-def partition(group):
-    return [{frozenset(np.flatnonzero(row == g).tolist()) for g in set(row.tolist()) - {-1}} for row in group]
-
-
 def test_labels_are_those_of_the_rules_read_frame_by_frame():
     kinds = set()
     for seed in range(60):
         made = scene(seed)
-        m = groups_and_events(*made)
+        m = measured(*made)
         assert partition(m.group) == labels(*made), seed
         kinds |= {e.kind for e in m.events}
     assert kinds == {"merge", "split", "form", "dissolve", "enter", "leave"}
@@ -99,7 +95,7 @@ def test_events_tell_every_change_of_labels():
     """Between two frames without an event, nobody who stays changes group."""
     for seed in range(30):
         pos, vel, there, intent, fps = scene(seed)
-        m = groups_and_events(pos, vel, there, intent, fps)
+        m = measured(pos, vel, there, intent, fps)
         starts = {e.start for e in m.events if e.kind != "leave"} | {e.start + 1 for e in m.events if e.kind == "leave"}
         for t in range(1, len(pos)):
             stay = there[t] & there[t - 1] & (m.group[t] != m.group[t - 1])
@@ -109,7 +105,7 @@ def test_events_tell_every_change_of_labels():
 def test_near_lists_strangers_only_and_whole_stretches():
     for seed in range(30):
         pos, vel, there, intent, fps = scene(seed)
-        m = groups_and_events(pos, vel, there, intent, fps)
+        m = measured(pos, vel, there, intent, fps)
         expected = []
         for a in range(there.shape[1]):
             for b in range(a + 1, there.shape[1]):

@@ -19,12 +19,7 @@ from sim.types import Detections, Truth
 from tests.hand_made import with_rows
 from tests.recordings import mot_folder
 from tracking.fitting import detection_matching as matching
-from tracking.fitting.error_correlation import (
-    bivariate_normal_cdf,
-    correlations,
-    fit_memory,
-    miss_correlations,
-)
+from tracking.fitting.error_correlation import bivariate_normal_cdf, correlations, fit_memory, miss_correlations
 from tracking.fitting.error_statistics import error_statistics, miss_runs
 from tracking.fitting.false_alarms import alarm_tracks
 
@@ -115,6 +110,13 @@ def test_detections_in_frames_without_labels_are_no_false_alarms() -> None:
     assert got.match.tolist() == expected.match.tolist()
     assert got.owner.tolist() == expected.owner.tolist()
     assert 0.5 < got.false.sum() / got.truth.length < 1.5
+
+
+def test_detections_of_other_frames_are_told() -> None:
+    scene = simulate(load("street"), 30_000, streams=())
+    late = scene.truth.replace(frame=scene.truth.frame + 1, length=scene.length + 1, labelled=None)
+    with pytest.warns(UserWarning, match=r"with \+1 on their frame numbers the detections have"):
+        matching.match_sequence(replace(scene, load_truth=lambda: late))
 
 
 def people(count: int = 30, frames: int = 300) -> Truth:

@@ -1,8 +1,10 @@
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
 
+from sim.io.formats.labels import labelled_truth_fields
 from sim.types import GroupEvent, Groups, Tracks
 from tests.reference_sense import paced
 from tracking.grouping import merge_split_events
@@ -24,13 +26,10 @@ def tracks(people, *, scale=1.0, there=None, boxes=False, group=None, vel=True, 
         k = np.flatnonzero(there[t])
         n = len(k)
         box = np.column_stack([pos[t, k] - [5, 10], np.tile([10.0, 20], (n, 1))]) if boxes else None
-        out.append(
-            Tracks(
-                t + 1, t / FPS, "image" if scale != 1 else "ground", "person", ids[k],
-                np.full(n, -1) if group is None else group[t, k], pos[t, k],
-                speed[t, k] if vel else np.full((n, 2), np.nan), np.zeros((n, 4, 4)), box, np.ones(n),
-            )
-        )  # fmt: skip
+        label = np.full(n, -1) if group is None else group[t, k]
+        moves = speed[t, k] if vel else np.full((n, 2), np.nan)
+        known = ids[k], label, pos[t, k], moves, np.zeros((n, 4, 4)), box, np.ones(n)
+        out.append(Tracks(t + 1, t / FPS, "image" if scale != 1 else "ground", "person", *known))
     return out
 
 
@@ -56,6 +55,28 @@ def joining(speed=0.4, near=0.8):
 def leaving():
     """A pair, and one 0.69 m beside it who drifts away at 0.4 m/s from 5 s on."""
     return [*side_by_side(), paced((5, (1, 0)), (15, (1, 0.4)), start=(0, 1.39))]
+
+
+def truth(made):
+    id, pos, vel = (np.concatenate([getattr(t, name) for t in made]) for name in ("id", "pos", "vel"))
+    return labelled_truth_fields(np.arange(1, len(id) + 1), id, id // 2, pos, vel, fps=FPS, length=len(made))
+
+
+@pytest.mark.parametrize("measure", [truth, lambda made: derive(made, FPS, rule=RULE), lambda made: derive(made, FPS)])
+def test_memory_grows_as_what_was_seen(measure):
+    """Of people who come one after the other, tables of all frames by all people would grow as their square."""
+
+    def peak(people):
+        still, there = np.zeros((20 * people, 2)), np.repeat(np.eye(people, dtype=bool), 20, axis=0)
+        made = tracks([(still, still)] * people, there=there)
+        tracemalloc.start()
+        measure(made)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return most
+
+    peak(2)  # imports
+    assert peak(160) < 6 * peak(40)
 
 
 def test_a_pair_is_a_group_once_it_is_acquainted():

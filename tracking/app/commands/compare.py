@@ -20,11 +20,11 @@ import numpy as np
 
 from scenarios.errors import InputError, counted, shortened
 from sim.io.files.atomic import write_file
+from sim.io.files.own_files import output_file
 from sim.io.files.tables import json_document, read_json
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import checked_key, table
-from tracking.app.option_parsing import output_file
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import paired
 

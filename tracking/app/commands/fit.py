@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 
 from scenarios.errors import printable
+from sim.io.files.own_files import output_file
 from sim.types import Truth
 from tracking.app import option_parsing
 from tracking.app.command_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
@@ -28,7 +29,7 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     from tracking.fitting.sensor import fit_matched
     from tracking.stats import mean_of_finite
 
-    out = option_parsing.output_file(options.out, ".toml")
+    out = output_file(options.out, ".toml")
     opened = [open_source(source, fps=options.fps, images=False) for source in options.sources]
     recordings = [recording for found in opened for recording in found]
     matched = [match_sequence(recording) for recording in recordings]
@@ -54,7 +55,7 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     from tracking.fitting.belief import belief_scores, fit_belief, sample_of
     from tracking.fitting.grouping_scenes import pair_scenes
 
-    out, seeds = option_parsing.output_file(options.out, ".toml"), _fit_and_check_seeds(options)
+    out, seeds = output_file(options.out, ".toml"), _fit_and_check_seeds(options)
     samples = {key: sample_of(list(pair_scenes(options.names, numbers))) for key, numbers in seeds.items()}
     changes = sample_of(list(pair_scenes(options.events, seeds["fitted"]))) if options.events else None
     belief = fit_belief(samples["fitted"], changes)
@@ -101,7 +102,7 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
     from tracking.fitting.joint_events import EventRows, event_rows, event_scores, fit_events
     from tracking.papers.joint.config import EVENT_TIME
 
-    out, seeds = option_parsing.output_file(options.out, ".toml"), _fit_and_check_seeds(options)
+    out, seeds = output_file(options.out, ".toml"), _fit_and_check_seeds(options)
     rows = {
         key: EventRows.joined(event_rows(truth, EVENT_TIME, seed) for seed, truth in _simulated(options.names, numbers))
         for key, numbers in seeds.items()
@@ -124,7 +125,7 @@ def fit_relational(options: FitRelationalOptions) -> CommandResult:
     from tracking.fitting import relational
     from tracking.papers.relational.config import RelationalConfig
 
-    out, seeds = option_parsing.output_file(options.out, ".toml"), option_parsing.seeds(options.seeds)
+    out, seeds = output_file(options.out, ".toml"), option_parsing.seeds(options.seeds)
     params: dict[str, float | list[float]]
     if options.observed:
         entries = [entry for name in options.names for entry in resolve(name, relational.LABELS)]

@@ -13,10 +13,9 @@ from scenarios.loading.resolve import load, names, resolve
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario
 from sim.io.files.atomic import write_file
-from sim.io.files.own_files import refuse_foreign_file
+from sim.io.files.own_files import output_file, refuse_foreign_file
 from sim.sequence import simulate
 from sim.types import Sequence
-from tracking.app import option_parsing
 from tracking.app.command_options import MinimizeOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import number, table
@@ -48,7 +47,7 @@ def minimize(options: MinimizeOptions) -> CommandResult:
     """Searches the smallest scene in which the tracker fails, writes it as a scenario file and a replay page, and
     returns what was removed."""
     failure = parse_failure(options.condition)
-    out = option_parsing.output_file(options.out, ".toml")
+    out = output_file(options.out, ".toml")
     page = out.with_suffix(".html")
     refuse_foreign_file(page)
     if out.resolve() == Path(options.source).resolve():

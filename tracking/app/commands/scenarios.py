@@ -12,7 +12,7 @@ from scenarios.loading.toml_files import SUITES
 from scenarios.schema.scenario import Scenario
 from tracking.app.command_options import ScenariosOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.option_parsing import output_file, scenario_settings
+from tracking.app.option_parsing import scenario_settings
 
 
 def scenarios(options: ScenariosOptions) -> CommandResult:
@@ -71,6 +71,7 @@ def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResu
     if drawing is None:
         return CommandResult(data, words)
     from sim.io.files.atomic import write_file
+    from sim.io.files.own_files import output_file
 
     write_file(output_file(drawing, ".svg"), svg(scenario).encode())
     return CommandResult({**data, "drawing": drawing}, f"{words}\n{drawing}")

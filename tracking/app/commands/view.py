@@ -9,9 +9,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError, counted
-from sim.io.files.own_files import output_paths, refuse_foreign_file
+from sim.io.files.own_files import output_file, output_paths, refuse_foreign_file
 from sim.types import Sequence
-from tracking.app import option_parsing
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import checked_key
@@ -159,7 +158,7 @@ def _write_each(
 
 def _files(sequences: list[Sequence], out: Path, suffix: str) -> list[Path]:
     if len(sequences) == 1:
-        return [option_parsing.output_file(out, suffix)]
+        return [output_file(out, suffix)]
     files = output_paths(_folder(out, suffix, len(sequences)), [sequence.name for sequence in sequences], suffix)
     for file in files:
         refuse_foreign_file(file)

@@ -36,7 +36,7 @@ def test_units_of_positions(tmp_path, unit, factor):
 
 WARNED = {
     "frame,id,x,y,place,mood\n1,1,0.5,1,hall,\n2,1,0.6,1,hall,3\n": "line 1: columns that are not used: place, mood",
-    "frame,id,x,y,group\n1,1,0.5,1,0\n2,1,0.6,1,0\n": "group is 0 in all rows: all are one group",
+    "frame,id,x,y,group\n1,1,0.5,1,0\n2,1,0.6,1,0\n": "no two people of a frame are in one group",
     # as PeTrack writes them: id first, frames from 0, positions in cm
     "id frame x_cm y_cm z\n1 0 50 100 170\n1 1 60 100 170\n": "frames are counted from 0; they are read as frames",
 }
@@ -51,6 +51,11 @@ def test_what_is_read_otherwise_than_it_is_written_is_warned_of(tmp_path, text):
     assert truth.pos.tolist() == [[0.5, 1], [0.6, 1]]
 
 
+def test_one_group_of_all_is_warned_of(tmp_path):
+    with pytest.warns(UserWarning, match="all are one group"):
+        opened(tmp_path, "frame,id,x,y,group\n1,1,0.5,1,0\n1,2,0.6,1,0\n").truth  # noqa: B018
+
+
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("header", "row"), [(",frame,id,x,y,w,h", "0,{row}"), ("frame,id,x,y,w,h,", "{row},")])
 def test_columns_without_a_name_are_not_used(tmp_path, header, row):
@@ -63,7 +68,8 @@ UNCLEAR = {
     "1;7;10,5;20,5;30,5;40,5\n": "line 1: got '10,5'; expected a number",
     "<html>\n": "line 1: got columns <html>",
     "frame,id,u,v,w,h\n1,1,2,3,4,5\n": "line 1: got columns frame,id,u,v,w,h; expected frame ",
-    "time,id,x,y,w,h\n1,1,2,3,4,5\n": "line 1: got columns time,id,x,y,w,h; expected frame ",
+    "time,id,x,y,w,h\n1,1,2,3,4,5\n": "line 1: got columns time,id,x,y,w,h; expected frame .*time × frames per second",
+    "frame,id,x,y\n0.4,1,2,3\n0.8,1,2,3\n": "line 2: got .*time × frames per second",
     "frame,frame_id,x,y,w,h\n1,1,2,3,4,5\n": "line 1: got columns frame,frame_id,x,y,w,h; expected frame ",
     "1,1,0.1,1,1\n2,1,0.2,1,1\n": "line 1: .*4, 6, 7, 8, 9, 10 columns.*name the columns in the first line",
     "# x y of people\n1 1 20 30 170\n": "line 1: .*name the columns in the first line",
