@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sim.geometry.polygons import cross, footprint_hulls, gap_pairs, iou_pairs, pack
+from sim.geometry.polygons import cross, gap_pairs, iou_pairs, pack
+from sim.truth.group_hulls import footprint_hulls
 from sim.types import Array, Bools
 
 
