@@ -9,6 +9,7 @@ from scenarios.errors import InputError
 from tests import reference_background as reference
 from tracking.detect.background import (
     BACKGROUND,
+    BRIGHT,
     DARK,
     FOREGROUND,
     HIGHLIGHT,
@@ -17,7 +18,7 @@ from tracking.detect.background import (
     Background,
     fused_foreground,
 )
-from tracking.detect.background_settings import BRIGHT, BackgroundSettings
+from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.background_training import train
 from tracking.detect.background_training_kernels import FLOOR
 
