@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sim.geometry.polygons import cross, gap_pairs, iou_pairs, pack
-from sim.truth.group_hulls import footprint_hulls
+from sim.geometry.polygons import cross, footprint_hulls, gap_pairs, iou_pairs, pack
 from sim.types import Array, Bools
 
 

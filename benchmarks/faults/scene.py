@@ -9,8 +9,8 @@ import numpy as np
 
 from scenarios import load
 from sim import simulate
+from sim.geometry.polygons import footprint_hulls
 from sim.render.weather import draw_illumination
-from sim.truth.group_hulls import footprint_hulls
 from sim.types import EVENT_KINDS, Array, Bools, Groups, Ints, Sequence, Tracks
 from tracking.grouping.grouped_tracks import groups_in_frames
 

@@ -1,1 +1,1 @@
-"""Plane geometry: polygons and convex hulls."""
+"""Plane geometry: polygons, convex hulls, footprints of people, and a union-find for labelling connected sets."""

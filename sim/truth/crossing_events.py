@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from sim.elementary import atan2, dot, length
-from sim.geometry.polygons import gap_pairs, pack
-from sim.truth.group_hulls import FOOTPRINT_RADIUS, footprint_hulls, member_rows
+from sim.geometry.polygons import FOOTPRINT_RADIUS, footprint_hulls, gap_pairs, pack
+from sim.truth.group_hulls import member_rows
 from sim.truth.merge_split_rules import close_pairs, frames_of, mean_of_present, stretches
 from sim.truth.motion_rows import MotionRows
 from sim.types import Array, GroupEvent, Ints

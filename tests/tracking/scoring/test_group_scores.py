@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.truth.group_hulls import footprint_hulls
+from sim.geometry.polygons import footprint_hulls
 from tests.hand_made import Scene, event, tracks, truth
 from tracking.scoring import evaluate
 
