@@ -206,11 +206,9 @@ def trajnet_text(tables: TidyTables, fps: float) -> str:
     """Returns people on the ground as TrajNet++: the scene of each person, then the track of each person and frame."""
     stays = tables.people_summary.columns
     spans = zip(*(np.asarray(stays[name]).tolist() for name in ("id", "start_frame", "end_frame")), strict=True)
-    lines: list[Mapping[str, Any]] = [
-        {"scene": {"id": k, "p": p, "s": s, "e": e, "fps": fps}} for k, (p, s, e) in enumerate(spans)
-    ]
-    lines += [{"track": {"f": f, "p": p, "x": round(x, 4), "y": round(y, 4)}} for f, p, x, y in _places(tables)]
-    return "".join(f"{json.dumps(line)}\n" for line in lines)
+    scenes = ({"scene": {"id": k, "p": p, "s": s, "e": e, "fps": fps}} for k, (p, s, e) in enumerate(spans))
+    tracks = ({"track": {"f": f, "p": p, "x": round(x, 4), "y": round(y, 4)}} for f, p, x, y in _places(tables))
+    return "".join(f"{line}\n" for line in map(json.dumps, (*scenes, *tracks)))
 
 
 def pedpy_text(tables: TidyTables, fps: float) -> str:

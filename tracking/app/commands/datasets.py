@@ -27,8 +27,7 @@ def generate(options: GenerateOptions) -> CommandResult:
     lines = [f"{counted(len(folders), 'sequence')} in {folders[0].parent}"]
     left_out = {name: reason.line() for name, reason in folders.left_out.items()}
     lines += [f"left out: {name}: {reason}" for name, reason in left_out.items()]
-    data = {"sequences": folders, "folder": folders[0].parent, "left_out": left_out}
-    return CommandResult(data, "\n".join(lines))
+    return CommandResult({"sequences": folders, "folder": folders[0].parent, "left_out": left_out}, "\n".join(lines))
 
 
 def validate(options: ValidateOptions) -> CommandResult:

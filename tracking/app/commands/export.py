@@ -30,8 +30,7 @@ def export_coco(options: CocoOptions) -> CommandResult:
     """Writes a COCO file of all sequences with labelled boxes at the path of the options."""
     from sim.io.export.coco import coco
 
-    out = option_parsing.output_file(options.out, ".json")
-    path = coco(options.folder, out, person_class=options.person_class)
+    path = coco(options.folder, option_parsing.output_file(options.out, ".json"), person_class=options.person_class)
     root = options.folder if options.folder.is_dir() else options.folder.parent
     return CommandResult({"file": path, "root": root}, f"{path}\nfile names are relative to {root}")
 
