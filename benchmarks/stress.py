@@ -48,10 +48,10 @@ from tracking.scoring.evaluation import Scorer
 from tracking.stats import mean_interval
 from tracking.stress import failures, minimize
 from tracking.stress.axes import AXES, Axis, breaking_point, crossing
-from tracking.stress.episodes import OracleTask, Outcome, Store, Tasks
 from tracking.stress.reductions import difficulties
-from tracking.stress.search import Failure, search, worst
+from tracking.stress.scene_player import OracleTask, Outcome, Store, Tasks
 from tracking.stress.sweep import Plan, Sweep
+from tracking.stress.worst_scenes import SearchedScene, search, worst
 from tracking.tuning.tuned_tracker import TunedTracker
 
 TRUE_SEEDS = range(28_000, 28_040)
@@ -255,7 +255,7 @@ def light_changes(scenario: Scenario, seed: int, frames: SequenceOf[int]) -> boo
     return any(float(near.max() / near.min()) > CHANGE for near in around)
 
 
-def searched(kind: str, number: int, scenes: int, random: bool, folder: Path) -> list[Failure]:
+def searched(kind: str, number: int, scenes: int, random: bool, folder: Path) -> list[SearchedScene]:
     """Returns the scenes of one search."""
 
     def play(given: SequenceOf[Tasks]) -> Iterator[list[Outcome]]:
@@ -274,7 +274,7 @@ def searched(kind: str, number: int, scenes: int, random: bool, folder: Path) ->
     return search(sweep, scenes, seed, optuna.samplers.RandomSampler(seed=seed) if random else None)
 
 
-def searches(kinds: Iterable[str], count: int, scenes: int, folder: Path) -> list[Failure]:
+def searches(kinds: Iterable[str], count: int, scenes: int, folder: Path) -> list[SearchedScene]:
     """Prints a row for each weakness and sampler; returns the worst failure of each search by TPE, if there is one."""
     print(f"\nSearch, {count} searches of {scenes} scenes")
     head(["weakness", "sampler", "first, median", "with a failure", "failures, mean", "scenarios, mean"])
@@ -305,7 +305,7 @@ def story(count: int, scenes: int, folder: Path) -> None:
         source = one.scene.source
         assert source.entry is not None
         condition = failures.parse_failure(f"HOTA<{BEST - LOSS / 2:g}")
-        made = minimize.Search(_play_in_light, condition, source.seed, CONFIRMED)
+        made = minimize.Minimizer(_play_in_light, condition, source.seed, CONFIRMED)
         made.run(source.entry.scenario)
         fresh = source.seed, *made.fresh_seeds()
         own, *others = (made.outcome(made.smallest, seed, budget=False) for seed in fresh)
@@ -319,15 +319,15 @@ def story(count: int, scenes: int, folder: Path) -> None:
         row([source.name, f"{source.seed}", people, seconds, hard, f"{made.played}", *shares])
 
 
-def _play_in_light(scenario: Scenario, seed: int, repeat: int) -> failures.Outcome:
+def _play_in_light(scenario: Scenario, seed: int, repeat: int) -> failures.Judgement:
     try:
         sequence = simulate(scenario, seed, repeat, ())
         crossings = _crossings_of(sequence)
     except FlockscopeError as error:
-        return failures.Outcome(problem=error)
+        return failures.Judgement(problem=error)
     loss = LOSS * light_changes(scenario, seed, crossings)
     assert sequence.truth is not None
-    return failures.Outcome({"HOTA": BEST - loss}, people=len({*sequence.truth.id.tolist()}))
+    return failures.Judgement({"HOTA": BEST - loss}, people=len({*sequence.truth.id.tolist()}))
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ from scenarios.limits import FRAME_RATES
 from sim.types import Array, Bools, Ints, Motion
 
 PHYSICS_RATE = 50.0  # Hz
-SCRIPT_RATE = 10.0  # Hz: people come and go, orders and errands are looked at, fluctuations change
+SCRIPT_RATE = 10.0  # Hz: people come and go, orders and stops are looked at, fluctuations change
 STEPS = 5  # of the physics per tick of the script
 EXACT = 1e-6  # of a step: a frame as near to a step is on it
 

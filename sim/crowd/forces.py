@@ -3,7 +3,7 @@
 Forces on a person, in the order in which they are computed:
 
 - towards the goal, the person's place in the group's formation and the group's velocity: `forces_goal_kernels`;
-- sideways with the strides: `sway_kernels`;
+- sideways with the strides: `sway` there;
 - away from other people, other groups, walls and pillars: `forces_avoidance_kernels`.
 
 `sim.crowd.world.accelerate` adds them up. A body weighs 1 kg, so a force is an acceleration in m/s². The sum of the
@@ -123,7 +123,7 @@ class PeopleArrays(NamedTuple):
     # formation, forward and left, m
     noise: Array
     # (N, 5) cosine and sine of the phase of the strides; velocity of the sway x, y, m/s; amplitude of the sway at 1.34
-    # m/s, m. `sway_kernels` updates all but the amplitude.
+    # m/s, m. `sway` updates all but the amplitude.
     gait: Array
     calm: Array  # (N, 4) x, y, vx, vy without the velocity of the sway, m, m/s
     wanted: Array  # (N, 2) wanted velocity without its fluctuation, m/s. The goal kernels overwrite both.

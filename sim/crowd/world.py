@@ -5,7 +5,7 @@ read and forces written in batches; `World.columns` says which row of a batch is
 who has entered.
 
 Three clocks run side by side. The physics makes PHYSICS_RATE steps per s. SCRIPT_RATE times per s people come and go,
-orders and errands are looked at, and the fluctuations of the walk change; from the states at these ticks the truth is
+orders and stops are looked at, and the fluctuations of the walk change; from the states at these ticks the truth is
 measured. The camera takes its frames at any rate: a frame is the state at its time, on the straight line between two
 steps, which is how the physics moves people. So another frame rate shows the same world.
 """
@@ -22,13 +22,13 @@ import pymunk.batch
 from scenarios.errors import WorkError
 from scenarios.schema.scenario import Scenario
 from sim.clock import PHYSICS_RATE, SCRIPT_RATE, STEPS, FrameTimes
-from sim.crowd.errands import Errands
 from sim.crowd.forces import WAYPOINT, GroupArrays, Obstacles, PeopleArrays
 from sim.crowd.group_state import GroupState
 from sim.crowd.heading import facings, headings
 from sim.crowd.navigation import Navigator, blocked, scene_of
 from sim.crowd.order_execution import OrderExecution, groups_made
 from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, fluctuations, script_placement
+from sim.crowd.stops import Stops
 from sim.elementary import cos, length, sin
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.scene.terrain import flight_rows
@@ -86,7 +86,7 @@ class World:
         slowdown = scenario.crowd.slowdown_per_member
         self.groups = GroupState(self.entering, groups_made(scenario), Navigator(self.scene), slowdown)
         self.orders = OrderExecution(scenario, self.groups, script_placement(scenario, seed, repeat), seed, repeat)
-        self.errands = Errands(self.entering, self.groups, self.scene)
+        self.stops = Stops(self.entering, self.groups, self.scene)
         self.push = np.zeros((len(self.groups.arrays.speed), 2))
         self.obstacles = _obstacles(self.scene, scenario)
         self.space = _space(self.scene)
@@ -134,7 +134,7 @@ class World:
             t = tick / SCRIPT_RATE
             self._come_and_go(t, tick == -warm)
             self.states[self.columns] = self.state
-            changed = self.errands.advance(t, self.states)
+            changed = self.stops.advance(t, self.states)
             if tick >= 0:
                 self.group_of[self.columns] = self.groups.group_of[self.columns]
                 changed |= self.orders.advance(tick, t, self.states)

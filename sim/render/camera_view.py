@@ -39,12 +39,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float32]
 
-# BGR at full light, rows GREY … SKY of the kernels: paving or asphalt, grass, wall, pillar, steps, sky.
-PALETTE = np.array(
-    [[150, 154, 155], [76, 128, 116], [150, 160, 170], [160, 164, 168], [162, 165, 167], [236, 230, 222]], float
-)
-SPREAD = 12.0  # grey levels: sd by which the brightness of a sequence's materials differs from the palette
-SLAB_WIDTHS = (0.0, 0.5, 0.8, 1.2)  # m; 0 = asphalt
 MATERIALS = 0  # key of the random role "texture"; people have the keys from 1 on
 
 
@@ -146,7 +140,7 @@ class CameraView:
     @cached_property
     def geometry(self) -> PixelGeometry:
         """What the centre of each pixel shows of the empty scene."""
-        from sim.render.background_kernels import trace_pixels
+        from sim.render.empty_scene_kernels import trace_pixels
 
         size = self.height, self.width
         depth, kind, place = np.empty(size, np.float32), np.empty(size, np.uint8), np.empty((*size, 3), np.float32)
@@ -156,7 +150,7 @@ class CameraView:
     @cached_property
     def empty_scene(self) -> EmptyScene:
         """The painted empty scene under steady light, with unmoved plants."""
-        from sim.render.background_kernels import paint_pixels
+        from sim.render.empty_scene_kernels import PALETTE, SLAB_WIDTHS, SPREAD, paint_pixels
 
         size, light, plants = (self.height, self.width), self.light, self.plants
         colour, direct, green = np.empty((*size, 3), np.float32), *np.empty((2, *size), np.float32)

@@ -5,8 +5,8 @@ crowd is divided into parts: groups, and people alone. Two parts that are meant 
 of the first stretch in which the merge rule holds between them. A part whose people are meant to be in different groups
 is divided in the first frame of the first stretch in which the split rule holds between those people. People who enter
 in the same frame and are meant to be together form one part from that frame on. sim.truth.merge_split_rules has the
-rules. Stretches are found by looking ahead; the times at which the script gave orders are not used. sim.truth.identity
-says which group keeps its id and what kind of event a change is.
+rules. Stretches are found by looking ahead; the times at which the script gave orders are not used.
+sim.truth.group_ids_and_changes says which group keeps its id and what kind of event a change is.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from sim.truth.identity import GroupChange, Identities, PersonSet
+from sim.truth.group_ids_and_changes import GroupChange, Identities, PersonSet
 from sim.truth.merge_split_rules import HOLD_TIME, frames_of, holds_for, mean_of_present, separation, strangers
 from sim.truth.motion_rows import MotionRows, frames_of_change
 from sim.types import GroupEvent, Ints, Near

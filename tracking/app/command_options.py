@@ -332,7 +332,7 @@ class ValidateOptions(Options, words="validate", run="datasets:validate"):
     folder: Path = ARGUMENT("A generated sequence or dataset, or stored tracks.", metavar="DIR")
 
 
-class CocoOptions(Options, words="export coco", run="datasets:export_coco"):
+class CocoOptions(Options, words="export coco", run="export:export_coco"):
     """Write a COCO file with track and group ids and masks."""
 
     folder: Path = ARGUMENT("A sequence, or dataset of one split, with labelled boxes.", metavar="DIR")
@@ -340,14 +340,14 @@ class CocoOptions(Options, words="export coco", run="datasets:export_coco"):
     person_class: str | None = PERSON_CLASS()
 
 
-class KittiOptions(Options, words="export kitti", run="datasets:export_kitti"):
+class KittiOptions(Options, words="export kitti", run="export:export_kitti"):
     """Write stereo pairs, disparities and calibrations as in KITTI."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset with stereo pairs.", metavar="DIR")
     out: Path = OUT()
 
 
-class WebdatasetOptions(Options, words="export webdataset", run="datasets:export_webdataset"):
+class WebdatasetOptions(Options, words="export webdataset", run="export:export_webdataset"):
     """Write tar shards for streaming, in the format of the library webdataset."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset.", metavar="DIR")
@@ -355,7 +355,7 @@ class WebdatasetOptions(Options, words="export webdataset", run="datasets:export
     shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
 
 
-class TrajnetOptions(Options, words="export trajnet", run="tables:export_trajnet"):
+class TrajnetOptions(Options, words="export trajnet", run="export:export_trajnet"):
     """Write the positions of people, of tracks or of labels, as TrajNet++ (*.ndjson)."""
 
     source: Path = ARGUMENT("Output of `track` or `group`, or labelled people.", metavar="RUN|SOURCE")
@@ -363,11 +363,11 @@ class TrajnetOptions(Options, words="export trajnet", run="tables:export_trajnet
     fps: float | None = FPS()
 
 
-class PedpyOptions(TrajnetOptions, words="export pedpy", run="tables:export_pedpy"):
+class PedpyOptions(TrajnetOptions, words="export pedpy", run="export:export_pedpy"):
     """Write the positions of people, of tracks or of labels, as a text of PedPy and JuPedSim."""
 
 
-class CsvOptions(TrajnetOptions, words="export csv", run="tables:export_csv"):
+class CsvOptions(TrajnetOptions, words="export csv", run="export:export_csv"):
     """Write tables of people, groups, members, events and counts per minute as CSV, of tracks or of labels."""
 
     line: list[str] = option("Count who crosses a line. Can be given several times.", [], metavar="NAME=X1,Y1,X2,Y2")
@@ -375,7 +375,7 @@ class CsvOptions(TrajnetOptions, words="export csv", run="tables:export_csv"):
         "Count who is in a polygon. Can be given several times.", [], metavar="NAME=X1,Y1,X2,Y2,X3,Y3,…")
 
 
-class ParquetOptions(CsvOptions, words="export parquet", run="tables:export_parquet"):
+class ParquetOptions(CsvOptions, words="export parquet", run="export:export_parquet"):
     """Write tables of people, groups, members, events and counts per minute as Parquet, of tracks or of labels."""
 
 

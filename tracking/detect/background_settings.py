@@ -7,14 +7,6 @@ from typing import ClassVar
 
 from tracking.config import Config, param
 
-# Relative brightness above which a brightened pixel is foreground, not highlight (ours). Light shirts are 15 to 30 %
-# brighter than a grey floor; at 1.3 a third of their pixels are missed.
-BRIGHT = 1.15
-FOREGROUND_SLOWER = 10.0  # Foreground pixels adapt so many times more slowly than background pixels (ours).
-# s: a region that has stood still for this time and shows what left, not what came, becomes background (ours).
-GHOST_TIME = 1.0
-MOST_FOREGROUND = 0.6  # Share of the image: a frame with more foreground is not measured (ours).
-
 
 @dataclass(frozen=True)
 class BackgroundSettings(Config):

@@ -20,13 +20,14 @@ import numpy as np
 from sim.types import Array, Bools, Context, Image
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
-from tracking.detect.background_settings import GHOST_TIME, MOST_FOREGROUND, BackgroundSettings
+from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.ghosts import Ghosts, uncovered_in_sample
 from tracking.detect.person_size import PersonSize
 
 # m^2 at the image's scale, and px: a blob that is smaller than either is noise.
 LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0
 ASSUMED_HEIGHT = 18.0  # m that the image is assumed to be high while its scale is unknown.
+MOST_FOREGROUND = 0.6  # Share of the image: a frame with more foreground is not measured (ours).
 SAMPLED = 25  # About so many frames of the background sample are searched for people who stand alone.
 
 
@@ -104,9 +105,7 @@ class Foreground:
         self.model.adapt(seen.image, seen.classes, protected)
         if seen.plausible and self.ghosts is not None:
             model = self.model
-            found = self.ghosts.find(
-                seen.image, model.gain, seen.mask, model.mean, GHOST_TIME, self.scale, self.least_area
-            )
+            found = self.ghosts.find(seen.image, model.gain, seen.mask, model.mean, self.scale, self.least_area)
             if found is not None:
                 model.mend(found, self.ghosts.colour)
 

@@ -6,7 +6,7 @@ in one respect. At the edge of the region, either the picture or the model has a
 something came, the model if something left.
 
 A region of the foreground is a ghost if
-    still    its pixels have kept their colour for `ghost_time`
+    still    its pixels have kept their colour for GHOST_TIME
     open     more than half of its edge borders on background, not on other foreground
     left     along that edge the steps of the model sum to at least STEPS times those of the picture
 The step at a pixel of the edge is the difference of the mean colours inside the region and outside the foreground,
@@ -29,6 +29,7 @@ from sim.types import Bools, Image
 from tracking.detect import background_kernels, blobs
 from tracking.detect.background_kernels import Floats
 
+GHOST_TIME = 1.0  # s: a region that has been still for this time can be a ghost.
 SIGHTING = 0.25  # s from one look at the pixels to the next. A walking person uncovers a pixel in about this time.
 REACH = 3.5  # Noises (standard deviations of the camera) within which a pixel's colour is the same.
 LEAST_SIGHTINGS = 3  # Fewest looks at a still pixel, whatever the frame rate.
@@ -65,18 +66,17 @@ class Ghosts:
         self._frames = 0
 
     def find(
-        self, image: Image, gain: Floats, mask: Bools, model: Floats, ghost_time: float, px_per_m: float, least: float
+        self, image: Image, gain: Floats, mask: Bools, model: Floats, px_per_m: float, least: float
     ) -> Bools | None:
         """Adds a picture; returns the pixels (H, W) of ghosts with the unchanging pixels in a band round them, or None.
 
-        It is None if there is no ghost, and in most frames, as only some are looked at. ghost_time: s that a ghost must
-        have been unchanged. least: fewest pixels of a ghost.
+        It is None if there is no ghost, and in most frames, as only some are looked at. least: fewest pixels of one.
         """
         self._frames += 1
         if self._frames % self._every:
             return None
         background_kernels.watch(image, gain, self.reach, self.colour, self.sightings)
-        still = self.sightings >= max(math.ceil(ghost_time / self._step) + 1, LEAST_SIGHTINGS)
+        still = self.sightings >= max(math.ceil(GHOST_TIME / self._step) + 1, LEAST_SIGHTINGS)
         regions = blobs.find(mask & still, least)
         band = max(round(BAND_M * px_per_m), LEAST_BAND)
         found = np.zeros(mask.shape, bool)

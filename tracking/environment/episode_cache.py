@@ -25,7 +25,7 @@ from sim.types import Frame, Sequence, Truth
 
 if TYPE_CHECKING:
     from scenarios.loading.resolve import Entry
-    from tracking.objective import ObjectiveScorer
+    from tracking.fast_objective import ObjectiveScorer
 
 T = TypeVar("T")
 SourceSpec = str | Path | Sequence | Iterable["str | Path | Sequence | Source"]
@@ -168,7 +168,7 @@ class OpenedSource:
     @cached_property
     def judge(self) -> ObjectiveScorer:
         """An `ObjectiveScorer` of the sequence's truth, built on first use. Raises InputError without labels."""
-        from tracking.objective import ObjectiveScorer
+        from tracking.fast_objective import ObjectiveScorer
 
         self._kept.append(judge := ObjectiveScorer(self.truth))
         return judge

@@ -23,10 +23,10 @@ from tracking.errors.people import PersonError, matched_people, person_errors
 from tracking.errors.repairs import SHOWN, ComparedPeople, ComparedRun, scores
 from tracking.oracle import named_detections
 from tracking.running.run import TrackingRun
+from tracking.scoring.candidate_pairs import REACH
 from tracking.scoring.evaluation import MatchedSides
 from tracking.scoring.group_and_event_scores import TrackedGroups, compared_events, tracked_groups
 from tracking.scoring.people_comparison import Similarity, from_pixels
-from tracking.scoring.position_errors import REACH
 from tracking.scoring.rows import find_rows
 
 EVERY = 10**9  # costs of all errors

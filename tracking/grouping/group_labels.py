@@ -3,8 +3,8 @@
 A group is a connected component of linked people. Where the grouping says who is together *now*, these groups are
 shown, with the ids of the linked groups that they stand for; events are those of the linked groups. People are numbered
 as columns of arrays by frame and person, from 0; frames count from 0. Events are form, dissolve, merge, split, enter
-and leave; crossings and queues are not found here. Ids follow the identity rule of the truth (sim.truth.identity): a
-group that changes keeps its id where it shares most members.
+and leave; crossings and queues are not found here. Ids follow the rule of the truth
+(sim.truth.group_ids_and_changes): a group that changes keeps its id where it shares most members.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.truth.identity import GroupChange, Identities, Members, PersonSet
+from sim.truth.group_ids_and_changes import GroupChange, Identities, Members, PersonSet
 from sim.truth.merge_split_rules import frames_of, stretches
 from sim.truth.motion_rows import frames_of_change
 from sim.types import GroupEvent, Ints

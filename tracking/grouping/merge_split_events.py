@@ -2,8 +2,8 @@
 
 Two sources: links that a grouping switched (`event_of_change`), or labels that a tracker gave (`events_of_labels`).
 Changes that only correct what was believed are no events: `corrects`, and merges that become known late.
-What a change is called follows from sim.truth.identity.lineage, the same rule as in the truth. People are columns of
-arrays, frames count from 0; in the returned events people are columns + 1, frames count from 1.
+What a change is called follows from sim.truth.group_ids_and_changes, the same rule as in the truth. People are columns
+of arrays, frames count from 0; in the returned events people are columns + 1, frames count from 1.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
-from sim.truth.identity import GroupChange, PersonSet, lineage
+from sim.truth.group_ids_and_changes import GroupChange, PersonSet, group_changes
 from sim.truth.merge_split_rules import HOLD_TIME, frames_of, separation, stretches
 from sim.truth.motion_rows import MotionRows, frames_of_change
 from sim.types import Bools, GroupEvent, Ints
@@ -104,7 +104,7 @@ def events_of_labels(motion: MotionRows) -> list[GroupEvent]:
     for t in [0, *frames_of_change(frame, column, group, motion.length)]:
         rows = slice(*np.searchsorted(frame, (t, t + 1)))
         new, now = _members(column[rows], group[rows]), frozenset(column[rows].tolist())
-        changes = lineage(old, new, before, now) if t else []
+        changes = group_changes(old, new, before, now) if t else []
         events += [_event(c, t - (c.kind == "leave"), t - (c.kind == "leave"), t, motion) for c in changes]
         old, before = new, now
     return events

@@ -19,6 +19,7 @@ from sim.types import Array, Bools, Ints
 from tracking.scoring.rows import FrameRows, numbered
 
 EPS = float(np.finfo(float).eps)
+REACH = 2.0  # m: distance from which the similarity of two positions is 0; also the cut-off of GOSPA
 FOUND = 0.5  # Similarity from which a person or group counts as found: 1 m apart on the ground, or an IoU of 0.5.
 CHUNK = 200_000  # pairs compared at once: bounds memory and fits the cache
 SLACK = 1e-6  # share of the coordinates' range: more than rounding can move a row along the sort axis of `_near`

@@ -108,6 +108,11 @@ class Scores(Mapping[str, float]):
         return "\n".join(f"{key:28} {value:.4g}" for key, value in self.items() if not math.isnan(value))
 
 
+def objective(hota: Array, group_f1: Array) -> Array:
+    """Returns the score that ranks and tunes, (D,): the mean of HOTA and group_F1 (D,), or what is known of them."""
+    return mean_of_known(np.column_stack([hota, group_f1]))
+
+
 @dataclass(frozen=True, eq=False)
 class MatchedSides:
     """One truth and one tracker's tracks in the scored frames, with people matched, ready for computing scores."""
@@ -152,7 +157,7 @@ class MatchedSides:
             found = dict.fromkeys(CATALOGUE, np.full(len(weights), np.nan))
             for part in parts:
                 found |= part(weights)
-            found["objective"] = mean_of_known(np.column_stack([found["HOTA"], found["group_F1"]]))
+            found["objective"] = objective(found["HOTA"], found["group_F1"])
             return {key: found[key] for key in CATALOGUE}
 
         return score

@@ -20,10 +20,9 @@ from sim.truth.group_hulls import groups_over_time
 from sim.types import Array, Tracks, Truth
 from tracking.grouping.foot_points import boxed, can_stand, completed, feet, moved_events, standing
 from tracking.grouping.grouped_tracks import groups_in_frames, with_groups
-from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
+from tracking.scoring.candidate_pairs import REACH, Pairs, box_pairs, point_pairs
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.people_and_groups import PersonRows, Surface
-from tracking.scoring.position_errors import REACH
 
 # How two people are compared: IoU of boxes, or distance of positions on the ground or in the image.
 Similarity = Literal["boxes", "ground", "image"]

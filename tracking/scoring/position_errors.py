@@ -21,12 +21,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from sim.types import Array
-from tracking.scoring.candidate_pairs import Pairs, point_pairs
+from tracking.scoring.candidate_pairs import REACH, Pairs, point_pairs
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.matching import match
 from tracking.scoring.weighted_sums import FrameScores, WeightedScores
 
-REACH = 2.0  # m: distance from which the similarity of two positions is 0; also the cut-off of GOSPA
 POWER = 2.0
 PARTS = ("GOSPA_localisation", "GOSPA_missed", "GOSPA_false")
 

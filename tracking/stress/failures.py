@@ -36,7 +36,7 @@ Run = Callable[[Sequence], TrackingRun]  # Tracks a sequence.
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Judgement:
     """The result of one episode: scores by key, errors, number of people, or the problem that prevents a judgement."""
 
     scores: Mapping[str, float] = field(default_factory=dict)
@@ -56,13 +56,13 @@ class Failure:
     kind: str = ""
     cause: str = ""
 
-    def holds(self, outcome: Outcome) -> bool:
+    def holds(self, outcome: Judgement) -> bool:
         """Returns True if the tracker failed in this way: the score is beyond the bound, or such an error occurred."""
         if self.kind:
             return any(self.kind == kind and self.cause in ("", cause) for kind, cause in outcome.errors)
         return OPERATORS[self.beyond](outcome.scores.get(self.score, float("nan")), self.bound)
 
-    def found(self, outcome: Outcome) -> str:
+    def found(self, outcome: Judgement) -> str:
         """Returns in words what the episode shows: its problem, the errors that occurred, or the value of the score."""
         if outcome.problem is not None:
             return outcome.problem.line()
@@ -99,7 +99,7 @@ def _wrong(text: str, expected: str, remedy: str) -> InputError:
 
 def play_episode(
     run: Run, streams: Iterable[str], failure: Failure, scenario: Scenario, seed: int, repeat: int = 0
-) -> Outcome:
+) -> Judgement:
     """Simulates a scene, tracks it with `run`, and returns scores and errors as far as `failure` needs them.
 
     streams: the pictures to draw. repeat: number of the copy in the suite. `problem` of the result is set if an order
@@ -121,15 +121,15 @@ def play_episode(
         except WorkError:
             if failure.kind != CRASH:
                 raise
-            return Outcome({}, frozenset([(CRASH, "")]), people)
+            return Judgement({}, frozenset([(CRASH, "")]), people)
         with scorer_of(sequence) as scorer:
             scores = {key: value for key, value in scorer.evaluate(tracked).items() if value == value}
-            if failure.score and failure.holds(Outcome(scores)):
+            if failure.score and failure.holds(Judgement(scores)):
                 best = scorer.evaluate(oracle(sequence, tracked.info))[failure.score]
                 scores = {key: value for key, value in scores.items() if key != failure.score or best == best}
-        return Outcome(scores, _errors(failure, sequence, tracked), people)
+        return Judgement(scores, _errors(failure, sequence, tracked), people)
     except FlockscopeError as error:
-        return Outcome(problem=error)
+        return Judgement(problem=error)
 
 
 def _errors(failure: Failure, sequence: Sequence, run: TrackingRun) -> frozenset[tuple[str, str]]:

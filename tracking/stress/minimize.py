@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 from scenarios.errors import WorkError
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario
-from tracking.stress.failures import Failure, Outcome
+from tracking.stress.failures import Failure, Judgement
 from tracking.stress.reductions import STAGES, Stage, pinned, without
 
 ALLOWED = 5  # one of so many confirming seeds may not fail
@@ -37,15 +37,15 @@ def _most(seeds: int) -> int:
 
 
 # Plays an episode of a scenario with a seed; the last is the number of the suite's copy that the scenario is.
-Play = Callable[[Scenario, int, int], Outcome]
+Play = Callable[[Scenario, int, int], Judgement]
 
 
 class BudgetSpentError(Exception):
-    """No episode or no time is left; caught by `Search.run`."""
+    """No episode or no time is left; caught by `Minimizer.run`."""
 
 
 @dataclass
-class Search:
+class Minimizer:
     """The search for a smallest scene.
 
     State: `trail`, the accepted scenes from the first to the smallest; `guard`, the confirming seeds; `required`, how
@@ -63,8 +63,8 @@ class Search:
     guard: list[int] = field(default_factory=list)
     required: int = 0
     missed: Counter[int] = field(default_factory=Counter)
-    known: dict[tuple[str, int], Outcome] = field(default_factory=dict)
-    first: Outcome = Outcome()
+    known: dict[tuple[str, int], Judgement] = field(default_factory=dict)
+    first: Judgement = Judgement()
     played: int = 0
     complete: bool = False
     _end: float = float("inf")
@@ -196,7 +196,7 @@ class Search:
         outcome = self.outcome(scenario, seed)
         return outcome.problem is None and self.failure.holds(outcome)
 
-    def outcome(self, scenario: Scenario, seed: int, budget: bool = True) -> Outcome:
+    def outcome(self, scenario: Scenario, seed: int, budget: bool = True) -> Judgement:
         """Returns the outcome of an episode, which is played if it is not known yet.
 
         Raises BudgetSpentError if it must be played and the budget is spent; budget: False plays it all the same.

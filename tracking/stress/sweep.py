@@ -29,7 +29,7 @@ from sim.hashing import ENGINE
 from sim.types import Array, DetectionMode
 from tracking.environment.episode_cache import Source, sources
 from tracking.stress.axes import Axis, BreakingPoint, breaking_point
-from tracking.stress.episodes import ORACLE, OracleTask, PlayScenes, Store
+from tracking.stress.scene_player import ORACLE, OracleTask, PlayScenes, Store
 from tracking.tuning.parallel_episodes import EpisodeTask
 from tracking.tuning.tuned_tracker import TunedTracker
 

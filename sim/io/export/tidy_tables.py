@@ -21,7 +21,7 @@ import json
 import math
 import re
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Sequence as Series
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -177,7 +177,10 @@ def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[st
     """
     if form in TEXTS:
         name, beginning = TEXTS[form]
-        body = _people_text(tables, folder, form, facts["fps"])
+        if "x_m" not in tables.people.columns:
+            got, expected = "people in the image, px", "positions on the ground, m"
+            raise InputError(file=folder, got=got, expected=expected, remedy="track with --camera, or from points")
+        body = (trajnet_text if form == "trajnet" else pedpy_text)(tables, facts["fps"])
         _refuse_foreign(folder / name, beginning)
         write_file(folder / name, body.encode())
         return [folder / name]
@@ -199,21 +202,24 @@ def _refuse_foreign(path: Path, beginning: bytes | None) -> None:
     refuse_foreign_file(path)
 
 
-def _people_text(tables: TidyTables, folder: Path, form: Form, fps: float) -> str:
-    columns, stays = tables.people.columns, tables.people_summary.columns
-    if "x_m" not in columns:
-        got, expected = "people in the image, px", "positions on the ground, m"
-        raise InputError(file=folder, got=got, expected=expected, remedy="track with --camera, or from points")
-    rows = list(zip(*(columns[name].tolist() for name in ("frame", "id", "x_m", "y_m")), strict=True))
-    if form == "pedpy":
-        lines = [f"# framerate: {fps:g}", "# id\tframe\tx/m\ty/m"]
-        lines += [f"{p}\t{f}\t{x:.4f}\t{y:.4f}" for f, p, x, y in rows]
-    else:
-        spans = zip(*(np.asarray(stays[name]).tolist() for name in ("id", "start_frame", "end_frame")), strict=True)
-        scenes = ({"scene": {"id": k, "p": p, "s": s, "e": e, "fps": fps}} for k, (p, s, e) in enumerate(spans))
-        tracks = ({"track": {"f": f, "p": p, "x": round(x, 4), "y": round(y, 4)}} for f, p, x, y in rows)
-        lines = list(map(json.dumps, (*scenes, *tracks)))
-    return "".join(f"{line}\n" for line in lines)
+def trajnet_text(tables: TidyTables, fps: float) -> str:
+    """Returns people on the ground as TrajNet++: the scene of each person, then the track of each person and frame."""
+    stays = tables.people_summary.columns
+    spans = zip(*(np.asarray(stays[name]).tolist() for name in ("id", "start_frame", "end_frame")), strict=True)
+    scenes = ({"scene": {"id": k, "p": p, "s": s, "e": e, "fps": fps}} for k, (p, s, e) in enumerate(spans))
+    tracks = ({"track": {"f": f, "p": p, "x": round(x, 4), "y": round(y, 4)}} for f, p, x, y in _places(tables))
+    return "".join(f"{line}\n" for line in map(json.dumps, (*scenes, *tracks)))
+
+
+def pedpy_text(tables: TidyTables, fps: float) -> str:
+    """Returns people on the ground as a text of PedPy and JuPedSim."""
+    rows = "".join(f"{p}\t{f}\t{x:.4f}\t{y:.4f}\n" for f, p, x, y in _places(tables))
+    return f"# framerate: {fps:g}\n# id\tframe\tx/m\ty/m\n{rows}"
+
+
+def _places(tables: TidyTables) -> Iterator[tuple[int, int, float, float]]:
+    columns = tables.people.columns
+    return zip(*(columns[name].tolist() for name in ("frame", "id", "x_m", "y_m")), strict=True)
 
 
 def _csv(table: pyarrow.Table) -> bytes:

@@ -7,6 +7,7 @@ import pytest
 
 from scenarios.errors import InputError
 from tests import reference_background as reference
+from tracking.detect import background
 from tracking.detect.background import (
     BACKGROUND,
     DARK,
@@ -17,7 +18,7 @@ from tracking.detect.background import (
     Background,
     fused_foreground,
 )
-from tracking.detect.background_settings import BRIGHT, BackgroundSettings
+from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.background_training import train
 from tracking.detect.background_training_kernels import FLOOR
 
@@ -210,7 +211,7 @@ def test_kernels_equal_their_twins():
         picture[:6] = rng.integers(0, 255, (6, 50, 3))
         classes = made.classify(read_only(picture))
         planes = np.moveaxis(made.mean, 0, -1).astype(float), np.moveaxis(made.var, 0, -1).astype(float)
-        limits = (*made.thresholds, 0.7, BRIGHT)
+        limits = (*made.thresholds, 0.7, background.BRIGHT)
         twin = reference.classify(picture, planes[0], np.sqrt(planes[1]), made.s, made.b, made.valid, made.gain, limits)
         assert np.bincount(classes.ravel(), minlength=5).min() > 20
         assert np.mean(classes != twin) < 1e-3

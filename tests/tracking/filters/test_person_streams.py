@@ -10,8 +10,8 @@ import pytest
 from filterpy.monte_carlo import resampling
 from scipy import stats
 
-from tracking.filters.particles import residual_resample, systematic_resample_rows
 from tracking.filters.person_streams import NOBODY, PersonStreams, birth_keys
+from tracking.filters.resampling import residual_resample, systematic_resample_rows
 
 PLACES = np.random.default_rng(0).uniform(-50, 50, (400, 2))
 

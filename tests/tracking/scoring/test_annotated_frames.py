@@ -10,7 +10,7 @@ from sim.sequence import simulate
 from sim.types import Groups, Truth, Unscored
 from tests.hand_made import with_rows
 from tracking import track
-from tracking.objective import ObjectiveScorer
+from tracking.fast_objective import ObjectiveScorer
 from tracking.scoring import evaluate, score_arrays
 from tracking.scoring.annotated_frames import annotated_frames
 from tracking.scoring.catalogue import CATALOGUE

@@ -22,26 +22,26 @@ from tracking.app.commands.minimize import _of_run
 from tracking.app.commands.track import TrackerSetup
 from tracking.errors import groups
 from tracking.errors.people import PersonKind
-from tracking.stress.failures import Outcome, parse_failure, play_episode
-from tracking.stress.minimize import Search
+from tracking.stress.failures import Judgement, parse_failure, play_episode
+from tracking.stress.minimize import Minimizer
 from tracking.stress.reductions import STAGES, beginning, difficulties, pinned, script, without
 
 FAILURE = parse_failure("HOTA<0.5")
 Oracle = Callable[[Scenario, int], bool]
 
 
-def search(fails: Oracle, seen: list[tuple[Scenario, int, int]] | None = None, **changes) -> Search:
+def search(fails: Oracle, seen: list[tuple[Scenario, int, int]] | None = None, **changes) -> Minimizer:
     """A search whose episodes fail as the oracle says; nothing is simulated."""
 
-    def play(scenario: Scenario, seed: int, repeat: int) -> Outcome:
+    def play(scenario: Scenario, seed: int, repeat: int) -> Judgement:
         if seen is not None:
             seen.append((scenario, seed, repeat))
-        return Outcome({"HOTA": 0.4 if fails(scenario, seed) else 0.9}, people=1)
+        return Judgement({"HOTA": 0.4 if fails(scenario, seed) else 0.9}, people=1)
 
-    return Search(**{"play": play, "failure": FAILURE, "seed": 3, "confirm": 5, **changes})
+    return Minimizer(**{"play": play, "failure": FAILURE, "seed": 3, "confirm": 5, **changes})
 
 
-def minimised(fails: Oracle, scenario: Scenario | None = None, **changes) -> Search:
+def minimised(fails: Oracle, scenario: Scenario | None = None, **changes) -> Minimizer:
     """The search after its run, of HARD if no scenario is given."""
     made = search(fails, **changes)
     made.run(HARD if scenario is None else scenario)
@@ -170,7 +170,7 @@ def test_a_copy_of_a_suite_becomes_a_scene_of_its_own() -> None:
     drawn = pinned(HARD, 3, 2)
     assert drawn is not None
     assert made.trail[0] == drawn
-    alone = search(needs, play=lambda scenario, seed, repeat: Outcome({"HOTA": 0.4 if repeat else 0.9}))
+    alone = search(needs, play=lambda scenario, seed, repeat: Judgement({"HOTA": 0.4 if repeat else 0.9}))
     with pytest.raises(WorkError, match="copy 2 of an entry"):
         alone.run(HARD, repeat=2)
 
@@ -178,8 +178,8 @@ def test_a_copy_of_a_suite_becomes_a_scene_of_its_own() -> None:
 def test_an_order_that_does_not_come_true_is_no_failure() -> None:
     error = OrderError(got="no merge", expected="a merge", remedy="")
 
-    def play(scenario: Scenario, seed: int, repeat: int) -> Outcome:
-        return Outcome({"HOTA": 0.1}, problem=None if scenario.duration > 30 else error)
+    def play(scenario: Scenario, seed: int, repeat: int) -> Judgement:
+        return Judgement({"HOTA": 0.1}, problem=None if scenario.duration > 30 else error)
 
     assert 30 < minimised(needs, play=play).smallest.duration <= 31
 
@@ -203,7 +203,7 @@ def test_wrong_conditions(text: str, got: str) -> None:
 
 
 def test_conditions() -> None:
-    outcome = Outcome({"IDSW": 3.0}, frozenset({("switch", "hidden")}))
+    outcome = Judgement({"IDSW": 3.0}, frozenset({("switch", "hidden")}))
     true, false = ["IDSW>=3", "IDSW > 2", "IDSW<=3", "switch", "switch:hidden"], ["IDSW<3", "HOTA<0.5", "switch:near"]
     assert [text for text in (*true, *false, "late split") if parse_failure(text).holds(outcome)] == true
 

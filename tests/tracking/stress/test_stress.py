@@ -12,7 +12,7 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from tracking.environment.episode_cache import Source
 from tracking.stress.axes import AXES, NEVER, breaking_point, crossing, parse_axes, parse_axis
-from tracking.stress.episodes import Outcome, Store, Tasks
+from tracking.stress.scene_player import Outcome, Store, Tasks
 from tracking.stress.sweep import Plan, Sweep
 from tracking.tuning.parallel_episodes import EpisodeTask
 from tracking.tuning.tuned_tracker import TunedTracker

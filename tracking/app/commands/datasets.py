@@ -1,17 +1,10 @@
-"""`flockscope generate`, `replay`, `validate` and `export`: make, check and convert datasets."""
+"""`flockscope generate`, `replay` and `validate`: make and check datasets."""
 
 from __future__ import annotations
 
 from scenarios.errors import InputError, counted
 from tracking.app import option_parsing
-from tracking.app.command_options import (
-    CocoOptions,
-    GenerateOptions,
-    KittiOptions,
-    ReplayCommandOptions,
-    ValidateOptions,
-    WebdatasetOptions,
-)  # fmt: skip
+from tracking.app.command_options import GenerateOptions, ReplayCommandOptions, ValidateOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 
@@ -34,8 +27,7 @@ def generate(options: GenerateOptions) -> CommandResult:
     lines = [f"{counted(len(folders), 'sequence')} in {folders[0].parent}"]
     left_out = {name: reason.line() for name, reason in folders.left_out.items()}
     lines += [f"left out: {name}: {reason}" for name, reason in left_out.items()]
-    data = {"sequences": folders, "folder": folders[0].parent, "left_out": left_out}
-    return CommandResult(data, "\n".join(lines))
+    return CommandResult({"sequences": folders, "folder": folders[0].parent, "left_out": left_out}, "\n".join(lines))
 
 
 def validate(options: ValidateOptions) -> CommandResult:
@@ -52,41 +44,6 @@ def validate(options: ValidateOptions) -> CommandResult:
     lines = [problem.line() for problem in problems]
     listed = [problem.as_dict() for problem in problems]
     return CommandResult({"problems": listed, "error": listed[0]}, "\n".join(lines), code=1)
-
-
-def export_coco(options: CocoOptions) -> CommandResult:
-    """Writes a COCO file of all sequences with labelled boxes at the path of the options."""
-    from sim.io.export.coco import coco
-    from sim.io.files.own_files import output_file
-
-    out = output_file(options.out, ".json")
-    path = coco(options.folder, out, person_class=options.person_class)
-    root = options.folder if options.folder.is_dir() else options.folder.parent
-    return CommandResult({"file": path, "root": root}, f"{path}\nfile names are relative to {root}")
-
-
-def export_kitti(options: KittiOptions) -> CommandResult:
-    """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder --out."""
-    from sim.io.export.kitti import kitti
-
-    folders = kitti(options.folder, option_parsing.output_folder(options.out))
-    return CommandResult({"folders": folders}, "\n".join(map(str, folders)))
-
-
-def export_webdataset(options: WebdatasetOptions) -> CommandResult:
-    """Writes tar shards of all sequences of a generated dataset into the folder of --out, and an index.json."""
-    from sim.io.export.webdataset import size_of, webdataset
-
-    out = option_parsing.output_folder(options.out)
-    size = size_of(options.shard_size)
-    with ProgressMeter("export") as meter:
-        index = webdataset(options.folder, out, shard_size=size, progress=meter.update)
-    shards = index["shards"]
-    count, total = sum(len(s["sequences"]) for s in shards), sum(s["bytes"] for s in shards)
-    packed = f"{counted(count, 'sequence')} in {counted(len(shards), 'shard')}"
-    text = f"{packed}, {total / 1e6:.1f} MB; content {index['content_hash'][:16]}"
-    files = [out / s["name"] for s in shards]
-    return CommandResult({"shards": files, "bytes": total, "content_hash": index["content_hash"]}, text)
 
 
 def replay(options: ReplayCommandOptions) -> CommandResult:

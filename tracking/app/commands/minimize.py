@@ -25,8 +25,8 @@ from tracking.environment.episodes import streams_for
 from tracking.grouping.grouping_choice import default_grouping
 from tracking.grouping.link_rule import LinkRule
 from tracking.running.tracker_registry import find
-from tracking.stress.failures import CRASH, Failure, Outcome, parse_failure, play_episode
-from tracking.stress.minimize import Search
+from tracking.stress.failures import CRASH, Failure, Judgement, parse_failure, play_episode
+from tracking.stress.minimize import Minimizer
 from tracking.stress.reductions import OBSTACLES, difficulties, table_of
 from tracking.stress.sweep import generate_command
 
@@ -56,12 +56,12 @@ def minimize(options: MinimizeOptions) -> CommandResult:
     scene, setup = _scene_and_tracker(options)
     streams = streams_for(setup.tracker, setup.detections)
 
-    def play(scenario: Scenario, seed: int, repeat: int = 0) -> Outcome:
+    def play(scenario: Scenario, seed: int, repeat: int = 0) -> Judgement:
         meter.step(f"{scenario.duration:g} s, {counted(len(scenario.group), 'group')}")
         return play_episode(setup.run, streams, failure, scenario, seed, repeat)
 
     with ProgressMeter("minimize", options.episodes) as meter:
-        search = Search(play, failure, scene.seed, options.confirm, options.episodes, options.minutes)
+        search = Minimizer(play, failure, scene.seed, options.confirm, options.episodes, options.minutes)
         try:
             search.run(scene.scenario, scene.repeat)
         except KeyboardInterrupt:
@@ -133,7 +133,7 @@ def _sequence_of(info: Mapping[str, Any]) -> Path | None:
     return None
 
 
-def _write(out: Path, search: Search, scene: Scene, setup: TrackerSetup) -> Scenario:
+def _write(out: Path, search: Minimizer, scene: Scene, setup: TrackerSetup) -> Scenario:
     """Writes the smallest scene as a scenario file, and returns it as it is read again."""
     about = f"{scene.scenario.name} made small: {setup.tracker} has {search.failure.text}"
     small = search.smallest.model_copy(update={"about": about})
@@ -161,7 +161,7 @@ def _write_page(path: Path, setup: TrackerSetup, failure: Failure, sequence: Seq
 
 
 def _result(
-    search: Search, scene: Scene, setup: TrackerSetup, out: Path, outcomes: dict[int, Outcome]
+    search: Minimizer, scene: Scene, setup: TrackerSetup, out: Path, outcomes: dict[int, Judgement]
 ) -> CommandResult:
     small = search.smallest
     fails = {seed: search.fails(small, seed) for seed in outcomes}
@@ -180,7 +180,7 @@ def _result(
     return CommandResult(data, _text(data))
 
 
-def _counts(scenario: Scenario, outcome: Outcome) -> dict[str, float]:
+def _counts(scenario: Scenario, outcome: Judgement) -> dict[str, float]:
     """Returns how much there is of everything in a scene."""
     obstacles = {key: len(getattr(scenario.world, key)) for key in OBSTACLES}
     return {

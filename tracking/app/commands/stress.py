@@ -21,9 +21,9 @@ from tracking.app.progress import ProgressMeter
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval
 from tracking.stress.axes import BreakingPoint, parse_axes
-from tracking.stress.episodes import ORACLE, Store, contender, scene_player
-from tracking.stress.search import Failure, search, worst
+from tracking.stress.scene_player import ORACLE, Store, contender, scene_player
 from tracking.stress.sweep import Plan, Sweep, generate_command
+from tracking.stress.worst_scenes import SearchedScene, search, worst
 
 EPISODES, TABLE, RESULT = "episodes.jsonl", "episodes.parquet", "stress.json"
 REPORT = "report.html"
@@ -84,7 +84,7 @@ def _plan(options: StressOptions, detections: DetectionMode) -> Plan:
     )  # fmt: skip
 
 
-def _data(sweep: Sweep, found: list[Failure] | None) -> dict[str, Any]:
+def _data(sweep: Sweep, found: list[SearchedScene] | None) -> dict[str, Any]:
     """Returns all that stress.json has. found: the scenes of a search."""
     plan, rows, names = sweep.plan, sweep.rows(), [*sweep.trackers, ORACLE]
     data: dict[str, Any] = {
@@ -139,7 +139,7 @@ def _on_axis(plan: Plan, point: BreakingPoint) -> dict[str, float | None]:
     }
 
 
-def _failure(failure: Failure, place: int) -> dict[str, Any]:
+def _failure(failure: SearchedScene, place: int) -> dict[str, Any]:
     source = failure.scene.source
     command = generate_command(failure.scenario, source.seed, failure.settings, f"worst-{place}")
     return {

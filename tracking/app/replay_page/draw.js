@@ -1,5 +1,6 @@
-// Colours, shapes and labels that plan and image share.
+// Colours, shapes, labels and trails that plan, image and whole groups share.
 
+const TRAIL_SECONDS = 3;
 const darkQuery = matchMedia("(prefers-color-scheme: dark)");
 // Colour-blind readers can tell them apart; their contrast to the background is 3 : 1 or more.
 const COLOURS = {
@@ -130,6 +131,23 @@ function strokeRim(ctx) {
   ctx.lineWidth += 2;
   ctx.stroke();
   ctx.lineWidth -= 2;
+}
+
+// Where each person or group of a side was during the last TRAIL_SECONDS. map: x, y to px.
+function drawTrails(pane, side, map) {
+  const { ctx } = pane, reach = Math.round(TRAIL_SECONDS * data.fps), { tracked } = side;
+  ctx.lineCap = "round";
+  ctx.lineWidth = tracked ? 1.4 : 2;
+  ctx.setLineDash(tracked ? [3, 4] : []);
+  ctx.globalAlpha = 0.6;
+  for (const row of side.rows(pane.frame)) {
+    const points = [];
+    for (let k = Math.max(side.first[row], row - reach); k <= row; k++) points.push(map(side.x[k], side.y[k]));
+    ctx.strokeStyle = rowColour(side, row, pane.options.by);
+    strokeLine(ctx, points.filter(Boolean));
+  }
+  ctx.globalAlpha = 1;
+  ctx.setLineDash([]);
 }
 
 // Sizes the canvas to its place on the page; returns its context, width and height in CSS px.

@@ -156,23 +156,6 @@ function drawPlanHulls(plan, side) {
   }
 }
 
-// Where each person or group of a side was during the last 3 s. map: x, y to px.
-function drawTrails(pane, side, map) {
-  const { ctx } = pane, reach = Math.round(3 * data.fps), { tracked } = side;
-  ctx.lineCap = "round";
-  ctx.lineWidth = tracked ? 1.4 : 2;
-  ctx.setLineDash(tracked ? [3, 4] : []);
-  ctx.globalAlpha = 0.6;
-  for (const row of side.rows(pane.frame)) {
-    const points = [];
-    for (let k = Math.max(side.first[row], row - reach); k <= row; k++) points.push(map(side.x[k], side.y[k]));
-    ctx.strokeStyle = rowColour(side, row, pane.options.by);
-    strokeLine(ctx, points.filter(Boolean));
-  }
-  ctx.globalAlpha = 1;
-  ctx.setLineDash([]);
-}
-
 function drawPlanDetections(plan) {
   const { ctx } = plan;
   ctx.strokeStyle = theme.found;

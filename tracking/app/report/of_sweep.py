@@ -22,7 +22,7 @@ from tracking.ranking import rank
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval, mean_of_finite
-from tracking.stress.episodes import ORACLE
+from tracking.stress.scene_player import ORACLE
 from tracking.stress.sweep import Scene, Sweep, generate_command
 from tracking.tuning.parallel_episodes import opened_sources
 

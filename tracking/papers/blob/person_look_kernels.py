@@ -28,6 +28,8 @@ LEAST_VAR = 15.0**2  # a learned variance is taken to be at least this: light an
 ANY_VAR = 60.0**2  # variance of the colours of all people
 WORST_FIT = -1.0  # least log-likelihood ratio of a point: something else may be in front of it
 LEAST_SEEN = 3  # pictures after which a point of a look is known
+LEARN_SHOWN = 0.7  # least visible share of a person whose look is learned
+LOOK_TIME = 2.0  # s: time constant with which looks follow people who turn
 
 
 def unknown(n: int) -> Array:

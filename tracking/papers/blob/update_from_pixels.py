@@ -31,6 +31,7 @@ from tracking.detect.person_size import KEPT, PersonSize
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry, person_look_kernels, person_template, person_template_kernels
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
+from tracking.papers.blob.person_look_kernels import LEARN_SHOWN, LOOK_TIME
 from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 from tracking.papers.blob.track_management import TrackedEllipses
 from tracking.running import image_scale
@@ -45,8 +46,6 @@ SHARED = 0.35  # share of a predicted box that a blob's box must cover for the t
 UPRIGHT = 25.0  # deg, standard deviation of the direction of a person measured by an upright template
 EXTENT = 0.75, 1.3  # least and largest height and width of a template relative to the expected person
 BLIND = 25.0  # a template's variance of height and width relative to a lone blob's: they are predicted, not measured
-LEARN_SHOWN = 0.7  # least visible share of a person whose look is learned
-LOOK_TIME = 2.0  # s: time constant with which looks follow people who turn
 LEAST_SHOWN = 0.2  # a person of whom a smaller share is visible is measured as if this share were
 
 

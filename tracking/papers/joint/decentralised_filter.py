@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.filters.particles import systematic_resample_rows
+from tracking.filters.resampling import systematic_resample_rows
 from tracking.papers.joint.partition_labels_kernels import relabel
 
 

@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from sim.truth.identity import GroupChange, Identities, Members, PersonSet
+from sim.truth.group_ids_and_changes import GroupChange, Identities, Members, PersonSet
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.motion_rows import MotionRows
 from sim.types import Array, GroupEvent, Groups, Ints

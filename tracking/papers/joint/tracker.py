@@ -89,7 +89,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.truth.identity import Identities
+from sim.truth.group_ids_and_changes import Identities
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
 from tracking.detect.point_detections import PointTracker, boxes_at
 from tracking.filters.person_streams import NOBODY, PersonStreams

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.filters.particles import residual_resample
+from tracking.filters.resampling import residual_resample
 from tracking.papers.relational import particle_set_kernels, transition_kernels
 from tracking.papers.relational.transition_kernels import belonging
 

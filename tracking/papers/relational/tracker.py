@@ -12,7 +12,7 @@ together. z are the detections of a frame, w the weights. The steps of a frame:
     deaths    not measured for `time_window`     with their relations           sec. 2.1.1           tracker
     births    x ~ N(z, .), v ~ N(0, .)           relations of newcomers         secs. 2.1.1, 3.2     tracker
     estimate  means over particles                                                                   particle_set
-    resample  residual sampling                                                 sec. 2.1             filters.particles
+    resample  residual sampling                                                 sec. 2.1             filters.resampling
 
 Readings: eqs 2, 8 and 10 condition on earlier states only. Eq. 13 lacks the normaliser of eqs 4 and 14. Eq. 14 ends
 with the posterior of the frame before. Table 3 is read with B and C in m per frame, and C per axis; the mean speed of a

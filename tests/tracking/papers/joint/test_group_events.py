@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.truth.identity import Identities
+from sim.truth.group_ids_and_changes import Identities
 from tests.reference_joint import all_partitions, label_of, validity
 from tracking.papers.joint import division_kernels
 from tracking.papers.joint import group_proposal_kernels as events

@@ -21,6 +21,12 @@ from sim.scene.raycast import (
 from sim.scene.raycast_kernels import first_hit, has_solids, look
 
 GREY, GRASS, BRICK, STONE, STEP, SKY = range(6)  # rows of the palette
+# BGR at full light: paving or asphalt, grass, wall, pillar, steps, sky.
+PALETTE = np.array(
+    [[150, 154, 155], [76, 128, 116], [150, 160, 170], [160, 164, 168], [162, 165, 167], [236, 230, 222]], float
+)
+SPREAD = 12.0  # grey levels: sd by which the brightness of a sequence's materials differs from the palette
+SLAB_WIDTHS = (0.0, 0.5, 0.8, 1.2)  # m; 0 = asphalt
 CONTRAST, SLAB_WIDTH, PLANT_KEY, PLANT_LEVEL = range(4)  # slots of `style`: the last is inf without plants
 POINT, NORMAL, SPARE, BLOCKED = range(4)  # rows of the scratch `more`
 

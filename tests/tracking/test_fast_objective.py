@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Groups
+from tracking.fast_objective import ObjectiveScorer
 from tracking.grouping.belief import default_belief
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.grouping.grouping_choice import belief_groups, groups_now
 from tracking.grouping.merge_split_events import TrackedMotion
 from tracking.grouping.tracks_table import TracksTable
-from tracking.objective import ObjectiveScorer
 from tracking.scoring import evaluate
 
 KEYS = ("objective", "HOTA", "group_F1")

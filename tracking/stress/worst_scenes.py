@@ -23,7 +23,7 @@ import numpy as np
 
 from scenarios.loading.resolve import Entry, SuiteEntry, load, rows
 from tracking.environment.episode_cache import Source
-from tracking.stress.episodes import ORACLE
+from tracking.stress.scene_player import ORACLE
 from tracking.stress.sweep import Plan, Scene, Sweep, last_of_each_key
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ SCENARIO = "scenario"  # name of the parameter
 
 
 @dataclass(frozen=True)
-class Failure:
+class SearchedScene:
     """A scene that the search has drawn, with the scores of oracle and tracker on it."""
 
     number: int  # of the scene in the search, from 0
@@ -54,7 +54,7 @@ class Failure:
         """The oracle's score less the tracker's; nan if one is unknown."""
         return self.oracle - self.score
 
-    def nearness(self, other: Failure) -> float:
+    def nearness(self, other: SearchedScene) -> float:
         """Returns how near two scenes are: 1 at an equal place, falling to 0 where an axis differs by a fifth of its
         range; 0 for different scenarios."""
         if (self.scenario, self.scene.source.name) != (other.scenario, other.scene.source.name):
@@ -65,7 +65,7 @@ class Failure:
 
 def search(
     sweep: Sweep, count: int, seed: int = 0, sampler: optuna.samplers.BaseSampler | None = None
-) -> list[Failure]:
+) -> list[SearchedScene]:
     """Searches for scenes in which the first tracker of a sweep falls short of the oracle.
 
     Args:
@@ -89,7 +89,7 @@ def search(
 
     sweep.check_scenes()
     entries = [entry for name in sweep.plan.scenarios for entry in rows(name)]
-    tracker, found = next(iter(sweep.trackers)), list[Failure]()
+    tracker, found = next(iter(sweep.trackers)), list[SearchedScene]()
     with quiet_optuna():
         tpe = optuna.samplers.TPESampler(seed=seed, n_startup_trials=0, multivariate=True, constant_liar=True)
         study = optuna.create_study(direction="maximize", sampler=sampler or tpe)
@@ -112,16 +112,16 @@ def search(
     return found
 
 
-def worst(found: Sequence[Failure], most: int = LISTED) -> list[Failure]:
+def worst(found: Sequence[SearchedScene], most: int = LISTED) -> list[SearchedScene]:
     """Returns at most `most` failures with the greatest shortfalls above 0, worst first, no two near each other."""
-    chosen = list[Failure]()
+    chosen = list[SearchedScene]()
     for failure in sorted(found, key=lambda one: -one.shortfall):
         if failure.shortfall > 0 and len(chosen) < most and not any(failure.nearness(other) for other in chosen):
             chosen.append(failure)
     return chosen
 
 
-def _quarters(found: Sequence[Failure]) -> int:
+def _quarters(found: Sequence[SearchedScene]) -> int:
     """Returns how many of four scenes the sampler draws: 2, 3 if its mean shortfall is greater, 1 if it is smaller."""
     drawn, random = (
         np.array([failure.shortfall for failure in found if failure.sampled is sampled]) for sampled in (True, False)
@@ -144,7 +144,7 @@ def _asked(study: optuna.Study, plan: Plan, entries: int, seed: int, number: int
     return study.ask({**shares, SCENARIO: CategoricalDistribution(range(entries))})
 
 
-def _drawn(plan: Plan, entries: Sequence[SuiteEntry], trial: optuna.Trial, seed: int, sampled: bool) -> Failure:
+def _drawn(plan: Plan, entries: Sequence[SuiteEntry], trial: optuna.Trial, seed: int, sampled: bool) -> SearchedScene:
     entry: SuiteEntry = entries[trial.params[SCENARIO]]
     # Four digits, so that the scene's command is short; what was drawn and what is played differ by less than 0.1 %.
     values = tuple(float(f"{axis.at(trial.params[axis.name]):.4g}") for axis in plan.axes)
@@ -153,9 +153,9 @@ def _drawn(plan: Plan, entries: Sequence[SuiteEntry], trial: optuna.Trial, seed:
     of_scene = int(np.random.default_rng([seed, trial.number]).choice(plan.seeds))
     source = Source(entry.name, of_scene, entry=Entry(entry.name, scenario))
     place = tuple(trial.params[axis.name] for axis in plan.axes)
-    return Failure(trial.number, Scene(source, values), place, entry.scenario, settings, sampled)
+    return SearchedScene(trial.number, Scene(source, values), place, entry.scenario, settings, sampled)
 
 
-def _novelty(played: Failure, found: Sequence[Failure]) -> float:
+def _novelty(played: SearchedScene, found: Sequence[SearchedScene]) -> float:
     worse = (played.nearness(other) for other in found if other.shortfall >= played.shortfall)
     return max(played.shortfall, 0.0) * (1 - max(worse, default=0.0))

@@ -1,6 +1,6 @@
 import pytest
 
-from sim.truth.identity import identify, lineage
+from sim.truth.group_ids_and_changes import group_changes, identify
 
 
 def parts(*words):
@@ -34,7 +34,7 @@ def test_who_keeps_the_id(old, born, new, expected):
 def change(old, new, before, now, entered=""):
     people = [frozenset(map(int, w)) for w in (before, now, entered)]
     groups = [{g: frozenset(map(int, w)) for g, w in side.items()} for side in (old, new)]
-    return [(c.kind, c.before, c.after, c.members) for c in lineage(*groups, *people)]
+    return [(c.kind, c.before, c.after, c.members) for c in group_changes(*groups, *people)]
 
 
 CHANGES = [

@@ -13,9 +13,9 @@ import pytest
 from scenarios.errors import InputError
 from tests.tracking.stress.test_stress import sweep_of
 from tracking.stress.axes import parse_axes
-from tracking.stress.episodes import Outcome, Tasks
-from tracking.stress.search import NEAR, Failure, search, worst
+from tracking.stress.scene_player import Outcome, Tasks
 from tracking.stress.sweep import Sweep
+from tracking.stress.worst_scenes import NEAR, SearchedScene, search, worst
 from tracking.tuning.parallel_episodes import EpisodeTask
 
 HOLES = {"cross": (0.5, 4.0), "pass-by": (0.9, 1.0)}  # by scenario, detection and clutter where the tracker is worst
@@ -53,8 +53,8 @@ def test_both_holes_are_found(tmp_path: Path) -> None:
 def test_failures_near_worse_ones_are_not_listed(tmp_path: Path) -> None:
     one = search(sweep(tmp_path, []), 1)[0]
 
-    def failure(at: float, score: float, scenario: str = "cross") -> Failure:
-        return Failure(0, one.scene, (at, 0.5), scenario, (), True, 0.9, score)
+    def failure(at: float, score: float, scenario: str = "cross") -> SearchedScene:
+        return SearchedScene(0, one.scene, (at, 0.5), scenario, (), True, 0.9, score)
 
     found = [failure(0.5, 0.3), failure(0.5 + NEAR / 2, 0.2), failure(0.5 + 2 * NEAR, 0.6), failure(0.5, 0.8, "door")]
     assert worst(found) == [found[1], found[2], found[3]]

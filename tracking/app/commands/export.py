@@ -1,18 +1,63 @@
-"""`flockscope export csv`, `parquet`, `trajnet` and `pedpy`: tables of stored runs and of the truth of sequences."""
+"""`flockscope export`: datasets as COCO, KITTI and webdataset; runs and truths as CSV, Parquet, TrajNet++ and PedPy.
+
+The formats themselves are in sim.io.export.
+"""
 
 from __future__ import annotations
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, counted
 from sim.io.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
 from sim.io.source import open_source
 from sim.io.store.seal import is_run, is_sequence
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.app import option_parsing
-from tracking.app.command_options import CsvOptions, ParquetOptions, PedpyOptions, TrajnetOptions
+from tracking.app.command_options import (
+    CocoOptions,
+    CsvOptions,
+    KittiOptions,
+    ParquetOptions,
+    PedpyOptions,
+    TrajnetOptions,
+    WebdatasetOptions,
+)
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.app.stored_tracks import StoredTracks, find_tracks, holds_tracks, run_folders
+
+
+def export_coco(options: CocoOptions) -> CommandResult:
+    """Writes a COCO file of all sequences with labelled boxes at the path of the options."""
+    from sim.io.export.coco import coco
+    from sim.io.files.own_files import output_file
+
+    path = coco(options.folder, output_file(options.out, ".json"), person_class=options.person_class)
+    root = options.folder if options.folder.is_dir() else options.folder.parent
+    return CommandResult({"file": path, "root": root}, f"{path}\nfile names are relative to {root}")
+
+
+def export_kitti(options: KittiOptions) -> CommandResult:
+    """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder --out."""
+    from sim.io.export.kitti import kitti
+
+    folders = kitti(options.folder, option_parsing.output_folder(options.out))
+    return CommandResult({"folders": folders}, "\n".join(map(str, folders)))
+
+
+def export_webdataset(options: WebdatasetOptions) -> CommandResult:
+    """Writes tar shards of all sequences of a generated dataset into the folder of --out, and an index.json."""
+    from sim.io.export.webdataset import size_of, webdataset
+
+    out = option_parsing.output_folder(options.out)
+    size = size_of(options.shard_size)
+    with ProgressMeter("export") as meter:
+        index = webdataset(options.folder, out, shard_size=size, progress=meter.update)
+    shards = index["shards"]
+    count, total = sum(len(s["sequences"]) for s in shards), sum(s["bytes"] for s in shards)
+    packed = f"{counted(count, 'sequence')} in {counted(len(shards), 'shard')}"
+    text = f"{packed}, {total / 1e6:.1f} MB; content {index['content_hash'][:16]}"
+    files = [out / s["name"] for s in shards]
+    return CommandResult({"shards": files, "bytes": total, "content_hash": index["content_hash"]}, text)
 
 
 def export_csv(options: CsvOptions) -> CommandResult:

@@ -54,7 +54,7 @@ def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) 
     return kept
 
 
-def lineage(
+def group_changes(
     old: Members, new: Members, before: PersonSet, now: PersonSet, entered: PersonSet = frozenset()
 ) -> list[GroupChange]:
     """Returns what happened to the groups between two partitions: changes of old groups first, each in order of id.
@@ -130,9 +130,9 @@ class Identities:
     ) -> list[GroupChange]:  # fmt: skip
         """Takes the partition at time t and returns the changes since the last step; at first all groups enter.
 
-        people: all people present. parts: the partition. entered: as for `lineage`. known: as for `name`.
+        people: all people present. parts: the partition. entered: as for `group_changes`. known: as for `name`.
         """
         new = self.name(t, parts, known)
-        changes = lineage(self.groups, new, self.people, people, entered)
+        changes = group_changes(self.groups, new, self.people, people, entered)
         self.groups, self.people = new, people
         return changes

@@ -1,4 +1,4 @@
-"""The tuning objective alone, computed quickly and repeatedly on one truth; equal to the objective of `evaluate`.
+"""The objective computed quickly and repeatedly on one truth, for tuning; equal to that of tracking.scoring.evaluation.
 
 `ObjectiveScorer`: HOTA, group_F1 and their mean, for tuning and rewards that score one truth again and again.
 
@@ -23,7 +23,7 @@ from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import names_groups, with_groups
 from tracking.grouping.grouping_choice import groups_now
 from tracking.grouping.tracks_table import tabulate
-from tracking.scoring.evaluation import Scorer
+from tracking.scoring.evaluation import Scorer, objective
 from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
 from tracking.scoring.group_scores import f1, groups_found, shared_members
 from tracking.scoring.matching import mapped_people
@@ -32,7 +32,6 @@ from tracking.scoring.people_comparison import Similarity, in_one_plane, people_
 from tracking.scoring.rows import FrameRows, find_rows
 from tracking.scoring.track_scores import weighted_hota
 from tracking.scoring.weighted_sums import unweighted
-from tracking.stats import mean_of_known
 
 
 class ObjectiveScorer:
@@ -63,7 +62,8 @@ class ObjectiveScorer:
         if sides.frames.any():
             mapping = sides.mapping if sides.groups_only else mapped_people(pairs)
             found["group_F1"] = _group_f1(scorer, replace(sides, mapping=mapping), moved, px_per_m)
-        return {**found, "objective": mean_of_known(found.values())}
+        mean = objective(*(np.array([score]) for score in found.values()))
+        return {**found, "objective": float(mean[0])}
 
 
 def _group_f1(scorer: Scorer, sides: ComparedSides, tracks: Sequence[Tracks], px_per_m: float) -> float:

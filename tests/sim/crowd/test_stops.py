@@ -25,7 +25,7 @@ STOP = "group.a.stops=[{ at = [14, 10], stay = 6 }]"
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    path = tmp_path / "errand.toml"
+    path = tmp_path / "stops.toml"
     path.write_text(SCENE)
     return path
 

@@ -1,6 +1,6 @@
 """Leads groups from stop to stop while the simulation runs: where they stand, how long, and who stays behind.
 
-Errands change ways, places and targets (GroupState). They never touch a position, a velocity or a force.
+Stops change ways, places and targets (GroupState), never a position, a velocity or a force.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ RING, RINGS, ANGLES = 0.6, 5, 8  # m between the rings of places round a stop; r
 
 
 @dataclass
-class _Errand:
+class _Visit:
     """What one group has before it."""
 
     group: EnteringGroup
@@ -35,16 +35,16 @@ class _Errand:
     places: Array = field(default_factory=lambda: np.zeros((0, 2)))  # (n, 2) where its members stand or will stand, m
 
 
-class Errands:
+class Stops:
     """The stops of the groups of one running simulation; an order of the script ends the stops of its groups.
 
-    State: errands: the stops of each group that has stops left, by group index; stray: the time (s) at which a member
+    State: visits: the stops of each group that has stops left, by group index; stray: the time (s) at which a member
     who stays behind at a stop walks on, by column (person id - 1).
     """
 
     def __init__(self, entering: Sequence[EnteringGroup], groups: GroupState, scene: Scene) -> None:
         self.groups, self.scene = groups, scene
-        self.errands = {g.index: _Errand(g, list(g.stops)) for g in entering if g.stops}
+        self.visits = {g.index: _Visit(g, list(g.stops)) for g in entering if g.stops}
         self.stray: dict[int, float] = {}
 
     def advance(self, t: float, state: Array) -> bool:
@@ -54,20 +54,20 @@ class Errands:
         nearest to the stop and stands there in a circle until the time of the stop is over. If only some members stop,
         they stand still near the stop, and the group walks on without them.
         """
-        if not self.errands and not self.stray:
+        if not self.visits and not self.stray:
             return False
         changed = self._release(t)
-        for g, errand in list(self.errands.items()):
+        for g, visit in list(self.visits.items()):
             columns = self.groups.members[g]
-            if not self._concerns(errand, g, columns):
-                del self.errands[g]
+            if not self._concerns(visit, g, columns):
+                del self.visits[g]
             elif self.groups.present[columns].all():
-                changed |= self._advance(g, errand, columns, t, state)
+                changed |= self._advance(g, visit, columns, t, state)
         return changed
 
-    def _concerns(self, errand: _Errand, g: int, columns: list[int]) -> bool:
-        exists = self.groups.alive.get(errand.group.name) == g
-        return bool(errand.stops) and exists and bool((self.groups.queue_of[columns] < 0).all())
+    def _concerns(self, visit: _Visit, g: int, columns: list[int]) -> bool:
+        exists = self.groups.alive.get(visit.group.name) == g
+        return bool(visit.stops) and exists and bool((self.groups.queue_of[columns] < 0).all())
 
     def _release(self, t: float) -> bool:
         over = [column for column, end in self.stray.items() if end <= t]
@@ -76,14 +76,14 @@ class Errands:
             self.groups.held[column] = False
         return bool(over)
 
-    def _advance(self, g: int, errand: _Errand, columns: list[int], t: float, state: Array) -> bool:
-        stop, pos = errand.stops[0], state[columns, :2]
+    def _advance(self, g: int, visit: _Visit, columns: list[int], t: float, state: Array) -> bool:
+        stop, pos = visit.stops[0], state[columns, :2]
         middle = pos.mean(axis=0)
         far = float(length(middle - stop.at))
-        if errand.leaves is not None:
-            if t < errand.leaves:
+        if visit.leaves is not None:
+            if t < visit.leaves:
                 return False
-            self._walk_on(g, errand, middle)
+            self._walk_on(g, visit, middle)
             self.groups.take_places(columns, walking(len(columns), self.groups.spacing[g]), middle, g, pos)
             return True
         if not stop.whole:
@@ -92,28 +92,28 @@ class Errands:
             for column in (columns[m] for m in stop.members):
                 self.groups.held[column], self.groups.targets[column] = True, state[column, :2]
                 self.stray[column] = stop.end(t)
-            self._walk_on(g, errand, middle)
+            self._walk_on(g, visit, middle)
             return True
-        if errand.looked is None and far < LOOK_AHEAD:
-            errand.looked = t
+        if visit.looked is None and far < LOOK_AHEAD:
+            visit.looked = t
             place = self._free_place(g, stop.at, columns, state)
-            errand.places = self._circle(g, place)
+            visit.places = self._circle(g, place)
             self.groups.go(g, middle, [], place, "stand", float(self.groups.arrays.speed[g]))
         arrived = bool(self.groups.arrays.arrived[g])
-        if errand.looked is None or not (arrived or t >= errand.looked + PATIENCE):
+        if visit.looked is None or not (arrived or t >= visit.looked + PATIENCE):
             return False
         if not arrived:
             self.groups.write_way(g, [(middle, END)], "stand", float(self.groups.arrays.speed[g]), middle)
-            errand.places = self._circle(g, middle)
+            visit.places = self._circle(g, middle)
         self.groups.settled.add(g)
         self.groups.take_places(columns, standing(len(columns), self.groups.spacing[g]), middle, g, pos)
-        errand.leaves = stop.end(t)
+        visit.leaves = stop.end(t)
         return True
 
-    def _walk_on(self, g: int, errand: _Errand, middle: Array) -> None:
-        errand.stops = errand.stops[1:]
-        errand.looked, errand.leaves, errand.places = None, None, np.zeros((0, 2))
-        via, target, finish = errand.group.leg(errand.stops)
+    def _walk_on(self, g: int, visit: _Visit, middle: Array) -> None:
+        visit.stops = visit.stops[1:]
+        visit.looked, visit.leaves, visit.places = None, None, np.zeros((0, 2))
+        via, target, finish = visit.group.leg(visit.stops)
         self.groups.settled.discard(g)
         self.groups.go(g, middle, via, target, finish, float(self.groups.arrays.speed[g]))
 
@@ -126,7 +126,7 @@ class Errands:
         others = np.ones(len(state), np.bool_)
         others[columns] = False
         slow = others & (length(state[:, 2:]) < STANDING)
-        taken = [state[slow, :2], *(e.places for other, e in self.errands.items() if other != g)]
+        taken = [state[slow, :2], *(e.places for other, e in self.visits.items() if other != g)]
         taken = [places for places in taken if len(places)]
         ring = unit(2 * np.pi * np.arange(ANGLES) / ANGLES)
         rings = [at + k * RING * ring for k in range(1, RINGS + 1)]
