@@ -26,17 +26,15 @@ ExpectedMembers = tuple[Array, Array, Ints]
 def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> ExpectedMembers:
     """Returns where the K members of the confirmed groups that were measured lately should be at time t (s).
 
-    place (K, 2), reach (K,): how far from it each may be, from pixels at least as far as points are linked (R_0), as
-    places are less sure along the line of sight; in the unit of the points. group (K,): id of its row, a group's or a
-    part's."""
+    place (K, 2), reach (K,): how far from it each may be, in the unit of the points. group (K,): id of its row, a
+    group's or a part's."""
     recent = t - bank.last_seen <= max(scaled.config.carry_time, scaled.dt) + 1e-9
     rows = np.flatnonzero(bank.confirmed & recent).tolist()
     places = [bank.positions(r) for r in rows]
     last_seen = np.concatenate([np.zeros(0), *(bank.members[r].last_seen for r in rows)])
     group = np.repeat(bank.id[rows], [len(p) for p in places])
     place = np.concatenate([np.zeros((0, 2)), *places])
-    linked = scaled.constraint.link if scaled.from_pixels else 0.0
-    return place, np.maximum(walking_reach(scaled, t - last_seen), linked), group
+    return place, walking_reach(scaled, t - last_seen), group
 
 
 def add_newborns(

@@ -41,8 +41,9 @@ LEAST_DEPTH = 1.0  # m: places nearer to the camera are shown as at this depth.
 class GroundView(NamedTuple):
     """A map between image points, px, and the places on the ground, m, of the people whose middles are seen there.
 
-    camera: without lens distortion; without one, one that looks straight down. row: the image's middle row. foot: u,
-    px, where upright lines meet. lean: share by which they come nearer to each other per px downwards.
+    camera: one that shows all places (`radial` at least 0); without one, one that looks straight down. row: the image's
+    middle row. foot: u, px, where upright lines meet. lean: share by which they come nearer to each other per px
+    downwards.
     """
 
     camera: Camera
@@ -83,8 +84,8 @@ class ForegroundPoints:
 
     A run of foreground along the image of an upright line shows people one behind the other: it reaches from the head
     of the last to the feet of the first. Their middles lie from half a person below its upper end to half a person
-    above its lower end. So its points are those of the run, shrunk about its middle by a person's height. Two runs that
-    are no longer than a person together are pieces of one person, and have one middle.
+    above its lower end. So its points are those of the run, shrunk about its middle by a person's height. A run shorter
+    than a person shows a piece of one, whose middle is found as if the next run hid, or were, the rest of that person.
 
     State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
     is nan, learned from lone people in its background sample. step: px between the grid's points. view: from the image
@@ -164,11 +165,13 @@ def upright_runs(mask: Bools, column: Ints) -> tuple[Ints, Array, Array]:
 
 
 def with_other_pieces(line: Ints, top: Array, bottom: Array, high: Array) -> Array:
-    """Returns upper and lower ends (2, R) of the R runs of `upright_runs`, px; of two next to each other that are no
-    longer than a person in all, high (R,), those of both: they are pieces of one person."""
-    pieces = (line[1:] == line[:-1]) & (bottom[1:] - top[:-1] <= high[1:])
+    """Returns upper and lower ends (2, R) of the R runs of `upright_runs`, px. A run that is shorter than a person,
+    high (R,), and would reach the next on its line if it were as long, is a piece: it is continued into that run."""
+    same, feet, head = line[1:] == line[:-1], (top + high)[:-1], (bottom - high)[1:]
+    lower = np.where(same & (feet >= top[1:]), np.minimum(feet, bottom[1:]), -np.inf)
+    upper = np.where(same & (head <= bottom[:-1]), np.maximum(head, top[:-1]), np.inf)
     ends = np.stack([top, bottom])
-    ends[0, 1:][pieces], ends[1, :-1][pieces] = top[:-1][pieces], bottom[1:][pieces]
+    ends[0, 1:], ends[1, :-1] = np.minimum(top[1:], upper), np.maximum(bottom[:-1], lower)
     return ends
 
 
@@ -190,7 +193,8 @@ def ground_view(camera: Camera | None, shape: tuple[int, ...], scale: float) -> 
     (u, v), (fx, fy), (side, down, steep) = camera.centre_px, camera.focal_px, -camera.rotation[:, 2]
     steep = max(steep, 1e-3)
     lean = np.clip(steep / (fy * down + (v - high / 2) * steep), 0, 2 * MOST_LEAN / high)
-    return GroundView(camera.replace(radial=0.0), high / 2, float(u + fx * side / steep), float(lean))
+    lens = camera.replace(radial=max(camera.radial, 0.0))
+    return GroundView(lens, high / 2, float(u + fx * side / steep), float(lean))
 
 
 def _people(camera: Camera | None, view: GroundView, scale: float) -> tuple[Array, Array]:

@@ -12,11 +12,7 @@ from sim.scene.body import PERSON_HEIGHT
 from sim.scene.camera import camera_rotation, misaligned, project
 from sim.types import Camera, Tracks
 from tests import painted
-from tests.tracking.papers.group_pda.test_association_kernels import bank
-from tracking.papers.group_pda.births_and_losses import add_newborns, expected_members
-from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.from_pixels import ground_view, upright_lines, upright_runs, with_other_pieces
-from tracking.papers.group_pda.scaled_parameters import scale_parameters
 from tracking.papers.group_pda.tracker import GroupPda
 
 
@@ -57,12 +53,13 @@ def test_without_a_scale_and_without_anybody_it_is_asked_for(scale: float) -> No
         watch(scale, painted.sample(np.random.default_rng(0)))
 
 
-@pytest.mark.parametrize(("roll", "down"), [(0.0, 0.0), (0.1, 15.0)])
-def test_the_view_finds_people_on_the_ground_and_upright_lines(roll: float, down: float) -> None:
+@pytest.mark.parametrize(("roll", "down", "radial"), [(0.0, 0.0, 0.0), (0.1, 15.0, 0.0), (0.0, 0.0, 0.1)])
+def test_the_view_finds_people_on_the_ground_and_upright_lines(roll: float, down: float, radial: float) -> None:
     """Distances on the ground are those of the people whose middles are seen; heads and feet lie on one line."""
     image, position = (640, 480), np.array([3.0, -2.0, 7.0])
     rotation = camera_rotation(math.radians(40), 0.3)
     camera = misaligned(Camera("pinhole", image, (500.0, 500.0), (320.0, 240.0), position, rotation), roll, down)
+    camera = camera.replace(radial=radial)
     view = ground_view(camera, (480, 640, 3), 38.0)
     ground = position[:2] + np.array([[0.0, 8.0], [1.5, 8.0], [-3.0, 12.0], [2.0, 6.0]])
     heights = (PERSON_HEIGHT / 2, 0.0, PERSON_HEIGHT)
@@ -77,7 +74,7 @@ def test_the_view_finds_people_on_the_ground_and_upright_lines(roll: float, down
     step = 1e-6 * np.eye(2)
     slope = np.stack([(view.image(places + d) - view.image(places - d)) / 2e-6 for d in step], 2)
     np.testing.assert_allclose(view.jacobian(places), slope, rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(view.along(feet[:, 0], feet[:, 1], heads[:, 1]), heads[:, 0])
+    np.testing.assert_allclose(view.along(feet[:, 0], feet[:, 1], heads[:, 1]), heads[:, 0], atol=30 * radial)
     lines, columns = upright_lines(view, (480, 640), 4)
     (line,) = np.flatnonzero(np.abs(lines - 320) <= 2)[:1]
     mask = np.zeros((480, 640), bool)
@@ -85,12 +82,5 @@ def test_the_view_finds_people_on_the_ground_and_upright_lines(roll: float, down
         mask[np.arange(top, bottom), columns[top:bottom, line]] = True
     runs = upright_runs(mask, columns)
     np.testing.assert_array_equal(runs, [[line] * 2, [100, 200], [150, 230]])
-    for high, ends in ((130.0, [[100, 100], [230, 230]]), (129.0, [[100, 200], [150, 230]])):
+    for high, ends in ((140, [[100] * 2, [230] * 2]), (110, [[100, 120], [210, 230]]), (79, [[100, 200], [150, 230]])):
         np.testing.assert_array_equal(with_other_pieces(*runs, np.full(2, high)), ends)
-
-
-def test_a_new_group_that_is_linked_with_a_member_is_a_part_of_its_group() -> None:
-    scaled = scale_parameters(GroupPdaConfig(appearance=0.0), 10.0, 1.0, pixels=True)
-    one, apart = bank(size=np.ones(1)), np.array([[0.9 * scaled.constraint.link, 0.0]])
-    add_newborns(one, apart, np.ones(1), expected_members(one, scaled, 0.0), scaled, 0.0)
-    assert one.parent[1] == one.id[0]
