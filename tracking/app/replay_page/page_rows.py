@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.io.formats.labels import centres
 from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
 
 
@@ -131,9 +132,9 @@ class PageRows:
 def rows_of_truth(truth: Truth) -> PageRows:
     """Returns the truth's rows: on the ground if positions are labelled, else centres of boxes in the image."""
     n = len(truth.frame)
-    pos = truth.pos if truth.pos is not None else _centres(truth.box, n)
-    angle = truth.heading if truth.heading is not None else _directions(truth.vel, n)
     box = truth.box if truth.box is not None else np.full((n, 4), np.nan)
+    pos = truth.pos if truth.pos is not None else centres(box)
+    angle = truth.heading if truth.heading is not None else _directions(truth.vel, n)
     plane = "ground" if truth.pos is not None else "image"
     return PageRows(plane, truth.frame, truth.id, truth.group, pos, angle, box, truth.visibility)
 
@@ -155,10 +156,6 @@ def rows_of_tracks(tracks: SequenceOf[Tracks]) -> PageRows:
         np.ones(len(vel)),
         **(_wholes(tracks, vel) if any(t.unit == "group" for t in tracks) else {}),
     )
-
-
-def _centres(box: Array | None, n: int) -> Array:
-    return np.full((n, 2), np.nan) if box is None else box[:, :2] + box[:, 2:] / 2
 
 
 def _directions(vel: Array | None, n: int) -> Array:
