@@ -92,11 +92,7 @@ def script_json(value: Json) -> str:
 
 
 def page_data(
-    sequence: Sequence,
-    run: Run,
-    other: Run | None = None,
-    span: tuple[int, int] | None = None,
-    start: int = 1,
+    sequence: Sequence, run: Run, other: Run | None = None, span: tuple[int, int] | None = None, start: int = 1
 ) -> Json:
     """Returns all that the page shows except the video, as a JSON object.
 

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.io.formats.labels import centres
+from sim.io.store.track_files import flatten
 from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
 
 
@@ -141,21 +142,11 @@ def rows_of_truth(truth: Truth) -> PageRows:
 
 def rows_of_tracks(tracks: SequenceOf[Tracks]) -> PageRows:
     """Returns a tracker's rows, in the order of `tracks`."""
-    count = np.array([len(t.id) for t in tracks], np.int64)
-    box = [t.box if t.box is not None else np.full((len(t.id), 4), np.nan) for t in tracks]
-    vel = np.concatenate([np.zeros((0, 2)), *(t.vel[:, :2] for t in tracks)])
-    no_id = np.zeros(0, np.int64)
-    return PageRows(
-        "image" if any(t.plane == "image" for t in tracks) else "ground",
-        np.repeat(np.array([t.index for t in tracks], np.int64), count),
-        np.concatenate([no_id, *(t.id for t in tracks)]),
-        np.concatenate([no_id, *(t.group for t in tracks)]),
-        np.concatenate([np.zeros((0, 2)), *(t.pos[:, :2] for t in tracks)]),
-        _directions(vel, len(vel)),
-        np.concatenate([np.zeros((0, 4)), *box]),
-        np.ones(len(vel)),
-        **(_wholes(tracks, vel) if any(t.unit == "group" for t in tracks) else {}),
-    )
+    rows = flatten(list(tracks))
+    plane, shown = "image" if rows.plane == "image" else "ground", np.ones(len(rows.id))
+    wholes = _wholes(tracks, rows.vel) if rows.unit == "group" else {}
+    pos, angle = rows.pos[:, :2], _directions(rows.vel, len(rows.id))
+    return PageRows(plane, rows.frame, rows.id, rows.group, pos, angle, rows.box, shown, **wholes)
 
 
 def _directions(vel: Array | None, n: int) -> Array:
