@@ -56,7 +56,11 @@ class Errands:
         """
         if not self.errands and not self.stray:
             return False
-        changed = self._release(t)
+        over = [column for column, end in self.stray.items() if end <= t]
+        for column in over:
+            del self.stray[column]
+            self.groups.held[column] = False
+        changed = bool(over)
         for g, errand in list(self.errands.items()):
             columns = self.groups.members[g]
             if not self._concerns(errand, g, columns):
@@ -68,13 +72,6 @@ class Errands:
     def _concerns(self, errand: _Errand, g: int, columns: list[int]) -> bool:
         exists = self.groups.alive.get(errand.group.name) == g
         return bool(errand.stops) and exists and bool((self.groups.queue_of[columns] < 0).all())
-
-    def _release(self, t: float) -> bool:
-        over = [column for column, end in self.stray.items() if end <= t]
-        for column in over:
-            del self.stray[column]
-            self.groups.held[column] = False
-        return bool(over)
 
     def _advance(self, g: int, errand: _Errand, columns: list[int], t: float, state: Array) -> bool:
         stop, pos = errand.stops[0], state[columns, :2]
