@@ -24,7 +24,7 @@ from scenarios.errors import InputError
 from scenarios.limits import REPEATS
 from scenarios.loading import toml_files
 from scenarios.loading.checks import check
-from scenarios.loading.toml_files import CATALOGUE, SUITES, Table, did_you_mean, dump, names, suite_names
+from scenarios.loading.toml_files import CATALOGUE, SUITES, did_you_mean, dump, names, suite_names
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import ObservationSpec, Scenario
 from scenarios.schema.sensor import Sensor
@@ -50,16 +50,9 @@ def sensor_settings(path: str | Path) -> tuple[str, ...]:
     Raises:
         InputError: The file cannot be read, has no [sensor] table, or has a wrong key or value.
     """
-    return tuple(f"sensor.{key}={toml_files.toml_value(v)}" for key, v in sensor_table(path).items())
-
-
-def sensor_table(path: str | Path) -> Table:
-    """Returns the keys that are given in the file's [sensor] table, with their values; no defaults are added."""
-    path = Path(path)
-    table = toml_files.parse(path, "check the path, or make one with `flockscope fit sensor`")
-    validate(table, path, model=SensorFile)
-    given: Table = table["sensor"]
-    return given
+    table = toml_files.parse(Path(path), "check the path, or make one with `flockscope fit sensor`")
+    validate(table, Path(path), model=SensorFile)
+    return tuple(f"sensor.{key}={toml_files.toml_value(v)}" for key, v in table["sensor"].items())
 
 
 def dump_sensor(sensor: Sensor, about: str = "") -> str:

@@ -56,7 +56,11 @@ class Stops:
         """
         if not self.visits and not self.stray:
             return False
-        changed = self._release(t)
+        over = [column for column, end in self.stray.items() if end <= t]
+        for column in over:
+            del self.stray[column]
+            self.groups.held[column] = False
+        changed = bool(over)
         for g, visit in list(self.visits.items()):
             columns = self.groups.members[g]
             if not self._concerns(visit, g, columns):
@@ -68,13 +72,6 @@ class Stops:
     def _concerns(self, visit: _Visit, g: int, columns: list[int]) -> bool:
         exists = self.groups.alive.get(visit.group.name) == g
         return bool(visit.stops) and exists and bool((self.groups.queue_of[columns] < 0).all())
-
-    def _release(self, t: float) -> bool:
-        over = [column for column, end in self.stray.items() if end <= t]
-        for column in over:
-            del self.stray[column]
-            self.groups.held[column] = False
-        return bool(over)
 
     def _advance(self, g: int, visit: _Visit, columns: list[int], t: float, state: Array) -> bool:
         stop, pos = visit.stops[0], state[columns, :2]

@@ -88,7 +88,8 @@ class World:
         self.orders = OrderExecution(scenario, self.groups, script_placement(scenario, seed, repeat), seed, repeat)
         self.stops = Stops(self.entering, self.groups, self.scene)
         self.push = np.zeros((len(self.groups.arrays.speed), 2))
-        self.obstacles = _obstacles(self.scene, scenario)
+        stairs = np.column_stack([flight_rows(self.scene), [spec.slowdown for spec in scenario.world.stairs]])
+        self.obstacles = Obstacles(np.array(self.scene.walls).reshape(-1, 4), np.array(self.scene.pillars), stairs)
         self.space = _space(self.scene)
         self.bodies: dict[int, pymunk.Body] = {}
         self.columns = np.zeros(0, np.int64)
@@ -154,7 +155,10 @@ class World:
         out = self.force[:n]
         for step in range(1, STEPS + 1):
             if not accelerate(self.state, self.people, self.groups.arrays, self.obstacles, STEP_TIME, self.push, out):
-                raise self._blown_up()
+                raise WorkError(
+                    file=self.scenario.name, place=f"seed {self.seed}", got="a position or velocity that is not finite",
+                    expected="finite motion", remedy="report the scenario and seed as a bug",
+                )  # fmt: skip
             pymunk.batch.set_space_bodies(self.space, WRITE, self._write_buffer)
             self.space.step(STEP_TIME)
             self._read(READ)
@@ -162,12 +166,6 @@ class World:
                 self.between[step, self.columns] = self.state
         self.groups.waypoint[self.columns] = self.people.tag[:, WAYPOINT]
         self.gait[self.columns] = self.people.gait
-
-    def _blown_up(self) -> WorkError:
-        return WorkError(
-            file=self.scenario.name, place=f"seed {self.seed}", got="a position or velocity that is not finite",
-            expected="finite motion", remedy="report the scenario and seed as a bug",
-        )  # fmt: skip
 
     def _come_and_go(self, t: float, first: bool) -> None:
         """Removes people who leave at time t (s, negative in the warm-up), and adds groups that enter."""
@@ -184,18 +182,14 @@ class World:
             self.waiting.remove(group)
             self.groups.enter(group)
             heading = self.groups.arrays.heading[group.index]
-            # A walking group starts back on its way, so that it is at its start when the recording begins.
-            start_back = first and group.enter == 0 and self._way_back_is_free(group, heading)
-            back = self.scenario.warmup * group.speed * heading if start_back else 0.0
+            # A walking group starts back on its way if that is free, to be at its start when the recording begins.
+            back = group.pos - self.scenario.warmup * group.speed * heading
+            early = first and group.enter == 0 and group.walks and not len(self.scene.pillars)
+            start = back if early and not blocked(group.pos, back, self.scene.walls).any() else group.pos
             velocity = group.speed * heading if group.walks else heading * 0
-            for member, pos in zip(group.members, group.pos - back, strict=True):
+            for member, pos in zip(group.members, start, strict=True):
                 self.bodies[member.column] = self._body(pos, velocity)
         self._map_rows()
-
-    def _way_back_is_free(self, group: EnteringGroup, heading: Array) -> bool:
-        back = group.pos - self.scenario.warmup * group.speed * heading
-        free = not blocked(group.pos, back, self.scene.walls).any() and not len(self.scene.pillars)
-        return group.walks and free
 
     def _has_room(self, group: EnteringGroup) -> bool:
         d = length(group.pos[:, None] - self.state[None, :, :2])
@@ -254,11 +248,6 @@ class World:
             free_speed=np.array([m.free_speed for m in self.members]), scene=self.scene,
             orders=self.orders.record(frames), measured=measured,
         )  # fmt: skip
-
-
-def _obstacles(scene: Scene, scenario: Scenario) -> Obstacles:
-    stairs = np.column_stack([flight_rows(scene), [spec.slowdown for spec in scenario.world.stairs]])
-    return Obstacles(np.array(scene.walls).reshape(-1, 4), np.array(scene.pillars), stairs)
 
 
 def _space(scene: Scene) -> pymunk.Space:

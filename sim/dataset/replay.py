@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -256,7 +257,7 @@ def resolve_replay(
     motion = _motion(moving, truth, replay_name(source.name, cut), view.camera.fps, cut, seed, shift)
     made = observe(view, motion if whole is None else motion.replace(scene=whole), people={}, streams=streams)
     if truth.labelled is None or not truth.labelled.any():
-        made = replace(made, load_truth=_without_groups(made))
+        made = replace(made, load_truth=partial(_without_groups, made))
     described = {**made.source, "kind": "replayed", "origin": origin.model_dump()}
     form = ReplaySpec(
         name=motion.name, replay=origin, **{name: getattr(view, name) for name in ObservationSpec.model_fields}
@@ -381,11 +382,8 @@ def replay_name(name: str, cut: Cut) -> str:
     return f"{clean}-t{cut.start:g}" if cut.start else clean
 
 
-def _without_groups(sequence: Sequence) -> Callable[[], Truth]:
-    def truth() -> Truth:
-        assert sequence.load_truth is not None
-        found = sequence.load_truth()
-        alone, nowhere = np.full(len(found.id), -1, np.int64), np.zeros(found.length, bool)
-        return found.replace(group=alone, groups=None, groups_px=None, events=None, near=None, labelled=nowhere)
-
-    return truth
+def _without_groups(sequence: Sequence) -> Truth:
+    assert sequence.load_truth is not None
+    found = sequence.load_truth()
+    alone, nowhere = np.full(len(found.id), -1, np.int64), np.zeros(found.length, bool)
+    return found.replace(group=alone, groups=None, groups_px=None, events=None, near=None, labelled=nowhere)

@@ -70,7 +70,7 @@ def _true_detections(
     p = detection_probability(truth, sensor, camera)
     open_ = (p > 0.0) & (p < 1.0)
     seen = np.where(open_, n[:, DETECT] < normal_quantile(np.where(open_, p, 0.5)), p >= 1.0) & ~hidden
-    base = _sensed_boxes(truth, sensor)
+    base = sensed_boxes(truth, sensor.box)
     if base is not None:
         seen &= np.isfinite(base).all(axis=1)
     n, u = n[seen], u[seen]
@@ -191,13 +191,13 @@ def _artificially_hidden(truth: Truth, sensor: Sensor, people: Mapping[str, tupl
     return hidden
 
 
-def _sensed_boxes(truth: Truth, sensor: Sensor) -> Array | None:
+def sensed_boxes(truth: Truth, kind: str) -> Array | None:
     """Returns the boxes (R, 4), left, top, width, height in px, that the detector measures, before errors are added.
 
     They are the boxes of the visible parts; a number that is nan there, as nothing is visible, is taken from the amodal
-    box (that of the whole person). If `sensor.box` is "amodal" or the truth has no visible boxes, they are the amodal
+    box (that of the whole person). If `kind` is "amodal" or the truth has no visible boxes, they are the amodal
     boxes themselves, not a copy. None if the truth has no boxes.
     """
-    if truth.box is None or truth.visible_box is None or sensor.box == "amodal":
+    if truth.box is None or truth.visible_box is None or kind == "amodal":
         return truth.box
     return np.where(np.isfinite(truth.visible_box), truth.visible_box, truth.box)

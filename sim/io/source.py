@@ -123,17 +123,17 @@ def holds_sequences(folder: Path) -> bool:
     return bool(_find(folder, DEPTH))
 
 
-def sequence_folders(path: Path, kind: str) -> list[Path]:
-    """Returns the sequence folders at a path or at most 3 levels below it, sorted.
+def generated_folders(path: Path) -> list[Path]:
+    """Returns the folders of the generated sequences at a path or at most 3 levels below it, sorted.
 
-    kind: "generated", "mot" or "biwi". Raises InputError if there are none, or a sequence is of another kind.
+    Raises InputError if there are none, or a sequence is of another kind.
     """
     found = _find(path, DEPTH) if path.is_dir() else []
-    other = next((p for p in found if p.is_file() or _kind(p) != kind), None)
+    other = next((p for p in found if p.is_file() or _kind(p) != "generated"), None)
     if not found or other is not None:
         got = "no sequences" if other is None else f"a recording, {other.name}"
-        expected = f"a {kind} sequence or dataset"
-        raise InputError(file=path, got=got, expected=expected, remedy="give what `flockscope generate` made")
+        expected, remedy = "a generated sequence or dataset", "give what `flockscope generate` made"
+        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
     return found
 
 

@@ -128,7 +128,7 @@ def inscribed_outlines(box: Array) -> Outlines:
 
 
 def image_size_of_boxes(*boxes: Array) -> tuple[int, int]:
-    """Returns the (width, height) px of the smallest image that holds all boxes (N, 4); (1, 1) without boxes."""
-    far = np.concatenate([box[:, :2] + box[:, 2:] for box in boxes]) if boxes else np.zeros((0, 2))
-    width, height = np.ceil(far.max(axis=0, initial=1.0)) if len(far) else (1.0, 1.0)
+    """Returns the (width, height) px of the smallest image that holds all known boxes (N, 4); (1, 1) without boxes."""
+    far = np.concatenate([np.zeros((0, 2)), *(box[:, :2] + box[:, 2:] for box in boxes)])
+    width, height = np.ceil(far[np.isfinite(far).all(axis=1)].max(axis=0, initial=1.0))
     return int(width), int(height)

@@ -28,13 +28,12 @@ app = typer.Typer(
 )
 
 
-def _declare() -> None:
-    groups = {name: typer.Typer(rich_markup_mode=None, help=text) for name, text in GROUPS.items()}
-    for name, group in groups.items():
-        app.add_typer(group, name=name)
-    for words, (kind, target) in COMMANDS.items():
-        family, _, name = words.rpartition(" ")
-        add_command(groups.get(family, app), name, kind, target)
+groups = {name: typer.Typer(rich_markup_mode=None, help=text) for name, text in GROUPS.items()}
+for name, group in groups.items():
+    app.add_typer(group, name=name)
+for words, (kind, target) in COMMANDS.items():
+    family, _, name = words.rpartition(" ")
+    add_command(groups.get(family, app), name, kind, target)
 
 
 def _version(wanted: bool) -> None:
@@ -84,6 +83,5 @@ def _open_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-_declare()
 if __name__ == "__main__":
     main()

@@ -7,10 +7,8 @@ from __future__ import annotations
 
 import errno
 import json
-import math
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, WorkError, is_control, printable
@@ -33,7 +31,9 @@ class CommandResult:
 def print_result(result: CommandResult, as_json: bool) -> int:
     """Prints the result of a command on stdout and returns its exit code, 0 or 1."""
     if as_json:
-        _print_json({"status": STATUS[result.code], **result.data})
+        from sim.io.files.tables import plain
+
+        _print_json({"status": STATUS[result.code], **plain(result.data)})
     else:
         print(printable(result.text, keep="\n").rstrip("\n"), flush=True)
     return result.code
@@ -62,13 +62,9 @@ def print_interrupted(as_json: bool) -> int:
 def as_flockscope_error(error: BaseException) -> FlockscopeError:
     """Returns (does not raise) the error to show to users for an unexpected exception: InputError or WorkError for a
     fault of the system, such as a full disk, else a WorkError that says that it is a bug."""
-    if isinstance(error, OSError):
-        return _system_error(error)
-    remedy = f"this is a bug: {DEBUG}=1 shows where"
-    return WorkError(got=f"{type(error).__name__}: {error}", expected="no exception", remedy=remedy)
-
-
-def _system_error(error: OSError) -> FlockscopeError:
+    if not isinstance(error, OSError):
+        remedy = f"this is a bug: {DEBUG}=1 shows where"
+        return WorkError(got=f"{type(error).__name__}: {error}", expected="no exception", remedy=remedy)
     from sim.io.files.atomic import DISK_FULL
 
     reason = error.strerror or type(error).__name__
@@ -80,23 +76,7 @@ def _system_error(error: OSError) -> FlockscopeError:
 
 def _print_json(data: dict[str, Any]) -> None:
     unicode = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"
-    text = json.dumps(as_json_value(data), ensure_ascii=not unicode, allow_nan=False)
+    text = json.dumps(data, ensure_ascii=not unicode, allow_nan=False)
     if not text.isprintable():
         text = "".join(json.dumps(c)[1:-1] if is_control(c) else c for c in text)
     print(text, flush=True)
-
-
-def as_json_value(value: Any) -> Any:
-    """Returns a copy of the value in types that `json` can write: paths as text, arrays and tuples as lists, None for
-    nan and infinity."""
-    if isinstance(value, dict):
-        return {str(key): as_json_value(v) for key, v in value.items()}
-    if isinstance(value, list | tuple | range):
-        return [as_json_value(v) for v in value]
-    if isinstance(value, Path):
-        return str(value)
-    if hasattr(value, "tolist"):
-        return as_json_value(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

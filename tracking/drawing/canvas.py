@@ -12,14 +12,8 @@ import numpy as np
 
 from sim.types import Array, Image
 
-INK, QUIET, GRID, FLOOR, THING, WALL = (
-    (36, 31, 27),
-    (120, 112, 104),
-    (238, 234, 230),
-    (253, 252, 251),
-    (144, 133, 125),
-    (60, 51, 45),
-)
+INK, QUIET, GRID = (36, 31, 27), (120, 112, 104), (238, 234, 230)
+FLOOR, THING, WALL = (253, 252, 251), (144, 133, 125), (60, 51, 45)
 # Colours of ids as RRGGBB; an id takes the colour at its number modulo 10.
 PALETTE = ("0072b2", "b84a00", "00805e", "a33a7a", "6a51a3", "8a6d00", "b2182b", "20708c", "4d7c0f", "7a4a2a")
 

@@ -82,17 +82,13 @@ def _repaired_pairs(people: ComparedPeople, label: Ints, kept: Bools, new: dict[
     return pairs
 
 
-def _fresh(values: Ints) -> int:
-    return int(values.max(initial=-1)) + 1
-
-
 def _labels(matched: MatchedPeople, errors: Collection[PersonError]) -> tuple[Ints, Bools, dict[int, int]]:
     """Returns the repaired id of each tracked row, which are kept, and the ids of added true rows."""
     true, est = matched.pairs.true, matched.pairs.est
     label, kept, new = est.id.copy(), np.ones(len(est), bool), {}
     kept[[row for error in errors if error.person is None for row in error.rows]] = False
     used = set(zip(est.frame[kept].tolist(), est.id[kept].tolist(), strict=True))
-    fresh = _fresh(est.id)
+    fresh = int(est.id.max(initial=-1)) + 1
     by_person: dict[int, list[PersonError]] = {}
     for error in errors:
         if error.person is not None:

@@ -22,6 +22,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.schema.sensor import BoxNoise, Memory, Sensor
 from sim.detector.box_noise import box_errors, seen_shift
+from sim.detector.sense import sensed_boxes
 from sim.scene.camera import foot_points
 from sim.types import Array
 from sim.types import Sequence as Recording
@@ -154,11 +155,9 @@ def _errors(m: MatchedRecording, kind: str) -> Array:
 
 
 def _true(m: MatchedRecording, kind: str) -> Array:
-    assert m.truth.box is not None
-    true = m.truth.box
-    if kind == "visible" and m.truth.visible_box is not None:
-        true = np.where(np.isfinite(m.truth.visible_box), m.truth.visible_box, true)
-    return true[m.hit]
+    boxes = sensed_boxes(m.truth, kind)
+    assert boxes is not None
+    return boxes[m.hit]
 
 
 def fit_points(

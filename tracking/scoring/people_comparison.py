@@ -97,7 +97,8 @@ def in_one_plane(
     ground = similarity == "ground"
     if similarity in (None, "boxes"):
         ground = truth.pos is not None and all(
-            _can_be_grounded(truth, run, own) for run, own in zip(runs, pixels, strict=True)
+            plane_of(truth, run) != "image" or can_stand(run, truth.camera, own)
+            for run, own in zip(runs, pixels, strict=True)
         )
     moved = [
         _on_ground(truth, run) if ground else _in_image(truth, run, own) for run, own in zip(runs, pixels, strict=True)
@@ -113,10 +114,6 @@ def in_one_plane(
 def from_pixels(run: Iterable[Tracks]) -> bool:
     """Returns True if the tracker of a run worked on pictures, by the run's `info`; False if it has no `info`."""
     return getattr(run, "info", {}).get("detections") == "image"
-
-
-def _can_be_grounded(truth: Truth, run: Sequence[Tracks], pixels: bool) -> bool:
-    return plane_of(truth, run) != "image" or can_stand(run, truth.camera, pixels)
 
 
 def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:

@@ -127,13 +127,10 @@ class Minimizer:
         self.required = counts[chosen]
         return starts[chosen]
 
-    def _enough(self, seeds: int) -> int:
-        return min(_most(seeds), self.required * seeds // max(len(self.guard), 1))
-
     def _holds_on_fresh_seeds(self) -> bool:
         """Returns True if enough fresh seeds fail; else they confirm, too, and the search is back where all hold."""
         fresh = self.fresh_seeds()
-        enough = self._enough(len(fresh))
+        enough = min(_most(len(fresh)), self.required * len(fresh) // max(len(self.guard), 1))
         if self._count(self.smallest, fresh) >= enough:
             return True
         self.required += enough
@@ -146,14 +143,10 @@ class Minimizer:
         self.complete = False
         changed = True
         while changed:
-            changed = self._fix()
+            changed = self._accept(pinned(self.smallest, self.seed))  # drawn groups become those of the own seed
             for stage in STAGES:
                 changed |= self._reduce(stage)
         self.complete = True
-
-    def _fix(self) -> bool:
-        """Replaces drawn groups by those of the own seed; returns True if the tracker still fails then."""
-        return self._accept(pinned(self.smallest, self.seed))
 
     def _reduce(self, stage: Stage) -> bool:
         """Takes out all pieces of one kind that can be; returns True if there were any."""

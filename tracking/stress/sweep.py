@@ -210,7 +210,8 @@ class Sweep:
         if len(self.plan.axes) != 1:
             limited = self.plan.episodes is not None or self.plan.minutes is not None
             return (limited or not self.plan.axes) and self._add_seeds(self.seeds)
-        for point in sorted(self.breaks().values(), key=lambda point: -_width(point)):
+        # The widest interval comes first; one that is not known at all counts as 0 wide.
+        for point in sorted(self.breaks().values(), key=lambda p: p.low - p.high if np.isfinite(p.low) else 0.0):
             if np.isfinite(point.at):
                 if point.high - point.low > NARROW and (self._narrow(point) or self._add_seeds(self.seeds)):
                     return True
@@ -223,12 +224,9 @@ class Sweep:
         k = int(np.clip(np.searchsorted(self.way, point.at), 1, len(self.way) - 1))
         gap = self.way[k] - self.way[k - 1]
         wide = gap > NARROW / 2 and gap >= point.high - point.low - ROUNDING
-        return wide and len(self.values) < MOST_VALUES and self._insert(k)
-
-    def _insert(self, k: int) -> bool:
         (axis,) = self.plan.axes
         middle = axis.between(*self.values[k - 1], *self.values[k])
-        if middle is None:
+        if not wide or len(self.values) >= MOST_VALUES or middle is None:
             return False
         self.values.insert(k, (middle,))
         return True
@@ -243,11 +241,6 @@ class Sweep:
         more = max(more, 0 if self.seeds else 1)
         self.seeds += more
         return more > 0
-
-
-def _width(point: BreakingPoint) -> float:
-    """Returns the width of an interval, 0 of one that is not known at all."""
-    return point.high - point.low if np.isfinite(point.low) else 0.0
 
 
 def last_of_each_key(settings: Iterable[str]) -> tuple[str, ...]:

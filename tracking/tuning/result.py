@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import Any
 from scenarios.errors import counted
 from sim.hashing import installed
 from sim.io.files.atomic import write_file
+from sim.io.files.tables import plain
 from tracking.config import Config
 from tracking.tuning.comparison import Candidate, Comparison, TrialRecord
 from tracking.tuning.search_plan import SearchPlan, seeds_text
@@ -214,7 +214,7 @@ class TuningResult:
         """Writes the parameters to `path` (TOML), and beside it all figures (.json), the plots (.svg) and, with several
         goals, the parameters of each candidate of the front. Returns the paths of all files."""
         target = Path(path)
-        files = {".json": json.dumps(_without_nan(self.as_dict()), indent=1, allow_nan=False) + "\n", **self.plots()}
+        files = {".json": json.dumps(plain(self.as_dict()), indent=1, allow_nan=False) + "\n", **self.plots()}
         files |= {f".front-{k}.toml": self.to_toml(c) for k, c in enumerate(self.front, 1)}
         for suffix, content in files.items():
             write_file(target.with_suffix(suffix), content.encode())
@@ -235,15 +235,6 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
         "trial": candidate.trial, "training": list(candidate.training), "validation": list(candidate.validation),
         "params": candidate.config.as_dict(),
     }  # fmt: skip
-
-
-def _without_nan(value: Any) -> Any:
-    """Returns a copy of `value`, nested dicts, lists and tuples, with None for nan and infinity, which JSON lacks."""
-    if isinstance(value, dict):
-        return {key: _without_nan(v) for key, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _short_settings(settings: Sequence[str]) -> list[str]:

@@ -24,6 +24,7 @@ from sim.io.files.tables import json_text
 from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
 from sim.io.store.seal import read_whole_manifest
+from sim.scene.visibility import image_size_of_boxes
 from sim.streams import file_name
 from sim.types import Array, Ints, Sequence, Truth
 
@@ -78,7 +79,7 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
         truth, files = sequence.truth, _picture_files(sequence)
         assert truth is not None
         assert truth.box is not None
-        size = sequence.image_size or _extent(truth.box)
+        size = sequence.image_size or image_size_of_boxes(truth.box)
         shape = {"width": size[0], "height": size[1]}
         videos.append(json_text({**about, **shape}))
         for index in range(1, (sequence.length or 0) + 1):
@@ -93,12 +94,6 @@ def _document(sequences: list[Sequence], root: Path, path: Path) -> str:
     blocks = [f'"{name}": [\n' + ",\n".join(rows) + "\n]" for name, rows in lists.items()]
     head = f'"info": {json_text(info)}, "licenses": []', f'"categories": [{json_text(PERSON)}]'
     return "{" + ",\n".join([*head, *blocks]) + "}\n"
-
-
-def _extent(box: Array) -> tuple[int, int]:
-    edges = box[:, :2] + box[:, 2:]
-    right, bottom = np.ceil(edges[np.isfinite(edges).all(axis=1)].max(axis=0, initial=1)).astype(int).tolist()
-    return right, bottom
 
 
 def _picture_files(sequence: Sequence) -> dict[int, Path]:

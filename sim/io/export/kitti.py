@@ -20,7 +20,7 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.io.files.atomic import write_file
 from sim.io.pictures.stored_pictures import StoredPictures
-from sim.io.source import sequence_folders, split_and_name
+from sim.io.source import generated_folders, split_and_name
 from sim.io.store.camera_files import read_camera
 from sim.io.store.seal import read_whole_manifest
 from sim.types import Camera
@@ -41,7 +41,7 @@ def kitti(source: str | Path, out: str | Path) -> list[Path]:
     Raises:
         InputError: Two sequences share a folder.
     """
-    folders = sequence_folders(Path(source), "generated")
+    folders = generated_folders(Path(source))
     targets = [Path(out) / split_and_name(folder) for folder in folders]
     if len(set(targets)) < len(targets):
         raise InputError(file=source, got="two sequences of one name", expected="unique names", remedy="rename one")

@@ -22,7 +22,7 @@ from sim.io.files import tables
 from sim.io.files.atomic import lock_folder, remove_partials, staged_path, write_file
 from sim.io.files.own_files import is_side_file
 from sim.io.pictures.stored_pictures import StoredPictures
-from sim.io.source import sequence_folders, split_and_name
+from sim.io.source import generated_folders, split_and_name
 from sim.io.store.seal import MANIFEST, read_whole_manifest
 
 BLOCK = 512  # bytes: a tar holds whole blocks
@@ -92,7 +92,7 @@ def size_of(text: str) -> int:
 
 def _shards(source: Path, size: int) -> list[dict[Path, str]]:
     """Returns the content hash of each sequence folder of each shard, as many as fit into a tar of `size` bytes."""
-    folders = sorted(sequence_folders(source, "generated"), key=split_and_name)
+    folders = sorted(generated_folders(source), key=split_and_name)
     twice = next((a for a, b in pairwise(map(split_and_name, folders)) if a == b), None)
     if twice is not None:
         raise InputError(file=source, got=f"two sequences {twice}", expected="unique names", remedy="export them apart")

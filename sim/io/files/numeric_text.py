@@ -186,15 +186,13 @@ def number_or_nan(text: str | None) -> float:
     return read_number(text) if text is not None and is_number_text(text) else float("nan")
 
 
-def bounded_number(
-    path: Path, place: str, text: str | None, low: float, high: float, whole: bool = False, remedy: str = "correct it"
-) -> float:
+def bounded_number(path: Path, place: str, text: str | None, low: float, high: float, whole: bool = False) -> float:
     """Returns the number that a text states; InputError unless from `low` to `high` and, if `whole`, a whole number."""
     value = number_or_nan(text)
     if not low <= value <= high or (whole and value % 1):
         got = "nothing" if text is None else repr(text)
         expected = f"a {'whole ' if whole else ''}number from {low:.12g} to {high:.12g}"
-        raise InputError(file=path, place=place, got=got, expected=expected, remedy=remedy)
+        raise InputError(file=path, place=place, got=got, expected=expected, remedy="correct it")
     return value
 
 

@@ -8,6 +8,7 @@ another kind.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
@@ -181,14 +182,19 @@ def is_own_table(path: Path) -> bool:
 
 
 def plain(value: Any) -> Any:
-    """Returns a value as JSON has it: arrays and tuples as lists, dataclasses as dicts, nan as None."""
+    """Returns a value as JSON has it: arrays, tuples and ranges as lists, dataclasses as dicts, paths as text, nan and
+    infinity as None."""
     if is_dataclass(value):
         return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, dict):
+        return {str(key): plain(v) for key, v in value.items()}
+    if isinstance(value, Path):
+        return str(value)
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
-    if isinstance(value, tuple | list):
+    if isinstance(value, tuple | list | range):
         return [plain(v) for v in value]
-    return None if value != value else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def json_text(value: Any) -> str:

@@ -15,7 +15,7 @@ from sim import hashing
 from sim.io.files.atomic import PARTIAL
 from sim.io.files.own_files import is_side_file
 from sim.io.pictures.stored_pictures import StoredPictures
-from sim.io.source import sequence_folders, split_and_name
+from sim.io.source import generated_folders, split_and_name
 from sim.io.store import seal, truth_files
 from sim.io.store.seal import is_run, read_run, run_problems
 from sim.io.store.track_files import read_tracks
@@ -64,7 +64,7 @@ def _inside(root: Path, kind: Callable[[Path], bool]) -> list[Path]:
 
 def content_hash(folder: str | Path) -> str:
     """Returns the SHA-256 of a generated dataset or sequence, from the hashes in its manifests."""
-    folders = sequence_folders(Path(folder), "generated")
+    folders = generated_folders(Path(folder))
     return hashing.dataset_hash({split_and_name(p): seal.read_manifest(p)["content_hash"] for p in folders})
 
 

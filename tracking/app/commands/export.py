@@ -5,6 +5,8 @@ The formats themselves are in sim.io.export.
 
 from __future__ import annotations
 
+from functools import partial
+
 from scenarios.errors import InputError, counted
 from sim.io.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
 from sim.io.source import open_source
@@ -12,15 +14,7 @@ from sim.io.store.seal import is_run, is_sequence
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.app import option_parsing
-from tracking.app.command_options import (
-    CocoOptions,
-    CsvOptions,
-    KittiOptions,
-    ParquetOptions,
-    PedpyOptions,
-    TrajnetOptions,
-    WebdatasetOptions,
-)
+from tracking.app.command_options import CocoOptions, CsvOptions, KittiOptions, TrajnetOptions, WebdatasetOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.app.stored_tracks import StoredTracks, find_tracks, holds_tracks, run_folders
@@ -60,27 +54,9 @@ def export_webdataset(options: WebdatasetOptions) -> CommandResult:
     return CommandResult({"shards": files, "bytes": total, "content_hash": index["content_hash"]}, text)
 
 
-def export_csv(options: CsvOptions) -> CommandResult:
-    """Writes the tables of every run or sequence as CSV."""
-    return _export(options, "csv", parse_places(options.line, options.zone))
-
-
-def export_parquet(options: ParquetOptions) -> CommandResult:
-    """Writes the tables of every run or sequence as Parquet."""
-    return _export(options, "parquet", parse_places(options.line, options.zone))
-
-
-def export_trajnet(options: TrajnetOptions) -> CommandResult:
-    """Writes the people of every run or sequence as TrajNet++."""
-    return _export(options, "trajnet", {})
-
-
-def export_pedpy(options: PedpyOptions) -> CommandResult:
-    """Writes the people of every run or sequence as a text of PedPy and JuPedSim."""
-    return _export(options, "pedpy", {})
-
-
-def _export(options: TrajnetOptions, form: Form, places: Places) -> CommandResult:
+def export(form: Form, options: TrajnetOptions) -> CommandResult:
+    """Writes the tables of every run or sequence, or their people, in this form."""
+    places = parse_places(options.line, options.zone) if isinstance(options, CsvOptions) else {}
     option_parsing.output_folder(options.out)
     jobs = _of_runs(options) if holds_tracks(options.source) else _of_sequences(options)
     folders = run_folders([sequence for sequence, _ in jobs], options.source, options.out)
@@ -101,6 +77,8 @@ def _export(options: TrajnetOptions, form: Form, places: Places) -> CommandResul
     return CommandResult({"tables": rows}, "\n".join(lines))
 
 
+export_csv, export_parquet = partial(export, "csv"), partial(export, "parquet")
+export_trajnet, export_pedpy = partial(export, "trajnet"), partial(export, "pedpy")
 Job = tuple[Sequence, StoredTracks | None]  # a sequence, or what stands for it, and the run whose tables are made
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scenarios.errors import InputError, counted, printable
 from sim.io.files.atomic import lock_folder, write_file
 from sim.io.files.own_files import refuse_foreign_file
-from sim.io.files.tables import Column, json_document, table_bytes
+from sim.io.files.tables import Column, json_document, plain, table_bytes
 from sim.types import Array, DetectionMode
 from tracking.app import option_parsing
 from tracking.app.command_options import StressOptions
@@ -113,9 +113,7 @@ def _data(sweep: Sweep, found: list[SearchedScene] | None) -> dict[str, Any]:
 
 def _means(scores: Array) -> dict[str, list[float | None]]:
     """Returns mean, ends of its 95 % interval, and number of scenes, for each column of scores (P, V)."""
-    mean, low, high = (
-        [value if np.isfinite(value) else None for value in end.tolist()] for end in mean_interval(scores)
-    )
+    mean, low, high = map(plain, mean_interval(scores))
     return {"mean": mean, "low": low, "high": high, "scenes": np.isfinite(scores).sum(axis=0).tolist()}
 
 
@@ -133,10 +131,8 @@ def _first(means: dict[str, Any], k: int = 0) -> dict[str, float | None]:
 def _on_axis(plan: Plan, point: BreakingPoint) -> dict[str, float | None]:
     (axis,) = plan.axes
     ends = {"at": point.at, "low": point.low, "high": point.high}
-    return {
-        name: axis.easy + share * (axis.hard - axis.easy) if np.isfinite(share) else None
-        for name, share in ends.items()
-    }
+    found: dict[str, float | None] = plain({k: axis.easy + x * (axis.hard - axis.easy) for k, x in ends.items()})
+    return found
 
 
 def _failure(failure: SearchedScene, place: int) -> dict[str, Any]:

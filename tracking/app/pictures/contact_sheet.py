@@ -16,7 +16,7 @@ import numpy as np
 from scenarios.errors import InputError, counted
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import marked_png
-from sim.types import Array, GroupEvent, Image, Ints, Scene, Sequence, Tracks
+from sim.types import Array, Image, Ints, Scene, Sequence, Tracks
 from tracking.drawing.canvas import FLOOR, INK, QUIET, THING, TRAIL_SECONDS, Canvas, text, text_width
 from tracking.drawing.layer_painting import KIND_COLOUR, event_words, kind_colour, paint_layer
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
@@ -151,19 +151,14 @@ def _picture(sequence: Sequence, parts: SequenceOf[View], length: int, chosen: l
 
 
 def _draw_title(area: Image, layer: Layer, index: int, fps: float) -> None:
-    events = events_near(layer, index, fps)
+    # events that become known at most 1 s before or after the frame, most important kinds first
+    near = [e for known, e in layer.events if e.kind in SHOWN_KINDS and abs(known - index) <= CLOSE_SECONDS * fps]
+    events = sorted(near, key=lambda event: SHOWN_KINDS[event.kind])
     words = f"{(index - 1) / fps:.1f} s" + "".join(f"   {event_words(event, layer.prefix)}" for event in events)
     ink = kind_colour(events[0].kind) if events else QUIET
     text(area, words[:62], (2, TITLE - 12), 0.72, ink, 2 if events else 1)
     border = (ink, 5) if events else (THING, 2)
     cv2.rectangle(area, (0, TITLE), (area.shape[1] - 1, area.shape[0] - 1), *border)
-
-
-def events_near(layer: Layer, index: int, fps: float) -> list[GroupEvent]:
-    """Returns the events of the kinds that are shown which become known at most 1 s before or after frame `index`,
-    most important kinds first."""
-    near = [e for known, e in layer.events if e.kind in SHOWN_KINDS and abs(known - index) <= CLOSE_SECONDS * fps]
-    return sorted(near, key=lambda event: SHOWN_KINDS[event.kind])
 
 
 def _draw_head(sheet: Image, sequence: Sequence, part: View, length: int) -> None:

@@ -10,7 +10,7 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from sim.io.files.atomic import write_file
+from sim.io.files.tables import plain
 from sim.io.store.truth_files import spans
 from sim.types import Array, GroupEvent, Sequence, Tracks
 from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
@@ -91,11 +92,7 @@ def script_json(value: Json) -> str:
 
 
 def page_data(
-    sequence: Sequence,
-    run: Run,
-    other: Run | None = None,
-    span: tuple[int, int] | None = None,
-    start: int = 1,
+    sequence: Sequence, run: Run, other: Run | None = None, span: tuple[int, int] | None = None, start: int = 1
 ) -> Json:
     """Returns all that the page shows except the video, as a JSON object.
 
@@ -200,15 +197,3 @@ def _detections(sequence: Sequence, low: int, high: int) -> Json | None:
         "y": deltas(pos[:, 1]),
         "box": [] if box is None else [deltas(box[:, k]) for k in range(4)],
     }
-
-
-def plain(value: Any) -> Any:
-    """Returns a value as JSON can hold it: dataclasses as dicts, tuples and arrays as lists, floats rounded to 6
-    decimals, None for a float that is nan."""
-    if is_dataclass(value):
-        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, tuple):
-        return [plain(one) for one in value]
-    if isinstance(value, float):
-        return None if math.isnan(value) else round(value, 6)
-    return np.round(value, 6).tolist() if isinstance(value, np.ndarray) else value

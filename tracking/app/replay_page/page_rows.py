@@ -18,6 +18,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.io.formats.labels import centres
+from sim.io.store.track_files import flatten
 from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
 
 
@@ -131,34 +133,20 @@ class PageRows:
 def rows_of_truth(truth: Truth) -> PageRows:
     """Returns the truth's rows: on the ground if positions are labelled, else centres of boxes in the image."""
     n = len(truth.frame)
-    pos = truth.pos if truth.pos is not None else _centres(truth.box, n)
-    angle = truth.heading if truth.heading is not None else _directions(truth.vel, n)
     box = truth.box if truth.box is not None else np.full((n, 4), np.nan)
+    pos = truth.pos if truth.pos is not None else centres(box)
+    angle = truth.heading if truth.heading is not None else _directions(truth.vel, n)
     plane = "ground" if truth.pos is not None else "image"
     return PageRows(plane, truth.frame, truth.id, truth.group, pos, angle, box, truth.visibility)
 
 
 def rows_of_tracks(tracks: SequenceOf[Tracks]) -> PageRows:
     """Returns a tracker's rows, in the order of `tracks`."""
-    count = np.array([len(t.id) for t in tracks], np.int64)
-    box = [t.box if t.box is not None else np.full((len(t.id), 4), np.nan) for t in tracks]
-    vel = np.concatenate([np.zeros((0, 2)), *(t.vel[:, :2] for t in tracks)])
-    no_id = np.zeros(0, np.int64)
-    return PageRows(
-        "image" if any(t.plane == "image" for t in tracks) else "ground",
-        np.repeat(np.array([t.index for t in tracks], np.int64), count),
-        np.concatenate([no_id, *(t.id for t in tracks)]),
-        np.concatenate([no_id, *(t.group for t in tracks)]),
-        np.concatenate([np.zeros((0, 2)), *(t.pos[:, :2] for t in tracks)]),
-        _directions(vel, len(vel)),
-        np.concatenate([np.zeros((0, 4)), *box]),
-        np.ones(len(vel)),
-        **(_wholes(tracks, vel) if any(t.unit == "group" for t in tracks) else {}),
-    )
-
-
-def _centres(box: Array | None, n: int) -> Array:
-    return np.full((n, 2), np.nan) if box is None else box[:, :2] + box[:, 2:] / 2
+    rows = flatten(list(tracks))
+    plane, shown = "image" if rows.plane == "image" else "ground", np.ones(len(rows.id))
+    wholes = _wholes(tracks, rows.vel) if rows.unit == "group" else {}
+    pos, angle = rows.pos[:, :2], _directions(rows.vel, len(rows.id))
+    return PageRows(plane, rows.frame, rows.id, rows.group, pos, angle, rows.box, shown, **wholes)
 
 
 def _directions(vel: Array | None, n: int) -> Array:

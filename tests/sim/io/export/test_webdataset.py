@@ -15,7 +15,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.export.webdataset import size_of, webdataset
 from sim.io.files import atomic, tables
-from sim.io.source import sequence_folders
+from sim.io.source import generated_folders
 from sim.io.store import sequence_folder
 from sim.io.store.seal import read_manifest, with_hash
 from sim.io.store.validate import content_hash, validate
@@ -142,7 +142,7 @@ def test_sizes(text: str, size: int) -> None:
 
 def copied(data: Path, tmp_path: Path, change: Callable[[dict[str, Any], Path], None]) -> Path:
     """A copy of the first sequence whose manifest is changed and sealed again."""
-    folder = Path(shutil.copytree(sequence_folders(data, "generated")[0], tmp_path / "flockscope-train/a"))
+    folder = Path(shutil.copytree(generated_folders(data)[0], tmp_path / "flockscope-train/a"))
     manifest = read_manifest(folder)
     change(manifest, folder)
     (folder / "manifest.json").write_bytes(tables.json_document(with_hash(manifest)))
