@@ -217,9 +217,18 @@ def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: Sca
         if not (exclusive[row] & (claims.claimants > 1)).any():
             bank.unshared[row] = t, *bank.x[row, 2:]
         offset = mine - bank.x[row, :2]
+        if not scaled.from_pixels:
+            bank.anchor[row] += displacement(bank.members[row].offset, offset, scaled.scale * scaled.config.carry_reach)
         known = any_within(offset, bank.members[row].offset, scaled.scale * scaled.config.carry_reach)
         parts = zip((offset, last_seen, known), _hidden_members(bank, row, claims.points, scaled, t), strict=True)
         bank.members[row] = MemberPlaces(*map(np.concatenate, parts))
+
+
+def displacement(before: Array, after: Array, reach: float) -> Array:
+    d2 = np.square(after[:, None] - before).sum(2)
+    nearest, here = d2.argmin(1), np.arange(len(after))
+    same = (d2.argmin(0)[nearest] == here) & (d2[here, nearest] <= reach**2)
+    return (after[same] - before[nearest[same]]).mean(0) if same.any() else np.zeros(2)
 
 
 def _hidden_members(bank: GroupBank, row: int, points: Array, scaled: ScaledParameters, t: float) -> MemberPlaces:

@@ -57,6 +57,7 @@ class GroupBank:
     null_time: Array
     unshared: Array
     parent: Ints
+    anchor: Array
     colour_hist: Array
     members: list[MemberPlaces]
     recent_points: list[list[tuple[float, Array]]]
@@ -68,7 +69,7 @@ class GroupBank:
         four = np.zeros((0, 4))
         return cls(
             four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none,
-            np.zeros((0, 3)), ids, np.zeros((0, colour_bins)), [], [],
+            np.zeros((0, 3)), ids, np.zeros((0, 2)), np.zeros((0, colour_bins)), [], [],
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -149,5 +150,5 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
     return GroupBank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, NO_ID),
         now, now.copy(), zero + scaled.dt, zero, np.zeros((count, 3)), np.full(count, NO_ID),
-        np.zeros((count, scaled.colour_bins)), members, [[] for _ in range(count)],
+        np.zeros((count, 2)), np.zeros((count, scaled.colour_bins)), members, [[] for _ in range(count)],
     )  # fmt: skip

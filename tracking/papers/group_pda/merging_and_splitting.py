@@ -281,14 +281,15 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     return GroupBank(
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1),
-        np.array([[bank.last_seen[rows].max(), *x[2:]]]), bank.parent[one],
+        np.array([[bank.last_seen[rows].max(), *x[2:]]]), bank.parent[one], bank.anchor[one] + bank.x[one, :2] - x[:2],
         bank.colour_hist[rows].sum(0, keepdims=True),
         [MemberPlaces(offset, last_seen, known)], [pooled_points([bank.recent_points[r] for r in rows.tolist()])],
     )  # fmt: skip
 
 
 def _moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float) -> PairMoment:
-    way, v = ((bank.x[b, k : k + 2] - bank.x[a, k : k + 2]) * scaled.metres_per_unit for k in (0, 2))
+    walked = bank.x[:, :2] + bank.anchor
+    way, v = ((y[b] - y[a]) * scaled.metres_per_unit for y in (walked, bank.x[:, 2:]))
     w = bank.size[[a, b]] / bank.size[[a, b]].sum()
     gap = _nearest(*(bank.positions(row) * scaled.metres_per_unit for row in (a, b)))
     return PairMoment(t, way, v, w @ bank.x[[a, b], :2], gap)
@@ -322,6 +323,7 @@ def fall_apart(
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
     parts.recent_points[largest], parts.unshared[:] = bank.recent_points[row], bank.unshared[row]
+    parts.anchor[:] = bank.anchor[row] + bank.x[row, :2] - parts.x[:, :2]
     places, members = bank.positions(row), bank.members[row]
     of = group[cKDTree(points).query(places)[1]]
     for k in range(len(parts)):
