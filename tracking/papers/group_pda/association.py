@@ -25,7 +25,7 @@ from sim.scene.camera import to_ground
 from sim.types import Array, Bools, Camera, Ints
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association_kernels import any_within
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
 LOWEST_HEAD = 1.5  # m above the ground: only few people, mostly children, are shorter.
@@ -143,12 +143,10 @@ def place_density(bank: GroupBank, points: Array, scaled: ScaledParameters, t: f
     """Returns the density (G, M) of the points about the places to which each group's members have walked on since no
     other group could have its points, and a little of it all over the group's extent."""
     density = np.tile(LEAST_PLACES / np.sqrt(np.linalg.det(bank.extent))[:, None], len(points))
-    for row, (then, *velocity) in enumerate(bank.unshared.tolist()):
-        places = [y + (t - then) * np.array(velocity) for at, y in bank.recent_points[row] if at == then]
-        if places:
-            away = np.square(points[:, None] - places[0]).sum(2)
-            var = 2 * scaled.point_sd**2 + np.square(scaled.scale * SPLIT_SPEED * (t - then))
-            density[row] += (np.exp(-away / var / 2) / var).mean(1)
+    for row, (then, velocity, places) in enumerate(bank.unshared):
+        away = np.square(points[:, None] - places - (t - then) * velocity).sum(2)
+        var = 2 * scaled.point_sd**2 + np.square(scaled.scale * SPLIT_SPEED * (t - then))
+        density[row] += (np.exp(-away / var / 2) / var).mean(1)
     return density
 
 
@@ -169,10 +167,6 @@ def shares(log_density: Array, may: Bools) -> Array:
     density = np.exp(log - log.max(0, initial=-np.inf))
     share[:, shared] = density / density.sum(0)
     return share
-
-
-RECENT_TIME = 3.0  # s for which a group's points are kept, to date the onset of a split.
-RECENT_POINTS = 64  # At most so many points of a group are kept of each frame.
 
 
 def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledParameters, t: float) -> PointClaims:
@@ -212,10 +206,8 @@ def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: Sca
     """Stores each group's points of this frame as its members and recent points, in the bank, in place."""
     for row in np.flatnonzero(exclusive.any(1)).tolist():
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]
-        kept = [p for p in bank.recent_points[row] if p[0] > t - RECENT_TIME]
-        bank.recent_points[row] = [*kept, (t, thinned(mine))]
         if not (exclusive[row] & (claims.claimants > 1)).any():
-            bank.unshared[row] = t, *bank.x[row, 2:]
+            bank.unshared[row] = Unshared(t, bank.x[row, 2:].copy(), mine)
         offset = mine - bank.x[row, :2]
         if not scaled.from_pixels:
             bank.anchor[row] += displacement(bank.members[row].offset, offset, scaled.scale * scaled.config.carry_reach)
@@ -237,11 +229,3 @@ def _hidden_members(bank: GroupBank, row: int, points: Array, scaled: ScaledPara
     hidden = past.known & (age > c.carry_time + 1e-9) & (age <= c.coast_time + 1e-9) & (c.carry_time > 0)
     hidden &= ~any_within(bank.positions(row), points, scaled.scale * c.carry_reach) & (not scaled.from_pixels)
     return MemberPlaces(past.offset[hidden], past.last_seen[hidden], past.known[hidden])
-
-
-def thinned(points: Array) -> Array:
-    """Returns at most RECENT_POINTS = 64 of the points (M, 2), selected by a hash of their coordinates."""
-    if len(points) <= RECENT_POINTS:
-        return points
-    scattered = np.sin(points @ np.array([12.9898, 78.233])) * 43758.5453
-    return points[np.argsort(scattered - np.floor(scattered), kind="stable")[:RECENT_POINTS]]

@@ -27,7 +27,7 @@ ground or px), times in s.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import combinations
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -38,14 +38,12 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition, regions_overlap
 from tracking.grouping.link_rule import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 # s before and after a moment for the difference of two groups' or parts' velocities: that of two steps in all.
 WALK_TIME = 0.8
 BEFORE = 16  # Places by which the way before the first moment is known.
-# Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three.
-REACH = 1.1
 
 
 class PairMoment(NamedTuple):
@@ -100,32 +98,12 @@ def chords(t: Array, d: Array, half: float) -> Array:
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
 
 
-def split_onset(
-    recent: list[tuple[float, Array]], parts: list[Array], metres_per_unit: Array, known: float
-) -> tuple[float, Array]:
-    """Returns when, in s, a group began to divide into two parts, and its centroid (2,) at that time, in the points'
-    unit."""
-    before = [(t, y * metres_per_unit) for t, y in recent if t <= known + 1e-9]
-    if len(before) < 2:
-        t, y = before[0] if before else (known, parts[0] * metres_per_unit)
-        return known, y.mean(0) / metres_per_unit
-    middle = np.array([p.mean(0) for p in parts]) * metres_per_unit
-    way = middle[1] - middle[0]
-    way = metres_per_unit * way / max(float(np.hypot(*way)), 1e-9)
-    spread = [max(float(way @ np.cov(p.T, bias=True) @ way), 0.0) if len(p) > 1 else 0.0 for p in parts]
-    reach = REACH * float(np.sqrt(spread).sum())
-    times, apart = [], []
-    for t, y in reversed(before):
-        side = np.square(y[:, None] - middle).sum(2).argmin(1)
-        middle = np.array([y[side == k].mean(0) if (side == k).any() else middle[k] for k in range(2)])
-        times.append(t)
-        apart.append(middle[1] - middle[0])
-    when, d = np.array(times[::-1]), np.array(apart[::-1])
-    gap = np.hypot(*d.T) - reach
-    slow = chords(when, d, WALK_TIME) < SPLIT_VELOCITY
-    together = (gap <= MERGE_DISTANCE) | ((gap <= SPLIT_DISTANCE) & slow)
-    k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(when) - 1)
-    return float(when[k]), before[k][1].mean(0) / metres_per_unit
+def split_onset(moments: list[PairMoment]) -> int:
+    """Returns the index of the moment since which two parts of a group have been apart."""
+    t, gap = np.array([m.t for m in moments]), np.array([m.gap for m in moments])
+    slow = chords(t, np.array([m.way for m in moments]), WALK_TIME) < SPLIT_VELOCITY
+    together = np.flatnonzero((gap <= MERGE_DISTANCE) | ((gap <= SPLIT_DISTANCE) & slow))
+    return min(int(together.max(initial=-1)) + 1, len(moments) - 1)
 
 
 HISTORY_TIME = 5.0  # s of a pair's past that are kept.
@@ -161,7 +139,7 @@ class GroupChanges:
             linked = [pair for pair in pairs if not self._apart(pair, scaled, t)]
             parts = [np.flatnonzero(np.isin(bank.id, ids)) for ids in _connected(linked, bank.id[rows].tolist())]
             if len(parts) > 1:
-                yield _split_into(bank, group, parts, scaled, t)
+                yield self._split_into(bank, group, parts, scaled, t)
 
     def _apart(self, pair: Pair, scaled: ScaledParameters, t: float) -> bool:
         if not scaled.config.corrections:
@@ -171,6 +149,20 @@ class GroupChanges:
             return False  # one of them is not measured
         near = max((m.t for m in moments if m.gap <= MERGE_DISTANCE), default=moments[0].t)
         return t - near > scaled.config.confirm_time + 1e-9
+
+    def _split_into(
+        self, bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledParameters, t: float
+    ) -> WholeGroupEvent:
+        heads = [rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]] for rows in parts]
+        apart = []
+        for i, j in (pair for two in combinations(parts, 2) for pair in product(*two)):
+            moments = self.moments.get(_pair(bank, i, j)) or [_moment(bank, i, j, scaled, t)]
+            apart.append(moments[split_onset(moments)])
+        first = max(apart, key=lambda m: m.t)
+        for rows, head in zip(parts, heads, strict=True):
+            bank.parent[rows], bank.parent[head] = bank.id[head], NO_ID
+        children = tuple(sorted(bank.id[heads].tolist()))
+        return WholeGroupEvent("split", first.t, (group,), children, tuple(first.middle.tolist()))
 
     def _join_parts(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
         near = _overlapping(bank, np.flatnonzero(bank.confirmed & _measured(bank, t)), scaled.config.gate)
@@ -217,30 +209,6 @@ def _pair(bank: GroupBank, i: int, j: int) -> Pair:
     return a, b
 
 
-def _split_into(bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledParameters, t: float) -> WholeGroupEvent:
-    parts = sorted(parts, key=lambda rows: (group not in bank.id[rows], -bank.size[rows].sum()))
-    recent = pooled_points([bank.recent_points[r] for rows in parts for r in rows.tolist()])
-    two = [np.concatenate([_latest_points(bank, r) for r in rows.tolist()]) for rows in parts[:2]]
-    onset, place = split_onset(recent, two, scaled.metres_per_unit, t)
-    heads = [rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]] for rows in parts]
-    for rows, head in zip(parts, heads, strict=True):
-        bank.parent[rows], bank.parent[head] = bank.id[head], NO_ID
-    return WholeGroupEvent("split", onset, (group,), tuple(sorted(bank.id[heads].tolist())), tuple(place.tolist()))
-
-
-def _latest_points(bank: GroupBank, row: int) -> Array:
-    recent = bank.recent_points[row]
-    return recent[-1][1] if recent else bank.positions(row)
-
-
-def pooled_points(recent: list[list[tuple[float, Array]]]) -> list[tuple[float, Array]]:
-    """Returns the recent points of several rows of the bank, joined by time: pairs (time, points), oldest first."""
-    by_time: dict[float, list[Array]] = {}
-    for t, points in (moment for past in recent for moment in past):
-        by_time.setdefault(t, []).append(points)
-    return [(t, np.concatenate(by_time[t])) for t in sorted(by_time)]
-
-
 def whole_groups(bank: GroupBank, rows: Ints) -> GroupBank:
     """Returns a bank with one row per group of these rows of the bank: the union of its parts."""
     group = bank.group[rows]
@@ -281,9 +249,8 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     return GroupBank(
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1),
-        np.array([[bank.last_seen[rows].max(), *x[2:]]]), bank.parent[one], bank.anchor[one] + bank.x[one, :2] - x[:2],
-        bank.colour_hist[rows].sum(0, keepdims=True),
-        [MemberPlaces(offset, last_seen, known)], [pooled_points([bank.recent_points[r] for r in rows.tolist()])],
+        bank.parent[one], bank.anchor[one] + bank.x[one, :2] - x[:2], bank.colour_hist[rows].sum(0, keepdims=True),
+        [MemberPlaces(offset, last_seen, known)], [Unshared(bank.last_seen[rows].max(), x[2:], offset + x[:2])],
     )  # fmt: skip
 
 
@@ -322,13 +289,8 @@ def fall_apart(
     largest = int(np.lexsort((parts.x[:, 1], parts.x[:, 0], away, -parts.size))[0])
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
-    parts.recent_points[largest], parts.unshared[:] = bank.recent_points[row], bank.unshared[row]
     parts.anchor[:] = bank.anchor[row] + bank.x[row, :2] - parts.x[:, :2]
-    places, members = bank.positions(row), bank.members[row]
-    of = group[cKDTree(points).query(places)[1]]
-    for k in range(len(parts)):
-        offset = places[of == k] - parts.x[k, :2]
-        parts.members[k] = MemberPlaces(offset, members.last_seen[of == k], members.known[of == k])
+    parts.unshared = [here._replace(velocity=bank.x[row, 2:]) for here in parts.unshared]
     if bank.id[row] != NO_ID:
         parts.parent[:] = bank.group[row]
         parts.parent[largest] = bank.parent[row]
