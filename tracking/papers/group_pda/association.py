@@ -25,7 +25,7 @@ from sim.scene.camera import to_ground
 from sim.types import Array, Bools, Camera, Ints
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association_kernels import any_within
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
 LOWEST_HEAD = 1.5  # m above the ground: only few people, mostly children, are shorter.
@@ -135,21 +135,6 @@ def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio
     return np.asarray(found)
 
 
-# Part of the density of a group's members that is even over its extent, of those who are not where they walked.
-LEAST_PLACES = 0.05
-
-
-def place_density(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> Array:
-    """Returns the density (G, M) of the points about the places to which each group's members have walked on since no
-    other group could have its points, and a little of it all over the group's extent."""
-    density = np.tile(LEAST_PLACES / np.sqrt(np.linalg.det(bank.extent))[:, None], len(points))
-    for row, (then, velocity, places) in enumerate(bank.unshared):
-        away = np.square(points[:, None] - places - (t - then) * velocity).sum(2)
-        var = 2 * scaled.point_sd**2 + np.square(scaled.scale * SPLIT_SPEED * (t - then))
-        density[row] += (np.exp(-away / var / 2) / var).mean(1)
-    return density
-
-
 def log_ratio(density: Array, claims: PointClaims) -> Array:
     """Returns log p(y | g) - log p(y | other groups) (G, M) of each shared point y, given p (G, M), and 0 of others."""
     ratio, shared = np.zeros(claims.d2.shape), np.flatnonzero(claims.claimants > 1)
@@ -202,21 +187,29 @@ def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: 
     return place[missed], row_of[missed], last_seen[missed]
 
 
-def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: ScaledParameters, t: float) -> None:
-    """Stores each group's points of this frame as its members and recent points, in the bank, in place."""
+def remember(
+    bank: GroupBank, claims: PointClaims, exclusive: Bools, predicted: Array, scaled: ScaledParameters, t: float
+) -> None:
+    """Stores each group's points of this frame as its members, and how far these walked, in the bank, in place.
+
+    predicted (G, 2): the groups' centroids before the update.
+    """
     for row in np.flatnonzero(exclusive.any(1)).tolist():
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]
-        if not (exclusive[row] & (claims.claimants > 1)).any():
-            bank.unshared[row] = Unshared(t, bank.x[row, 2:].copy(), mine)
-        offset = mine - bank.x[row, :2]
+        offset, places = mine - bank.x[row, :2], bank.members[row].offset + predicted[row]
+        reach = scaled.scale * scaled.config.carry_reach
         if not scaled.from_pixels:
-            bank.anchor[row] += displacement(bank.members[row].offset, offset, scaled.scale * scaled.config.carry_reach)
-        known = any_within(offset, bank.members[row].offset, scaled.scale * scaled.config.carry_reach)
+            bank.anchor[row] += predicted[row] - bank.x[row, :2] + displacement(places, mine, reach)
+        known = any_within(mine, places, reach)
         parts = zip((offset, last_seen, known), _hidden_members(bank, row, claims.points, scaled, t), strict=True)
         bank.members[row] = MemberPlaces(*map(np.concatenate, parts))
 
 
 def displacement(before: Array, after: Array, reach: float) -> Array:
+    """Returns the mean displacement (2,) of the places before (K, 2) that are after (M, 2), too: 0 if none is.
+
+    A place is there, too, if it and one after are each other's nearest, at most `reach` apart; all in one unit.
+    """
     d2 = np.square(after[:, None] - before).sum(2)
     nearest, here = d2.argmin(1), np.arange(len(after))
     same = (d2.argmin(0)[nearest] == here) & (d2[here, nearest] <= reach**2)

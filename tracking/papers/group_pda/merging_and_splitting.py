@@ -3,11 +3,12 @@
 Merging (sec. 3.1, 3.2): which groups are near with like velocities, for how long, and their union. Input: the bank of
 groups after the update of a frame; output: the bank with merged groups, and the events. The relation R_x holds for two
 groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
-components of groups under R_x; each becomes one group. With `corrections` there is evidence over time
-(ours), as of a Markov chain of two states: a moment speaks for one group the more, the smaller the difference of
-velocities is beside `merge_velocity`, on the mean of two steps, and against it if people of both are more than 1.5 m
-apart. Since the onset, when the sum was least, it must have grown by `merge_time`. Without, velocities are alike if the
-regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
+components of groups under R_x; each becomes one group. With `corrections` there is evidence over time (ours), as of a
+Markov chain of two states: a moment speaks for one group the more, the smaller the difference of velocities is beside
+`merge_velocity`, on the mean of two steps, and against it if people of both are more than 1.5 m apart. From points the
+velocities are those of the members who are seen in both of two frames (`anchor` of the bank). Since the onset, when the
+sum was least, it must have grown by `merge_time`. Without, velocities are alike if the regions SR_v overlap. Groups
+that are not measured, or infeasible, do not merge.
 
 Splitting (sec. 3.3, 4.2): a group without feasible associations for `split_time` falls apart. An association (a set of
 points that may be a group's) is feasible if its points form one group under the group constraint G_y
@@ -18,10 +19,9 @@ beside a member: misses, sway and noise take people apart for a moment. Each par
 their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates become one row again. Sets of
 parts whose people have been more than 1.5 m from the rest's for `confirm_time` split off.
 
-Onsets (ours): when an event that is known now began. The onset of a split is measured from the group's earlier points,
-divided among the parts. Distances are metres on the ground (in an image depth is stretched to it). The distances and
-velocities of the truth's rules come from sim.truth.merge_split_rules. Lengths are in the unit of the points (m on the
-ground or px), times in s.
+Onsets (ours): when an event that is known now began, by the moments of the two groups or parts. Distances are metres on
+the ground (in an image depth is stretched to it). The distances and velocities of the truth's rules come from
+sim.truth.merge_split_rules. Lengths are in the unit of the points (m on the ground or px), times in s.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition, regions_overlap
 from tracking.grouping.link_rule import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 # s before and after a moment for the difference of two groups' or parts' velocities: that of two steps in all.
@@ -49,7 +49,7 @@ BEFORE = 16  # Places by which the way before the first moment is known.
 class PairMoment(NamedTuple):
     """Two groups a and b at one time; a has the smaller id.
 
-    t: s. way, velocity (2,): from a's centroid to b's, m on the ground, and b's velocity less a's, as filtered, m/s.
+    t: s. way, velocity (2,): from a's anchor to b's, m on the ground, and b's velocity less a's, as filtered, m/s.
     middle (2,): mean of the centroids, weighted by people, in the unit of the points. gap: distance of their nearest
     people, m.
     """
@@ -156,7 +156,7 @@ class GroupChanges:
         heads = [rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]] for rows in parts]
         apart = []
         for i, j in (pair for two in combinations(parts, 2) for pair in product(*two)):
-            moments = self.moments.get(_pair(bank, i, j)) or [_moment(bank, i, j, scaled, t)]
+            moments = self.moments.get(_pair(bank, i, j)) or [moment(bank, i, j, scaled, t)]
             apart.append(moments[split_onset(moments)])
         first = max(apart, key=lambda m: m.t)
         for rows, head in zip(parts, heads, strict=True):
@@ -196,7 +196,7 @@ class GroupChanges:
     def _extend(self, bank: GroupBank, i: int, j: int, scaled: ScaledParameters, t: float) -> list[PairMoment]:
         pair, (a, b) = _pair(bank, i, j), sorted((i, j), key=lambda row: bank.id[row])
         past = [m for m in self.moments.get(pair, []) if t - HISTORY_TIME < m.t < t]
-        self.moments[pair] = [*past, _moment(bank, a, b, scaled, t)]
+        self.moments[pair] = [*past, moment(bank, a, b, scaled, t)]
         return self.moments[pair]
 
 
@@ -250,11 +250,12 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1),
         bank.parent[one], bank.anchor[one] + bank.x[one, :2] - x[:2], bank.colour_hist[rows].sum(0, keepdims=True),
-        [MemberPlaces(offset, last_seen, known)], [Unshared(bank.last_seen[rows].max(), x[2:], offset + x[:2])],
+        [MemberPlaces(offset, last_seen, known)],
     )  # fmt: skip
 
 
-def _moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float) -> PairMoment:
+def moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float) -> PairMoment:
+    """Returns the moment at time t, s, of the groups in the rows a and b of the bank; a has the smaller id."""
     walked = bank.x[:, :2] + bank.anchor
     way, v = ((y[b] - y[a]) * scaled.metres_per_unit for y in (walked, bank.x[:, 2:]))
     w = bank.size[[a, b]] / bank.size[[a, b]].sum()
@@ -290,7 +291,11 @@ def fall_apart(
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
     parts.anchor[:] = bank.anchor[row] + bank.x[row, :2] - parts.x[:, :2]
-    parts.unshared = [here._replace(velocity=bank.x[row, 2:]) for here in parts.unshared]
+    places, members = bank.positions(row), bank.members[row]
+    of = group[cKDTree(points).query(places)[1]]
+    for k in range(len(parts)):
+        offset = places[of == k] - parts.x[k, :2]
+        parts.members[k] = MemberPlaces(offset, members.last_seen[of == k], members.known[of == k])
     if bank.id[row] != NO_ID:
         parts.parent[:] = bank.group[row]
         parts.parent[largest] = bank.parent[row]

@@ -13,7 +13,14 @@ from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, shares
+from tracking.papers.group_pda.association import (
+    PointClaims,
+    claimed,
+    displacement,
+    point_log_density,
+    remember,
+    shares,
+)
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
@@ -329,14 +336,18 @@ def test_whose_a_shared_point_is() -> None:
     assert shares(colours, d2 > 0)[0] > 0.7
 
 
-def test_a_shared_point_is_of_the_group_whose_members_walked_there() -> None:
-    scaled, points = scale_parameters(GroupPdaConfig(), 10, 1.0), np.array([[0.0, 0.0], [2.0, 0.2]])
-    bank = newborn(points, np.ones(2), np.arange(2), scaled, 5.0)
-    bank.recent_points, bank.unshared = [[(5.0, points[:1])], [(5.0, points[1:])]], np.array([[5, 1, 0], [5, -1, 0.0]])
-    bank.x[:, 2:] *= -1  # of no account: they may have been led astray by shared points
-    soon, late = (place_density(bank, points + np.array([[t, 0.0], [-t, 0.0]]), scaled, 5 + t) for t in (0.5, 2.0))
-    assert (np.diag(soon) > 10 * soon[[1, 0], [0, 1]]).all()
-    assert late.max() < 0.2 * soon.max()
+def test_who_comes_into_view_or_is_hidden_does_not_displace_a_group() -> None:
+    before, walked = np.array([[0.0, 0.0], [0.6, 0.0], [3.0, 0.0]]), np.array([0.2, 0.1])
+    after = np.vstack([before[1::-1] + walked, [[1.4, 0.0], [-2.0, 1.0]]])  # one is hidden, two come
+    assert displacement(before, after, 0.37) == pytest.approx(walked)
+    assert displacement(before, before + 5.0, 0.37).tolist() == [0.0, 0.0]
+    scaled, t = scale_parameters(GroupPdaConfig(), 10, 1.0), 0.1
+    one = newborn(before, np.ones(3), np.zeros(3, int), scaled, 0.0)
+    claims = claimed(after, np.ones(4), np.ones((1, 4)), t)
+    here = one.x[0, :2] + one.anchor[0]
+    predicted, one.x[0, :2] = one.x[:, :2].copy(), after.mean(0)
+    remember(one, claims, np.ones((1, 4), bool), predicted, scaled, t)
+    assert one.x[0, :2] + one.anchor[0] - here == pytest.approx(walked)
 
 
 @pytest.mark.parametrize("seed", range(30))
