@@ -146,6 +146,12 @@ def unbroken(moments: list[merging_and_splitting.PairMoment], alike: float) -> A
     return np.where(likeness(moments, alike) > 0, 1.0, -1e3)
 
 
+def evenly(bank: GroupBank, points: Array, *others: object) -> Array:
+    """Replaces `place_density`: nothing is known of members' places."""
+    del others
+    return np.ones((len(bank), len(points)))
+
+
 def by_centroids(bank: GroupBank, *pair: Any) -> merging_and_splitting.PairMoment:
     """Replaces `moment`: groups walk as their centroids do."""
     return moment(replace(bank, anchor=np.zeros_like(bank.anchor)), *pair)
@@ -169,6 +175,7 @@ def forgetful(
 
 REPLACED: Mapping[str, Replacement] = {
     "evidence over time: an unbroken time in its place": (merging_and_splitting, "likeness", unbroken),
+    "members' places in shared points": (group_pda, "place_density", evenly),
     "walks of the members seen in two frames": (merging_and_splitting, "moment", by_centroids),
     "hidden groups": (group_pda, "associate", without_hiding),
     "members' places in parts": (group_pda, "fall_apart", forgetful),

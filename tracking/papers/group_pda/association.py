@@ -25,7 +25,7 @@ from sim.scene.camera import to_ground
 from sim.types import Array, Bools, Camera, Ints
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association_kernels import any_within
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
 LOWEST_HEAD = 1.5  # m above the ground: only few people, mostly children, are shorter.
@@ -135,6 +135,21 @@ def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio
     return np.asarray(found)
 
 
+# Part of the density of a group's members that is even over its extent, of those who are not where they walked.
+LEAST_PLACES = 0.05
+
+
+def place_density(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> Array:
+    """Returns the density (G, M) of the points about the places to which each group's members have walked on since no
+    other group could have its points, and a little of it all over the group's extent."""
+    density = np.tile(LEAST_PLACES / np.sqrt(np.linalg.det(bank.extent))[:, None], len(points))
+    for row, (then, velocity, places) in enumerate(bank.unshared):
+        away = np.square(points[:, None] - places - (t - then) * velocity).sum(2)
+        var = 2 * scaled.point_sd**2 + np.square(scaled.scale * SPLIT_SPEED * (t - then))
+        density[row] += (np.exp(-away / var / 2) / var).mean(1)
+    return density
+
+
 def log_ratio(density: Array, claims: PointClaims) -> Array:
     """Returns log p(y | g) - log p(y | other groups) (G, M) of each shared point y, given p (G, M), and 0 of others."""
     ratio, shared = np.zeros(claims.d2.shape), np.flatnonzero(claims.claimants > 1)
@@ -196,6 +211,8 @@ def remember(
     """
     for row in np.flatnonzero(exclusive.any(1)).tolist():
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]
+        if not (exclusive[row] & (claims.claimants > 1)).any():
+            bank.unshared[row] = Unshared(t, bank.x[row, 2:].copy(), mine)
         offset, places = mine - bank.x[row, :2], bank.members[row].offset + predicted[row]
         reach = scaled.scale * scaled.config.carry_reach
         if not scaled.from_pixels:

@@ -67,6 +67,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - too much foreground: predicted only. Paper: none. Why: the light has changed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
   similar groups cross.
+- places, from points (c): in the same, where members have walked since the group last shared no point. Paper: none.
+  Why: groups that meet keep their people.
 - split: after `split_time`, until then predicted only; measured frames count back; members' places, colours and age go
   along; (c) parent's velocity. Paper: after consecutive infeasible frames (Fig. 1: at once), at rest. Why: misses.
 - parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
@@ -119,6 +121,7 @@ from tracking.papers.group_pda.association import (
     claimed,
     gated_distances,
     log_ratio,
+    place_density,
     remember,
     search_regions,
     with_missed_members,
@@ -292,6 +295,8 @@ class GroupPda:
         ratio = np.zeros(claims.d2.shape)
         if scaled.colour_bins:
             ratio = self.config.appearance * log_ratio(colour_density(bank, self.colours), claims)
+        elif self.config.corrections and not scaled.from_pixels and (claims.claimants > 1).any():
+            ratio = log_ratio(place_density(bank, claims.points, scaled, t), claims)
         mine = associate(bank, claims, region, ratio, scaled, t)
         remember(bank, claims, mine, predicted, scaled, t)
         if scaled.colour_bins:

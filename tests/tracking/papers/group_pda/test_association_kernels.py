@@ -17,6 +17,7 @@ from tracking.papers.group_pda.association import (
     PointClaims,
     claimed,
     displacement,
+    place_density,
     point_log_density,
     remember,
     shares,
@@ -24,7 +25,7 @@ from tracking.papers.group_pda.association import (
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
 from tracking.papers.group_pda.merging_and_splitting import merged
 from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
 
@@ -334,6 +335,16 @@ def test_whose_a_shared_point_is() -> None:
     assert shares(log_density, d2 > 0)[1] > 0.9  # the nearer by d2 is the diffuse one
     colours = point_log_density(np.full(2, 2.0), region, claims, np.array([[2.0], [-2.0]]))
     assert shares(colours, d2 > 0)[0] > 0.7
+
+
+def test_a_shared_point_is_of_the_group_whose_members_walked_there() -> None:
+    scaled, points = scale_parameters(GroupPdaConfig(), 10, 1.0), np.array([[0.0, 0.0], [2.0, 0.2]])
+    bank = newborn(points, np.ones(2), np.arange(2), scaled, 5.0)
+    bank.unshared = [Unshared(5.0, np.array([1 - 2 * k, 0.0]), points[k : k + 1]) for k in range(2)]
+    bank.x[:, 2:] *= -1  # of no account: they may have been led astray by shared points
+    soon, late = (place_density(bank, points + np.array([[t, 0.0], [-t, 0.0]]), scaled, 5 + t) for t in (0.5, 2.0))
+    assert (np.diag(soon) > 10 * soon[[1, 0], [0, 1]]).all()
+    assert late.max() < 0.2 * soon.max()
 
 
 def test_who_comes_into_view_or_is_hidden_does_not_displace_a_group() -> None:
