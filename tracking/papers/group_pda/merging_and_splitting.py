@@ -84,17 +84,12 @@ def likeness(moments: list[PairMoment], alike: float) -> Array:
     return np.where(gap > MERGE_DISTANCE, -1.0, np.maximum(1 - np.square(differ / alike), -1.0))
 
 
-def windows(t: Array, half: float) -> tuple[Ints, Ints]:
-    """Returns the first and the last index (K,) of the times t (K,), s, ascending, that are at most `half` s from each
-    time; near both ends from the middle of the outermost window."""
-    middle = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
-    return np.searchsorted(t, middle - half - 1e-9), np.searchsorted(t, middle + half + 1e-9) - 1
-
-
 def chords(t: Array, d: Array, half: float) -> Array:
-    """Returns speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords of their `windows`."""
-    k, (first, last) = np.arange(len(t)), windows(t, half)
-    first, last = np.minimum(first, np.maximum(k - 1, 0)), np.maximum(last, np.minimum(k + 1, len(t) - 1))
+    """Returns speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords over `half` s before and
+    after each time; near both ends those of the outermost whole chord."""
+    middle, k = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0])), np.arange(len(t))
+    first = np.minimum(np.searchsorted(t, middle - half - 1e-9), np.maximum(k - 1, 0))
+    last = np.maximum(np.searchsorted(t, middle + half + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
 
 

@@ -48,4 +48,3 @@ def test_a_split_began_when_the_parts_were_apart_however_noisy_the_looks(speed: 
         gap = 0.8 + speed * np.maximum(t - 2, 0) + np.random.default_rng(seed).normal(0, 0.05, len(t))
         past = [PairMoment(s, np.array([d, 0]), np.zeros(2), np.zeros(2), d) for s, d in zip(t, gap, strict=True)]
         assert past[split_onset(past)].t == pytest.approx(since, abs=0.5)
-    assert split_onset(past[:1]) == 0
