@@ -12,9 +12,8 @@ from filterpy.kalman import KalmanFilter
 from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
 from tracking.grouping.whole_groups import NO_ID
-from tracking.papers.group_pda import association
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, shares
+from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, remember, shares
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
@@ -288,10 +287,7 @@ def samples(r, count):
     x = np.hstack([mean, r.normal(size=(count, 2))])
     extent = np.array([np.cov(y.T, bias=True).reshape(2, 2) for y in points])
     P = np.array([positive(r, 4) for _ in range(count)])
-    members = [
-        MemberPlaces(y - m, np.full(len(y), float(k)), np.ones(len(y), bool))
-        for k, (y, m) in enumerate(zip(points, mean, strict=True))
-    ]
+    members = [MemberPlaces(y - y.mean(0), np.full(len(y), float(k)), y[:, 0] < 99) for k, y in enumerate(points)]
     size = np.array([float(len(y)) for y in points])
     born = r.permutation(count).astype(float)
     return points, bank(x=x, P=P, extent=extent, size=size, first_seen=born, members=members)
@@ -344,10 +340,10 @@ def test_who_comes_into_view_or_is_hidden_does_not_displace_a_group() -> None:
     before, walked = np.array([[0.0, 0.0], [0.6, 0.0], [3.0, 0.0]]), np.array([0.2, 0.1])
     after = np.vstack([before[1::-1] + walked, [[1.4, 0.0], [-2.0, 1.0]]])  # one is hidden, two come
     scaled = scale_parameters(GroupPdaConfig(), 10, 1.0)
-    claims = association.claimed(after, np.ones(4), np.ones((1, 4)), 0.1)
+    claims = PointClaims(after, np.ones(4), np.full(4, 0.1), np.ones((1, 4)), np.full(4, -1), np.ones(4, int))
     one = newborn(before, np.ones(3), np.zeros(3, int), scaled, 0.0)
     predicted, one.x[0, :2] = one.x[:, :2].copy(), after.mean(0)
-    association.remember(one, claims, np.ones((1, 4), bool), predicted, scaled, 0.1)
+    remember(one, claims, np.ones((1, 4), bool), predicted, scaled, 0.1)
     assert one.x[0, :2] + one.anchor[0] - predicted[0] == pytest.approx(walked)
 
 
