@@ -287,7 +287,7 @@ def samples(r, count):
     x = np.hstack([mean, r.normal(size=(count, 2))])
     extent = np.array([np.cov(y.T, bias=True).reshape(2, 2) for y in points])
     P = np.array([positive(r, 4) for _ in range(count)])
-    members = [MemberPlaces(y - y.mean(0), np.full(len(y), float(k)), y[:, 0] < 99) for k, y in enumerate(points)]
+    members = [MemberPlaces(y - y.mean(0), np.full(len(y), k), np.ones(len(y), bool)) for k, y in enumerate(points)]
     size = np.array([float(len(y)) for y in points])
     born = r.permutation(count).astype(float)
     return points, bank(x=x, P=P, extent=extent, size=size, first_seen=born, members=members)
