@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -29,9 +30,8 @@ from tracking.grouping.whole_groups import GroupIds
 from tracking.papers.group_pda import merging_and_splitting
 from tracking.papers.group_pda import tracker as group_pda
 from tracking.papers.group_pda.association import PointClaims, associate
-from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
+from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.merging_and_splitting import fall_apart
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 from tracking.running.run import TrackingRun, track
@@ -138,7 +138,7 @@ def tracked(sequence: Recording, variants: Iterable[Variant], mode: DetectionMod
     return found
 
 
-likeness = merging_and_splitting.likeness
+likeness, moment = merging_and_splitting.likeness, merging_and_splitting.moment
 
 
 def unbroken(moments: list[merging_and_splitting.PairMoment], alike: float) -> Array:
@@ -152,6 +152,11 @@ def evenly(bank: GroupBank, points: Array, *others: object) -> Array:
     return np.ones((len(bank), len(points)))
 
 
+def by_centroids(bank: GroupBank, *pair: Any) -> merging_and_splitting.PairMoment:
+    """Replaces `moment`: groups walk as their centroids do."""
+    return moment(replace(bank, anchor=np.zeros_like(bank.anchor)), *pair)
+
+
 def without_hiding(
     bank: GroupBank, claims: PointClaims, region: Array, ratio: Array, scaled: ScaledParameters, t: float
 ) -> Bools:
@@ -163,17 +168,17 @@ def without_hiding(
 def forgetful(
     bank: GroupBank, row: int, points: Array, weights: Array, scaled: ScaledParameters, t: float, ids: GroupIds
 ) -> None:
-    """Replaces `fall_apart`: parts have the members that are among the points alone."""
-    seen = any_within(bank.positions(row), points, 1e-6)
-    bank.members[row] = MemberPlaces(*(value[seen] for value in bank.members[row]))
+    """Replaces `fall_apart`: of no place of the parts is known whether a member was there before."""
+    bank.members[row] = bank.members[row]._replace(known=np.zeros(len(bank.members[row].known), bool))
     fall_apart(bank, row, points, weights, scaled, t, ids)
 
 
 REPLACED: Mapping[str, Replacement] = {
     "evidence over time: an unbroken time in its place": (merging_and_splitting, "likeness", unbroken),
     "members' places in shared points": (group_pda, "place_density", evenly),
+    "walks of the members seen in two frames": (merging_and_splitting, "moment", by_centroids),
     "hidden groups": (group_pda, "associate", without_hiding),
-    "hidden members in parts": (group_pda, "fall_apart", forgetful),
+    "members' places in parts": (group_pda, "fall_apart", forgetful),
 }
 
 

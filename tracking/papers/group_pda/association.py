@@ -25,7 +25,7 @@ from sim.scene.camera import to_ground
 from sim.types import Array, Bools, Camera, Ints
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association_kernels import any_within
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
 LOWEST_HEAD = 1.5  # m above the ground: only few people, mostly children, are shorter.
@@ -143,12 +143,10 @@ def place_density(bank: GroupBank, points: Array, scaled: ScaledParameters, t: f
     """Returns the density (G, M) of the points about the places to which each group's members have walked on since no
     other group could have its points, and a little of it all over the group's extent."""
     density = np.tile(LEAST_PLACES / np.sqrt(np.linalg.det(bank.extent))[:, None], len(points))
-    for row, (then, *velocity) in enumerate(bank.unshared.tolist()):
-        places = [y + (t - then) * np.array(velocity) for at, y in bank.recent_points[row] if at == then]
-        if places:
-            away = np.square(points[:, None] - places[0]).sum(2)
-            var = 2 * scaled.point_sd**2 + np.square(scaled.scale * SPLIT_SPEED * (t - then))
-            density[row] += (np.exp(-away / var / 2) / var).mean(1)
+    for row, (then, velocity, places) in enumerate(bank.unshared):
+        away = np.square(points[:, None] - places - (t - then) * velocity).sum(2)
+        var = 2 * scaled.point_sd**2 + np.square(scaled.scale * SPLIT_SPEED * (t - then))
+        density[row] += (np.exp(-away / var / 2) / var).mean(1)
     return density
 
 
@@ -169,10 +167,6 @@ def shares(log_density: Array, may: Bools) -> Array:
     density = np.exp(log - log.max(0, initial=-np.inf))
     share[:, shared] = density / density.sum(0)
     return share
-
-
-RECENT_TIME = 3.0  # s for which a group's points are kept, to date the onset of a split.
-RECENT_POINTS = 64  # At most so many points of a group are kept of each frame.
 
 
 def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledParameters, t: float) -> PointClaims:
@@ -208,18 +202,35 @@ def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: 
     return place[missed], row_of[missed], last_seen[missed]
 
 
-def remember(bank: GroupBank, claims: PointClaims, exclusive: Bools, scaled: ScaledParameters, t: float) -> None:
-    """Stores each group's points of this frame as its members and recent points, in the bank, in place."""
+def remember(
+    bank: GroupBank, claims: PointClaims, exclusive: Bools, predicted: Array, scaled: ScaledParameters, t: float
+) -> None:
+    """Stores each group's points of this frame as its members, and how far these walked, in the bank, in place.
+
+    predicted (G, 2): the groups' centroids before the update.
+    """
     for row in np.flatnonzero(exclusive.any(1)).tolist():
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]
-        kept = [p for p in bank.recent_points[row] if p[0] > t - RECENT_TIME]
-        bank.recent_points[row] = [*kept, (t, thinned(mine))]
         if not (exclusive[row] & (claims.claimants > 1)).any():
-            bank.unshared[row] = t, *bank.x[row, 2:]
-        offset = mine - bank.x[row, :2]
-        known = any_within(offset, bank.members[row].offset, scaled.scale * scaled.config.carry_reach)
+            bank.unshared[row] = Unshared(t, bank.x[row, 2:].copy(), mine)
+        offset, places = mine - bank.x[row, :2], bank.members[row].offset + predicted[row]
+        reach = scaled.scale * scaled.config.carry_reach
+        if not scaled.from_pixels:
+            bank.anchor[row] += predicted[row] - bank.x[row, :2] + displacement(places, mine, reach)
+        known = any_within(mine, places, reach)
         parts = zip((offset, last_seen, known), _hidden_members(bank, row, claims.points, scaled, t), strict=True)
         bank.members[row] = MemberPlaces(*map(np.concatenate, parts))
+
+
+def displacement(before: Array, after: Array, reach: float) -> Array:
+    """Returns the mean displacement (2,) of the places before (K, 2) that are after (M, 2), too: 0 if none is.
+
+    A place is there, too, if it and one after are each other's nearest, at most `reach` apart; all in one unit.
+    """
+    d2 = np.square(after[:, None] - before).sum(2)
+    nearest, here = d2.argmin(1), np.arange(len(after))
+    same = (d2.argmin(0)[nearest] == here) & (d2[here, nearest] <= reach**2)
+    return (after[same] - before[nearest[same]]).mean(0) if same.any() else np.zeros(2)
 
 
 def _hidden_members(bank: GroupBank, row: int, points: Array, scaled: ScaledParameters, t: float) -> MemberPlaces:
@@ -228,11 +239,3 @@ def _hidden_members(bank: GroupBank, row: int, points: Array, scaled: ScaledPara
     hidden = past.known & (age > c.carry_time + 1e-9) & (age <= c.coast_time + 1e-9) & (c.carry_time > 0)
     hidden &= ~any_within(bank.positions(row), points, scaled.scale * c.carry_reach) & (not scaled.from_pixels)
     return MemberPlaces(past.offset[hidden], past.last_seen[hidden], past.known[hidden])
-
-
-def thinned(points: Array) -> Array:
-    """Returns at most RECENT_POINTS = 64 of the points (M, 2), selected by a hash of their coordinates."""
-    if len(points) <= RECENT_POINTS:
-        return points
-    scattered = np.sin(points @ np.array([12.9898, 78.233])) * 43758.5453
-    return points[np.argsort(scattered - np.floor(scattered), kind="stable")[:RECENT_POINTS]]

@@ -16,8 +16,6 @@ from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.scaled_parameters import SPEED_PRIOR, SPLIT_SPEED, ScaledParameters
 
-LISTS = ("members", "recent_points")  # Fields of GroupBank that are lists, not arrays.
-
 
 class MemberPlaces(NamedTuple):
     """Where a group's K members, or their pixels, were measured last.
@@ -32,6 +30,14 @@ class MemberPlaces(NamedTuple):
     known: Bools
 
 
+class Unshared(NamedTuple):
+    """The points (K, 2) of a group, when no other group could have them, last: at time t, s, with its velocity (2,)."""
+
+    t: float
+    velocity: Array
+    points: Array
+
+
 @dataclass
 class GroupBank:
     """The state of G groups or parts of groups, a row each. Lengths: in the unit of the points (m or px), times: in s.
@@ -40,10 +46,11 @@ class GroupBank:
     covariance of the members' positions about the centroid; size (G,): N, people. id (G,): NO_ID = -1 for a tentative
     group; a part has one of its own. first_seen (G,): time of the first points, of a part those of its group; last_seen
     (G,): of the last points. measured_time (G,): total time measured. null_time (G,): time without a feasible
-    association, less measured frames in it. unshared (G, 3): time and velocity when, last, no other group could have
-    its points. parent (G,): id of the group that the row is a part of, or NO_ID if it is no part (see
-    merging_and_splitting). colour_hist (G, C): people by colour; C = 0 without colours. members: a MemberPlaces of each
-    group. recent_points: of each group, a list of (time, points (K, 2)) of the last seconds.
+    association, less measured frames in it. parent (G,): id of the group that the row is a part of, or NO_ID if it is
+    no part (see merging_and_splitting). anchor (G, 2): from the centroid to a point that walks, from points, as the
+    members who are seen in both of two frames; who comes into view or is hidden moves the centroid alone. colour_hist
+    (G, C): people by colour; C = 0 without colours. members: a MemberPlaces of each group; unshared: an Unshared of
+    each.
     """
 
     x: Array
@@ -55,11 +62,11 @@ class GroupBank:
     last_seen: Array
     measured_time: Array
     null_time: Array
-    unshared: Array
     parent: Ints
+    anchor: Array
     colour_hist: Array
     members: list[MemberPlaces]
-    recent_points: list[list[tuple[float, Array]]]
+    unshared: list[Unshared]
 
     @classmethod
     def empty(cls, colour_bins: int = 0) -> GroupBank:
@@ -68,7 +75,7 @@ class GroupBank:
         four = np.zeros((0, 4))
         return cls(
             four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none,
-            np.zeros((0, 3)), ids, np.zeros((0, colour_bins)), [], [],
+            ids, np.zeros((0, 2)), np.zeros((0, colour_bins)), [], [],
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -89,7 +96,7 @@ class GroupBank:
         rows, chosen = np.arange(len(self))[rows], dict[str, Any]()
         for f in fields(self):
             value = getattr(self, f.name)
-            chosen[f.name] = [value[r] for r in rows.tolist()] if f.name in LISTS else value[rows]
+            chosen[f.name] = [value[r] for r in rows.tolist()] if isinstance(value, list) else value[rows]
         return replace(self, **chosen)
 
     def positions(self, row: int) -> Array:
@@ -111,7 +118,7 @@ class GroupBank:
         """Appends the rows of another bank with as many colour bins (else ValueError), in place."""
         for f in fields(self):
             a, b = getattr(self, f.name), getattr(other, f.name)
-            setattr(self, f.name, a + b if f.name in LISTS else np.concatenate([a, b]))
+            setattr(self, f.name, a + b if isinstance(a, list) else np.concatenate([a, b]))
 
     def move_with(self, rows: int | slice, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
         """Gives these rows the velocity of the group in `row` of a bank, in place; nothing without `corrections`."""
@@ -145,9 +152,10 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
     P[:, [2, 3], [2, 3]] = (scaled.scale * SPEED_PRIOR) ** 2
     many = np.bincount(g, minlength=count).tolist()
     members = [MemberPlaces(d[g == k], np.full(n, t), np.zeros(n, bool)) for k, n in enumerate(many)]
+    unshared = [Unshared(t, np.zeros(2), y[g == k]) for k in range(count)]
     zero, now = np.zeros(count), np.full(count, t)
     return GroupBank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, NO_ID),
-        now, now.copy(), zero + scaled.dt, zero, np.zeros((count, 3)), np.full(count, NO_ID),
-        np.zeros((count, scaled.colour_bins)), members, [[] for _ in range(count)],
+        now, now.copy(), zero + scaled.dt, zero, np.full(count, NO_ID),
+        np.zeros((count, 2)), np.zeros((count, scaled.colour_bins)), members, unshared,
     )  # fmt: skip

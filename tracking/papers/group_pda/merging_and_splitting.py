@@ -3,11 +3,12 @@
 Merging (sec. 3.1, 3.2): which groups are near with like velocities, for how long, and their union. Input: the bank of
 groups after the update of a frame; output: the bank with merged groups, and the events. The relation R_x holds for two
 groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
-components of groups under R_x; each becomes one group. With `corrections` there is evidence over time
-(ours), as of a Markov chain of two states: a moment speaks for one group the more, the smaller the difference of
-velocities is beside `merge_velocity`, on the mean of two steps, and against it if people of both are more than 1.5 m
-apart. Since the onset, when the sum was least, it must have grown by `merge_time`. Without, velocities are alike if the
-regions SR_v overlap. Groups that are not measured, or infeasible, do not merge.
+components of groups under R_x; each becomes one group. With `corrections` there is evidence over time (ours), as of a
+Markov chain of two states: a moment speaks for one group the more, the smaller the difference of velocities is beside
+`merge_velocity`, on the mean of two steps, and against it if people of both are more than 1.5 m apart. From points the
+velocities are those of the members who are seen in both of two frames (`anchor` of the bank). Since the onset, when the
+sum was least, it must have grown by `merge_time`. Without, velocities are alike if the regions SR_v overlap. Groups
+that are not measured, or infeasible, do not merge.
 
 Splitting (sec. 3.3, 4.2): a group without feasible associations for `split_time` falls apart. An association (a set of
 points that may be a group's) is feasible if its points form one group under the group constraint G_y
@@ -18,16 +19,15 @@ beside a member: misses, sway and noise take people apart for a moment. Each par
 their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates become one row again. Sets of
 parts whose people have been more than 1.5 m from the rest's for `confirm_time` split off.
 
-Onsets (ours): when an event that is known now began. The onset of a split is measured from the group's earlier points,
-divided among the parts. Distances are metres on the ground (in an image depth is stretched to it). The distances and
-velocities of the truth's rules come from sim.truth.merge_split_rules. Lengths are in the unit of the points (m on the
-ground or px), times in s.
+Onsets (ours): when an event that is known now began, by the moments of the two groups or parts. Distances are metres on
+the ground (in an image depth is stretched to it). The distances and velocities of the truth's rules come from
+sim.truth.merge_split_rules. Lengths are in the unit of the points (m on the ground or px), times in s.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import combinations
+from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -38,20 +38,18 @@ from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition, regions_overlap
 from tracking.grouping.link_rule import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 # s before and after a moment for the difference of two groups' or parts' velocities: that of two steps in all.
 WALK_TIME = 0.8
 BEFORE = 16  # Places by which the way before the first moment is known.
-# Distance of the last person in a row from its middle, in standard deviations: 1 for two people, 1.2 for three.
-REACH = 1.1
 
 
 class PairMoment(NamedTuple):
     """Two groups a and b at one time; a has the smaller id.
 
-    t: s. way, velocity (2,): from a's centroid to b's, m on the ground, and b's velocity less a's, as filtered, m/s.
+    t: s. way, velocity (2,): from a's anchor to b's, m on the ground, and b's velocity less a's, as filtered, m/s.
     middle (2,): mean of the centroids, weighted by people, in the unit of the points. gap: distance of their nearest
     people, m.
     """
@@ -86,46 +84,21 @@ def likeness(moments: list[PairMoment], alike: float) -> Array:
     return np.where(gap > MERGE_DISTANCE, -1.0, np.maximum(1 - np.square(differ / alike), -1.0))
 
 
-def windows(t: Array, half: float) -> tuple[Ints, Ints]:
-    """Returns the first and the last index (K,) of the times t (K,), s, ascending, that are at most `half` s from each
-    time; near both ends from the middle of the outermost window."""
-    middle = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0]))
-    return np.searchsorted(t, middle - half - 1e-9), np.searchsorted(t, middle + half + 1e-9) - 1
-
-
 def chords(t: Array, d: Array, half: float) -> Array:
-    """Returns speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords of their `windows`."""
-    k, (first, last) = np.arange(len(t)), windows(t, half)
-    first, last = np.minimum(first, np.maximum(k - 1, 0)), np.maximum(last, np.minimum(k + 1, len(t) - 1))
+    """Returns speeds (K,) of the positions d (K, 2) at the times t (K,), s, ascending: chords over `half` s before and
+    after each time; near both ends those of the outermost whole chord."""
+    middle, k = np.clip(t, min(t[0] + half, t[-1]), max(t[-1] - half, t[0])), np.arange(len(t))
+    first = np.minimum(np.searchsorted(t, middle - half - 1e-9), np.maximum(k - 1, 0))
+    last = np.maximum(np.searchsorted(t, middle + half + 1e-9) - 1, np.minimum(k + 1, len(t) - 1))
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
 
 
-def split_onset(
-    recent: list[tuple[float, Array]], parts: list[Array], metres_per_unit: Array, known: float
-) -> tuple[float, Array]:
-    """Returns when, in s, a group began to divide into two parts, and its centroid (2,) at that time, in the points'
-    unit."""
-    before = [(t, y * metres_per_unit) for t, y in recent if t <= known + 1e-9]
-    if len(before) < 2:
-        t, y = before[0] if before else (known, parts[0] * metres_per_unit)
-        return known, y.mean(0) / metres_per_unit
-    middle = np.array([p.mean(0) for p in parts]) * metres_per_unit
-    way = middle[1] - middle[0]
-    way = metres_per_unit * way / max(float(np.hypot(*way)), 1e-9)
-    spread = [max(float(way @ np.cov(p.T, bias=True) @ way), 0.0) if len(p) > 1 else 0.0 for p in parts]
-    reach = REACH * float(np.sqrt(spread).sum())
-    times, apart = [], []
-    for t, y in reversed(before):
-        side = np.square(y[:, None] - middle).sum(2).argmin(1)
-        middle = np.array([y[side == k].mean(0) if (side == k).any() else middle[k] for k in range(2)])
-        times.append(t)
-        apart.append(middle[1] - middle[0])
-    when, d = np.array(times[::-1]), np.array(apart[::-1])
-    gap = np.hypot(*d.T) - reach
-    slow = chords(when, d, WALK_TIME) < SPLIT_VELOCITY
-    together = (gap <= MERGE_DISTANCE) | ((gap <= SPLIT_DISTANCE) & slow)
-    k = min(int(np.flatnonzero(together)[-1]) + 1 if together.any() else 0, len(when) - 1)
-    return float(when[k]), before[k][1].mean(0) / metres_per_unit
+def split_onset(moments: list[PairMoment]) -> int:
+    """Returns the index of the moment since which two parts of a group have been apart."""
+    t, gap = np.array([m.t for m in moments]), np.array([m.gap for m in moments])
+    slow = chords(t, np.array([m.way for m in moments]), WALK_TIME) < SPLIT_VELOCITY
+    together = np.flatnonzero((gap <= MERGE_DISTANCE) | ((gap <= SPLIT_DISTANCE) & slow))
+    return min(int(together.max(initial=-1)) + 1, len(moments) - 1)
 
 
 HISTORY_TIME = 5.0  # s of a pair's past that are kept.
@@ -161,7 +134,7 @@ class GroupChanges:
             linked = [pair for pair in pairs if not self._apart(pair, scaled, t)]
             parts = [np.flatnonzero(np.isin(bank.id, ids)) for ids in _connected(linked, bank.id[rows].tolist())]
             if len(parts) > 1:
-                yield _split_into(bank, group, parts, scaled, t)
+                yield self._split_into(bank, group, parts, scaled, t)
 
     def _apart(self, pair: Pair, scaled: ScaledParameters, t: float) -> bool:
         if not scaled.config.corrections:
@@ -171,6 +144,20 @@ class GroupChanges:
             return False  # one of them is not measured
         near = max((m.t for m in moments if m.gap <= MERGE_DISTANCE), default=moments[0].t)
         return t - near > scaled.config.confirm_time + 1e-9
+
+    def _split_into(
+        self, bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledParameters, t: float
+    ) -> WholeGroupEvent:
+        heads = [rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]] for rows in parts]
+        apart = []
+        for i, j in (pair for two in combinations(parts, 2) for pair in product(*two)):
+            moments = self.moments.get(_pair(bank, i, j)) or [moment(bank, i, j, scaled, t)]
+            apart.append(moments[split_onset(moments)])
+        first = max(apart, key=lambda m: m.t)
+        for rows, head in zip(parts, heads, strict=True):
+            bank.parent[rows], bank.parent[head] = bank.id[head], NO_ID
+        children = tuple(sorted(bank.id[heads].tolist()))
+        return WholeGroupEvent("split", first.t, (group,), children, tuple(first.middle.tolist()))
 
     def _join_parts(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
         near = _overlapping(bank, np.flatnonzero(bank.confirmed & _measured(bank, t)), scaled.config.gate)
@@ -204,7 +191,7 @@ class GroupChanges:
     def _extend(self, bank: GroupBank, i: int, j: int, scaled: ScaledParameters, t: float) -> list[PairMoment]:
         pair, (a, b) = _pair(bank, i, j), sorted((i, j), key=lambda row: bank.id[row])
         past = [m for m in self.moments.get(pair, []) if t - HISTORY_TIME < m.t < t]
-        self.moments[pair] = [*past, _moment(bank, a, b, scaled, t)]
+        self.moments[pair] = [*past, moment(bank, a, b, scaled, t)]
         return self.moments[pair]
 
 
@@ -215,30 +202,6 @@ def _measured(bank: GroupBank, t: float) -> Bools:
 def _pair(bank: GroupBank, i: int, j: int) -> Pair:
     a, b = sorted((int(bank.id[i]), int(bank.id[j])))
     return a, b
-
-
-def _split_into(bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledParameters, t: float) -> WholeGroupEvent:
-    parts = sorted(parts, key=lambda rows: (group not in bank.id[rows], -bank.size[rows].sum()))
-    recent = pooled_points([bank.recent_points[r] for rows in parts for r in rows.tolist()])
-    two = [np.concatenate([_latest_points(bank, r) for r in rows.tolist()]) for rows in parts[:2]]
-    onset, place = split_onset(recent, two, scaled.metres_per_unit, t)
-    heads = [rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]] for rows in parts]
-    for rows, head in zip(parts, heads, strict=True):
-        bank.parent[rows], bank.parent[head] = bank.id[head], NO_ID
-    return WholeGroupEvent("split", onset, (group,), tuple(sorted(bank.id[heads].tolist())), tuple(place.tolist()))
-
-
-def _latest_points(bank: GroupBank, row: int) -> Array:
-    recent = bank.recent_points[row]
-    return recent[-1][1] if recent else bank.positions(row)
-
-
-def pooled_points(recent: list[list[tuple[float, Array]]]) -> list[tuple[float, Array]]:
-    """Returns the recent points of several rows of the bank, joined by time: pairs (time, points), oldest first."""
-    by_time: dict[float, list[Array]] = {}
-    for t, points in (moment for past in recent for moment in past):
-        by_time.setdefault(t, []).append(points)
-    return [(t, np.concatenate(by_time[t])) for t in sorted(by_time)]
 
 
 def whole_groups(bank: GroupBank, rows: Ints) -> GroupBank:
@@ -281,14 +244,15 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     return GroupBank(
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1),
-        np.array([[bank.last_seen[rows].max(), *x[2:]]]), bank.parent[one],
-        bank.colour_hist[rows].sum(0, keepdims=True),
-        [MemberPlaces(offset, last_seen, known)], [pooled_points([bank.recent_points[r] for r in rows.tolist()])],
+        bank.parent[one], bank.anchor[one] + bank.x[one, :2] - x[:2], bank.colour_hist[rows].sum(0, keepdims=True),
+        [MemberPlaces(offset, last_seen, known)], [Unshared(float(bank.last_seen[rows].max()), x[2:], offset + x[:2])],
     )  # fmt: skip
 
 
-def _moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float) -> PairMoment:
-    way, v = ((bank.x[b, k : k + 2] - bank.x[a, k : k + 2]) * scaled.metres_per_unit for k in (0, 2))
+def moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float) -> PairMoment:
+    """Returns the moment at time t, s, of the groups in the rows a and b of the bank; a has the smaller id."""
+    walked = bank.x[:, :2] + bank.anchor
+    way, v = ((y[b] - y[a]) * scaled.metres_per_unit for y in (walked, bank.x[:, 2:]))
     w = bank.size[[a, b]] / bank.size[[a, b]].sum()
     gap = _nearest(*(bank.positions(row) * scaled.metres_per_unit for row in (a, b)))
     return PairMoment(t, way, v, w @ bank.x[[a, b], :2], gap)
@@ -321,7 +285,8 @@ def fall_apart(
     largest = int(np.lexsort((parts.x[:, 1], parts.x[:, 0], away, -parts.size))[0])
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
-    parts.recent_points[largest], parts.unshared[:] = bank.recent_points[row], bank.unshared[row]
+    parts.anchor[:] = bank.anchor[row] + bank.x[row, :2] - parts.x[:, :2]
+    parts.unshared = [part._replace(velocity=bank.x[row, 2:]) for part in parts.unshared]
     places, members = bank.positions(row), bank.members[row]
     of = group[cKDTree(points).query(places)[1]]
     for k in range(len(parts)):

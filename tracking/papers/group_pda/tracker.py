@@ -67,8 +67,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - too much foreground: predicted only. Paper: none. Why: the light has changed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
   similar groups cross.
-- places, from points (c): in the same, where members have walked since the group last shared no point, for 3 s, at most
-  64 points of a frame. Paper: none. Why: groups that meet keep their people.
+- places, from points (c): in the same, where members have walked since the group last shared no point. Paper: none.
+  Why: groups that meet keep their people.
 - split: after `split_time`, until then predicted only; measured frames count back; members' places, colours and age go
   along; (c) parent's velocity. Paper: after consecutive infeasible frames (Fig. 1: at once), at rest. Why: misses.
 - parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
@@ -83,8 +83,9 @@ Departures. Those marked (c) are off with `corrections` off.
 - walking out: a new group within reach of a member (2 m/s; from pixels at least R_0's) is a part of its group and as
   old, (c) with its velocity; without corrections it splits off once confirmed. Paper: a new group. Why: splits without
   shared points.
-- like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`. Paper: SR_v
-  overlap. Why: P does not measure likeness; people sway with each step.
+- like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`; from points
+  of the members seen in both of two frames. Paper: SR_v overlap. Why: P does not measure likeness; people sway with
+  each step; hidden members move the centroid.
 - SR_v, without corrections: of the updated velocity, with the gate's γ. Paper: of the predicted one; its size is not
   stated. Why: Fig. 1 merges after the update.
 - near groups, (c): people at most 1.5 m apart, too. Paper: regions overlap. Why: no merge after a split.
@@ -286,20 +287,18 @@ class GroupPda:
         return self.scaled
 
     def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> None:
-        bank = self.bank
+        bank, predicted = self.bank, self.bank.x[:, :2].copy()
         region = search_regions(bank, scaled)
         d2 = gated_distances(bank, points, region, scaled)
         claims = with_missed_members(claimed(points, weights, d2, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
+        ratio = np.zeros(claims.d2.shape)
         if scaled.colour_bins:
-            density = colour_density(bank, self.colours)
-        elif scaled.from_pixels or not self.config.corrections or not (claims.claimants > 1).any():
-            density = np.ones(claims.d2.shape)
-        else:
-            density = place_density(bank, claims.points, scaled, t)
-        weight = self.config.appearance if scaled.colour_bins else 1.0
-        mine = associate(bank, claims, region, weight * log_ratio(density, claims), scaled, t)
-        remember(bank, claims, mine, scaled, t)
+            ratio = self.config.appearance * log_ratio(colour_density(bank, self.colours), claims)
+        elif self.config.corrections and not scaled.from_pixels and (claims.claimants > 1).any():
+            ratio = log_ratio(place_density(bank, claims.points, scaled, t), claims)
+        mine = associate(bank, claims, region, ratio, scaled, t)
+        remember(bank, claims, mine, predicted, scaled, t)
         if scaled.colour_bins:
             update_histograms(bank, mine, claims.claimants, self.colours, claims.weights, scaled)
         self._split(claims, mine, scaled, t)

@@ -13,11 +13,11 @@ from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, shares
+from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, remember, shares
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
 from tracking.papers.group_pda.merging_and_splitting import merged
 from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
 
@@ -287,10 +287,7 @@ def samples(r, count):
     x = np.hstack([mean, r.normal(size=(count, 2))])
     extent = np.array([np.cov(y.T, bias=True).reshape(2, 2) for y in points])
     P = np.array([positive(r, 4) for _ in range(count)])
-    members = [
-        MemberPlaces(y - m, np.full(len(y), float(k)), np.ones(len(y), bool))
-        for k, (y, m) in enumerate(zip(points, mean, strict=True))
-    ]
+    members = [MemberPlaces(y - y.mean(0), np.full(len(y), k), np.ones(len(y), bool)) for k, y in enumerate(points)]
     size = np.array([float(len(y)) for y in points])
     born = r.permutation(count).astype(float)
     return points, bank(x=x, P=P, extent=extent, size=size, first_seen=born, members=members)
@@ -332,11 +329,22 @@ def test_whose_a_shared_point_is() -> None:
 def test_a_shared_point_is_of_the_group_whose_members_walked_there() -> None:
     scaled, points = scale_parameters(GroupPdaConfig(), 10, 1.0), np.array([[0.0, 0.0], [2.0, 0.2]])
     bank = newborn(points, np.ones(2), np.arange(2), scaled, 5.0)
-    bank.recent_points, bank.unshared = [[(5.0, points[:1])], [(5.0, points[1:])]], np.array([[5, 1, 0], [5, -1, 0.0]])
+    bank.unshared = [Unshared(5.0, np.array([1 - 2 * k, 0.0]), points[k : k + 1]) for k in range(2)]
     bank.x[:, 2:] *= -1  # of no account: they may have been led astray by shared points
     soon, late = (place_density(bank, points + np.array([[t, 0.0], [-t, 0.0]]), scaled, 5 + t) for t in (0.5, 2.0))
     assert (np.diag(soon) > 10 * soon[[1, 0], [0, 1]]).all()
     assert late.max() < 0.2 * soon.max()
+
+
+def test_who_comes_into_view_or_is_hidden_does_not_displace_a_group() -> None:
+    before, walked = np.array([[0.0, 0.0], [0.6, 0.0], [3.0, 0.0]]), np.array([0.2, 0.1])
+    after = np.vstack([before[1::-1] + walked, [[1.4, 0.0], [-2.0, 1.0]]])  # one is hidden, two come
+    scaled = scale_parameters(GroupPdaConfig(), 10, 1.0)
+    claims = PointClaims(after, np.ones(4), np.full(4, 0.1), np.ones((1, 4)), np.full(4, -1), np.ones(4, int))
+    one = newborn(before, np.ones(3), np.zeros(3, int), scaled, 0.0)
+    predicted, one.x[0, :2] = one.x[:, :2].copy(), after.mean(0)
+    remember(one, claims, np.ones((1, 4), bool), predicted, scaled, 0.1)
+    assert one.x[0, :2] + one.anchor[0] - predicted[0] == pytest.approx(walked)
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -9,7 +9,7 @@ from tests.tracking.papers.group_pda.test_association_kernels import bank
 from tracking.grouping.whole_groups import GroupIds
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import MemberPlaces
-from tracking.papers.group_pda.merging_and_splitting import GroupChanges, _moment, fall_apart
+from tracking.papers.group_pda.merging_and_splitting import GroupChanges, fall_apart, moment
 from tracking.papers.group_pda.scaled_parameters import scale_parameters
 
 FPS = 10.0
@@ -39,7 +39,7 @@ def test_the_gap_is_the_least_of_all_pairs(seed: int) -> None:
     members = [MemberPlaces(p, np.zeros(len(p)), np.ones(len(p), bool)) for p in (here, there)]
     two = bank(size=np.ones(2), members=members)
     expected = np.hypot(*((here[:, None] - there) * scaled.metres_per_unit).T).min()
-    assert _moment(two, 0, 1, scaled, 0.0).gap == pytest.approx(expected, rel=1e-12)
+    assert moment(two, 0, 1, scaled, 0.0).gap == pytest.approx(expected, rel=1e-12)
 
 
 def test_parts_of_a_group_keep_the_places_of_its_members() -> None:
