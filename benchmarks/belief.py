@@ -251,7 +251,6 @@ CHANGED: Mapping[str, dict[str, float]] = {
     "`stay` = `come`": {"stay": 1.2},
     "`come` 0": {"come": 0.0},
     "`memory` 0 s": {"memory": 0.0},
-    "`arrival` 0 s": {"arrival": 0.0},
 }
 
 

@@ -54,16 +54,14 @@ def identify(old: Members, parts: Iterable[PersonSet], born: Mapping[int, int]) 
     return kept
 
 
-def group_changes(
-    old: Members, new: Members, before: PersonSet, now: PersonSet, entered: PersonSet = frozenset()
-) -> list[GroupChange]:
+def group_changes(old: Members, new: Members, before: PersonSet, now: PersonSet) -> list[GroupChange]:
     """Returns what happened to the groups between two partitions: changes of old groups first, each in order of id.
 
-    old, new: members of each group, by id. before, now: all people present at the two times. entered: people who count
-    as having just entered, though they may be in `before`. `members` of a split or dissolve: the old group's people who
-    are present now; of a leave: all people of the old group; of the other kinds: the new group's people.
+    old, new: members of each group, by id. before, now: all people present at the two times. `members` of a split or
+    dissolve: the old group's people who are present now; of a leave: all people of the old group; of the other kinds:
+    the new group's people.
     """
-    stay = (before & now) - entered
+    stay = before & now
     was, is_ = _unit_of(old, before), _unit_of(new, now)
     unchanged = {g for g, people in old.items() if new.get(g) == people and people <= stay}
     found: list[GroupChange] = []
@@ -124,15 +122,12 @@ class Identities:
             self.born.setdefault(g, t)
         return new
 
-    def step(
-        self, t: int, people: PersonSet, parts: Iterable[PersonSet], entered: PersonSet = frozenset(),
-        known: Members = NOBODY,
-    ) -> list[GroupChange]:  # fmt: skip
+    def step(self, t: int, people: PersonSet, parts: Iterable[PersonSet], known: Members = NOBODY) -> list[GroupChange]:
         """Takes the partition at time t and returns the changes since the last step; at first all groups enter.
 
-        people: all people present. parts: the partition. entered: as for `group_changes`. known: as for `name`.
+        people: all people present. parts: the partition. known: as for `name`.
         """
         new = self.name(t, parts, known)
-        changes = group_changes(self.groups, new, self.people, people, entered)
+        changes = group_changes(self.groups, new, self.people, people)
         self.groups, self.people = new, people
         return changes

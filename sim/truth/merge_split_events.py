@@ -11,7 +11,7 @@ sim.truth.group_ids_and_changes says which group keeps its id and what kind of e
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations, pairwise
 from typing import Literal
@@ -82,7 +82,7 @@ class _RuleTimes:
         while True:
             divided = [piece for part in parts for piece in self._divide(part, t)]
             due = [pair for pair, frames in self._meant_to_join(divided, t) if _first(frames, t) == t]
-            joined = _connected(divided, due)
+            joined = connected(divided, due)
             if len(joined) == len(divided) == len(parts):
                 return parts
             parts = joined
@@ -114,7 +114,7 @@ class _RuleTimes:
             return [part]
         # Two subsets stay together, too, if a third one connects them.
         unsplit = [(a, b) for a, b in self._meant_to_divide(part) if _first(self._onsets("split", a, b, t), t) != t]
-        return _connected(list(self._by_intent(part).values()), unsplit)
+        return connected(list(self._by_intent(part).values()), unsplit)
 
     def _onsets(self, rule: Rule, a: PersonSet, b: PersonSet, t: int) -> Ints:
         """Returns the frames, ascending, from which the rule will hold long enough between parts a and b."""
@@ -141,7 +141,7 @@ def _first(frames: Ints, t: int) -> int:
     return int(frames[k]) if k < len(frames) else NEVER
 
 
-def _connected(parts: list[PersonSet], links: list[tuple[PersonSet, PersonSet]]) -> list[PersonSet]:
+def connected(parts: Sequence[PersonSet], links: Sequence[tuple[PersonSet, PersonSet]]) -> list[PersonSet]:
     """Returns the parts, each united with all that links connect it to."""
     whole = {part: part for part in parts}
     for a, b in links:

@@ -34,7 +34,7 @@ FROZEN = Path(__file__).with_name("belief.toml")  # The default belief.
 KIND = "belief"
 UNSEEN = -4.0  # Belief about two people who are too far apart for a row: log-odds.
 DECISIONS = NOW, EVENTS = ("now", "events")  # Columns of a table.
-NUMBERS = ("threshold", "stay", "come", "memory", "arrival")  # Numbers of `Belief` in its file.
+NUMBERS = ("threshold", "stay", "come", "memory")  # Numbers of `Belief` in its file.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +58,6 @@ class Belief:
     stay: float = 7.0
     come: float = 1.2
     memory: float = 1.0  # (s): a missed member stays so long in the group
-    arrival: float = 1.0  # (s): people who were together so soon after a first frame arrived together: no merge
 
     def as_dict(self) -> dict[str, object]:
         """Returns the entries of run.json about the belief: kind, bias, its numbers, and a hash of `toml_text`."""

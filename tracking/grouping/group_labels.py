@@ -9,7 +9,7 @@ and leave; crossings and queues are not found here. Ids follow the rule of the t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -22,13 +22,7 @@ from sim.types import GroupEvent, Ints
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import FoundGroups
 from tracking.grouping.link_rule import LinkRule
-from tracking.grouping.merge_split_events import (
-    LinkSwitch,
-    Parts,
-    TrackedMotion,
-    corrects,
-    event_of_change,
-)
+from tracking.grouping.merge_split_events import Parts, TrackedMotion, corrects, event_of_change
 
 
 @dataclass
@@ -56,16 +50,12 @@ class LinkedPeople:
             found += [frozenset(part)] if len(part) > 1 else []
         return found
 
-    def step(self, t: int, switched: Sequence[LinkSwitch], arrival: int, known: Members) -> list[GroupChange]:
-        """Switches links in frame t and returns the changes of the groups; the caller updates `present` before.
+    def step(self, t: int, known: Members) -> list[GroupChange]:
+        """Returns the changes of the groups in frame t; the caller updates `present` and the links before.
 
-        arrival: a person who is linked within this many frames of coming enters with the group. known: groups by id,
-        from which a new group takes over the id.
+        known: groups by id, from which a new group takes over the id.
         """
-        for a, b, on, _ in switched:
-            self.switch(a, b, on)
-        entered = _entered(self, switched, arrival)
-        return self.identities.step(t, frozenset(self.present), self.components(), entered, known)
+        return self.identities.step(t, frozenset(self.present), self.components(), known)
 
     def switch(self, a: int, b: int, on: bool) -> None:
         """Sets (`on` True) or removes (False) the link between two people; no effect if it is already so."""
@@ -83,7 +73,6 @@ def label_people(
     spells = _spells(frame, column, frames_of(rule.memory, motion.fps), length)
     state, events = LinkedPeople(), []
     group, group_of = np.full(len(frame), -1), np.full(int(column.max(initial=0)) + 1, -1)
-    arrival = frames_of(rule.arrival, motion.fps)
     assert found.links is not None
     links, shown, changes_now = found.links, dict[int, PersonSet](), _changes(found)
     cuts, rows = (np.searchsorted(x, np.arange(length + 1)) for x in (links.frame, frame))
@@ -96,7 +85,9 @@ def label_people(
         now = slice(int(cuts[t]), int(cuts[t + 1]))
         switched = list(zip(*(getattr(links, k)[now].tolist() for k in ("a", "b", "on", "sure")), strict=True))
         old = state.identities.groups
-        changes = state.step(t, _dated(state, t, switched, motion), arrival, shown)
+        for a, b, on, _ in switched:
+            state.switch(a, b, on)
+        changes = state.step(t, shown)
         shown = state.identities.name(t, _together_now(found, t, state), shown)
         for g, people in shown.items():
             group_of[list(people)] = g
@@ -106,7 +97,7 @@ def label_people(
             group_of[list(people)] = -1
         parted = {frozenset((a, b)): sure for a, b, on, sure in switched if not on}
         real = [c for c in changes if not corrects(c, parted)]
-        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, arrival) for c in real)
+        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, late=True) for c in real)
         events += [e for e in told if e is not None]
     return _without_singles(frame, group), events
 
@@ -130,23 +121,17 @@ def _together_now(found: FoundGroups, t: int, state: LinkedPeople) -> Iterable[P
     return [frozenset(people) for people in parts.values() if len(people) > 1]
 
 
-def _dated(
-    state: LinkedPeople, t: int, switched: Iterable[tuple[int, int, bool, bool]], motion: TrackedMotion
-) -> list[LinkSwitch]:
-    """Returns the links switched in frame t with the frame in which the two came together."""
-    # only links of people in no group yet may enter; the onset of the others is not needed
-    grouped = {p for people in state.identities.groups.values() for p in people}
-    return [
-        (a, b, on, motion.onset(frozenset([a]), frozenset([b]), t, joins=True) if on and not {a, b} <= grouped else t)
-        for a, b, on, _ in switched
-    ]
-
-
 def parts_of_change(change: GroupChange, old: Members, state: LinkedPeople) -> Parts:
     """Returns the parts that a change joined, or into which it divided a group, and since when all are present. old:
     the groups by id before the change."""
     parts = part_sets(change, old, state.identities.groups, frozenset(state.present.keys() & set(change.members)))
-    return Parts(parts, max((min(state.present[p] for p in part) for part in parts), default=0))
+    since = max((min(state.present[p] for p in part) for part in parts), default=0)
+    return Parts(parts, since, gone_people(change, old, state.present.keys()))
+
+
+def gone_people(change: GroupChange, old: Members, present: Set[int]) -> PersonSet:
+    """Returns the people of a group that a change divided who are present no more; nobody for other changes."""
+    return old[change.before[0]] - present if change.kind in ("split", "dissolve") else frozenset()
 
 
 def part_sets(change: GroupChange, old: Members, new: Members, people: PersonSet) -> list[PersonSet]:
@@ -166,15 +151,6 @@ def _spells(frame: Ints, column: Ints, memory: int, length: int) -> dict[int, li
         if last + memory + 1 < length:
             found.setdefault(int(last) + memory + 1, []).append((int(p), None))
     return found
-
-
-def _entered(state: LinkedPeople, switched: Iterable[LinkSwitch], arrival: int) -> PersonSet:
-    """Returns the people who enter with their group: in none yet, and linked within `arrival` frames of coming."""
-    grouped = {p for people in state.identities.groups.values() for p in people}
-    return frozenset(
-        p for a, b, on, since in switched if on for p in (a, b)
-        if p not in grouped and p in state.present and since <= state.present[p] + arrival
-    )  # fmt: skip
 
 
 def _without_singles(frame: Ints, group: Ints) -> Ints:

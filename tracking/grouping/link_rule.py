@@ -27,7 +27,6 @@ from sim.types import Array, Bools, Ints
 from tracking.config import Config, param
 
 CELLS = 1_000_000  # Numbers worked on together: bounds memory.
-ARRIVAL = 1.0  # s: a link that began within this time of a track's first frame is an arrival, no merge.
 
 
 @dataclass(frozen=True)
@@ -52,8 +51,6 @@ class LinkRule(Config):
     idle: float = param(0.0, (0.0, 1.0), "m/s",
         "two people who are both slower than this are not near; 0: standing people can be linked")
     memory: float = param(1.0, (0.0, 5.0), "s", "time for which a member that is missed stays in the group")
-    arrival: float = param(ARRIVAL, (0.0, 5.0), "s",
-        "a link that began within this time of a track's first frame is no merge")
     # fmt: on
 
 

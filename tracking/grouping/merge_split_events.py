@@ -1,7 +1,8 @@
 """Merge, split, form, dissolve, enter and leave events of groups of tracked people: from changes of their groups.
 
 Two sources: links that a grouping switched (`event_of_change`), or labels that a tracker gave (`events_of_labels`).
-Changes that only correct what was believed are no events: `corrects`, and merges that become known late.
+Changes that only correct what was believed are no events: who was not seen apart does not merge, and who was not seen
+together, or is not apart, does not split (`TrackedMotion.onset`, `corrects`).
 What a change is called follows from sim.truth.group_ids_and_changes, the same rule as in the truth. People are columns
 of arrays, frames count from 0; in the returned events people are columns + 1, frames count from 1.
 """
@@ -9,20 +10,19 @@ of arrays, frames count from 0; in the returned events people are columns + 1, f
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 
 from sim.truth.group_ids_and_changes import GroupChange, PersonSet, group_changes
-from sim.truth.merge_split_rules import HOLD_TIME, frames_of, separation, stretches
+from sim.truth.merge_split_events import connected
+from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, frames_of, separation, stretches
 from sim.truth.motion_rows import MotionRows, frames_of_change
 from sim.types import Bools, GroupEvent, Ints
 
-# A switched link: its people a, b, True if switched on, first frame of the stretch that caused it.
-LinkSwitch = tuple[int, int, bool, int]
-SEARCHED = 20.0  # s before the report in which the onset of a change is looked for.
-LAG = 6.0  # s after its onset in which a merge must become known: standing on near each other tells little new.
+SEARCHED = 12.0  # s before the report in which people must have been seen to come together or to part.
+ARRIVAL = 1.0  # s: who is there so soon after the first frame was there before it, and does not enter.
 BRIDGED = 0.5  # s: gaps in a stretch that do not end it.
 LOOK_BACK = 20  # Frames before an event's start in which its position is looked for.
 
@@ -34,17 +34,27 @@ class TrackedMotion:
     rows: MotionRows
     fps: float  # frames per second
 
-    def onset(self, a: PersonSet, b: PersonSet, t: int, *, joins: bool) -> int:
+    def onset(self, a: PersonSet, b: PersonSet, t: int, *, joins: bool) -> int | None:
         """Returns the frame in which two parts came together (joins True) or parted (False), as known in frame t. a, b:
-        the parts, sets of columns. Frames count from 0; only the 20 s before t are searched."""
+        the parts, sets of columns. Frames count from 0; only the 12 s before t are searched.
+
+        It is None if the parts were not apart before they came together or are not near now, and if they were not
+        together before they parted or are not apart now.
+        """
         first = max(0, t + 1 - frames_of(SEARCHED, self.fps))
         pos, vel, _ = self.rows.window([*sorted(a), *sorted(b)], first, t + 1)
         found = separation(pos, vel, *np.split(np.arange(len(a) + len(b)), [len(a)]))
+        near = self._lasting(found.distance < MERGE_DISTANCE)
         rules = [self._lasting(holds) for holds in (found.split_rule(), found.merge_rule())]
         before, after = rules if joins else rules[::-1]
-        begin = int(np.flatnonzero(before)[-1]) + 1 if before.any() else 0
+        if not before.any():
+            return None
+        begin = int(np.flatnonzero(before)[-1]) + 1
         held = np.flatnonzero(after[begin:])
-        return first + begin + int(held[0]) if len(held) else t
+        if len(held):
+            return first + begin + int(held[0])
+        # velocities are too rough to ask for the merge rule, too
+        return t if joins and near[-1] else None
 
     def _lasting(self, holds: Bools) -> Bools:
         """Returns `holds` (N,) with gaps up to 0.5 s filled, without stretches shorter than 2 s that end earlier."""
@@ -61,29 +71,38 @@ class Parts:
 
     sets: Sequence[PersonSet]
     since: int  # frame (from 0) from which on a person of each has been present
+    gone: PersonSet = frozenset()  # people of a divided group who are present no more
 
 
 def event_of_change(
-    change: GroupChange, t: int, parts: Parts, motion: TrackedMotion, arrival: int
+    change: GroupChange, t: int, parts: Parts, motion: TrackedMotion, *, late: bool = False
 ) -> GroupEvent | None:
     """Returns the event of a change that became known in frame t.
 
-    It is None for a merge or form within `arrival` frames of the first frame with all parts, and for an enter as soon
-    after the first frame of all: these people were together from the start. It is None also for a merge or form that
-    became known more than 6 s after its onset.
+    It is None for a merge or split that was not seen (`TrackedMotion.onset`), and for an enter in the first second.
+    late: True if groups are known later than their people, so that people alone who form one and were never apart
+    enter.
     """
     # a group leaves when its last two people were seen, or its last one
     if change.kind == "leave":
         seen = motion.rows.count(change.members, t + 1)
         start = int(np.flatnonzero(seen >= min(seen.max(), 2))[-1])
-    else:
+    elif change.kind != "enter":
         joins = change.kind not in ("split", "dissolve")
-        start = min((motion.onset(a, b, t, joins=joins) for a, b in combinations(parts.sets, 2)), default=t)
-    # people who were together when they were first seen neither met nor came: no event
-    joined = max(parts.since + arrival, t - 1 - frames_of(LAG, motion.fps))
-    known = {"enter": arrival, "merge": joined, "form": joined}
-    if start <= known.get(change.kind, -1):
-        return None
+        # whoever held a group together may be gone
+        pairs = list(combinations(parts.sets, 2))
+        onsets = [motion.onset(a, b | parts.gone, t, joins=joins) for a, b in pairs]
+        unchanged = [pair for pair, onset in zip(pairs, onsets, strict=True) if onset is None]
+        if len(set(connected(parts.sets, unchanged))) > 1:
+            start = min(onset for onset in onsets if onset is not None)
+        elif late and change.kind == "form" and parts.since > t - frames_of(SEARCHED, motion.fps):
+            change = replace(change, kind="enter", before=())
+        else:
+            return None
+    if change.kind == "enter":
+        start = parts.since
+        if start <= frames_of(ARRIVAL, motion.fps):
+            return None
     end = start if change.kind in ("enter", "leave") else t
     return _event(change, start, end, t, motion.rows)
 

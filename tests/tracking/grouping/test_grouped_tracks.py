@@ -7,7 +7,6 @@ import pytest
 from sim.io.formats.labels import labelled_truth_fields
 from sim.types import GroupEvent, Groups, Tracks
 from tests.reference_sense import paced
-from tracking.grouping import merge_split_events
 from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.grouping.link_rule import LinkRule
 
@@ -106,12 +105,12 @@ def test_split_after_two_seconds_apart():
     assert events(made) == [(116, "split", 97, (1,), (-1, 1), (1, 2, 3))]
 
 
-@pytest.mark.parametrize(("lag", "told"), [(1.5, [(129, "merge", 114)]), (1.4, [])])
-def test_a_merge_that_becomes_known_too_late_is_no_event(monkeypatch, lag, told):
-    monkeypatch.setattr(merge_split_events, "LAG", lag)
-    made = derive(tracks(joining()), FPS, rule=RULE)
-    assert [e[:3] for e in events(made)] == told
-    assert made[128].group.tolist() == [1, 1, 1], "the groups know it all the same"
+@pytest.mark.parametrize(("apart", "told"), [(1.8, []), (2.8, ["merge"])])
+def test_who_was_never_apart_does_not_merge(apart, told):
+    near = paced((8, (1, 0)), (4, (1, (0.8 - apart) / 4)), (8, (1, 0)), start=(0, 0.7 + apart))
+    made = derive(tracks([*side_by_side(), near]), FPS, rule=RULE)
+    assert [e[1] for e in events(made)] == told
+    assert made[-1].group.tolist() == [1, 1, 1], "the groups know it all the same"
 
 
 @pytest.mark.parametrize(("together", "told"), [(0, []), (2, ["dissolve"])])

@@ -19,8 +19,7 @@ from sim.truth.group_ids_and_changes import GroupChange, Identities, Members, Pe
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.motion_rows import MotionRows
 from sim.types import Array, GroupEvent, Groups, Ints
-from tracking.grouping.group_labels import part_sets
-from tracking.grouping.link_rule import ARRIVAL
+from tracking.grouping.group_labels import gone_people, part_sets
 from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, corrects, event_of_change
 from tracking.papers.joint import partition_labels_kernels
 
@@ -85,9 +84,11 @@ class ReportedEvents:
             there = frozenset(change.members) & now
             sets = part_sets(change, old, new, there)
             since = max((min(self.first[p] for p in part) for part in sets), default=0) - begin
-            parts = Parts([frozenset(column[p] for p in part) for part in sets], since)
+            sets.append(gone_people(change, old, now))
+            *known, gone = (frozenset(column[p] for p in part if p in column) for part in sets)
+            parts = Parts(known, since, gone)
             own = replace(change, members=tuple(sorted(column[p] for p in change.members if p in column)))
-            event = event_of_change(own, len(self.recent) - 1, parts, motion, frames_of(ARRIVAL, self.fps))
+            event = event_of_change(own, len(self.recent) - 1, parts, motion)
             if event is not None:
                 x, y = event.pos
                 out.append(replace(
