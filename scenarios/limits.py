@@ -1,7 +1,7 @@
 """Bounds of what is read, each in one place: sizes of files, frames, pictures, crowds, numbers.
 
-`python -m benchmarks.limits` measures the time and memory that each bound costs. A value beyond a bound is refused with
-an InputError. The bounds lie far above real recordings, so that a mistyped number is refused before it fills memory.
+A value beyond a bound is refused with an InputError. The bounds lie far above real recordings, so that a mistyped
+number is refused before it fills memory.
 """
 
 from __future__ import annotations

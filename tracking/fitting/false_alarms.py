@@ -71,9 +71,11 @@ def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
     """Returns the false alarms of a recording as tracks over time, in the order of their first detection."""
     pause = max(1, round(PAUSE * m.truth.fps))
     found: list[list[int]] = []
-    for index in np.unique(m.frame[m.false]).tolist():
-        open_ = [rows for rows in found if m.frame[rows[-1]] >= index - pause]
-        here = np.flatnonzero(m.false & (m.frame == index))
+    open_: list[list[int]] = []
+    alarms = np.flatnonzero(m.false)
+    alarms = alarms[np.argsort(m.frame[alarms], kind="stable")]
+    for here in np.split(alarms, np.flatnonzero(np.diff(m.frame[alarms])) + 1) if len(alarms) else []:
+        open_ = [rows for rows in open_ if m.frame[rows[-1]] >= m.frame[here[0]] - pause]
         iou = box_iou(m.box[[rows[-1] for rows in open_], None], m.box[here]) if open_ else np.zeros((0, len(here)))
         linked: set[int] = set()
         while iou.size and iou.max() >= LINK:
@@ -81,7 +83,9 @@ def alarm_tracks(m: MatchedRecording) -> list[AlarmTrack]:
             open_[i].append(int(here[j]))
             iou[i], iou[:, j] = -1.0, -1.0
             linked.add(j)
-        found += [[int(row)] for j, row in enumerate(here) if j not in linked]
+        new = [[int(row)] for j, row in enumerate(here) if j not in linked]
+        found += new
+        open_ += new
     return [AlarmTrack(m, np.array(rows), _person_of_alarm(m, rows)) for rows in found]
 
 
