@@ -1,13 +1,14 @@
 """Boxes that are tracked in the image, as people on the ground: `standing` moves the tracks to where the boxes stand,
 and `completed` derives groups and events there. The ground is that of the camera, or of the boxes (`ground_of_boxes`).
 
-Distances between people are those of the ground, in m, and not px divided by one scale for near and far people. Boxes
-from pixels are never moved, as the foot of a blob is no person's.
+Distances between people are those of the ground, in m, and not px divided by one scale for near and far people. In
+depth they count as precisely as boxes measure them (`as_measured`), also if the tracker itself reports the feet of its
+boxes. Boxes from pixels are never moved, as the foot of a blob is no person's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -22,6 +23,7 @@ from tracking.grouping.grouping_choice import Grouping
 
 FLATTENED = 0.4  # k of `as_measured`: F1 of pairs was greatest, of 0 to 1, seen from 5 to 25 degrees above people.
 OVERHEAD = 1e-6  # Level part of the axis of a camera that looks straight down.
+PICTURES = frozenset({"pixels", "stereo"})  # Inputs whose boxes have feet that are no person's.
 CLIMB = 8  # Steps in which the height of the ground below a foot point is found.
 
 
@@ -35,26 +37,33 @@ def boxed(tracks: Sequence[Tracks]) -> bool:
     return all(t.box is not None and t.unit == "person" for t in tracks if len(t.id))
 
 
-def can_stand(tracks: Sequence[Tracks], camera: Camera | None, pixels: bool) -> bool:
-    """Returns True if tracks can be moved from the image to the ground: people with boxes, a camera, no pixels. pixels:
-    True if the tracker worked on pictures."""
-    return plane_of_run(tracks) == "image" and camera is not None and boxed(tracks) and not pixels
+def source_of(run: Iterable[Tracks] | None) -> str | None:
+    """Returns what the tracker of a run worked on, an `InputKind`, by the run's `info`; None if it is unknown."""
+    info = getattr(run, "info", {})
+    return info.get("input") or ("pixels" if info.get("detections") == "image" else None)
+
+
+def can_stand(tracks: Sequence[Tracks], camera: Camera | None, source: str | None = None) -> bool:
+    """Returns True if tracks can be moved from the image to the ground: people with boxes, a camera, no pictures.
+    source: as in `completed`."""
+    return plane_of_run(tracks) == "image" and camera is not None and boxed(tracks) and source not in PICTURES
 
 
 def ground_below(
-    tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, pixels: bool,
+    tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, source: str | None = None,
     image_size: tuple[int, int] | None = None,
 ) -> Ground:  # fmt: skip
-    """Returns the ground to which tracks in the image can be moved: by the camera if known, else by the first boxes.
+    """Returns the ground on which the boxes of tracks stand: by the camera if known, else by the first boxes.
 
-    The boxes are used only if the tracker names no groups. The ground is unknown for tracks that are not in the image,
-    lack boxes, or come from pixels.
+    source: as in `completed`. The boxes are used only if the tracker names no groups. The ground is unknown for tracks
+    that lack boxes or come from pictures, and for positions that are neither in the image nor measured by boxes.
     """
-    if plane_of_run(tracks) != "image" or pixels or not boxed(tracks):
+    plane, planes = plane_of_run(tracks), ("image", "ground") if source == "boxes" else ("image",)
+    if plane not in planes or source in PICTURES or not boxed(tracks):
         return Ground()
     if camera is not None:
         return Ground(camera)
-    return Ground() if names_groups(tracks) else ground_of_boxes(tracks, px_per_m, image_size)
+    return Ground() if plane == "ground" or names_groups(tracks) else ground_of_boxes(tracks, px_per_m, image_size)
 
 
 def as_measured(pos: Array, camera: Camera) -> Array:
@@ -81,30 +90,37 @@ def completed(
     *,
     camera: Camera | None,
     scene: Scene | None,
-    pixels: bool,
+    source: str | None = None,
     image_size: tuple[int, int] | None = None,
 ) -> tuple[tuple[Tracks, ...], Ground]:
     """Returns the tracks with groups and events filled in, and the ground that was used for them.
 
     If the ground under the boxes is known (`ground_below`), groups are derived from positions there, else as
-    `with_groups` does. pixels: True if the tracker worked on pictures. image_size: width, height, px; None: unknown.
+    `with_groups` does. source: what the tracker worked on, an `InputKind`; None: unknown. image_size: width, height,
+    px; None: unknown.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks), Ground()
-    ground = ground_below(tracks, camera, px_per_m, pixels, image_size)
+    ground = ground_below(tracks, camera, px_per_m, source, image_size)
     if ground.camera is None:
         return with_groups(tracks, fps, px_per_m, rule), ground
     stairs = None if camera is None else scene  # the boxes tell no place in the scene
-    feet = [t.replace(pos=as_measured(t.pos, ground.camera)) for t in standing(tracks, ground.camera, stairs)]
-    grouped, named = with_groups(feet, fps, 1.0, rule), names_groups(tracks)
-    pairs = zip(with_velocities(tracks, fps), grouped, strict=True)
-    return tuple(_grouped_as(t, g, named) for t, g in pairs), ground
+    feet = standing(tracks, ground.camera, stairs) if plane_of_run(tracks) == "image" else tracks
+    grouped, named = with_groups(depth_as_measured(feet, ground.camera), fps, 1.0, rule), names_groups(tracks)
+    out = [_grouped_as(t, g) for t, g in zip(with_velocities(tracks, fps), grouped, strict=True)]
+    found = [t.groups if named else None for t in out]
+    shown = zip(out, found, groups_in_frames(out), strict=True)
+    return tuple(t.replace(groups=groups if own is None else own) for t, own, groups in shown), ground
 
 
-def _grouped_as(t: Tracks, grouped: Tracks, named: bool) -> Tracks:
+def depth_as_measured(tracks: Sequence[Tracks], camera: Camera) -> list[Tracks]:
+    """Returns tracks on the ground with positions `as_measured` and unknown (nan) velocities."""
+    return [t.replace(pos=as_measured(t.pos, camera), vel=np.full_like(t.vel, np.nan)) for t in tracks]
+
+
+def _grouped_as(t: Tracks, grouped: Tracks) -> Tracks:
     new = moved_events(grouped.events[len(t.events) :], t.id, t.pos)
-    out = t.replace(group=grouped.group, events=(*t.events, *new), derived=True)
-    return out if named and t.groups is not None else out.replace(groups=groups_in_frames([out])[0])
+    return t.replace(group=grouped.group, events=(*t.events, *new), derived=True)
 
 
 def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> list[Tracks]:

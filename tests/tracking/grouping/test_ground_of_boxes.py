@@ -33,10 +33,10 @@ def test_ground_is_that_of_the_camera_or_unknown(tilt: float, height: float, kno
     box[:, 3] *= np.where(r.random(400) < cut, r.uniform(0.1, 0.4, 400), 1)
     one = (np.arange(400), np.full(400, -1), box[:, :2], box[:, :2], np.zeros((400, 4, 4)), box)
     tracks, px_per_m = Tracks(1, 0.0, "image", "person", *one), np.median(box[:, 3]) / 1.7
-    ground = ground_below([tracks], None, px_per_m, pixels=False)
+    ground = ground_below([tracks], None, px_per_m)
     found = ground.camera
     assert (ground.source, found is not None) == ("boxes" if known else None, known)
-    assert ground_below([tracks.replace(group=one[0])], None, px_per_m, pixels=False) == Ground(), "it names groups"
+    assert ground_below([tracks.replace(group=one[0])], None, px_per_m) == Ground(), "it names groups"
     sized = ground_of_boxes([tracks], px_per_m, (640, 480)).camera
     if found is not None:
         assert sized is not None
