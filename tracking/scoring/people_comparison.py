@@ -11,14 +11,14 @@ compared in the image.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
 from sim.truth.group_hulls import groups_over_time
 from sim.types import Array, Tracks, Truth
-from tracking.grouping.foot_points import PICTURES, boxed, can_stand, completed, feet, moved_events, source_of, standing
+from tracking.grouping.foot_points import boxed, can_stand, completed, feet, moved_events, standing
 from tracking.grouping.grouped_tracks import groups_in_frames
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.group_and_event_scores import ComparedSides
@@ -109,11 +109,6 @@ def in_one_plane(
         return moved, "ground"
     by_overlap = truth.camera is None and truth.box is not None and all(boxed(run) for run in runs)
     return moved, "boxes" if by_overlap else "image"
-
-
-def from_pixels(run: Iterable[Tracks]) -> bool:
-    """Returns True if the tracker of a run worked on pictures, by the run's `info`; False if it has no `info`."""
-    return source_of(run) in PICTURES
 
 
 def _can_be_grounded(truth: Truth, run: Sequence[Tracks], source: str | None) -> bool:

@@ -17,7 +17,7 @@ from tracking.grouping import foot_points
 from tracking.grouping.foot_points import as_measured, ground_below
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 from tracking.grouping.grouped_tracks import without_groups
-from tracking.running.run import grouped
+from tracking.running.run import TrackingRun, grouped
 
 
 @pytest.mark.parametrize(
@@ -70,3 +70,13 @@ def test_depth_by_a_camera_that_is_turned_about_its_axis() -> None:
         moved = as_measured(pos, camera)
         assert np.hypot(*(moved[1] - moved[0])) == pytest.approx(8)
         assert np.hypot(*(moved[2] - moved[0])) == pytest.approx(2.7, abs=0.2)
+
+
+def test_feet_that_the_tracker_reports_count_as_measured_if_it_worked_on_boxes() -> None:
+    scene = sim.simulate(scenarios.load("cross", set=["camera.fps=5", "camera.tilt_deg=15"]), 30_000, streams=())
+    run = tracking.track("blob", scene, detections="file")
+    bare, of_points = tuple(without_groups(run)), {**run.info, "input": "points"}
+    given = (run, TrackingRun(bare, run.info), TrackingRun(bare, of_points), bare)
+    a, b, c, d = ([(t.group.tolist(), t.groups.pos.tolist()) for t in grouped(one, scene)] for one in given)
+    assert a == b != c == d
+    assert (run[0].plane, run.info["ground"]) == ("ground", "camera")
