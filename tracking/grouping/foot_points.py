@@ -108,9 +108,8 @@ def completed(
     feet = standing(tracks, ground.camera, stairs) if plane_of_run(tracks) == "image" else tracks
     grouped, named = with_groups(depth_as_measured(feet, ground.camera), fps, 1.0, rule), names_groups(tracks)
     out = [_grouped_as(t, g) for t, g in zip(with_velocities(tracks, fps), grouped, strict=True)]
-    found = [t.groups if named else None for t in out]
-    shown = zip(out, found, groups_in_frames(out), strict=True)
-    return tuple(t.replace(groups=groups if own is None else own) for t, own, groups in shown), ground
+    pairs = zip(out, groups_in_frames(out), strict=True)
+    return tuple(t if named and t.groups is not None else t.replace(groups=g) for t, g in pairs), ground
 
 
 def depth_as_measured(tracks: Sequence[Tracks], camera: Camera) -> list[Tracks]:

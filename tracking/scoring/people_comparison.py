@@ -90,10 +90,10 @@ def in_one_plane(
 ) -> tuple[list[Sequence[Tracks]], Similarity]:
     """Returns the tracks of all runs of one sequence in one plane, and the similarity of people to use for all.
 
-    truth: as `grounded` returns it. sources: for each run, `source_of` it. similarity: returned
-    as it is unless None, which chooses it by the data. Tracks that were moved to the ground must be compared with the
-    truth that `on_feet` returns. Raises IncomparableError if a run on the ground must be moved to the image but has no
-    boxes of people.
+    truth: as `grounded` returns it. sources: of each run, as `source_of` returns it. similarity: returned as it is
+    unless None, which chooses it by the data. Tracks that were moved to the ground must be compared with the truth that
+    `on_feet` returns. Raises IncomparableError if a run on the ground must be moved to the image but has no boxes of
+    people.
     """
     ground = similarity == "ground"
     if similarity in (None, "boxes"):

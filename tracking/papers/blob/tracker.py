@@ -196,29 +196,18 @@ def image_covariance(state: Array, scale: Array) -> Array:
 def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array, Bools]:
     """Returns ground positions (K, 2) m, velocities (K, 2) m/s, covariances (K, 4, 4), and flags (N,) of tracks that
     have one."""
-    from sim.scene.camera import ground_jacobian, to_ground
+    from sim.scene.camera import ground_jacobian, standing_share, to_ground
 
-    foot, rate, cov = _foot(camera, state, scale)
-    ground = to_ground(camera, foot)
+    # a person stands below the centre of the box by the share `lower` of its height
+    feet, lower = state.copy(), standing_share(camera) - 0.5
+    feet[: kalman.VAR, :, 1] += lower * state[: kalman.VAR, :, 2]
+    feet[kalman.VAR :, :, 1] += lower**2 * state[kalman.VAR :, :, 2]
+    ground = to_ground(camera, feet[kalman.PLACE, :, :2])
     seen = np.asarray(np.isfinite(ground).all(1))
-    if not seen.all():
-        ground, foot, rate, cov = ground[seen], foot[seen], rate[seen], cov[seen]
-    jacobian = ground_jacobian(camera, foot)
-    turn = np.zeros((len(foot), 4, 4))
+    feet, cov = feet[:, seen, :2], image_covariance(feet, scale)[seen]
+    jacobian = ground_jacobian(camera, feet[kalman.PLACE])
+    turn = np.zeros((len(cov), 4, 4))
     turn[:, :2, :2] = turn[:, 2:, 2:] = jacobian
     out = turn @ cov @ turn.transpose(0, 2, 1)
-    return ground, np.einsum("nij,nj->ni", jacobian, rate), (out + out.transpose(0, 2, 1)) / 2, seen
-
-
-def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array]:
-    place, rate = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
-    cov = image_covariance(state, scale)
-    if camera.kind == "pinhole":
-        place[:, 1] += state[kalman.PLACE, :, 2] / 2
-        rate[:, 1] += state[kalman.RATE, :, 2] / 2
-        var, cross, rate_var = state[kalman.VAR :, :, 2] * np.square(scale) / 4
-        cov[:, 1, 1] += var
-        cov[:, 1, 3] += cross
-        cov[:, 3, 1] += cross
-        cov[:, 3, 3] += rate_var
-    return place, rate, cov
+    vel = np.einsum("nij,nj->ni", jacobian, feet[kalman.RATE])
+    return ground[seen], vel, (out + out.transpose(0, 2, 1)) / 2, seen
