@@ -14,8 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.scene.camera import foot_points
-from sim.scene.terrain import height_at
+from sim.scene.camera import seen_ground, standing_share
 from sim.types import Array, Bools, Camera, GroupEvent, Ints, Scene, Tracks
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 from tracking.grouping.grouped_tracks import groups_in_frames, names_groups, with_groups, with_velocities
@@ -24,7 +23,6 @@ from tracking.grouping.grouping_choice import Grouping
 FLATTENED = 0.4  # k of `as_measured`: F1 of pairs was greatest, of 0 to 1, seen from 5 to 25 degrees above people.
 OVERHEAD = 1e-6  # Level part of the axis of a camera that looks straight down.
 PICTURES = frozenset({"pixels", "stereo"})  # Inputs whose boxes have feet that are no person's.
-CLIMB = 8  # Steps in which the height of the ground below a foot point is found.
 
 
 def plane_of_run(tracks: Sequence[Tracks]) -> str | None:
@@ -141,13 +139,7 @@ def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> l
 
 def feet(box: Array, camera: Camera, scene: Scene | None) -> Array:
     """Returns the ground points x, y (R, 2), m, on which boxes (R, 4), px, stand; nan for a box that stands nowhere."""
-    z = np.zeros(len(box))
-    pos = foot_points(box, z, camera)
-    if scene is not None and scene.stairs:
-        for _ in range(CLIMB):
-            z = height_at(scene, pos)
-            pos = foot_points(box, z, camera)
-    return pos
+    return seen_ground(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]), scene)[0]
 
 
 def moved_events(events: Sequence[GroupEvent], id: Ints, pos: Array) -> tuple[GroupEvent, ...]:
