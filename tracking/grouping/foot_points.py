@@ -3,7 +3,7 @@ and `completed` derives groups and events there. The ground is that of the camer
 
 Distances between people are those of the ground, in m, and not px divided by one scale for near and far people. In
 depth they count as precisely as boxes measure them (`as_measured`), also if the tracker itself reports the feet of its
-boxes. Boxes from pixels are never moved, as the foot of a blob is no person's.
+boxes on the ground. Boxes in the image from pixels are never moved, as the foot of a blob is no person's.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 from tracking.grouping.grouped_tracks import groups_in_frames, names_groups, with_groups, with_velocities
 from tracking.grouping.grouping_choice import Grouping
 
-FLATTENED = 0.4  # k of `as_measured`: F1 of pairs was greatest, of 0 to 1, seen from 5 to 25 degrees above people.
+FLATTENED = 0.4  # k of `as_measured`: of 0 to 1, about the greatest F1 of groups and pairs from 5 to 60 degrees above.
 OVERHEAD = 1e-6  # Level part of the axis of a camera that looks straight down.
-PICTURES = frozenset({"pixels", "stereo"})  # Inputs whose boxes have feet that are no person's.
+# Planes in which the feet of boxes measure where people are, by the tracker's input; of other inputs: the image.
+PLANES = {"boxes": ("image", "ground"), "pixels": ("ground",), "stereo": ()}
 
 
 def plane_of_run(tracks: Sequence[Tracks]) -> str | None:
@@ -44,7 +45,11 @@ def source_of(run: Iterable[Tracks] | None) -> str | None:
 def can_stand(tracks: Sequence[Tracks], camera: Camera | None, source: str | None = None) -> bool:
     """Returns True if tracks can be moved from the image to the ground: people with boxes, a camera, no pictures.
     source: as in `completed`."""
-    return plane_of_run(tracks) == "image" and camera is not None and boxed(tracks) and source not in PICTURES
+    return plane_of_run(tracks) == "image" and camera is not None and _stand(tracks, source)
+
+
+def _stand(tracks: Sequence[Tracks], source: str | None) -> bool:
+    return plane_of_run(tracks) in PLANES.get(source or "", ("image",)) and boxed(tracks)
 
 
 def ground_below(
@@ -54,14 +59,14 @@ def ground_below(
     """Returns the ground on which the boxes of tracks stand: by the camera if known, else by the first boxes.
 
     source: as in `completed`. The boxes are used only if the tracker names no groups. The ground is unknown for tracks
-    that lack boxes or come from pictures, and for positions that are neither in the image nor measured by boxes.
+    that lack boxes, lie in the image and come from pictures, or lie on the ground and come from neither boxes nor
+    pixels.
     """
-    plane, planes = plane_of_run(tracks), ("image", "ground") if source == "boxes" else ("image",)
-    if plane not in planes or source in PICTURES or not boxed(tracks):
+    if not _stand(tracks, source):
         return Ground()
-    if camera is not None:
+    if camera is not None or plane_of_run(tracks) == "ground" or names_groups(tracks):
         return Ground(camera)
-    return Ground() if plane == "ground" or names_groups(tracks) else ground_of_boxes(tracks, px_per_m, image_size)
+    return ground_of_boxes(tracks, px_per_m, image_size)
 
 
 def as_measured(pos: Array, camera: Camera) -> Array:

@@ -72,11 +72,11 @@ def test_depth_by_a_camera_that_is_turned_about_its_axis() -> None:
         assert np.hypot(*(moved[2] - moved[0])) == pytest.approx(2.7, abs=0.2)
 
 
-def test_feet_that_the_tracker_reports_count_as_measured_if_it_worked_on_boxes() -> None:
+def test_feet_that_the_tracker_reports_count_as_measured_by_what_it_worked_on() -> None:
     scene = sim.simulate(scenarios.load("cross", set=["camera.fps=5", "camera.tilt_deg=15"]), 30_000, streams=())
     run = tracking.track("blob", scene, detections="file")
-    bare, of_points = tuple(without_groups(run)), {**run.info, "input": "points"}
-    given = (run, TrackingRun(bare, run.info), TrackingRun(bare, of_points), bare)
-    a, b, c, d = ([(t.group.tolist(), t.groups.pos.tolist()) for t in grouped(one, scene)] for one in given)
-    assert a == b != c == d
+    bare = tuple(without_groups(run))
+    given = (run, *(TrackingRun(bare, {"input": kind}) for kind in ("boxes", "pixels", "points")), bare)
+    a, b, c, d, e = ([(t.group.tolist(), t.groups.pos.tolist()) for t in grouped(one, scene)] for one in given)
+    assert a == b == c != d == e
     assert (run[0].plane, run.info["ground"]) == ("ground", "camera")
