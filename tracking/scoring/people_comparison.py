@@ -98,7 +98,8 @@ def in_one_plane(
     ground = similarity == "ground"
     if similarity in (None, "boxes"):
         ground = truth.pos is not None and all(
-            _can_be_grounded(truth, run, own) for run, own in zip(runs, sources, strict=True)
+            plane_of(truth, run) != "image" or can_stand(run, truth.camera, own)
+            for run, own in zip(runs, sources, strict=True)
         )
     moved = [
         _on_ground(truth, run) if ground else _in_image(truth, run, own) for run, own in zip(runs, sources, strict=True)
@@ -109,10 +110,6 @@ def in_one_plane(
         return moved, "ground"
     by_overlap = truth.camera is None and truth.box is not None and all(boxed(run) for run in runs)
     return moved, "boxes" if by_overlap else "image"
-
-
-def _can_be_grounded(truth: Truth, run: Sequence[Tracks], source: str | None) -> bool:
-    return plane_of(truth, run) != "image" or can_stand(run, truth.camera, source)
 
 
 def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
