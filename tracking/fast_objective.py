@@ -20,6 +20,7 @@ import numpy as np
 
 from sim.types import Ints, Tracks, Truth
 from tracking.grouping.belief import default_belief
+from tracking.grouping.foot_points import depth_as_measured, ground_below
 from tracking.grouping.grouped_tracks import names_groups, with_groups
 from tracking.grouping.grouping_choice import groups_now
 from tracking.grouping.tracks_table import tabulate
@@ -44,14 +45,15 @@ class ObjectiveScorer:
         self.scorer = Scorer(truth)
 
     def scores(
-        self, tracks: Sequence[Tracks], px_per_m: float, pixels: bool = False, similarity: Similarity | None = None
+        self, tracks: Sequence[Tracks], px_per_m: float, source: str | None = None, similarity: Similarity | None = None
     ) -> dict[str, float]:
         """Returns HOTA, group_F1 and objective, by key, of tracks sorted by frame.
 
         Scored are the frames from 1 to the last of the tracks. px_per_m: image scale for deriving groups; nan takes the
-        truth's. pixels: True if the tracker works on pictures. A score is nan where that of `evaluate` is.
+        truth's. source: what the tracker works on, an `InputKind`; None: unknown. A score is nan where that of
+        `evaluate` is.
         """
-        (moved,), similarity = in_one_plane(self.scorer.truth, [tracks], [pixels], similarity)
+        (moved,), similarity = in_one_plane(self.scorer.truth, [tracks], [source], similarity)
         scorer, last = self.scorer.judge(tracks, moved), tracks[-1].index if tracks else 0
         inside = scorer.scored(last)
         sides = scorer.sides([t for t in moved if inside[t.index]], inside)
@@ -61,6 +63,9 @@ class ObjectiveScorer:
             found["HOTA"] = unweighted(weighted_hota(pairs, pairs.size), pairs.size)["HOTA"]
         if sides.frames.any():
             mapping = sides.mapping if sides.groups_only else mapped_people(pairs)
+            if sides.surface == "ground" and not names_groups(moved):
+                camera = ground_below(moved, scorer.truth.camera, px_per_m, source).camera
+                moved = moved if camera is None else depth_as_measured(moved, camera)
             found["group_F1"] = _group_f1(scorer, replace(sides, mapping=mapping), moved, px_per_m)
         mean = objective(*(np.array([score]) for score in found.values()))
         return {**found, "objective": float(mean[0])}

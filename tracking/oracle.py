@@ -93,7 +93,7 @@ def named_detections(
     reported = [prepared.tracker.step(f, f.detections) for f in prepared.frames() if f.index <= truth.length]
     scorer = Scorer(truth)
     # Boxes are moved first: then they are matched with the true places, with which trackers on the ground are compared.
-    moved, _ = in_one_plane(scorer.truth, [reported], [False], similarity)
+    moved, _ = in_one_plane(scorer.truth, [reported], [None], similarity)
     (compared,) = scorer.compare(moved, similarity, None)
     sides, true = compared.sides, compared.sides.true
     cuts = np.cumsum([0, *(len(t.id) for t in sides.tracks)]).tolist()

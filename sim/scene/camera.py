@@ -28,7 +28,10 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, PICTURE_SIZES, SCALES, fits_picture, is_number
 from sim.elementary import PI, atan2, dot, exp, inverse_3x3, length, log, product, sin, turned, unit
 from sim.scene.body import PERSON_HEIGHT
-from sim.types import Array, Bools, Camera
+from sim.scene.terrain import height_at
+from sim.types import Array, Bools, Camera, Scene
+
+CLIMB = 8  # Steps in which the height of the ground that is seen at an image point is found.
 
 
 def undistort(x: Array, k: float) -> Array:
@@ -118,6 +121,20 @@ def to_ground(camera: Camera, uv: Array, z: float | Array = 0.0) -> Array:
     return np.asarray(origin[:, :2] + _reach(origin, direction, z)[:, None] * direction[:, :2])
 
 
+def seen_ground(camera: Camera, uv: Array, scene: Scene | None) -> tuple[Array, Array]:
+    """Returns the ground points x, y (N, 2) m, and their heights (N,) m, that are seen at image points uv (N, 2) px.
+
+    The ground is level without a scene. x, y are nan where no ground is seen.
+    """
+    z = np.zeros(len(uv))
+    xy = to_ground(camera, uv, z)
+    if scene is not None and scene.stairs:
+        for _ in range(CLIMB):
+            z = height_at(scene, xy)
+            xy = to_ground(camera, uv, z)
+    return xy, z
+
+
 def _reach(origin: Array, direction: Array, z: float | Array) -> Array:
     """Returns how far along each ray a point of height z lies, in lengths of its direction; nan where none does."""
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -139,7 +156,7 @@ def standing_share(camera: Camera | None) -> float:
     return 0.5 if camera is not None and camera.kind == "top" else 1.0
 
 
-def ground_jacobian(camera: Camera, uv: Array, z: float = 0.0) -> Array:
+def ground_jacobian(camera: Camera, uv: Array, z: float | Array = 0.0) -> Array:
     """Returns the derivative d(x, y)/d(u, v) of `to_ground` at image points uv (N, 2) px, (N, 2, 2) m/px.
 
     The ray X = O + s D meets the plane at s = (z - O_z)/D_z. Then dX = s dD + D ds and ds = -s dD_z/D_z.

@@ -163,12 +163,12 @@ class Rollout:
         if `every` is True all. Raises InputError if tracks and labels cannot be compared."""
         from tracking.scoring.people_comparison import IncomparableError
 
-        px_per_m, pixels = self.prepared.px_per_m(self.tracks), self.prepared.mode == "image"
+        px_per_m = self.prepared.px_per_m(self.tracks)
         try:
             if every:
                 found: Mapping[str, float] = self._every_score(px_per_m)
             else:
-                found = self.opened.judge.scores(self.tracks, px_per_m, pixels, self.similarity)
+                found = self.opened.judge.scores(self.tracks, px_per_m, self.prepared.input, self.similarity)
         except IncomparableError as error:
             expected, remedy = "what tracks and labels have", "choose another similarity, or other detections"
             raise InputError(
@@ -182,8 +182,8 @@ class Rollout:
 
         context, mode, judge = self.prepared.context, self.prepared.mode, self.opened.judge
         tracks, _ = completed(
-            self.tracks, context.fps, px_per_m, camera=context.camera, scene=context.scene, pixels=mode == "image",
-            image_size=context.image_size,
+            self.tracks, context.fps, px_per_m, camera=context.camera, scene=context.scene,
+            source=self.prepared.input, image_size=context.image_size,
         )  # fmt: skip
         run = TrackingRun(tracks, {"detections": mode})
         return judge.scorer.evaluate(run, similarity=self.similarity, frames=len(run))

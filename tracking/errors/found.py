@@ -21,12 +21,13 @@ from tracking.errors.causes import Cause, Facts, cause_of_ghost, cause_of_group,
 from tracking.errors.groups import LINEAGE, GroupError, Memberships, group_errors, wrong_lineages
 from tracking.errors.people import PersonError, matched_people, person_errors
 from tracking.errors.repairs import SHOWN, ComparedPeople, ComparedRun, scores
+from tracking.grouping.foot_points import source_of
 from tracking.oracle import named_detections
 from tracking.running.run import TrackingRun
 from tracking.scoring.candidate_pairs import REACH
 from tracking.scoring.evaluation import MatchedSides
 from tracking.scoring.group_and_event_scores import TrackedGroups, compared_events, tracked_groups
-from tracking.scoring.people_comparison import Similarity, from_pixels
+from tracking.scoring.people_comparison import Similarity
 from tracking.scoring.rows import find_rows
 
 EVERY = 10**9  # costs of all errors
@@ -137,7 +138,7 @@ def find_errors(
             remedy="state it with --px-per-m",
         )  # fmt: skip
     run, (_, place, _) = _compared_run(compared[0], tracked), _places(compared[0])
-    of = _facts(sequence, compared[0], None if seen is None else compared[1], from_pixels(tracks))
+    of = _facts(sequence, compared[0], None if seen is None else compared[1], source_of(tracks) in ("pixels", "stereo"))
     found = [FoundError(*one, None) for one in _with_causes(compared[0], tracked, run, place, of)]
     whole = scores(run) if costs or causes else {}
     found.sort(key=lambda one: one.error.start - one.error.end)

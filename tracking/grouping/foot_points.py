@@ -1,28 +1,29 @@
 """Boxes that are tracked in the image, as people on the ground: `standing` moves the tracks to where the boxes stand,
 and `completed` derives groups and events there. The ground is that of the camera, or of the boxes (`ground_of_boxes`).
 
-Distances between people are those of the ground, in m, and not px divided by one scale for near and far people. Boxes
-from pixels are never moved, as the foot of a blob is no person's.
+Distances between people are those of the ground, in m, and not px divided by one scale for near and far people. In
+depth they count as precisely as boxes measure them (`as_measured`), also if the tracker itself reports the feet of its
+boxes on the ground. Boxes in the image from pixels are never moved, as the foot of a blob is no person's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from sim.scene.camera import foot_points
-from sim.scene.terrain import height_at
+from sim.scene.camera import seen_ground, standing_share
 from sim.types import Array, Bools, Camera, GroupEvent, Ints, Scene, Tracks
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 from tracking.grouping.grouped_tracks import groups_in_frames, names_groups, with_groups, with_velocities
 from tracking.grouping.grouping_choice import Grouping
 
-FLATTENED = 0.4  # k of `as_measured`: F1 of pairs was greatest, of 0 to 1, seen from 5 to 25 degrees above people.
+FLATTENED = 0.4  # k of `as_measured`: of 0 to 1, about the greatest F1 of groups and pairs from 5 to 60 degrees above.
 OVERHEAD = 1e-6  # Level part of the axis of a camera that looks straight down.
-CLIMB = 8  # Steps in which the height of the ground below a foot point is found.
+# Planes in which the feet of boxes measure where people are, by the tracker's input; of other inputs: the image.
+PLANES = {"boxes": ("image", "ground"), "pixels": ("ground",), "stereo": ()}
 
 
 def plane_of_run(tracks: Sequence[Tracks]) -> str | None:
@@ -35,26 +36,37 @@ def boxed(tracks: Sequence[Tracks]) -> bool:
     return all(t.box is not None and t.unit == "person" for t in tracks if len(t.id))
 
 
-def can_stand(tracks: Sequence[Tracks], camera: Camera | None, pixels: bool) -> bool:
-    """Returns True if tracks can be moved from the image to the ground: people with boxes, a camera, no pixels. pixels:
-    True if the tracker worked on pictures."""
-    return plane_of_run(tracks) == "image" and camera is not None and boxed(tracks) and not pixels
+def source_of(run: Iterable[Tracks] | None) -> str | None:
+    """Returns what the tracker of a run worked on, an `InputKind`, by the run's `info`; None if it is unknown."""
+    info = getattr(run, "info", {})
+    return info.get("input") or ("pixels" if info.get("detections") == "image" else None)
+
+
+def can_stand(tracks: Sequence[Tracks], camera: Camera | None, source: str | None = None) -> bool:
+    """Returns True if tracks can be moved from the image to the ground: people with boxes, a camera, no pictures.
+    source: as in `completed`."""
+    return plane_of_run(tracks) == "image" and camera is not None and _stand(tracks, source)
+
+
+def _stand(tracks: Sequence[Tracks], source: str | None) -> bool:
+    return plane_of_run(tracks) in PLANES.get(source or "", ("image",)) and boxed(tracks)
 
 
 def ground_below(
-    tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, pixels: bool,
+    tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, source: str | None = None,
     image_size: tuple[int, int] | None = None,
 ) -> Ground:  # fmt: skip
-    """Returns the ground to which tracks in the image can be moved: by the camera if known, else by the first boxes.
+    """Returns the ground on which the boxes of tracks stand: by the camera if known, else by the first boxes.
 
-    The boxes are used only if the tracker names no groups. The ground is unknown for tracks that are not in the image,
-    lack boxes, or come from pixels.
+    source: as in `completed`. The boxes are used only if the tracker names no groups. The ground is unknown for tracks
+    that lack boxes, lie in the image and come from pictures, or lie on the ground and come from neither boxes nor
+    pixels.
     """
-    if plane_of_run(tracks) != "image" or pixels or not boxed(tracks):
+    if not _stand(tracks, source):
         return Ground()
-    if camera is not None:
+    if camera is not None or plane_of_run(tracks) == "ground" or names_groups(tracks):
         return Ground(camera)
-    return Ground() if names_groups(tracks) else ground_of_boxes(tracks, px_per_m, image_size)
+    return ground_of_boxes(tracks, px_per_m, image_size)
 
 
 def as_measured(pos: Array, camera: Camera) -> Array:
@@ -81,30 +93,36 @@ def completed(
     *,
     camera: Camera | None,
     scene: Scene | None,
-    pixels: bool,
+    source: str | None = None,
     image_size: tuple[int, int] | None = None,
 ) -> tuple[tuple[Tracks, ...], Ground]:
     """Returns the tracks with groups and events filled in, and the ground that was used for them.
 
     If the ground under the boxes is known (`ground_below`), groups are derived from positions there, else as
-    `with_groups` does. pixels: True if the tracker worked on pictures. image_size: width, height, px; None: unknown.
+    `with_groups` does. source: what the tracker worked on, an `InputKind`; None: unknown. image_size: width, height,
+    px; None: unknown.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks), Ground()
-    ground = ground_below(tracks, camera, px_per_m, pixels, image_size)
+    ground = ground_below(tracks, camera, px_per_m, source, image_size)
     if ground.camera is None:
         return with_groups(tracks, fps, px_per_m, rule), ground
     stairs = None if camera is None else scene  # the boxes tell no place in the scene
-    feet = [t.replace(pos=as_measured(t.pos, ground.camera)) for t in standing(tracks, ground.camera, stairs)]
-    grouped, named = with_groups(feet, fps, 1.0, rule), names_groups(tracks)
-    pairs = zip(with_velocities(tracks, fps), grouped, strict=True)
-    return tuple(_grouped_as(t, g, named) for t, g in pairs), ground
+    feet = standing(tracks, ground.camera, stairs) if plane_of_run(tracks) == "image" else tracks
+    grouped, named = with_groups(depth_as_measured(feet, ground.camera), fps, 1.0, rule), names_groups(tracks)
+    out = [_grouped_as(t, g) for t, g in zip(with_velocities(tracks, fps), grouped, strict=True)]
+    pairs = zip(out, groups_in_frames(out), strict=True)
+    return tuple(t if named and t.groups is not None else t.replace(groups=g) for t, g in pairs), ground
 
 
-def _grouped_as(t: Tracks, grouped: Tracks, named: bool) -> Tracks:
+def depth_as_measured(tracks: Sequence[Tracks], camera: Camera) -> list[Tracks]:
+    """Returns tracks on the ground with positions `as_measured` and unknown (nan) velocities."""
+    return [t.replace(pos=as_measured(t.pos, camera), vel=np.full_like(t.vel, np.nan)) for t in tracks]
+
+
+def _grouped_as(t: Tracks, grouped: Tracks) -> Tracks:
     new = moved_events(grouped.events[len(t.events) :], t.id, t.pos)
-    out = t.replace(group=grouped.group, events=(*t.events, *new), derived=True)
-    return out if named and t.groups is not None else out.replace(groups=groups_in_frames([out])[0])
+    return t.replace(group=grouped.group, events=(*t.events, *new), derived=True)
 
 
 def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> list[Tracks]:
@@ -126,13 +144,7 @@ def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> l
 
 def feet(box: Array, camera: Camera, scene: Scene | None) -> Array:
     """Returns the ground points x, y (R, 2), m, on which boxes (R, 4), px, stand; nan for a box that stands nowhere."""
-    z = np.zeros(len(box))
-    pos = foot_points(box, z, camera)
-    if scene is not None and scene.stairs:
-        for _ in range(CLIMB):
-            z = height_at(scene, pos)
-            pos = foot_points(box, z, camera)
-    return pos
+    return seen_ground(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]), scene)[0]
 
 
 def moved_events(events: Sequence[GroupEvent], id: Ints, pos: Array) -> tuple[GroupEvent, ...]:

@@ -20,7 +20,7 @@ from scenarios.limits import INTEGER
 from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
 from tracking.config import Config
 from tracking.running import image_scale, tracker_registry
-from tracking.running.detection_mode import check_detections, choose_mode, frames_with_detections
+from tracking.running.detection_mode import InputKind, check_detections, choose_mode, frames_with_detections, input_kind
 from tracking.running.image_scale import ImageScale
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracks_check import ReportHistory, check_tracks
@@ -44,6 +44,11 @@ class PreparedTracker:
     frames_given: tuple[Frame, ...] | None
     scale_frames: int = 0  # as of ImageScale
     history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
+
+    @property
+    def input(self) -> InputKind:
+        """What the tracker works on."""
+        return input_kind(self.tracker.needs, self.mode, self.sequence, self.frames_given or ())
 
     def frames(self) -> Iterator[Frame]:
         """Returns a new iterator over the frames as the tracker gets them, in order. Each call starts at frame 1."""

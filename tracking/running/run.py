@@ -23,7 +23,6 @@ from sim.hashing import installed
 from sim.types import DetectionMode, Sequence, Tracker, Tracks
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.running import image_scale
-from tracking.running.detection_mode import input_kind
 from tracking.running.image_scale import ImageScale
 from tracking.running.prepare import Params, PreparedTracker, prepare
 from tracking.running.time_limit import TimeLimited
@@ -60,7 +59,7 @@ def run_info(
         "config": prepared.config.as_dict() if prepared.config else {},
         "seed": seed,
         "detections": prepared.mode,
-        "input": input_kind(prepared.tracker.needs, prepared.mode, prepared.sequence, prepared.frames_given or ()),
+        "input": prepared.input,
         "sensor": dict(sensor),
         "background": None if sample is None else prepared.sequence.source.get("background", f"{len(sample)} frames"),
         **_facts(prepared.sequence, tracks, scale, ground, begins),
@@ -235,11 +234,10 @@ def track(
         if progress is not None:
             progress(frame.index)
     whole = clock() - begun
-    scale, pixels = prepared.scale(reported), prepared.mode == "image"
-    known = prepared.context
+    scale, known = prepared.scale(reported), prepared.context
     tracks, ground = completed(
-        reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene, pixels=pixels,
-        image_size=known.image_size,
+        reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene,
+        source=prepared.input, image_size=known.image_size,
     )  # fmt: skip
     named, late, odd = names_groups(reported), late_groups(reported), list[str]()
     if named and chosen is not None:
@@ -276,7 +274,7 @@ def group(
             is unknown or not above 0, or labels or the file of the grouping cannot be read.
         WorkError: A simulated person did not carry out an order of the scenario's script.
     """
-    from tracking.grouping.foot_points import completed
+    from tracking.grouping.foot_points import completed, source_of
     from tracking.grouping.grouped_tracks import without_groups
     from tracking.grouping.known_people import known_people
     from tracking.grouping.plausibility import implausible
@@ -294,7 +292,7 @@ def group(
         raise InputError(file=file, got=got, expected="metres, or a scale", remedy=remedy)
     tracks, ground = completed(
         people, sequence.fps, scale.px_per_m, rule, camera=sequence.camera, scene=sequence.scene,
-        pixels=run is not None and run.info.get("detections") == "image", image_size=sequence.image_size,
+        source=source_of(run), image_size=sequence.image_size,
     )  # fmt: skip
     for text in implausible(sequence.name, people, sequence.fps, scale.px_per_m):
         warnings.warn(text, UserWarning, stacklevel=2)
@@ -312,14 +310,13 @@ def group(
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
     """Returns stored tracks of a sequence, one `Tracks` per frame, with groups and events derived where they lack. The
     default grouping is used."""
-    from tracking.grouping.foot_points import completed
+    from tracking.grouping.foot_points import completed, source_of
 
     known = image_scale.before_frames(sequence)
     # Labels of all frames tell the scale better than boxes of the first frames.
     truth = sequence.truth if known.frames or not np.isfinite(known.px_per_m) else None
     px_per_m = known.px_per_m if truth is None else truth.px_per_m
-    pixels = getattr(tracks, "info", {}).get("detections") == "image"
     return completed(
-        tracks, sequence.fps, px_per_m, camera=sequence.camera, scene=sequence.scene, pixels=pixels,
-        image_size=sequence.image_size,
+        tracks, sequence.fps, px_per_m, camera=sequence.camera, scene=sequence.scene,
+        source=source_of(tracks), image_size=sequence.image_size,
     )[0]  # fmt: skip

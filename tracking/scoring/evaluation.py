@@ -28,6 +28,7 @@ from functools import cached_property
 import numpy as np
 
 from sim.types import Array, Bools, Tracks, Truth, Unscored
+from tracking.grouping.foot_points import source_of
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.annotated_frames import annotated_frames, seen_in
 from tracking.scoring.candidate_pairs import Pairs, box_pairs
@@ -39,7 +40,6 @@ from tracking.scoring.people_and_groups import PersonRows, Surface, TrueGroups, 
 from tracking.scoring.people_comparison import (
     IncomparableError,
     Similarity,
-    from_pixels,
     grounded,
     in_one_plane,
     on_feet,
@@ -258,7 +258,7 @@ class Scorer:
         All runs are compared in one plane and by one similarity; the arguments are as in `evaluate`."""
         inside = self.scored(frames)
         ordered = [_in_order(run, inside) for run in runs]
-        moved, chosen = in_one_plane(self.truth, ordered, [from_pixels(run) for run in runs], similarity)
+        moved, chosen = in_one_plane(self.truth, ordered, [source_of(run) for run in runs], similarity)
         judges = [self.judge(given, run) for given, run in zip(ordered, moved, strict=True)]
         return [judge._matched(run, chosen, inside) for judge, run in zip(judges, moved, strict=True)]
 

@@ -11,7 +11,7 @@ compared in the image.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -19,8 +19,13 @@ import numpy as np
 from sim.truth.group_hulls import groups_over_time
 from sim.types import Array, Tracks, Truth
 from tracking.grouping.foot_points import boxed, can_stand, completed, feet, moved_events, standing
+<<<<<<< HEAD
 from tracking.grouping.grouped_tracks import groups_in_frames, with_groups
 from tracking.scoring.candidate_pairs import REACH, Pairs, box_pairs, point_pairs
+=======
+from tracking.grouping.grouped_tracks import groups_in_frames
+from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
+>>>>>>> s15-ground
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.people_and_groups import PersonRows, Surface
 
@@ -85,23 +90,27 @@ def on_feet(truth: Truth) -> Truth:
 
 
 def in_one_plane(
-    truth: Truth, runs: Sequence[Sequence[Tracks]], pixels: Sequence[bool], similarity: Similarity | None = None
+    truth: Truth, runs: Sequence[Sequence[Tracks]], sources: Sequence[str | None], similarity: Similarity | None = None
 ) -> tuple[list[Sequence[Tracks]], Similarity]:
     """Returns the tracks of all runs of one sequence in one plane, and the similarity of people to use for all.
 
-    truth: as `grounded` returns it. pixels: for each run, True if its tracker worked on pictures. similarity: returned
-    as it is unless None, which chooses it by the data. Tracks that were moved to the ground must be compared with the
-    truth that `on_feet` returns. Raises IncomparableError if a run on the ground must be moved to the image but has no
-    boxes of people.
+    truth: as `grounded` returns it. sources: of each run, as `source_of` returns it. similarity: returned as it is
+    unless None, which chooses it by the data. Tracks that were moved to the ground must be compared with the truth that
+    `on_feet` returns. Raises IncomparableError if a run on the ground must be moved to the image but has no boxes of
+    people.
     """
     ground = similarity == "ground"
     if similarity in (None, "boxes"):
         ground = truth.pos is not None and all(
             plane_of(truth, run) != "image" or can_stand(run, truth.camera, own)
+<<<<<<< HEAD
             for run, own in zip(runs, pixels, strict=True)
+=======
+            for run, own in zip(runs, sources, strict=True)
+>>>>>>> s15-ground
         )
     moved = [
-        _on_ground(truth, run) if ground else _in_image(truth, run, own) for run, own in zip(runs, pixels, strict=True)
+        _on_ground(truth, run) if ground else _in_image(truth, run, own) for run, own in zip(runs, sources, strict=True)
     ]
     if similarity is not None:
         return moved, similarity
@@ -111,26 +120,29 @@ def in_one_plane(
     return moved, "boxes" if by_overlap else "image"
 
 
+<<<<<<< HEAD
 def from_pixels(run: Iterable[Tracks]) -> bool:
     """Returns True if the tracker of a run worked on pictures, by the run's `info`; False if it has no `info`."""
     return getattr(run, "info", {}).get("detections") == "image"
 
 
+=======
+>>>>>>> s15-ground
 def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
-    if truth.camera is None or not can_stand(run, truth.camera, pixels=False):
+    if truth.camera is None or not can_stand(run, truth.camera):
         return run
     return standing(run, truth.camera, truth.scene)
 
 
-def _in_image(truth: Truth, run: Sequence[Tracks], pixels: bool) -> Sequence[Tracks]:
-    if plane_of(truth, run) == "image":
-        if not can_stand(run, truth.camera, pixels) or all(t.derived for t in run):
-            return run
-        return completed(run, truth.fps, truth.px_per_m, camera=truth.camera, scene=truth.scene, pixels=pixels)[0]
-    if not boxed(run):
+def _in_image(truth: Truth, run: Sequence[Tracks], source: str | None) -> Sequence[Tracks]:
+    flat = plane_of(truth, run) == "image"
+    if flat and not can_stand(run, truth.camera, source):
+        return run
+    if not (flat or boxed(run)):
         what = "groups without people" if any(t.unit == "group" for t in run) else "people without boxes"
         raise IncomparableError(f"labels or runs in the image (px), and one on the ground (m) with {what}")
-    return [_track_in_image(t) for t in with_groups(run, truth.fps, truth.px_per_m)]
+    known = completed(run, truth.fps, truth.px_per_m, camera=truth.camera, scene=truth.scene, source=source)[0]
+    return known if flat else [_track_in_image(t) for t in known]
 
 
 def _track_in_image(t: Tracks) -> Tracks:

@@ -17,7 +17,7 @@ from tracking.grouping import foot_points
 from tracking.grouping.foot_points import as_measured, ground_below
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 from tracking.grouping.grouped_tracks import without_groups
-from tracking.running.run import grouped
+from tracking.running.run import TrackingRun, grouped
 
 
 @pytest.mark.parametrize(
@@ -33,10 +33,10 @@ def test_ground_is_that_of_the_camera_or_unknown(tilt: float, height: float, kno
     box[:, 3] *= np.where(r.random(400) < cut, r.uniform(0.1, 0.4, 400), 1)
     one = (np.arange(400), np.full(400, -1), box[:, :2], box[:, :2], np.zeros((400, 4, 4)), box)
     tracks, px_per_m = Tracks(1, 0.0, "image", "person", *one), np.median(box[:, 3]) / 1.7
-    ground = ground_below([tracks], None, px_per_m, pixels=False)
+    ground = ground_below([tracks], None, px_per_m)
     found = ground.camera
     assert (ground.source, found is not None) == ("boxes" if known else None, known)
-    assert ground_below([tracks.replace(group=one[0])], None, px_per_m, pixels=False) == Ground(), "it names groups"
+    assert ground_below([tracks.replace(group=one[0])], None, px_per_m) == Ground(), "it names groups"
     sized = ground_of_boxes([tracks], px_per_m, (640, 480)).camera
     if found is not None:
         assert sized is not None
@@ -70,3 +70,13 @@ def test_depth_by_a_camera_that_is_turned_about_its_axis() -> None:
         moved = as_measured(pos, camera)
         assert np.hypot(*(moved[1] - moved[0])) == pytest.approx(8)
         assert np.hypot(*(moved[2] - moved[0])) == pytest.approx(2.7, abs=0.2)
+
+
+def test_feet_that_the_tracker_reports_count_as_measured_by_what_it_worked_on() -> None:
+    scene = sim.simulate(scenarios.load("cross", set=["camera.fps=5", "camera.tilt_deg=15"]), 30_000, streams=())
+    run = tracking.track("blob", scene, detections="file")
+    bare = tuple(without_groups(run))
+    given = (run, *(TrackingRun(bare, {"input": kind}) for kind in ("boxes", "pixels", "points")), bare)
+    a, b, c, d, e = ([(t.group.tolist(), t.groups.pos.tolist()) for t in grouped(one, scene)] for one in given)
+    assert a == b == c != d == e
+    assert (run[0].plane, run.info["ground"]) == ("ground", "camera")

@@ -41,7 +41,8 @@ switches it off, one holds in the preset `paper`, too.
   ones, missed or not, also after `tentative_time`. Paper: one value of ρ. Why: false alarms end early.
 - several boxes or blobs of one track, with "rho": the nearest counts. Paper: all are assigned (frame 367), not how.
   Why: a filter takes one.
-- places: with a camera on the ground, not of tracks above the horizon. Paper: px. Why: scenes are in m.
+- places: with a camera on the ground, or on the scene's stairs, not of tracks above the horizon. Paper: px. Why:
+  scenes are in m.
 - `management`: by an existence probability (existence), of which a frame that nobody observed is no evidence; a track
   below 0.5 is tentative again. Paper: ρ. Why: rates hold at any frame rate and detector.
 - association: one to one, most likely, against false and new boxes. Paper: nearest gated track. Why: a wide gate must
@@ -100,7 +101,7 @@ from typing import ClassVar, cast
 
 import numpy as np
 
-from sim.types import Array, Bools, Camera, Context, Detections, Frame, Plane, Tracks
+from sim.types import Array, Bools, Camera, Context, Detections, Frame, Plane, Scene, Tracks
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
@@ -176,7 +177,7 @@ class Blob:
             cov, plane = image_covariance(state, scale), "image"
         else:
             state[kalman.PLACE] = place
-            pos, vel, cov, shown = on_ground(camera, state, scale)
+            pos, vel, cov, shown = on_ground(camera, self.context.scene, state, scale)
             rows, box, alone, plane = rows[shown], box[shown], alone[shown], "ground"
         id, score, seen = people.id[rows], people.score[rows], people.measured[rows]
         return Tracks(
@@ -193,32 +194,21 @@ def image_covariance(state: Array, scale: Array) -> Array:
     return cov.reshape(-1, 4, 4)
 
 
-def on_ground(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array, Bools]:
+def on_ground(camera: Camera, scene: Scene | None, state: Array, scale: Array) -> tuple[Array, Array, Array, Bools]:
     """Returns ground positions (K, 2) m, velocities (K, 2) m/s, covariances (K, 4, 4), and flags (N,) of tracks that
     have one."""
-    from sim.scene.camera import ground_jacobian, to_ground
+    from sim.scene.camera import ground_jacobian, seen_ground, standing_share
 
-    foot, rate, cov = _foot(camera, state, scale)
-    ground = to_ground(camera, foot)
+    # a person stands below the centre of the box by the share `lower` of its height
+    feet, lower = state.copy(), standing_share(camera) - 0.5
+    feet[: kalman.VAR, :, 1] += lower * state[: kalman.VAR, :, 2]
+    feet[kalman.VAR :, :, 1] += lower**2 * state[kalman.VAR :, :, 2]
+    ground, z = seen_ground(camera, feet[kalman.PLACE, :, :2], scene)
     seen = np.asarray(np.isfinite(ground).all(1))
-    if not seen.all():
-        ground, foot, rate, cov = ground[seen], foot[seen], rate[seen], cov[seen]
-    jacobian = ground_jacobian(camera, foot)
-    turn = np.zeros((len(foot), 4, 4))
+    feet, cov = feet[:, seen, :2], image_covariance(feet, scale)[seen]
+    jacobian = ground_jacobian(camera, feet[kalman.PLACE], z[seen])
+    turn = np.zeros((len(cov), 4, 4))
     turn[:, :2, :2] = turn[:, 2:, 2:] = jacobian
     out = turn @ cov @ turn.transpose(0, 2, 1)
-    return ground, np.einsum("nij,nj->ni", jacobian, rate), (out + out.transpose(0, 2, 1)) / 2, seen
-
-
-def _foot(camera: Camera, state: Array, scale: Array) -> tuple[Array, Array, Array]:
-    place, rate = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
-    cov = image_covariance(state, scale)
-    if camera.kind == "pinhole":
-        place[:, 1] += state[kalman.PLACE, :, 2] / 2
-        rate[:, 1] += state[kalman.RATE, :, 2] / 2
-        var, cross, rate_var = state[kalman.VAR :, :, 2] * np.square(scale) / 4
-        cov[:, 1, 1] += var
-        cov[:, 1, 3] += cross
-        cov[:, 3, 1] += cross
-        cov[:, 3, 3] += rate_var
-    return place, rate, cov
+    vel = np.einsum("nij,nj->ni", jacobian, feet[kalman.RATE])
+    return ground[seen], vel, (out + out.transpose(0, 2, 1)) / 2, seen

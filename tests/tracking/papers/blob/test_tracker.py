@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.types import Context, Detections, Frame
+from sim.types import Context, Detections, Frame, Scene, Stairs
 from tests.painted import ids
 from tests.reference_sense import above, pinhole
 from tracking.papers.blob import existence
@@ -224,16 +224,19 @@ def test_innovations_are_white_and_of_unit_size_on_the_model_itself():
         assert abs(np.mean(found[lag:] * found[:-lag])) < 0.06
 
 
+@pytest.mark.parametrize("high", [0.0, 1.0])
 @pytest.mark.parametrize("camera", [pinhole(25.0, at=(0.0, 0.0, 4.0)), above()], ids=["pinhole", "top"])
-def test_reports_on_the_ground_where_the_camera_is_known(camera):
+def test_reports_on_the_ground_where_the_camera_is_known(camera, high):
     from sim.scene.camera import project, px_per_m_at_centre
 
-    context = Context(fps=FPS, px_per_m=px_per_m_at_centre(camera), camera=camera, image_size=camera.image)
+    flight = Stairs(np.array([-9.0, 9.0]), np.array([-6.0, 9.0]), 20.0, high, 4, landing=30.0)
+    scene = Scene(np.array([30.0, 30.0]), stairs=(flight,) if high else ())
+    context = Context(FPS, px_per_m_at_centre(camera), camera, scene, camera.image)
     middle = np.array([0.0, 9.0] if camera.kind == "pinhole" else [8.0, 5.0])
     path = middle + np.array([[-2 + 0.1 * k, 0.03 * k] for k in range(40)])
     boxes = []
     for x, y in path:
-        (foot, head), _ = project(camera, np.array([[x, y, 0.0], [x, y, 1.7]]))
+        (foot, head), _ = project(camera, np.array([[x, y, high], [x, y, high + 1.7]]))
         if camera.kind == "top":
             boxes.append([[*(foot - 9), 18, 18]])
         else:
