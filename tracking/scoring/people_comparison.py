@@ -19,13 +19,8 @@ import numpy as np
 from sim.truth.group_hulls import groups_over_time
 from sim.types import Array, Tracks, Truth
 from tracking.grouping.foot_points import boxed, can_stand, completed, feet, moved_events, standing
-<<<<<<< HEAD
-from tracking.grouping.grouped_tracks import groups_in_frames, with_groups
-from tracking.scoring.candidate_pairs import REACH, Pairs, box_pairs, point_pairs
-=======
 from tracking.grouping.grouped_tracks import groups_in_frames
-from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
->>>>>>> s15-ground
+from tracking.scoring.candidate_pairs import REACH, Pairs, box_pairs, point_pairs
 from tracking.scoring.group_and_event_scores import ComparedSides
 from tracking.scoring.people_and_groups import PersonRows, Surface
 
@@ -103,11 +98,7 @@ def in_one_plane(
     if similarity in (None, "boxes"):
         ground = truth.pos is not None and all(
             plane_of(truth, run) != "image" or can_stand(run, truth.camera, own)
-<<<<<<< HEAD
-            for run, own in zip(runs, pixels, strict=True)
-=======
             for run, own in zip(runs, sources, strict=True)
->>>>>>> s15-ground
         )
     moved = [
         _on_ground(truth, run) if ground else _in_image(truth, run, own) for run, own in zip(runs, sources, strict=True)
@@ -120,14 +111,6 @@ def in_one_plane(
     return moved, "boxes" if by_overlap else "image"
 
 
-<<<<<<< HEAD
-def from_pixels(run: Iterable[Tracks]) -> bool:
-    """Returns True if the tracker of a run worked on pictures, by the run's `info`; False if it has no `info`."""
-    return getattr(run, "info", {}).get("detections") == "image"
-
-
-=======
->>>>>>> s15-ground
 def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
     if truth.camera is None or not can_stand(run, truth.camera):
         return run
