@@ -109,7 +109,7 @@ def associate(
     x, P = bank.x.copy(), bank.P.copy()
     state, chosen = kernels.associate(
         claims.points, claims.weights, claims.d2, log_ratio, claims.owner, claims.claimants,
-        shares(log_density, np.isfinite(log_density)), t - claims.last_seen, region,
+        shares(log_density, np.isfinite(log_density)), region,
         bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,
     )  # fmt: skip
     mine = chosen & (np.arange(len(bank))[:, None] == shares(log_density, chosen).argmax(0)) if len(bank) else chosen

@@ -50,8 +50,7 @@ Departures. Those marked (c) are off with `corrections` off.
 - missed detections: (c) a miss hypothesis; if it outweighs all associations, the group coasts; from points, missed
   members stand in for `carry_time`, and their places stay the group's for `coast_time`. Paper: not considered. Why:
   detectors miss people.
-- stand-ins: the centroid is measured as of its points' mean time; associations of stand-ins alone leave x and P as they
-  are. Paper: none. Why: their places come from x.
+- stand-ins: associations of stand-ins alone leave x and P as they are. Paper: none. Why: their places come from x.
 - size: N over the probability that a member is seen (`detect_prob`) within `carry_time`, from points. Paper: N. Why:
   detectors miss people.
 - Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated. Why:
