@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from collections import Counter
 from dataclasses import fields, replace
 
@@ -324,6 +325,14 @@ def test_a_shared_point_is_of_the_group_whose_members_walked_there() -> None:
     soon, late = (place_density(bank, points + np.array([[t, 0.0], [-t, 0.0]]), scaled, 5 + t) for t in (0.5, 2.0))
     assert (np.diag(soon) > 10 * soon[[1, 0], [0, 1]]).all()
     assert late.max() < 0.2 * soon.max()
+    many = np.repeat(points, 2_000, 0)
+    bank.unshared = [group._replace(points=np.repeat(group.points, 2_000, 0)) for group in bank.unshared]
+    tracemalloc.start()
+    np.testing.assert_allclose(
+        place_density(bank, many, scaled, 5.0)[:, ::2_000], place_density(bank, points, scaled, 5.0)
+    )
+    assert tracemalloc.get_traced_memory()[1] < 2e7  # bytes; all pairs take more than 1e8
+    tracemalloc.stop()
 
 
 def test_who_comes_into_view_or_is_hidden_does_not_displace_a_group() -> None:
