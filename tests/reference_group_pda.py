@@ -128,12 +128,7 @@ def associations(mine, shared, points, weights, rules):
     return [s for s in sets if free or reference_components.is_group(points[s], weights[s], rules.constraint)]
 
 
-def measures(s, weights, age):
-    """H of the centroid of these points: it lies behind by their mean age."""
-    return np.hstack([np.eye(2), -(weights[s] @ age[s]) / weights[s].sum() * np.eye(2)])
-
-
-def masses(sets, mine, shared, points, weights, age, region, x, P, extent, size, rules):
+def masses(sets, mine, shared, points, weights, own, region, x, P, extent, size, rules):
     """Masses of the associations, m_d m_N (4.2), and of the miss, all normalised; each one's R.
 
     m_N is a mass of numbers of people, which differ by those of a point: Gaussian, with tails. The miss has the same
@@ -145,9 +140,8 @@ def masses(sets, mine, shared, points, weights, age, region, x, P, extent, size,
     log, R = [], []
     for s in sets:
         n, mean, cov = moments(points[s], weights[s])
-        R.append(centroid_noise(n, cov, extent, size, rules, weights[s] @ (age[s] == 0) or None))
-        now = measures(s, weights, age)
-        close = multivariate_normal(x[:2], now @ P @ now.T + R[-1]).logpdf(mean)
+        R.append(centroid_noise(n, cov, extent, size, rules, weights[s] @ (own[s] < 0) or None))
+        close = multivariate_normal(x[:2], H @ P @ H.T + R[-1]).logpdf(mean)
         many = (1 - NEWCOMERS) * norm(size, sigma).pdf(n) + NEWCOMERS * (size + 1) / (size + 1 + n) ** 2
         log.append(close + np.log(step * many))
     miss = -np.inf
@@ -160,7 +154,7 @@ def masses(sets, mine, shared, points, weights, age, region, x, P, extent, size,
     return np.exp(np.array(log) - total), np.exp(miss - total), R
 
 
-def update(g, points, weights, d2, own, hits, share, age, region, x, P, extent, size, hold, rules):
+def update(g, points, weights, d2, own, hits, share, region, x, P, extent, size, hold, rules):
     """One group after its points: state, rows chosen, mass of the miss, x, P, extent, size."""
     mine, shared = claims(d2, own, hits, share, g, rules)
     same = x, P, extent, size
@@ -172,13 +166,12 @@ def update(g, points, weights, d2, own, hits, share, age, region, x, P, extent, 
         if reference_components.partition(points[some], weights[some], rules.constraint).max() < 0:
             return "nothing", [], 0.0, *same  # noise
         return "null", some, 0.0, *same
-    beta, miss, R = masses(sets, mine, shared, points, weights, age, region, x, P, extent, size, rules)
+    beta, miss, R = masses(sets, mine, shared, points, weights, own, region, x, P, extent, size, rules)
     states, covariances = [x], [P]
     for s, r in zip(sets, R, strict=True):
-        now = measures(s, weights, age)
-        K = P @ now.T @ np.linalg.inv(now @ P @ now.T + r) * (age[s] == 0).any()
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + r) * (own[s] < 0).any()
         states.append(x + K @ (moments(points[s], weights[s])[1] - x[:2]))
-        covariances.append(P - K @ now @ P)
+        covariances.append(P - K @ H @ P)
     mass = np.array([miss, *beta])
     new_x = mass @ np.array(states)
     new_P = sum(b * (C + np.outer(y - new_x, y - new_x)) for b, y, C in zip(mass, states, covariances, strict=True))

@@ -109,7 +109,7 @@ def associate(
     x, P = bank.x.copy(), bank.P.copy()
     state, chosen = kernels.associate(
         claims.points, claims.weights, claims.d2, log_ratio, claims.owner, claims.claimants,
-        shares(log_density, np.isfinite(log_density)), t - claims.last_seen, region,
+        shares(log_density, np.isfinite(log_density)), region,
         bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,
     )  # fmt: skip
     mine = chosen & (np.arange(len(bank))[:, None] == shares(log_density, chosen).argmax(0)) if len(bank) else chosen
@@ -137,6 +137,7 @@ def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio
 
 # Part of the density of a group's members that is even over its extent, of those who are not where they walked.
 LEAST_PLACES = 0.05
+MOST_PLACES = 64  # Places that are compared: bounds memory from pixels.
 
 
 def place_density(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> Array:
@@ -144,7 +145,8 @@ def place_density(bank: GroupBank, points: Array, scaled: ScaledParameters, t: f
     other group could have its points, and a little of it all over the group's extent."""
     density = np.tile(LEAST_PLACES / np.sqrt(np.linalg.det(bank.extent))[:, None], len(points))
     for row, (then, velocity, places) in enumerate(bank.unshared):
-        away = np.square(points[:, None] - places - (t - then) * velocity).sum(2)
+        some = places[:: len(places) // MOST_PLACES + 1]
+        away = np.square(points[:, None] - some - (t - then) * velocity).sum(2)
         var = 2 * scaled.point_sd**2 + np.square(scaled.scale * SPLIT_SPEED * (t - then))
         density[row] += (np.exp(-away / var / 2) / var).mean(1)
     return density

@@ -35,7 +35,6 @@ from tracking.papers.group_pda.association_mass_kernels import (
     log_count,
     log_density,
     log_miss,
-    running_ages,
     running_moments,
 )  # fmt: skip
 
@@ -100,16 +99,16 @@ def any_within(place: Array, points: Array, reach: float) -> Bools:
 @njit(cache=True)
 def associate(
     points: Array, weights: Array, d2: Array, log_ratio: Array, owner: Ints, claimants: Ints,
-    share: Array, age: Array, region: Array, x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
+    share: Array, region: Array, x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
 ) -> tuple[Ints, Bools]:  # fmt: skip
     """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (sec. 4.1 to 4.3).
 
     x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M) and
     region (G, 2, 2): of `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour
-    or place. owner (M,): the row of the only group that may have the point outside its region, or -1.
-    claimants (M,): number of groups that may have the point. share (G, M): probability that a point is the group's. age
-    (M,): time, s, since a missed member that stands in was measured, 0 for a point of this frame.
-    rest (G,): True for groups whose extent and size must not change. rules: see association_mass_kernels.
+    or place. owner (M,): the row of the only group that may have the point, a missed member that stands in, outside its
+    region; -1 for a point of this frame. claimants (M,): number of groups that may have the point. share (G, M):
+    probability that a point is the group's. rest (G,): True for groups whose extent and size must not change. rules:
+    see association_mass_kernels.
 
     Returns the state (G,) of each group and the points (G, M) bool of its likeliest association:
     - NOTHING = 0: the group has no points, only noise, or the miss has at least the mass of all associations. No points
@@ -125,14 +124,13 @@ def associate(
         n = len(order)
         if n == 0:
             continue
-        mine, people, ages, colour = np.empty((n, 2)), np.empty(n), np.empty(n), np.zeros(n)
+        mine, people, fresh, colour = np.empty((n, 2)), np.empty(n), np.empty(n), np.empty(n)
         others = 0.0  # people of other groups, expected
         for k in range(n):
             p = order[k]
             mine[k, 0], mine[k, 1] = points[p, 0], points[p, 1]
-            people[k], ages[k] = weights[p], age[p]
-            if log_ratio.shape[1]:
-                colour[k] = log_ratio[g, p] * weights[p]
+            people[k], fresh[k] = weights[p], weights[p] if owner[p] < 0 else 0.0
+            colour[k] = log_ratio[g, p] * weights[p]
             others += weights[p] * (1 - share[g, p])
         if rules[ASSOCIATION] == UNCONSTRAINED:
             start = n
@@ -147,7 +145,7 @@ def associate(
         taken = 0
         if feasible.any():
             best = _estimate(
-                mine, people, ages, colour, start, feasible, region[g], x[g], P[g], extent[g], size[g : g + 1],
+                mine, people, fresh, colour, start, feasible, region[g], x[g], P[g], extent[g], size[g : g + 1],
                 rest[g] or others > rules[FREEZE_SHARE] * size[g], rules,
             )  # fmt: skip
             if best >= 0:
@@ -175,7 +173,7 @@ def _ordered_points(
                     likeliest = other
             if association == NEAREST and shares and likeliest != g:
                 continue
-            distance[n] = d2[n] - 2 * log_ratio[n] if len(log_ratio) else d2[n]
+            distance[n] = d2[n] - 2 * log_ratio[n]
             order[own + shared] = n
             if shares:
                 shared += 1
@@ -187,11 +185,11 @@ def _ordered_points(
 
 @njit(cache=True)
 def _estimate(
-    points: Array, weights: Array, age: Array, colour: Array, start: int, feasible: Bools, region: Array,
+    points: Array, weights: Array, fresh: Array, colour: Array, start: int, feasible: Bools, region: Array,
     x: Array, P: Array, extent: Array, size: Array, rest: bool, rules: Array,
 ) -> int:  # fmt: skip
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
-    seen, mean_age = running_ages(weights, age, start)
+    seen = np.cumsum(np.append(0.0, fresh))[start:]  # people measured in this frame
     S = np.empty((len(people), 3))
     log_mass, beta = np.empty(len(people)), np.empty(len(people))
     unit = weights.sum() / len(weights)  # people that one point stands for: makes m_N a mass of numbers of points
@@ -203,11 +201,8 @@ def _estimate(
     for j in range(len(people)):
         log_mass[j] = -np.inf
         if feasible[j] and people[j] > 0:
-            fresh = seen[j] if seen[j] > 0 else people[j]
-            R, a = centroid_noise(people[j], fresh, cov[j], extent, size[0], rules), mean_age[j]
-            S[j, 0] = P[0, 0] - 2 * a * P[0, 2] + a * a * P[2, 2] + R[0]
-            S[j, 1] = P[0, 1] - a * (P[0, 3] + P[1, 2]) + a * a * P[2, 3] + R[1]
-            S[j, 2] = P[1, 1] - 2 * a * P[1, 3] + a * a * P[3, 3] + R[2]
+            R = centroid_noise(people[j], seen[j] if seen[j] > 0 else people[j], cov[j], extent, size[0], rules)
+            S[j, 0], S[j, 1], S[j, 2] = P[0, 0] + R[0], P[0, 1] + R[1], P[1, 1] + R[2]
             m_d = log_density(mean[j, 0], mean[j, 1], S[j])
             log_mass[j] = m_d + log_count(people[j], size[0], width) + np.log(unit) + evidence[j]  # eq. 4.2, m_g = 1
             top = max(top, log_mass[j])
@@ -226,30 +221,29 @@ def _estimate(
     for j in range(len(beta)):
         if seen[j] > 0:
             measured[j] = beta[j]
-    _mix(measured, mean, mean_age, S, x, P)
+    _mix(measured, mean, S, x, P)
     if not rest:
         _adapt(beta, matched, people, cov, extent, size, rules)
     return best if matched > miss else -1
 
 
 @njit(cache=True)
-def _mix(beta: Array, mean: Array, age: Array, S: Array, x: Array, P: Array) -> None:
+def _mix(beta: Array, mean: Array, S: Array, x: Array, P: Array) -> None:
     shift, spread, less = np.zeros(4), np.zeros((4, 4)), np.zeros((4, 4))
-    step, PH, gain = np.empty(4), np.empty((4, 2)), np.empty((4, 2))
+    step, gain = np.empty(4), np.empty((4, 2))
     for j in range(len(beta)):
         if beta[j] <= 0:
             continue
         area = S[j, 0] * S[j, 2] - S[j, 1] * S[j, 1]
         ixx, ixy, iyy = S[j, 2] / area, -S[j, 1] / area, S[j, 0] / area
         for a in range(4):
-            PH[a, 0], PH[a, 1] = P[a, 0] - age[j] * P[a, 2], P[a, 1] - age[j] * P[a, 3]
-            gain[a, 0] = PH[a, 0] * ixx + PH[a, 1] * ixy
-            gain[a, 1] = PH[a, 0] * ixy + PH[a, 1] * iyy
+            gain[a, 0] = P[a, 0] * ixx + P[a, 1] * ixy
+            gain[a, 1] = P[a, 0] * ixy + P[a, 1] * iyy
             step[a] = gain[a, 0] * mean[j, 0] + gain[a, 1] * mean[j, 1]
             shift[a] += beta[j] * step[a]
         for a in range(4):
             for b in range(4):
-                less[a, b] += beta[j] * (gain[a, 0] * PH[b, 0] + gain[a, 1] * PH[b, 1])
+                less[a, b] += beta[j] * (gain[a, 0] * P[b, 0] + gain[a, 1] * P[b, 1])
                 spread[a, b] += beta[j] * step[a] * step[b]
     for a in range(4):
         x[a] += shift[a]

@@ -2,11 +2,11 @@
 
 An association is a set of points that may be one group's; its mass, a relative weight, is m_d m_N m_g. m_d is the
 density of the points' centroid about the predicted one: `log_density`, with covariance S = H P H' + R. P is the
-covariance of the group's state, H picks its position (without missed members), and R (`centroid_noise`) is the
-covariance of the measured centroid. m_N is the density of the number of people in the points, given that of the group:
-`log_count`. m_g is 1 for a feasible association (its points form one group), else 0. `log_miss` is the log mass of the
-miss hypothesis, that no point is the group's. The module association_kernels puts them together. Symmetric 2 x 2
-matrices are stored as (3,) = xx, xy, yy. The slots of the array `rules` are named here.
+covariance of the group's state, H picks its position, and R (`centroid_noise`) is the covariance of the measured
+centroid. m_N is the density of the number of people in the points, given that of the group: `log_count`. m_g is 1 for a
+feasible association (its points form one group), else 0. `log_miss` is the log mass of the miss hypothesis, that no
+point is the group's. The module association_kernels puts them together. Symmetric 2 x 2 matrices are stored as (3,) =
+xx, xy, yy. The slots of the array `rules` are named here.
 """
 
 from __future__ import annotations
@@ -62,24 +62,6 @@ def running_moments(points: Array, weights: Array, x: float, y: float, start: in
             n, sx, sy = n + w, sx + w * u, sy + w * v
             sxx, sxy, syy = sxx + w * u * u, sxy + w * u * v, syy + w * v * v
     return people, mean, cov
-
-
-@njit(cache=True)
-def running_ages(weights: Array, age: Array, start: int) -> tuple[Array, Array]:
-    """Returns the people (J,) measured in this frame and the mean age (J,) in s of each association's points.
-
-    weights (M,): people that each point stands for; age (M,): time since it was measured, 0 in this frame. Association
-    j = 0, 1, … M - start has the first start + j points. Both are 0 for an association without points.
-    """
-    seen, mean = np.zeros(len(weights) - start + 1), np.zeros(len(weights) - start + 1)
-    people = now = total = 0.0
-    for k in range(len(weights) + 1):
-        if k >= start and people > 0:
-            seen[k - start], mean[k - start] = now, total / people
-        if k < len(weights):
-            people, total = people + weights[k], total + weights[k] * age[k]
-            now += weights[k] if age[k] <= 0 else 0.0
-    return seen, mean
 
 
 @njit(cache=True)

@@ -50,8 +50,7 @@ Departures. Those marked (c) are off with `corrections` off.
 - missed detections: (c) a miss hypothesis; if it outweighs all associations, the group coasts; from points, missed
   members stand in for `carry_time`, and their places stay the group's for `coast_time`. Paper: not considered. Why:
   detectors miss people.
-- stand-ins: the centroid is measured as of its points' mean time; associations of stand-ins alone leave x and P as they
-  are. Paper: none. Why: their places come from x.
+- stand-ins: associations of stand-ins alone leave x and P as they are. Paper: none. Why: their places come from x.
 - size: N over the probability that a member is seen (`detect_prob`) within `carry_time`, from points. Paper: N. Why:
   detectors miss people.
 - Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated. Why:
@@ -61,14 +60,14 @@ Departures. Those marked (c) are off with `corrections` off.
 - hidden feet: with boxes and a camera not overhead, points whose feet another box may hide are put no further than
   below heads at 1.5 m. Paper: points as they are. Why: hidden feet displace points.
 - pixels: foreground of tracking.detect on a grid of 0.1 m, each a share of a person, put where on the ground that
-  person's middle is: the runs along the images of upright lines, less a person's height; two runs no longer than a
-  person are pieces of one. Paper: all of an unnamed background subtraction, each counts one, in px. Why: N in people;
-  speed; near and far people are alike, and who stands behind is apart.
+  person's middle is: the runs along the images of upright lines, less a person's height; a run shorter than a person
+  is continued to that height into the next. Paper: all of an unnamed background subtraction, each counts one, in px.
+  Why: N in people; speed; near and far people are alike, and who stands behind is apart.
 - too much foreground: predicted only. Paper: none. Why: the light has changed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
   similar groups cross.
-- places, from points (c): in the same, where members have walked since the group last shared no point. Paper: none.
-  Why: groups that meet keep their people.
+- places, (c): in the same, where members have walked since the group last shared no point. Paper: none. Why: groups
+  that meet keep their people.
 - split: after `split_time`, until then predicted only; measured frames count back; members' places, colours and age go
   along; (c) parent's velocity. Paper: after consecutive infeasible frames (Fig. 1: at once), at rest. Why: misses.
 - parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
@@ -80,9 +79,8 @@ Departures. Those marked (c) are off with `corrections` off.
   Why: others' people stay out.
 - ids: the part that was largest when the group fell apart keeps the id, after its loss the largest left; of merged
   groups the largest, then the oldest. Paper: none. Why: tracks need ids.
-- walking out: a new group within reach of a member (2 m/s; from pixels at least R_0's) is a part of its group and as
-  old, (c) with its velocity; without corrections it splits off once confirmed. Paper: a new group. Why: splits without
-  shared points.
+- walking out: a new group within reach of a member (2 m/s) is a part of its group and as old, (c) with its velocity;
+  without corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
 - like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`; from points
   of the members seen in both of two frames. Paper: SR_v overlap. Why: P does not measure likeness; people sway with
   each step; hidden members move the centroid.
@@ -293,10 +291,10 @@ class GroupPda:
         claims = with_missed_members(claimed(points, weights, d2, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
         ratio = np.zeros(claims.d2.shape)
+        if self.config.corrections and (claims.claimants > 1).any():
+            ratio += log_ratio(place_density(bank, claims.points, scaled, t), claims)
         if scaled.colour_bins:
-            ratio = self.config.appearance * log_ratio(colour_density(bank, self.colours), claims)
-        elif self.config.corrections and not scaled.from_pixels and (claims.claimants > 1).any():
-            ratio = log_ratio(place_density(bank, claims.points, scaled, t), claims)
+            ratio += self.config.appearance * log_ratio(colour_density(bank, self.colours), claims)
         mine = associate(bank, claims, region, ratio, scaled, t)
         remember(bank, claims, mine, predicted, scaled, t)
         if scaled.colour_bins:
