@@ -277,7 +277,7 @@ class Particle(PointTracker):
         c, missed = self.config, self.slots.missed
         stayed = (1 - c.detect_prob) * np.exp((self.dt - missed) / c.hidden_time)
         # people leave with their partners: whose partner is measured is hidden
-        alone = 1 - (self.particles.together() * self.slots.seen).max(axis=1, initial=0.0)
+        alone = 1 - (self.particles.together() * (missed == 0)).max(axis=1, initial=0.0)
         gone = LEAVING_RATE * self.dt * alone / (stayed + np.finfo(float).tiny)
         return np.where((missed == 0) | c.certain_sensor, 1.0, 1 / (1 + gone))
 
