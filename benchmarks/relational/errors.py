@@ -34,6 +34,8 @@ PERIOD, AWAY, ROUGH = 6.0, 2.0, 0.1
 """Mode recordings: s from one occlusion to the next, its length, standard deviation of a detection per axis, m."""
 FPS, SEEN, NOISE = 10.0, 4.0, 0.05
 """Mode hidden: frames per second, s before the occlusion, standard deviation of a detection, m."""
+EVERYBODY = "report_existence=0"
+"""Modes hidden and recordings: where a filter places a hidden person, also if the person has probably left."""
 
 
 def places(truth: Truth) -> tuple[Array, float]:
@@ -140,7 +142,7 @@ def pair(seed: int) -> tuple[Array, Iterator[Frame]]:
 
 def hidden_partner(name: str, seed: int, given: argparse.Namespace) -> Array:
     """Returns the error of the hidden one of two people, (L,), m, when an occlusion of each of LENGTHS would end."""
-    tracker = find(name)(config_of(name, given.counts[0], given))
+    tracker = find(name)(config_of(name, given.counts[0], given).with_set(EVERYBODY))
     tracker.reset(Context(FPS, float("nan")), seed)
     (pos, frames), found = pair(seed), []
     last = [round((SEEN + length) * FPS) for length in LENGTHS]
@@ -197,7 +199,7 @@ def recordings(given: argparse.Namespace) -> None:
         for seed in given.seeds:
             hidden, frames = hiding_frames(q.truth, seed, q.fps)
             for name in FILTERS:
-                tracker = find(name)(config_of(name, given.counts[0], given))
+                tracker = find(name)(config_of(name, given.counts[0], given).with_set(EVERYBODY))
                 tracker.reset(Context(q.fps, places(q.truth)[1] if q.truth.pos is None else float("nan")), seed)
                 away = errors(q.truth, [tracker.step(frame, frame.detections) for frame in frames])
                 found["hidden"][name].append(float(away[hidden].mean()))

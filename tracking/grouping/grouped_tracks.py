@@ -128,7 +128,7 @@ def _grouped(table: TracksTable, named: bool, fps: float, rule: Grouping) -> tup
     if named and (table.group < 0).all():
         return table, []
     found = find_groups(table, fps, rule)
-    motion = TrackedMotion(table.motion(), fps)
+    motion = TrackedMotion(table.motion(), fps, table.measured_motion())
     group, events = label_people(table.frame, table.column, motion, found, rule)
     if not named:
         return replace(table, group=group), events

@@ -33,6 +33,7 @@ class TrackedMotion:
 
     rows: MotionRows
     fps: float  # frames per second
+    measured: MotionRows | None = None  # rows in which people are measured, not predicted; None: all rows
 
     def onset(self, a: PersonSet, b: PersonSet, t: int, *, joins: bool) -> int | None:
         """Returns the frame in which two parts came together (joins True) or parted (False), as known in frame t. a, b:
@@ -83,9 +84,9 @@ def event_of_change(
     late: True if groups are known later than their people, so that people alone who form one and were never apart
     enter.
     """
-    # a group leaves when its last two people were seen, or its last one
+    # a group leaves when its last two people were measured, or its last one: it may be predicted for longer
     if change.kind == "leave":
-        seen = motion.rows.count(change.members, t + 1)
+        seen = (motion.measured or motion.rows).count(change.members, t + 1)
         start = int(np.flatnonzero(seen >= min(seen.max(), 2))[-1])
     elif change.kind != "enter":
         joins = change.kind not in ("split", "dissolve")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,13 @@ class TracksTable:
     def motion(self) -> MotionRows:
         """Returns the rows of known position, sorted by person, then frame."""
         return MotionRows.of(self.frame, self.column, self.pos, self.vel, self.group, self.length)
+
+    def measured_motion(self) -> MotionRows:
+        """Returns the rows of `motion` in which people are measured; all rows of people who never are."""
+        if self.seen is None:
+            return self.motion()
+        known = self.seen | ~np.isin(self.column, self.column[self.seen])
+        return replace(self, pos=np.where(known[:, None], self.pos, np.nan)).motion()
 
 
 def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float) -> TracksTable:

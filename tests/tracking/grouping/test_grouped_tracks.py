@@ -175,11 +175,12 @@ def test_who_joins_as_they_come_is_no_merge():
 
 def test_a_group_waits_for_a_member_who_is_not_seen():
     there = np.ones((200, 2), bool)
-    there[50:58, 1] = there[120:, 1] = False
-    made = derive(tracks(side_by_side(), there=there), FPS)
+    there[50:58, 1] = there[140:, 1] = False
+    given = tracks(side_by_side(), there=there)
+    made = derive([t.replace(seen=(t.id == 1) | (t.index <= 120)) for t in given], FPS)
     assert made[49].group.tolist() == made[58].group.tolist() == [1, 1]
     assert made[52].group.tolist() == [-1], "a group of which one is seen is none now"
-    assert events(made) == [(131, "leave", 120, (1,), (-1,), (1, 2))]
+    assert events(made) == [(151, "leave", 120, (1,), (-1,), (1, 2))], "measured last in frame 120"
 
 
 RULES = [

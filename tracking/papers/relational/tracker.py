@@ -65,7 +65,9 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
 - deaths*: the window slows by the probability of being behind known pillars and walls, by default also people; a
   person counts as measured with more than 1/2. Paper: after a window, which may depend on occlusion. Why: nobody is
   visible there.
-- deaths, report: also below an existence; from `report_existence`. Paper: after the window; all. Why: false alarms.
+- deaths, report: also below an existence; from `report_existence`, of existence times the probability that a missed
+  person has not left, by the rates of misses and of people who leave without their partners. Paper: after the window;
+  all. Why: false alarms; who has left the view is missed, too.
 - newcomers*: half of those near join a group, by g at the distance of the nearest member. Paper: half join a group.
   Why: far groups are improbable.
 - weights: one for each person, others averaged; a missed person has the partners'. Paper: one for a particle. Why:
@@ -99,6 +101,7 @@ from tracking.papers.relational.config import (
     BODY_RADIUS,
     KERNEL_WIDTH,
     LEAST_EXISTENCE,
+    LEAVING_RATE,
     NEWCOMER_SHARE,
     RESAMPLE_SHARE,
     SPEED_PRIOR,
@@ -258,6 +261,7 @@ class Particle(PointTracker):
 
     def _report(self, frame: Frame) -> Tracks:
         mean, cov, exist = self.particles.estimates()
+        exist = exist * self._stayed()
         rows = exist >= self.config.report_existence
         self.slots.name(rows)
         self._follow(np.where(rows[:, None], mean, np.nan))
@@ -268,6 +272,14 @@ class Particle(PointTracker):
         box = boxes_at(pos, self.slots.size[rows]) if self.plane == "image" else None
         alone, seen = np.full(len(id), -1), self.slots.seen[rows]
         return Tracks(frame.index, frame.t, self.plane, "person", id, alone, pos, vel, cov, box, score, seen=seen)
+
+    def _stayed(self) -> Array:
+        c, missed = self.config, self.slots.missed
+        stayed = (1 - c.detect_prob) * np.exp((self.dt - missed) / c.hidden_time)
+        # people leave with their partners: whose partner is measured is hidden
+        alone = 1 - (self.particles.together() * (missed == 0)).max(axis=1, initial=0.0)
+        gone = LEAVING_RATE * self.dt * alone / (stayed + np.finfo(float).tiny)
+        return np.where((missed == 0) | c.certain_sensor, 1.0, 1 / (1 + gone))
 
     def _follow(self, state: Array) -> None: ...
 
