@@ -26,7 +26,6 @@ BIRTH_DENSITY = 0.003  # 1/(m^2 s): new people (ours).
 CONFIRMED, REPORTED = 0.9, 0.5
 LEAST_PRESENCE = 0.02  # Who is less probably still there, as a person or a false alarm, is removed (ours).
 SPEED_PRIOR = 1.3  # m/s: standard deviation of a new person's velocity, per axis, that of walking people (ours).
-GATE = 0.999  # Probability that a detection of a person is in the gate (ours).
 # m: s_0, prior scatter of a cluster, as of one person more, and D_0, distance of a virtual other cluster (ours).
 SCATTER, APART = 0.5, 2.0
 SIZE_MEAN, SIZE_STD = 1.0, 1.5  # mu and sigma of the prior over group sizes, people.
@@ -96,6 +95,4 @@ class JointConfig(BackgroundSettings):
         return np.array([dt / EVENT_TIME, SHARPNESS, every, SIZE_MEAN, SIZE_STD])
 
 
-# Squared Mahalanobis distance of the gate: the quantile of chi-squared with 2 degrees of freedom.
-LARGEST_DISTANCE = float(-2 * np.log1p(-GATE))
 SCALES = np.array([SCATTER, APART])  # The scales (2,) of the validity, as partition_labels_kernels has them.

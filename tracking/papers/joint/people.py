@@ -16,7 +16,7 @@ from tracking.detect.point_detections import PersonTable
 from tracking.filters import existence, kalman
 from tracking.filters.assignment import optimal
 from tracking.filters.person_streams import birth_keys
-from tracking.papers.joint.config import BIRTH_DENSITY, CLUTTER_DENSITY, LARGEST_DISTANCE, SPEED_PRIOR
+from tracking.papers.joint.config import BIRTH_DENSITY, CLUTTER_DENSITY, SPEED_PRIOR
 
 NEWCOMER_NOISE = 1.0  # Standard deviation of the acceleration of a person who is not confirmed, m/s^2.
 
@@ -32,11 +32,6 @@ class Candidates(PersonTable):
         """The probability (K,) that each person exists."""
         return np.asarray(self.states[:, : existence.FALSE].sum(axis=1))
 
-    @property
-    def presence(self) -> Array:
-        """The probability (K,) that there still is anything: a person, or what caused a false alarm."""
-        return np.asarray(self.states.sum(axis=1))
-
     def odds(self, detect_prob: float, dt: float) -> Array:
         """Returns the odds (K,) of being detected over those of being missed, by the density of detections that are
         nobody's, m^2. Times the density of a person's detections they are the odds that a detection is the person's."""
@@ -50,8 +45,7 @@ class Candidates(PersonTable):
     def weigh(self, rows: Ints, density: Array, detect_prob: float) -> None:
         """Updates existence: the people `rows` (R,) were measured, at places of `density` (R,), 1/m^2; all others were
         missed."""
-        p = np.full(len(self.states), detect_prob)
-        existence.update(self.states.T, rows, p, density / CLUTTER_DENSITY, 1.0)
+        existence.update(self.states.T, rows, np.full(len(self.states), detect_prob), density / CLUTTER_DENSITY, 1.0)
 
 
 @dataclass
@@ -78,17 +72,15 @@ class Newcomers(Candidates):
         """Predicts all filters dt s ahead, in place."""
         kalman.predict(self.bank, dt, kalman.white_acceleration(dt, np.full(2, NEWCOMER_NOISE)))
 
-    def measure(self, points: Array, sizes: Array, noise: float, detect_prob: float, dt: float) -> Bools:
-        """Updates the newcomers by the points (M, 2), m, associated with them, in place; returns bool (M,), True for
-        points left over. sizes (M, 2), px: of boxes; noise: standard deviation, m; dt: s since the last frame."""
+    def measure(self, points: Array, sizes: Array, noise: float, detect_prob: float, dt: float) -> Ints:
+        """Updates the newcomers by the points (M, 2), m, associated with them, in place; returns the rows of
+        the points left over. sizes (M, 2), px: of boxes; noise: standard deviation, m; dt: s since the last frame."""
         cov = self.bank[kalman.VAR][:, None] * np.eye(2)
         rows, columns, density = associate(self.bank[kalman.PLACE], cov, points, noise, self.odds(detect_prob, dt))
         kalman.update(self.bank, rows, points[columns], noise**2)
         self.weigh(rows, density, detect_prob)
         self.size[rows] = np.where(np.isnan(sizes[columns]), self.size[rows], sizes[columns])
-        free = np.ones(len(points), bool)
-        free[columns] = False
-        return free
+        return np.setdiff1d(np.arange(len(points)), columns)
 
     def start(self, points: Array, sizes: Array, noise: float, frame: int, dt: float) -> None:
         """Adds a person at each of the points (M, 2), m; frame: number of this frame; dt: s since the last one."""
@@ -110,15 +102,9 @@ def associate(mean: Array, cov: Array, points: Array, noise: float, odds: Array)
     """Returns rows and columns (R,) of the associated people and points, one to one, and the densities N(z; mean, S)
     (R,) of the points, 1/m^2. A pair is more probable than none, and the product of all is the largest. odds (K,): as
     `Candidates.odds`."""
-    if not len(mean) or not len(points):
-        return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
     S = cov + noise**2 * np.eye(2)
-    # d^2 is at least |error|^2 over the trace of S: most pairs need no more than that
-    square = np.square(points[:, 0] - mean[:, :1]) + np.square(points[:, 1] - mean[:, 1:])
-    k, m = np.nonzero(square <= LARGEST_DISTANCE * (1 + 1e-9) * np.trace(S, axis1=1, axis2=2)[:, None])
-    error = points[m] - mean[k]
-    d2 = np.einsum("ri,ri->r", error, np.linalg.solve(S[k], error[..., None])[..., 0])
-    log_density = np.full(square.shape, -np.inf)
-    log_density[k, m] = np.where(d2 <= LARGEST_DISTANCE, -(d2 + np.linalg.slogdet(2 * np.pi * S)[1][k]) / 2, -np.inf)
+    error = points - mean[:, None]
+    d2 = np.einsum("kmi,kij,kmj->km", error, np.linalg.inv(S), error)
+    log_density = -(d2 + np.linalg.slogdet(2 * np.pi * S)[1][:, None]) / 2
     rows, columns = optimal(-log_density - np.log(odds)[:, None], 0.0)
     return rows, columns, np.exp(log_density[rows, columns])

@@ -39,8 +39,8 @@ event_classifier.toml, which names scenes and seeds. Not fitted: N_x, N_z, Î£, Î
 
 Departures. A star marks those that stay in the preset `paper`:
 
-- association*: within a gate, one for all particles, of the largest probability; newcomers after people. Paper: given.
-  Why: detections are anonymous.
+- association*: one for all particles, of the largest probability; newcomers after people. Paper: given. Why:
+  detections are anonymous.
 - existence*: a probability, by a Markov chain in time and by measurements and misses (`detect_prob`, `hidden_time`).
   Paper: none. Why: any frame rate; misses and false alarms.
 - births*: a free detection, followed by a Kalman filter, is a person when it probably exists. Paper: not stated. Why:
@@ -166,9 +166,8 @@ class Joint(PointTracker):
         tracks = self._report(frame)
         self._resample()
         if detections is not None:
-            free = np.ones(len(points), bool)
-            free[columns] = False
-            self._keep(self.people.presence >= LEAST_PRESENCE)
+            free = np.setdiff1d(np.arange(len(points)), columns)
+            self._keep(self.people.states.sum(axis=1) >= LEAST_PRESENCE)
             self._newcomers(points[free], sizes[free])
         return tracks
 
@@ -177,8 +176,9 @@ class Joint(PointTracker):
         weights = np.full(ahead.shape[:2], 1 / len(ahead))
         mean, cov = report.moments(ahead, weights)
         spread = process_noise(c.place_noise, c.velocity_noise, self.dt)[0] * np.eye(2)
-        odds = self.people.odds(c.detect_prob, self.dt)
-        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, odds)
+        return associate(
+            mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, self.people.odds(c.detect_prob, self.dt)
+        )
 
     def _filter(self, z: Array) -> None:
         if not len(z):
@@ -212,15 +212,14 @@ class Joint(PointTracker):
         sure = new.existence >= CONFIRMED
         if sure.any():
             self._add(sure)
-        new.keep(~sure & (new.presence >= LEAST_PRESENCE))
+        new.keep(~sure & (new.states.sum(axis=1) >= LEAST_PRESENCE))
 
     def _add(self, rows: Bools) -> None:
         c, key = self.config, self.newcomers.key[rows]
         normals = self.streams.normals(BIRTHS, key, c.particles, STATE)
         if c.individuals == "measured":
             normals[:] = 0.0
-        state = self.newcomers.draw(rows, normals)
-        self.nested = n = self.nested.joined(state)
+        self.nested = n = self.nested.joined(self.newcomers.draw(rows, normals))
         self.people.add(self.newcomers, rows)
         self.belief.add(n.x.mean(axis=0))
         uniforms = self.streams.uniforms(PLACING, key, n.log_q.size, 1).reshape(*n.log_q.shape, len(key))
@@ -238,12 +237,10 @@ class Joint(PointTracker):
         shown = self.people.existence >= REPORTED
         id, group, mean, cov = id[shown], report.known_groups(self.identities, id[shown]), mean[shown], cov[shown]
         pos, vel, cov = mean[:, :2] * self.unit, mean[:, 2:] * self.unit, cov * self.unit**2
-        box = boxes_at(pos, self.people.size[shown]) if self.plane == "image" else None
-        self.shown = box
-        groups = report.no_groups(group)
+        self.shown = boxes_at(pos, self.people.size[shown]) if self.plane == "image" else None
         return Tracks(
-            frame.index, frame.t, self.plane, "person", id, group, pos, vel, cov, box, np.ones(len(id)), groups, events,
-            own_events=OWN_EVENTS,
+            frame.index, frame.t, self.plane, "person", id, group, pos, vel, cov, self.shown, np.ones(len(id)),
+            report.no_groups(group), events, own_events=OWN_EVENTS,
         )  # fmt: skip
 
     def _groups(self) -> list[Ints]:
