@@ -173,12 +173,10 @@ class Joint(PointTracker):
 
     def _associate(self, points: Array) -> tuple[Ints, Ints, Array]:
         c, ahead = self.config, moved(self.nested.x, self.dt)
-        weights = np.full(ahead.shape[:2], 1 / len(ahead))
-        mean, cov = report.moments(ahead, weights)
+        mean, cov = report.moments(ahead, np.full(ahead.shape[:2], 1 / len(ahead)))
         spread = process_noise(c.place_noise, c.velocity_noise, self.dt)[0] * np.eye(2)
-        return associate(
-            mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, self.people.odds(c.detect_prob, self.dt)
-        )
+        odds = self.people.odds(c.detect_prob, self.dt)
+        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, odds)
 
     def _filter(self, z: Array) -> None:
         if not len(z):
