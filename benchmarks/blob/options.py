@@ -29,7 +29,8 @@ from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE
 from benchmarks.support.replaced_code import Replacement, replaced_code
 from benchmarks.support.tables import head, row, signed
 from sim.io.source import open_source
-from tracking.papers.blob import existence, track_management, update_from_boxes
+from tracking.filters import existence
+from tracking.papers.blob import track_management, update_from_boxes
 from tracking.papers.blob.track_management import TrackedPeople
 from tracking.stats import mean_interval
 

@@ -207,10 +207,9 @@ class PointTracker:
 class PersonTable:
     """The tracked people of a `PointTracker`, one row each; a subclass adds columns.
 
-    missed (K,): s since the last measurement. size (K, 2): width, height of the box, px, nan if unknown. key (K,): of
-    the random streams, made of the first measurement."""
+    size (K, 2): width, height of the box, px, nan if unknown. key (K,): of the random streams, made of the first
+    measurement."""
 
-    missed: Array = field(default_factory=lambda: np.zeros(0))
     size: Array = field(default_factory=lambda: np.zeros((0, 2)))
     key: Keys = field(default_factory=lambda: np.zeros(0, np.uint64))
 
@@ -221,7 +220,7 @@ class PersonTable:
                 setattr(self, name, column[:, rows] if column.ndim == 3 else column[rows])
 
     def extend(self, **columns: Any) -> None:
-        """Adds people who were measured just now, with their values in all columns but `missed`."""
-        for name, new in {"missed": np.zeros(len(columns["key"])), **columns}.items():
+        """Adds people with their values in all columns."""
+        for name, new in columns.items():
             old = getattr(self, name)
             setattr(self, name, np.concatenate([old, new], axis=1 if old.ndim == 3 else 0))

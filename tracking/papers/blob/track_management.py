@@ -25,8 +25,8 @@ import numpy as np
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Context, Ints
 from tracking.detect.person_size import upright
-from tracking.filters import assignment, kalman, track_uncertainty
-from tracking.papers.blob import box_geometry, existence, person_look_kernels
+from tracking.filters import assignment, existence, kalman, track_uncertainty
+from tracking.papers.blob import box_geometry, person_look_kernels
 from tracking.papers.blob.config import BlobConfig
 
 # Relative margin of rho, with which deletion comes earlier, so that filters near their steady state count as in it.

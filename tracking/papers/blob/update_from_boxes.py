@@ -11,9 +11,9 @@ import numpy as np
 
 from sim.types import Array, Detections, Frame, Ints
 from tracking.filters import kalman
+from tracking.filters.existence import ScoreCalibration
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
-from tracking.papers.blob.existence import ScoreCalibration
 from tracking.papers.blob.track_management import LEAST_EXISTENCE, TrackedPeople
 from tracking.running import image_scale
 

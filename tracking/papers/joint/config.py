@@ -20,8 +20,12 @@ from tracking.detect.background_settings import BackgroundSettings
 FITTED: dict[str, list[float]] = tomllib.loads(
     Path(__file__).with_name("event_classifier.toml").read_text(encoding="utf-8")
 )["params"]
+CLUTTER_DENSITY = 0.002  # 1/m^2: false alarms per frame (ours).
+BIRTH_DENSITY = 0.003  # 1/(m^2 s): new people (ours).
+# Existence probabilities from which a new person is tracked, and a tracked one reported (ours).
+CONFIRMED, REPORTED = 0.9, 0.5
+LEAST_PRESENCE = 0.02  # Who is less probably still there, as a person or a false alarm, is removed (ours).
 SPEED_PRIOR = 1.3  # m/s: standard deviation of a new person's velocity, per axis, that of walking people (ours).
-GATE = 0.999  # Probability that a detection of a person is in the gate (ours).
 # m: s_0, prior scatter of a cluster, as of one person more, and D_0, distance of a virtual other cluster (ours).
 SCATTER, APART = 0.5, 2.0
 SIZE_MEAN, SIZE_STD = 1.0, 1.5  # mu and sigma of the prior over group sizes, people.
@@ -67,10 +71,10 @@ class JointConfig(BackgroundSettings):
         "log p(Z | X) is this times the beliefs of the pairs in one group, per second; 0: by the validity (ours)")
     belief_memory: float = param(0.2, (0.0, 2.0), "share",
         "of the belief's `stay` for people reported in one group, and of its `come` for others (ours)")
-    confirm_time: float = param(0.3, (0.0, 3.0), "s",
-        "a new person is tracked so long after the first measurement, or given up so long after the last (ours)")
-    coast_time: float = param(1.0, (0.1, 10.0), "s",
-        "people are removed who are missed for longer, in a group all together (ours)", "log")
+    detect_prob: float = param(0.9, (0.1, 0.999), "probability",
+        "a person who can be detected is detected in a frame (ours)")
+    hidden_time: float = param(0.5, (0.05, 10.0), "s",
+        "mean time in which a person cannot be detected (ours)", "log")
     # fmt: on
     merge_weights: tuple[float, ...] = _weights("merge")
     split_weights: tuple[float, ...] = _weights("split")
@@ -91,6 +95,4 @@ class JointConfig(BackgroundSettings):
         return np.array([dt / EVENT_TIME, SHARPNESS, every, SIZE_MEAN, SIZE_STD])
 
 
-# Squared Mahalanobis distance of the gate: the quantile of chi-squared with 2 degrees of freedom.
-LARGEST_DISTANCE = float(-2 * np.log1p(-GATE))
 SCALES = np.array([SCATTER, APART])  # The scales (2,) of the validity, as partition_labels_kernels has them.

@@ -1,8 +1,8 @@
 """Who is tracked: detections are associated with people, new people are started and lost ones removed (all ours).
 
 The paper does not say how individuals start, end or get their detections. One association serves all particles: that
-of least total cost with the means over particles. A new person is followed by a Kalman filter until confirmed, and then
-drawn into the particles from its posterior.
+of the largest probability with the means over particles. A new person is followed by a Kalman filter until it probably
+exists, and then drawn into the particles from its posterior.
 """
 
 from __future__ import annotations
@@ -12,71 +12,81 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.detect.point_detections import PersonTable, followed_sizes
-from tracking.filters import kalman
+from tracking.detect.point_detections import PersonTable
+from tracking.filters import existence, kalman
 from tracking.filters.assignment import optimal
-from tracking.filters.person_streams import Keys, birth_keys
+from tracking.filters.person_streams import birth_keys
+from tracking.papers.joint.config import BIRTH_DENSITY, CLUTTER_DENSITY, SPEED_PRIOR
 
 NEWCOMER_NOISE = 1.0  # Standard deviation of the acceleration of a person who is not confirmed, m/s^2.
 
 
 @dataclass
-class People(PersonTable):
+class Candidates(PersonTable):
+    """People who may exist. states (K, 3): probabilities of existence.SHOWN and the following, by person."""
+
+    states: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @property
+    def existence(self) -> Array:
+        """The probability (K,) that each person exists."""
+        return np.asarray(self.states[:, : existence.FALSE].sum(axis=1))
+
+    def odds(self, detect_prob: float, dt: float) -> Array:
+        """Returns the odds (K,) of being detected over those of being missed, by the density of detections that are
+        nobody's, m^2. Times the density of a person's detections they are the odds that a detection is the person's."""
+        p = detect_prob * self.states[:, [existence.SHOWN, existence.FALSE]].sum(axis=1)
+        return np.asarray(p / (1 - p) / (CLUTTER_DENSITY + BIRTH_DENSITY * dt))
+
+    def pass_time(self, change: Array) -> None:
+        """Predicts existence by a step's matrix (3, 3), as `existence.transition` has it."""
+        self.states = self.states @ change.T
+
+    def weigh(self, rows: Ints, density: Array, detect_prob: float) -> None:
+        """Updates existence: the people `rows` (R,) were measured, at places of `density` (R,), 1/m^2; all others were
+        missed."""
+        existence.update(self.states.T, rows, np.full(len(self.states), detect_prob), density / CLUTTER_DENSITY, 1.0)
+
+
+@dataclass
+class People(Candidates):
     """The K tracked people. id (K,): of the track. next_id: the next new id."""
 
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     next_id: int = 1
 
-    def add(self, size: Array, key: Keys) -> None:
-        """Adds people; size (M, 2): of their boxes, px, nan if unknown; key (M,)."""
-        self.extend(id=self.next_id + np.arange(len(size)), size=size, key=key)
-        self.next_id += len(size)
-
-    def record(self, rows: Ints, sizes: Array, dt: float) -> None:
-        """Records that the people `rows` (R,) were measured in a frame, with boxes of `sizes` (R, 2), px, and that all
-        others were missed for dt s more."""
-        self.missed += dt
-        self.missed[rows] = 0.0
-        self.size[rows] = followed_sizes(self.size[rows], sizes, dt)
-
-    def absence(self, group: Ints) -> Array:
-        """Returns for how long each person has been missed, s, (K,); in a group of whom nobody was measured, the sum
-        over its members."""
-        same = ((group[:, None] == group) & (group >= 0)) | np.eye(len(group), dtype=bool)
-        measured = (same & (self.missed == 0)).any(axis=1)
-        return np.where(measured, self.missed, same @ self.missed)
+    def add(self, new: Newcomers, rows: Bools) -> None:
+        """Adds the newcomers `rows` (M,)."""
+        ids = self.next_id + np.arange(rows.sum())
+        self.extend(id=ids, states=new.states[rows], size=new.size[rows], key=new.key[rows])
+        self.next_id += len(ids)
 
 
 @dataclass
-class Newcomers(PersonTable):
-    """People who are not confirmed yet. `missed` does not grow in frames in which nobody could be measured. bank (5, M,
-    2): a Kalman filter of x, y, m, for each. age (M,): s since the first measurement."""
+class Newcomers(Candidates):
+    """People who are not confirmed yet. bank (5, M, 2): a Kalman filter of x, y, m, for each."""
 
     bank: Array = field(default_factory=lambda: np.zeros((5, 0, 2)))
-    age: Array = field(default_factory=lambda: np.zeros(0))
 
     def predict(self, dt: float) -> None:
-        """Predicts all filters dt s ahead, in place, and adds dt to the ages."""
+        """Predicts all filters dt s ahead, in place."""
         kalman.predict(self.bank, dt, kalman.white_acceleration(dt, np.full(2, NEWCOMER_NOISE)))
-        self.age += dt
 
-    def measure(self, points: Array, sizes: Array, noise: float, gate: float) -> Bools:
-        """Updates the newcomers by the points (M, 2), m, associated with them, in place; returns bool (M,), True for
-        points left over. sizes (M, 2), px: of boxes; noise: standard deviation, m; gate: largest d^2."""
-        d2 = kalman.distances(self.bank, points, noise**2)
-        rows, columns = optimal(np.where(d2 <= gate, d2, np.inf), 2 * gate)
+    def measure(self, points: Array, sizes: Array, noise: float, detect_prob: float, dt: float) -> Ints:
+        """Updates the newcomers by the points (M, 2), m, associated with them, in place; returns the rows of
+        the points left over. sizes (M, 2), px: of boxes; noise: standard deviation, m; dt: s since the last frame."""
+        cov = self.bank[kalman.VAR][:, None] * np.eye(2)
+        rows, columns, density = associate(self.bank[kalman.PLACE], cov, points, noise, self.odds(detect_prob, dt))
         kalman.update(self.bank, rows, points[columns], noise**2)
-        self.missed[rows] = 0.0
+        self.weigh(rows, density, detect_prob)
         self.size[rows] = np.where(np.isnan(sizes[columns]), self.size[rows], sizes[columns])
-        free = np.ones(len(points), bool)
-        free[columns] = False
-        return free
+        return np.setdiff1d(np.arange(len(points)), columns)
 
-    def start(self, points: Array, sizes: Array, noise: float, speed: float, frame: int) -> None:
-        """Adds a person at each of the points (M, 2), m; speed: standard deviation of the velocity per axis, m/s;
-        frame: number of this frame."""
-        bank, age = kalman.born(points, noise**2, speed**2), np.zeros(len(points))
-        self.extend(bank=bank, age=age, size=sizes, key=birth_keys(points, frame))
+    def start(self, points: Array, sizes: Array, noise: float, frame: int, dt: float) -> None:
+        """Adds a person at each of the points (M, 2), m; frame: number of this frame; dt: s since the last one."""
+        bank, person = kalman.born(points, noise**2, SPEED_PRIOR**2), BIRTH_DENSITY * dt
+        states = existence.newborn(np.full(len(points), person / (person + CLUTTER_DENSITY))).T
+        self.extend(bank=bank, states=states, size=sizes, key=birth_keys(points, frame))
 
     def draw(self, rows: Bools, normals: Array) -> Array:
         """Returns states (N, R, 4) drawn from the posteriors of the R people `rows`; normals (N, R, 4)."""
@@ -88,18 +98,13 @@ class Newcomers(PersonTable):
         return np.concatenate([place + a * u, rate + b * u + c * v], axis=-1)
 
 
-def associate(mean: Array, cov: Array, points: Array, noise: float, gate: float) -> tuple[Ints, Ints]:
-    """Returns rows and columns (R,) of the associated people and points: least total of d^2 + ln |S| (one to one)."""
-    if not len(mean) or not len(points):
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+def associate(mean: Array, cov: Array, points: Array, noise: float, odds: Array) -> tuple[Ints, Ints, Array]:
+    """Returns rows and columns (R,) of the associated people and points, one to one, and the densities N(z; mean, S)
+    (R,) of the points, 1/m^2. A pair is more probable than none, and the product of all is the largest. odds (K,): as
+    `Candidates.odds`."""
     S = cov + noise**2 * np.eye(2)
-    # d^2 is at least |error|^2 over the trace of S: most pairs need no more than that
-    square = np.square(points[:, 0] - mean[:, :1]) + np.square(points[:, 1] - mean[:, 1:])
-    k, m = np.nonzero(square <= gate * (1 + 1e-9) * np.trace(S, axis1=1, axis2=2)[:, None])
-    error = points[m] - mean[k]
-    d2 = np.einsum("ri,ri->r", error, np.linalg.solve(S[k], error[..., None])[..., 0])
-    log_det = np.linalg.slogdet(S)[1]
-    log_det = log_det - log_det.min()
-    cost = np.full(square.shape, np.inf)
-    cost[k, m] = np.where(d2 <= gate, d2 + log_det[k], np.inf)
-    return optimal(cost, gate + float(log_det.max()) + 1e-9)
+    error = points - mean[:, None]
+    d2 = np.einsum("kmi,kij,kmj->km", error, np.linalg.inv(S), error)
+    log_density = -(d2 + np.linalg.slogdet(2 * np.pi * S)[1][:, None]) / 2
+    rows, columns = optimal(-log_density - np.log(odds)[:, None], 0.0)
+    return rows, columns, np.exp(log_density[rows, columns])

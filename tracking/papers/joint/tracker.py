@@ -32,19 +32,21 @@ Readings, where the paper is silent or contradicts itself:
 - |e| is n + n' after Merge, n after None, n / 2 after Split.
 - In Fig. 3 a group is named by its least member; so people who are mostly together can be separated.
 - The first partition of a person is drawn by the validity: the person is alone or joins the nearest group.
-- Velocities at the start are those of a Kalman filter over `confirm_time`; those of DEEPER-JIGT.2 are of the last step.
+- Velocities at the start are those of a Kalman filter of the new person; those of DEEPER-JIGT.2 are of the last step.
 
-Fitted, as the paper leaves them open: `confirm_time` and λ_cl on friends-meet, training seeds 0:2;
+Fitted, as the paper leaves it open: λ_cl on friends-meet, training seeds 0:2;
 event_classifier.toml, which names scenes and seeds. Not fitted: N_x, N_z, Σ, λ_y, α.
 
 Departures. A star marks those that stay in the preset `paper`:
 
-- association*: within a gate, one for all particles, least sum of d² + ln |S|; newcomers after people. Paper: given.
-  Why: detections are anonymous.
-- births*: a free detection, followed by a Kalman filter, is a person after `confirm_time`. Paper: not stated. Why:
+- association*: one for all particles, of the largest probability; newcomers after people. Paper: given. Why:
+  detections are anonymous.
+- existence*: a probability, by a Markov chain in time and by measurements and misses (`detect_prob`, `hidden_time`).
+  Paper: none. Why: any frame rate; misses and false alarms.
+- births*: a free detection, followed by a Kalman filter, is a person when it probably exists. Paper: not stated. Why:
   false alarms.
-- losses*: removed after `coast_time`; in an unseen group times are summed. Paper: restarted from the truth. Why: no
-  truth; a group that nobody sees has left.
+- losses*: removed when it probably no longer exists, and unreported before. Paper: restarted from the truth. Why: no
+  truth.
 - p(y | x)*: normal about the place; 1 if missed. Paper: colour templates. Why: input is points.
 - pixels*: each blob one detection (`pixel_noise`). Paper: boxes. Why: no detector.
 - proposal*: mixture for each person, the dynamics alone if missed. Paper: mixture of products. Why: people differ.
@@ -91,12 +93,13 @@ import numpy as np
 
 from sim.truth.group_ids_and_changes import Identities
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
-from tracking.detect.point_detections import PointTracker, boxes_at
+from tracking.detect.point_detections import PointTracker, boxes_at, followed_sizes
+from tracking.filters import existence
 from tracking.filters.person_streams import NOBODY, PersonStreams
 from tracking.grouping.belief import EVENTS, default_belief
 from tracking.grouping.pair_belief import PairBelief
 from tracking.papers.joint import decentralised_filter, report
-from tracking.papers.joint.config import LARGEST_DISTANCE, SCALES, SHARPNESS, SPEED_PRIOR, JointConfig
+from tracking.papers.joint.config import CONFIRMED, LEAST_PRESENCE, REPORTED, SCALES, SHARPNESS, JointConfig
 from tracking.papers.joint.decentralised_filter import Nested
 from tracking.papers.joint.distributions import (
     BIRTHS,
@@ -149,27 +152,31 @@ class Joint(PointTracker):
         detections = self.detected(frame, detections, self.shown)
         self.streams.frame += 1
         points, sizes = (np.zeros((0, 2)),) * 2 if detections is None else self.points(detections)
-        rows, columns = self._associate(points)
+        change = existence.transition(self.dt, self.config.hidden_time)
+        self.people.pass_time(change)
+        self.newcomers.pass_time(change)
+        self.newcomers.predict(self.dt)
+        rows, columns, density = self._associate(points)
         z = np.full((len(self.people.id), 2), np.nan)
         z[rows] = points[columns]
+        if detections is not None:
+            self.people.weigh(rows, density, self.config.detect_prob)
+            self.people.size[rows] = followed_sizes(self.people.size[rows], sizes[columns], self.dt)
         self._filter(z)
         tracks = self._report(frame)
         self._resample()
-        self.newcomers.predict(self.dt)
         if detections is not None:
-            free = np.ones(len(points), bool)
-            free[columns] = False
-            self.people.record(rows, sizes[columns], self.dt)
-            self._keep(self.people.absence(tracks.group) <= self.config.coast_time + 1e-9)
+            free = np.setdiff1d(np.arange(len(points)), columns)
+            self._keep(self.people.states.sum(axis=1) >= LEAST_PRESENCE)
             self._newcomers(points[free], sizes[free])
         return tracks
 
-    def _associate(self, points: Array) -> tuple[Ints, Ints]:
+    def _associate(self, points: Array) -> tuple[Ints, Ints, Array]:
         c, ahead = self.config, moved(self.nested.x, self.dt)
-        weights = np.full(ahead.shape[:2], 1 / len(ahead))
-        mean, cov = report.moments(ahead, weights)
+        mean, cov = report.moments(ahead, np.full(ahead.shape[:2], 1 / len(ahead)))
         spread = process_noise(c.place_noise, c.velocity_noise, self.dt)[0] * np.eye(2)
-        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, LARGEST_DISTANCE)
+        odds = self.people.odds(c.detect_prob, self.dt)
+        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, odds)
 
     def _filter(self, z: Array) -> None:
         if not len(z):
@@ -197,23 +204,21 @@ class Joint(PointTracker):
         self.belief.keep(rows)
 
     def _newcomers(self, points: Array, sizes: Array) -> None:
-        c, new, frame = self.config, self.newcomers, self.streams.frame
-        new.missed += self.dt
-        free = new.measure(points, sizes, self.noise, LARGEST_DISTANCE)
-        new.start(points[free], sizes[free], self.noise, SPEED_PRIOR, frame)
-        sure = (new.age >= c.confirm_time - 1e-9) & (new.missed == 0)
+        new = self.newcomers
+        free = new.measure(points, sizes, self.noise, self.config.detect_prob, self.dt)
+        new.start(points[free], sizes[free], self.noise, self.streams.frame, self.dt)
+        sure = new.existence >= CONFIRMED
         if sure.any():
             self._add(sure)
-        new.keep(~sure & (new.missed <= c.confirm_time + 1e-9))
+        new.keep(~sure & (new.states.sum(axis=1) >= LEAST_PRESENCE))
 
     def _add(self, rows: Bools) -> None:
         c, key = self.config, self.newcomers.key[rows]
         normals = self.streams.normals(BIRTHS, key, c.particles, STATE)
         if c.individuals == "measured":
             normals[:] = 0.0
-        state = self.newcomers.draw(rows, normals)
-        self.nested = n = self.nested.joined(state)
-        self.people.add(self.newcomers.size[rows], key)
+        self.nested = n = self.nested.joined(self.newcomers.draw(rows, normals))
+        self.people.add(self.newcomers, rows)
         self.belief.add(n.x.mean(axis=0))
         uniforms = self.streams.uniforms(PLACING, key, n.log_q.size, 1).reshape(*n.log_q.shape, len(key))
         place_newcomers(n.x, n.z, uniforms, SHARPNESS, SCALES)
@@ -221,21 +226,19 @@ class Joint(PointTracker):
     def _report(self, frame: Frame) -> Tracks:
         n, c, id = self.nested, self.config, self.people.id
         mean, cov = report.moments(n.x, n.component_weights(c.own_weights))
-        pos, vel = mean[:, :2] * self.unit, mean[:, 2:] * self.unit
-        box = boxes_at(pos, self.people.size) if self.plane == "image" else None
-        self.shown = box
         old = self.identities.groups
         parts = [frozenset(id[rows].tolist()) for rows in self._groups()]
         changes = self.identities.step(frame.index, frozenset(id.tolist()), parts)
         self.belief.see(mean[:, :2])
         self.events.add(id, mean[:, :2])
         events = self.events.events(changes, old, self.identities.groups, self.belief.log_odds, self.unit)
-        group = report.known_groups(self.identities, id)
-        groups = report.no_groups(group)
-        score, cov = np.ones(len(id)), cov * self.unit**2
+        shown = self.people.existence >= REPORTED
+        id, group, mean, cov = id[shown], report.known_groups(self.identities, id[shown]), mean[shown], cov[shown]
+        pos, vel, cov = mean[:, :2] * self.unit, mean[:, 2:] * self.unit, cov * self.unit**2
+        self.shown = boxes_at(pos, self.people.size[shown]) if self.plane == "image" else None
         return Tracks(
-            frame.index, frame.t, self.plane, "person", id.copy(), group, pos, vel, cov, box, score, groups, events,
-            own_events=OWN_EVENTS,
+            frame.index, frame.t, self.plane, "person", id, group, pos, vel, cov, self.shown, np.ones(len(id)),
+            report.no_groups(group), events, own_events=OWN_EVENTS,
         )  # fmt: skip
 
     def _groups(self) -> list[Ints]:

@@ -124,6 +124,7 @@ class Slots(PersonTable):
     person could have been seen, s. seen (K,): True if measured in this frame. next_id: the next new id.
     """
 
+    missed: Array = field(default_factory=lambda: np.zeros(0))
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     seen: Bools = field(default_factory=lambda: np.zeros(0, bool))
     next_id: int = 1
@@ -247,7 +248,8 @@ class Particle(PointTracker):
         draws = self.streams.normals(BIRTHS, key, 2 * p.count, 2).reshape(2, p.count, len(points), 2)
         exist = c.birth_rate * self.dt / (c.birth_rate * self.dt + c.clutter_density)
         p.add(points + self.noise * draws[0], SPEED_PRIOR * draws[1], exist)
-        self.slots.extend(id=np.full(len(key), -1), seen=np.ones(len(key), bool), size=sizes, key=key)
+        missed, unnamed, seen = np.zeros(len(key)), np.full(len(key), -1), np.ones(len(key), bool)
+        self.slots.extend(missed=missed, id=unnamed, seen=seen, size=sizes, key=key)
         self._relate_newcomers(points)
 
     def _uniforms(self, people: Ints) -> Array:

@@ -9,7 +9,7 @@ from scenarios.errors import InputError
 from sim.types import Context, Detections, Frame, Scene, Stairs
 from tests.painted import ids
 from tests.reference_sense import above, pinhole
-from tracking.papers.blob import existence
+from tracking.filters import existence
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
 

@@ -7,7 +7,7 @@ import pytest
 
 from sim.types import Context, Frame
 from tests.point_frames import FPS, detections, stepped
-from tracking.papers.joint.config import LARGEST_DISTANCE, JointConfig
+from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.distributions import process_noise
 from tracking.papers.joint.tracker import Joint
 from tracking.stats import paired
@@ -27,14 +27,14 @@ def walk(starts, velocity, frames, noise=0.0, seed=0):
 
 def kalman(tracker, points, config):
     """The exact means of x and y of one person, from the newcomer's posterior on: Sigma of eq. 3, noise of a point."""
-    frames = int(np.ceil(config.confirm_time * FPS - 1e-9)) + 1
-    bank = Joint(config)
-    bank.reset(Context(FPS, float("nan")), 0)
+    frames = [len(t.id) for t in stepped(Joint(), [[p] for p in points])].index(1)
+    tracker.reset(Context(FPS, float("nan")), 0)
     for k in range(1, frames):
-        bank.step(Frame(k, (k - 1) / FPS), detections(k, [points[k - 1]]))
-    new = bank.newcomers
+        tracker.step(Frame(k, (k - 1) / FPS), detections(k, [points[k - 1]]))
+    new = tracker.newcomers
     new.predict(1 / FPS)
-    new.measure(np.array([points[frames - 1]]), np.full((1, 2), np.nan), config.point_noise, LARGEST_DISTANCE)
+    z = np.array([points[frames - 1]])
+    new.measure(z, np.full(z.shape, np.nan), config.point_noise, config.detect_prob, 1 / FPS)
     place, rate, var, cross, rate_var = new.bank[:, 0]
     x, P = np.concatenate([place, rate]), np.kron([[var[0], cross[0]], [cross[0], rate_var[0]]], np.eye(2))
     A, H = np.eye(4) + np.eye(4, k=2) / FPS, np.eye(4)[:2]
@@ -117,12 +117,12 @@ def test_parting_people_split():
     assert (tracks[-1].group < 0).all()
 
 
-def test_a_person_who_is_missed_goes_on_and_is_removed():
-    points = walk([[0, 0]], [1.0, 0.0], 20)
-    gone = [[]] * 15
-    tracks = stepped(Joint(), points + gone)
-    assert [len(t.id) for t in tracks[-15:]] == [1] * 11 + [0] * 4
-    assert tracks[29].pos[0, 0] == pytest.approx(2.9, abs=0.4)
+@pytest.mark.parametrize("fps", [5, 20])
+def test_a_person_who_is_missed_goes_on_and_is_removed_after_a_time(fps):
+    tracks = stepped(tracker := Joint(), walk([[0, 0]], [FPS / fps, 0.0], 2 * fps) + [[]] * (4 * fps), fps=fps)
+    assert [t.t for t in tracks if len(t.id)][-1] == pytest.approx(3.1, abs=0.2)
+    assert tracks[3 * fps].pos[0, 0] == pytest.approx(3.0, abs=0.6)
+    assert not len(tracker.people.id)
 
 
 def test_a_member_who_is_missed_stays_in_the_group():

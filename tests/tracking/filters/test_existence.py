@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.papers.blob import existence
-from tracking.papers.blob.existence import ScoreCalibration
+from tracking.filters import existence
+from tracking.filters.existence import ScoreCalibration
 
 NONE = np.zeros(0, np.int64)
 
