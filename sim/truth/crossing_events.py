@@ -50,12 +50,14 @@ def encounters(motion: MotionRows, fps: float) -> list[tuple[int, int, int, int]
     rows, start = member_rows(t, motion.column, label)
     if not len(start):
         return []
-    frame, name, width = t[rows][start], label[rows][start], int(label.max()) + 1
+    frame = t[rows][start]
+    names, name = np.unique(label[rows][start], return_inverse=True)  # ids may be too large for their products
     i, j = _within_reach(frame, motion.pos[rows], start)
-    pair, when = name[i] * width + name[j], frame[i]  # sorted by group within a frame: name[i] < name[j]
+    pair, when = name[i] * len(names) + name[j], frame[i]  # sorted by group within a frame: name[i] < name[j]
     order = np.lexsort((when, pair))
     pair, first, last = stretches(pair[order], when[order], 1, frames_of(BRIDGE_TIME, fps))
-    return sorted(zip(*(x.tolist() for x in (first, last, pair // width, pair % width)), strict=True))
+    ids = (names[k] for k in divmod(pair, len(names)))
+    return sorted(zip(*(x.tolist() for x in (first, last, *ids)), strict=True))
 
 
 def _within_reach(t: Ints, places: Array, start: Ints) -> tuple[Ints, Ints]:

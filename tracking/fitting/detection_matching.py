@@ -74,7 +74,8 @@ def match_sequence(sequence: Sequence) -> MatchedRecording:
             raise InputError(file=file, got=got, expected=expected, remedy=remedy)
     assert truth is not None
     made = match_detections(*_annotated(truth, found), sequence.image_size, sequence.camera)
-    shifted = shifted_boxes(made.truth, made.frame[~made.false], made.box[~made.false])
+    row = made.owner[~made.false]  # its frame is that of the recording, also where annotated frames are renumbered
+    shifted = shifted_boxes(truth, truth.frame[row], made.box[~made.false])
     if shifted:
         warnings.warn(f"{file}: {shifted}", stacklevel=2)
     return made

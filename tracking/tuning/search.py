@@ -218,8 +218,8 @@ def require_optuna(place: str) -> None:
 
 
 def _checked_target(out: Path, candidates: int) -> Path:
-    """Returns `out` if neither it nor a file beside it that `TuningResult.write` writes is somebody else's. candidates:
-    the most candidates of a front."""
+    """Returns `out` if neither it nor the figures and the front beside it are somebody else's. candidates: the most
+    candidates of a front."""
     refuse_foreign_file(output_file(out, ".toml").with_suffix(".json"), RESULT_MARKS)
     for k in range(1, candidates + 1):
         refuse_foreign_file(out.with_suffix(f".front-{k}.toml"))

@@ -148,7 +148,8 @@ class TextRows:
                 got, expected = f"{len(cells)} columns", f"{width} columns, as in the first line"
                 got, expected = (bad[0], "a number") if bad else (got, expected)
                 remedy = f"remove the lines that begin with #, and {NAME_THEM}" if line.startswith("#") else CORRECT
-                if bad and is_number_text(bad[0].strip("'").replace(",", ".")):
+                parts = line.split(";" if ";" in line else None)  # whatever the separator was taken to be
+                if bad and any("," in part and is_number_text(part.replace(",", ".")) for part in parts):
                     remedy = "write decimals with a point"
                 return InputError(file=self.file, place=f"line {number}", got=got, expected=expected, remedy=remedy)
         return InputError(file=self.file, got="unreadable numbers", expected="rows of numbers", remedy="check the file")

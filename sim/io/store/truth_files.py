@@ -92,7 +92,8 @@ def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
     """Returns a MOTChallenge text: of each row frame, id, box and the cells `rest`; an unknown box is -1,-1,-1,-1."""
     lines = []
     # rows of arrays: lists of all their numbers would need more memory than the text
-    for f, i, (left, top, width, height), boxed, end in zip(frame, id, box, has_box(box), rest, strict=True):
+    for f, i, row, boxed, end in zip(frame, id, box, has_box(box), rest, strict=True):
+        left, top, width, height = row.tolist()
         corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed else "-1,-1,-1,-1"
         lines.append(f"{f},{i},{corner},{end}\n")
     return "".join(lines).encode()
@@ -101,10 +102,10 @@ def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
 def score_and_place(score: Array, place: Array | None) -> Iterator[str]:
     """Yields the cells conf, x, y, z of R MOT lines. place (R, 3): positions in m, nan or None if unknown."""
     places = np.full((len(score), 3), np.nan) if place is None else place
-    return (f"{s:.4f},{_cells(xyz)}" for s, xyz in zip(score, places, strict=True))
+    return (f"{s:.4f},{_cells(xyz.tolist())}" for s, xyz in zip(score, places, strict=True))
 
 
-def _cells(xyz: Array) -> str:
+def _cells(xyz: list[float]) -> str:
     if not all(map(math.isfinite, xyz)):
         return "-1,-1,-1"
     x, y, z = (f"{v:.3f}" for v in xyz)

@@ -112,10 +112,12 @@ def test_detections_in_frames_without_labels_are_no_false_alarms() -> None:
     assert 0.5 < got.false.sum() / got.truth.length < 1.5
 
 
-def test_detections_of_other_frames_are_told() -> None:
+@pytest.mark.parametrize("step", [1, 5])
+def test_detections_of_other_frames_are_told(step: int) -> None:
     scene = simulate(load("street"), 30_000, streams=())
-    late = scene.truth.replace(frame=scene.truth.frame + 1, length=scene.length + 1, labelled=None)
-    with pytest.warns(UserWarning, match=r"with \+1 on their frame numbers the detections have"):
+    some = with_rows(scene.truth, scene.truth.frame % step == 0, visible_box=None)
+    late = some.replace(frame=some.frame + step, length=scene.length + step, labelled=None)
+    with pytest.warns(UserWarning, match=rf"with \+{step} on their frame numbers the detections have"):
         matching.match_sequence(replace(scene, load_truth=lambda: late))
 
 

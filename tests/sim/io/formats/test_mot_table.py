@@ -65,7 +65,8 @@ def test_columns_without_a_name_are_not_used(tmp_path, header, row):
 
 
 UNCLEAR = {
-    "1;7;10,5;20,5;30,5;40,5\n": "line 1: got '10,5'; expected a number",
+    "1;7;10,5;20,5;30,5;40,5\n": "line 1: got '10,5'; expected a number; write decimals with a point",
+    "1\t7\t10,5\t20,5\t30,5\t40,5\n": "line 1: .* write decimals with a point",
     "<html>\n": "line 1: got columns <html>",
     "frame,id,u,v,w,h\n1,1,2,3,4,5\n": "line 1: got columns frame,id,u,v,w,h; expected frame ",
     "time,id,x,y,w,h\n1,1,2,3,4,5\n": "line 1: got columns time,id,x,y,w,h; expected frame .*time × frames per second",
