@@ -45,8 +45,12 @@ class TrackedMotion:
         first = max(0, t + 1 - frames_of(SEARCHED, self.fps))
         pos, vel, _ = self.rows.window([*sorted(a), *sorted(b)], first, t + 1)
         found = separation(pos, vel, *np.split(np.arange(len(a) + len(b)), [len(a)]))
-        near = self._lasting(found.distance < MERGE_DISTANCE)
-        rules = [self._lasting(holds) for holds in (found.split_rule(), found.merge_rule())]
+        there, apart = np.isfinite(found.distance), found.split_rule()
+        # people more than 1.5 m apart may be in one group, too
+        together = found.merge_rule() if joins else there & ~apart
+        # while a part is hidden, what was seen last still holds
+        seen = np.maximum.accumulate(np.where(there, np.arange(len(pos)), 0))
+        near, *rules = (self._lasting(holds[seen]) for holds in (found.distance < MERGE_DISTANCE, apart, together))
         before, after = rules if joins else rules[::-1]
         if not before.any():
             return None

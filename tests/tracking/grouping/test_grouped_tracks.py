@@ -113,13 +113,13 @@ def test_who_was_never_apart_does_not_merge(apart, told):
     assert made[-1].group.tolist() == [1, 1, 1], "the groups know it all the same"
 
 
-@pytest.mark.parametrize(("together", "told"), [(0, []), (2, ["dissolve"])])
-def test_who_was_together_by_mistake_parts_without_an_event(together, told):
-    """Two who part at 0.7 m/s, at once, or after 2 s side by side: both are linked at first."""
-    parting = [paced((12, (1, 0))), paced((together, (1, 0)), (12 - together, (1, 0.7)), start=(0, 0.7))]
-    made = derive(tracks(parting), FPS)
-    assert made[0].group.tolist() == [1, 1]
-    assert [e[1] for e in events(made)] == told
+@pytest.mark.parametrize(("gap", "together", "hidden"), [(0.7, 0, 0), (0.7, 2, 0), (1.7, 8, 0), (0.7, 2, 9)])
+def test_who_was_together_by_mistake_parts_without_an_event(gap, together, hidden):
+    """Two who part at 0.7 m/s, at once, or after some time side by side, one at times hidden for 0.9 s."""
+    parting = [paced((16, (1, 0))), paced((together, (1, 0)), (16 - together, (1, 0.7)), start=(0, gap))]
+    made = derive(tracks(parting, there=np.arange(160)[:, None] % 20 >= [0, hidden]), FPS)
+    assert max(len(set(t.group.tolist())) < len(t.group) for t in made[:30])
+    assert [e[1] for e in events(made)] == ["dissolve"] * (together > 0)
 
 
 def test_the_ends_of_a_chain_part_when_its_middle_leaves():

@@ -229,6 +229,8 @@ def displacement(before: Array, after: Array, reach: float) -> Array:
 
     A place is there, too, if it and one after are each other's nearest, at most `reach` apart; all in one unit.
     """
+    if not len(before):
+        return np.zeros(2)
     d2 = np.square(after[:, None] - before).sum(2)
     nearest, here = d2.argmin(1), np.arange(len(after))
     same = (d2.argmin(0)[nearest] == here) & (d2[here, nearest] <= reach**2)
