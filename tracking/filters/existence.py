@@ -1,9 +1,9 @@
 """The existence probability of a track, and what a detector's score says of it (ours).
 
-A track began with one box. That box, and the track with it, is in one of four states: a person who can be detected (S,
-shown) or not (H, hidden), a false object (F) that the detector takes for a person for a while, or nothing any more
-(0). r = P(S) + P(H) is the existence probability. As in IPDA (Musicki, Evans, Stankovic 1994, "Markov chain two") and
-JIPDA:
+A track began with one detection (of `blob`, a box). It, and the track with it, is in one of four states: a person who
+can be detected (S, shown) or not (H, hidden), a false object (F) that the detector takes for a person for a while, or
+nothing any more (0). r = P(S) + P(H) is the existence probability. As in IPDA (Musicki, Evans, Stankovic 1994, "Markov
+chain two") and JIPDA:
 
     predict   S, H -> 0 at the rate 1 / LIFETIME, F -> 0 at 1 / CLUTTER_TIME, S -> H at 1 / SHOWN_TIME, H -> S at
               1 / hidden_time: the same at each frame rate, as boxes within CLUTTER_TIME are no independent evidence
@@ -11,7 +11,8 @@ JIPDA:
     measured  S times 1 - p + p g e^l, F times 1 - p + p g    g = N(z; z_pred, S) / density of false boxes
     birth     S : F = U e^l : C + D                           U new people, C false boxes, D second boxes of people
                                                               expected there in a frame
-All states are normalised to the sum 1 afterwards. l is the log-likelihood ratio of the score.
+All states are normalised to the sum 1 afterwards. l is the log-likelihood ratio of the score. `joint` has no scores
+(l = 0) and no D; what is learned of scores serves `blob` alone.
 """
 
 from __future__ import annotations

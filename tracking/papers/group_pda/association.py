@@ -1,8 +1,9 @@
 """Data association of `group-pda`: which points a group may have (gate), and its update by them (sec. 4).
 
-Input: points (M, 2), in m on the ground or px, and the bank of G groups. Output: which points each group takes
-(a bool array); the groups' states in the bank are updated in place. Order in a frame: `gated_distances`, `claimed`,
-`with_missed_members`, `associate`. The masses and the update are in association_kernels and association_mass_kernels.
+Input: points (M, 2), in m on the ground or px, and the bank of G groups. Output: which points each group takes (a bool
+array); the groups' states in the bank are updated in place. Order in a frame: `search_regions`, `gated_distances`,
+`claimed`, `with_missed_members`, `place_density`, `log_ratio`, `associate`, `remember`. The masses and the update are
+in association_kernels and association_mass_kernels.
 
 Points of hidden feet are put below their heads first: `below_heads` (ours).
 

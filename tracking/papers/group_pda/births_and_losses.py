@@ -1,8 +1,8 @@
 """Births, confirmation and loss of `group-pda`'s groups: how a group's life begins and ends.
 
 A new group is tentative (without id). It is confirmed, and gets an id, once it has been measured long enough. A new
-group beside a member of a group is a part of that group (see merging_and_splitting). A group without measurements for
-too long is lost.
+group beside a member of a group is a part of that group (see merging_and_splitting). A group without points for too
+long is lost.
 
 Each function changes the bank of groups in place. Events of confirmed groups are returned as `WholeGroupEvent`s.
 """

@@ -30,14 +30,14 @@ class GroupPdaConfig(BackgroundSettings):
     point_noise: float = param(0.1, (0.005, 1.0), "m",
         "from points: standard deviation of a person's measured position, sensor and gait", "log", sees="points")
     extent_time: float = param(1.0, (0.05, 20.0), "s",
-        "time constant of extent and number of people, alpha_s and alpha_N of eq. 2.4", "log")
+        "time constant of extent, number of people and colours, alpha_s and alpha_N of eq. 2.4", "log")
     count_noise: float = param(0.5, (0.05, 5.0), "people", "sigma_n of m_N: the part that does not grow with N", "log")
     detect_prob: float = param(0.95, (0.3, 1.0), "probability",
         "from points: that a member is measured in a frame (ours)", sees="points")
     association: str = param("pda", ("pda", "nearest", "all", "none"), "",
         "pda: by masses (sec. 4.2); nearest, all: one association; none: no constraint (sec. 5.2.1)", "categorical")
     corrections: bool = param(True, (True, False), "",
-        "R, misses, rest and gate of extents, parts, velocities of merges and parts (ours)", "categorical")
+        "R, misses, noise, extents, parts, places, hidden groups, velocities: departures (c) (ours)", "categorical")
     appearance: float = param(0.5, (0.0, 5.0), "",
         "from pixels: weight of colours in the log masses (future work of sec. 6; ours)", sees="pixels")
     merge_velocity: float = param(0.5, (0.05, 3.0), "m/s",
@@ -49,7 +49,7 @@ class GroupPdaConfig(BackgroundSettings):
     confirm_time: float = param(0.3, (0.0, 3.0), "s",
         "a new group is confirmed after so long with measurements, removed after so long without; parts split (ours)")
     coast_time: float = param(1.5, (0.0, 10.0), "s",
-        "time without a measurement after which a group is lost (ours)")
+        "time without points after which a group is lost (ours)")
     report_coast: float = param(0.5, (0.0, 5.0), "s",
         "time after the last measurement for which a group is reported (ours)")
     carry_time: float = param(0.9, (0.0, 3.0), "s",

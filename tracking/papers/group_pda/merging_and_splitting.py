@@ -14,10 +14,10 @@ Splitting (sec. 3.3, 4.2): a group without feasible associations for `split_time
 points that may be a group's) is feasible if its points form one group under the group constraint G_y
 (tracking.filters.components). `fall_apart` partitions the points (M, 2) of such a group by G_y and replaces its row of
 the bank by one row per part. A group that G_y leaves whole stays. Each member's place, hidden or not, goes to the part
-with the nearest point (ours). With `corrections` the parts stay parts of one group (ours), and so do newborn groups
-beside a member: misses, sway and noise take people apart for a moment. Each part is tracked by itself; the group is
-their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates become one row again. Sets of
-parts whose people have been more than 1.5 m from the rest's for `confirm_time` split off.
+with the nearest point, but for places nearest to noise (ours). With `corrections` the parts stay parts of one group
+(ours), and so do newborn groups beside a member: misses, sway and noise take people apart for a moment. Each part is
+tracked by itself; the group is their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates
+become one row again. Sets of parts whose people have been more than 1.5 m from the rest's for `confirm_time` split off.
 
 Onsets (ours): when an event that is known now began, by the moments of the two groups or parts. Distances are metres on
 the ground (in an image depth is stretched to it). The distances and velocities of the truth's rules come from
@@ -264,6 +264,7 @@ def _nearest(here: Array, there: Array) -> float:
     return float(tree.query(here, distance_upper_bound=1.001 * most + 1e-9)[0].min())
 
 
+# G_x (sec. 3.1): connected components under R_x.
 def _connected(pairs: list[Pair], alone: Iterable[int] = ()) -> list[list[int]]:
     parts: list[set[int]] = [{id} for id in alone]
     for pair in pairs:
@@ -301,6 +302,7 @@ def fall_apart(
     bank.add(parts)
 
 
+# The part of R_x in space (sec. 3.1).
 def _overlapping(bank: GroupBank, rows: Ints, gate: float) -> Iterator[tuple[int, int]]:
     near = regions_overlap(bank.x[rows, :2], bank.extent[rows], gate)
     return ((int(rows[i]), int(rows[j])) for i, j in np.argwhere(np.triu(near, 1)).tolist())

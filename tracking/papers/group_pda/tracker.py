@@ -21,14 +21,14 @@ and the module:
     birth      unclaimed points, grouped by G_y                        sec. 3.3           births_and_losses
 
 The grouping functions G_0, G_x, G_y of points (sec. 3.1, 3.3, 4.2.1) are in tracking.filters.components: G_y links
-points at most 2 x `radius` apart, and joins linked sets whose regions overlap. A group or part that is not measured for
+points at most 2 x `radius` apart, and joins linked sets whose regions overlap. A group or part without points for
 `coast_time` is lost; a group leaves with its last part. `association = "none"` is section 5.2.1: a group takes all
-points in its region, whether they are one group or not, and does not fall apart.
+points in its region, whether they are one group or not, and does not fall apart. With `corrections` it may be hidden.
 
 Departures. Those marked (c) are off with `corrections` off.
 
 - units: m and s, in an image by one scale. Paper: px and frames. Why: any camera and frame rate.
-- F, Q: constant velocity, white acceleration, per root second. Paper: not stated. Why: any frame rate.
+- F, Q: constant velocity, white acceleration that is constant in a frame. Paper: not stated. Why: any frame rate.
 - search region of the gate, and distances that order shared points: by Σ, P and a point's variance; (c) wider in
   infeasible time. Paper: Σ, as in merges here. Why: few points give a small Σ.
 - extents: with 1/N, shrunk by `spread_weight` to a prior, `person_spread`; (c) corrected for the gate. Paper: sample
@@ -40,62 +40,71 @@ Departures. Those marked (c) are off with `corrections` off.
   confirmed no points of a confirmed group. Paper: at once. Why: false alarms.
 - P: Σ w² P of merged groups; new ones r² (1 + 1/N) and 1.3 m/s per axis, (c) parts the group's and 0.5 m/s. Paper:
   none. Why: the filter and SR_v need one.
-- R, (c): members keep places, some are missed. Paper: a member's place and noise, read as Σ / m, of m people. Why: less
-  noise.
-- m_d: S with the R of each association's m. Paper: one P_yc. Why: fewer people measure a centroid worse.
+- R, (c): members keep places, some are missed, stand-ins repeat their errors. Paper: a member's place and noise, read
+  as Σ / m, of m people. Why: less noise.
+- m_d: covariance H P H' + R, with the R of each association's m. Paper: one P_yc. Why: fewer people measure a centroid
+  worse.
 - m_N: σ_n grows with N, (c) by 15 %, else 1 %; heavy tails. Paper: normal, σ_n. Why: several join at once.
 - `association` nearest, all: one association, with the shared points that are most probably the group's, or with all.
   Paper: none. Why: comparison.
 - α_s and α_N: equal, from `extent_time`. Paper: two constants. Why: one parameter less.
-- missed detections: (c) a miss hypothesis; if it outweighs all associations, the group coasts; from points, missed
-  members stand in for `carry_time`, and their places stay the group's for `coast_time`. Paper: not considered. Why:
-  detectors miss people.
-- stand-ins: associations of stand-ins alone leave x and P as they are. Paper: none. Why: their places come from x.
+- missed detections: (c) a miss hypothesis, which shares in the means; if it outweighs all associations, the group
+  coasts; from points, missed members who were seen twice stand in for `carry_time` while the group has points, and
+  their places stay the group's for `coast_time`. Paper: not considered. Why: detectors miss people.
+- stand-ins: associations of stand-ins alone leave x and P as they are, and are no infeasible time. Paper: none. Why:
+  their places come from x.
 - size: N over the probability that a member is seen (`detect_prob`) within `carry_time`, from points. Paper: N. Why:
   detectors miss people.
 - Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated. Why:
   they would swell.
 - no points: coasts, lost after `coast_time`; frames without detections are predicted only. Paper: null masses, as
   before a split. Why: occlusion.
+- an association without points: has no mass. Paper: j = 0 may be empty. Why: it has no centroid; the miss stands for
+  it.
 - hidden feet: with boxes and a camera not overhead, points whose feet another box may hide are put no further than
   below heads at 1.5 m. Paper: points as they are. Why: hidden feet displace points.
 - pixels: foreground of tracking.detect on a grid of 0.1 m, each a share of a person, put where on the ground that
-  person's middle is: the runs along the images of upright lines, less a person's height; a run shorter than a person
-  is continued to that height into the next. Paper: all of an unnamed background subtraction, each counts one, in px.
-  Why: N in people; speed; near and far people are alike, and who stands behind is apart.
-- too much foreground: predicted only. Paper: none. Why: the light has changed.
-- colours: in the mass, order and division of shared points (`appearance`), from pixels. Paper: future work. Why:
-  similar groups cross.
-- places, (c): in the same, where members have walked since the group last shared no point. Paper: none. Why: groups
-  that meet keep their people.
+  person's middle is: the runs along the images of upright lines, less a person's height; a run shorter than a person is
+  continued to that height into the runs that it then reaches. The background rests where groups are. Paper: all of an
+  unnamed background subtraction, each counts one, in px. Why: N in people; speed; near and far people are alike, and
+  who stands behind is apart.
+- too much foreground: predicted only, if the background adapts. Paper: none. Why: the light has changed.
+- colours: in the mass, order and division of shared points (`appearance`), from pixels; learned from unshared points,
+  over `extent_time`. Paper: future work. Why: similar groups cross.
+- places, (c): in the same, from points, too: where members have walked since none of the group's points could be
+  another's. Paper: none. Why: groups that meet keep their people.
 - split: after `split_time`, until then predicted only; measured frames count back; members' places, colours and age go
   along; (c) parent's velocity. Paper: after consecutive infeasible frames (Fig. 1: at once), at rest. Why: misses.
 - parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
-  some have been more than 1.5 m from the rest for `confirm_time`; a part that is not measured holds the others; R_x
-  joins parts again. Paper: new groups at once. Why: misses and sway take people apart for a moment.
+  some have been more than 1.5 m from the rest for `confirm_time`; a part that is not measured, or infeasible, holds the
+  others; R_x joins parts again. Paper: new groups at once. Why: misses and sway take people apart for a moment.
 - split into one part or none: the group stays as it is. Paper: initialised anew. Why: others' points made it
   infeasible.
 - points of a split, and members' places: those most probably the group's, with stand-ins. Paper: all in the region.
   Why: others' people stay out.
 - ids: the part that was largest when the group fell apart keeps the id, after its loss the largest left; of merged
   groups the largest, then the oldest. Paper: none. Why: tracks need ids.
-- walking out: a new group within reach of a member (2 m/s) is a part of its group and as old, (c) with its velocity;
-  without corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
+- walking out: a new group within reach of a member (2 m/s and 3 r) is a part of its group and as old, (c) with its
+  velocity; without corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
 - like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`; from points
-  of the members seen in both of two frames. Paper: SR_v overlap. Why: P does not measure likeness; people sway with
-  each step; hidden members move the centroid.
+  of the members seen in both of two frames, stand-ins as predicted; of a group in parts, those of the part with its id.
+  Paper: SR_v overlap. Why: P does not measure likeness; people sway with each step; hidden members move the centroid.
 - SR_v, without corrections: of the updated velocity, with the gate's γ. Paper: of the predicted one; its size is not
   stated. Why: Fig. 1 merges after the update.
-- near groups, (c): people at most 1.5 m apart, too. Paper: regions overlap. Why: no merge after a split.
-- merge: of confirmed, measured, feasible groups, whose measured parts become one state; (c) once the evidence of the
-  last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing groups.
-- enter: so is a merge reported if at most one of the groups was there 1 s before. Paper: none. Why: they came together.
-- hidden, (c): a group or part whose points are all more probably others' is predicted only, and coasts. Paper: groups
-  share points. Why: hidden groups follow others.
+- near groups, (c): people more than 1.5 m apart are evidence against one group, too. Paper: regions overlap. Why: no
+  merge after a split.
+- merge: of confirmed, feasible groups whose part with the id is measured; their measured parts become one state; (c)
+  once the evidence of the last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing
+  groups.
+- enter: so is a merge reported if at most one of the groups was there 1 s before the onset. Paper: none. Why: they came
+  together.
+- hidden, (c): a group or part whose points are all more probably others' keeps x and P as predicted, and coasts. Paper:
+  groups share points. Why: hidden groups follow others.
 - reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
   search region. Why: lost groups are guesses.
-- onsets: dated back. Paper: none. Why: decisions lag.
-- depth of boxes in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px.
+- onsets: dated back; a split to when the last two parts came to be over 1.5 m apart and parting, or over 2.5 m. Paper:
+  none. Why: decisions lag.
+- depth of points in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px.
   Why: oblique views.
 """
 
@@ -211,10 +220,10 @@ class GroupPda:
         return self._report(frame, events, scaled, self._about(detections))
 
     def _report(self, frame: Frame, events: list[WholeGroupEvent], scaled: ScaledParameters, outline: Array) -> Tracks:
-        """Returns the confirmed groups measured within the last `report_coast` s, by id.
+        """Returns the confirmed groups that had points within the last `report_coast` s, by id.
 
         outline (V, 2): a polygon round the origin, in the plane's unit, that stands for what covers the ground or the
-        image about one member's place: a footprint, a usual box, or a cell of the pixel grid."""
+        image about one member's place: a footprint or a usual box; without effect from pixels."""
         seen = self.bank.confirmed & (frame.t - self.bank.last_seen <= self.config.report_coast + 1e-9)
         bank = whole_groups(self.bank, np.flatnonzero(seen))
         rows = np.argsort(bank.id)
@@ -263,7 +272,7 @@ class GroupPda:
         return FOOTPRINT * self.context.px_per_m if self.usual_box is None else SQUARE * self.usual_box / 2
 
     def outlines(self) -> list[Array]:
-        """Returns points (V, 2) u, v in px round the places of each confirmed group: the corners of whole grid cells.
+        """Returns points (V, 2) u, v in px round the places of each confirmed group: corners of columns a person high.
 
         From points they are the corners of footprints or usual boxes, in the unit of the points.
         """

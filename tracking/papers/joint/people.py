@@ -33,8 +33,9 @@ class Candidates(PersonTable):
         return np.asarray(self.states[:, : existence.FALSE].sum(axis=1))
 
     def odds(self, detect_prob: float, dt: float) -> Array:
-        """Returns the odds (K,) of being detected over those of being missed, by the density of detections that are
-        nobody's, m^2. Times the density of a person's detections they are the odds that a detection is the person's."""
+        """Returns the odds (K,) of detected to missed, divided by the density of nobody's detections, so in m^2; times
+        the density of a person's detections, the odds that a detection is the person's. A false alarm is detected, too.
+        """
         p = detect_prob * self.states[:, [existence.SHOWN, existence.FALSE]].sum(axis=1)
         return np.asarray(p / (1 - p) / (CLUTTER_DENSITY + BIRTH_DENSITY * dt))
 

@@ -51,8 +51,8 @@ CHORD = 0.5  # Time over which velocities are measured, s.
 
 class ReportedEvents:
     """Makes events from changes of the reported groups. State: recent, ids (K,) and positions (K, 2), m, of the last
-    frames; first, by id, the frame (from 0) of each person's first report; frames, their number so far; evidence, by
-    pair of ids in one group, the sum of its log-odds in that time; fps."""
+    frames; first, by id, the frame (from 0) in which each person was first tracked; frames, their number so far;
+    evidence, by pair of ids in one group, the sum of its log-odds in that time; fps."""
 
     def __init__(self, fps: float) -> None:
         self.fps, self.frames = fps, 0
@@ -61,7 +61,7 @@ class ReportedEvents:
         self.evidence: dict[tuple[int, int], float] = {}
 
     def add(self, id: Ints, pos: Array) -> None:
-        """Adds a frame: ids (K,) and places (K, 2), m, of the people reported."""
+        """Adds a frame: ids (K,) and places (K, 2), m, of the people tracked."""
         self.recent.append((id.copy(), pos.copy()))
         for person in id.tolist():
             self.first.setdefault(person, self.frames)

@@ -39,16 +39,22 @@ event_classifier.toml, which names scenes and seeds. Not fitted: N_x, N_z, Σ, �
 
 Departures. A star marks those that stay in the preset `paper`:
 
-- association*: one for all particles, of the largest probability; newcomers after people. Paper: given. Why:
-  detections are anonymous.
-- existence*: a probability, by a Markov chain in time and by measurements and misses (`detect_prob`, `hidden_time`).
-  Paper: none. Why: any frame rate; misses and false alarms.
-- births*: a free detection, followed by a Kalman filter, is a person when it probably exists. Paper: not stated. Why:
-  false alarms.
-- losses*: removed when it probably no longer exists, and unreported before. Paper: restarted from the truth. Why: no
-  truth.
+- association*: one for all particles, of the largest probability; newcomers after people. Places are predicted by eq.
+  3. Paper: given. Why: detections are anonymous.
+- existence*: probabilities of shown, hidden and false, by a Markov chain in time and by measurements and misses
+  (`detect_prob`, `hidden_time`). Paper: none. Why: any frame rate; misses and false alarms.
+- births*: a free detection, followed by a Kalman filter, is a person from an existence of 0.9 on. Paper: not stated.
+  Why: false alarms.
+- losses*: unreported below an existence of 1/2; removed if hardly anything is there any more, person or false alarm.
+  Paper: restarted from the truth. Why: no truth.
+- frames without measurement*: X is predicted, nobody counts as missed, Z changes as ever. Paper: each frame is
+  observed. Why: nobody could be seen.
+- existence in the filter*: unreported people count fully in partitions, votes and events. Paper: all exist. Why: one
+  state for all.
 - p(y | x)*: normal about the place; 1 if missed. Paper: colour templates. Why: input is points.
 - pixels*: each blob one detection (`pixel_noise`). Paper: boxes. Why: no detector.
+- boxes*: reported in the image, with sizes that follow the measured ones. Paper: a template's box at the state. Why:
+  they are shown and scored.
 - proposal*: mixture for each person, the dynamics alone if missed. Paper: mixture of products. Why: people differ.
 - π_det: product of dynamics and likelihood (`algorithm`). Paper: Σ about the detection. Why: more useful particles.
 - Σ*: white acceleration and jitter, per root second. Paper: not printed. Why: any frame rate.
@@ -58,8 +64,9 @@ Departures. A star marks those that stay in the preset `paper`:
 - validity*: with prior scatter, virtual cluster and least distance. Paper: Davies-Bouldin. Why: undefined for one
   cluster or equal centres.
 - λ_cl*: per second. Paper: each frame. Why: any frame rate.
-- p(Z | X): by the beliefs of pairs, from the reported states and groups, the same for all particles (`belief_rate`,
-  `belief_memory`). Paper: by the validity, of each particle. Why: passing strangers look alike.
+- p(Z | X): by the beliefs of pairs, from the estimated states and groups of all tracked people, the same for all
+  particles (`belief_rate`, `belief_memory`). Paper: by the validity, of each particle. Why: passing strangers look
+  alike.
 - eq. 5: for missed people alone, with the likeliest Z of the particle, in the proposal (`variant`). Paper: for all, in
   the weights. Why: people who are seen gain little by it, and the variance of the weights costs more.
 - events*: also people alone; in random order, each changes once. Paper: groups, all at once. Why: people alone must
@@ -80,9 +87,9 @@ Departures. A star marks those that stay in the preset `paper`:
   own. Why: a group keeps its least member.
 - weights of votes*: before step 2, by the rest, in the preset by w (`algorithm`). Paper: summed over i after step 2.
   Why: no noise of resampling.
-- ids, onsets*: ids of the truth, onsets dated back. Paper: none. Why: as the truth.
-- events that correct groups*: not reported (`tracking.grouping.merge_split_events`). Paper: none. Why: who was in one
-  group by mistake neither met nor parts.
+- ids, onsets*: ids of the truth; onsets dated back, but for enter and leave. Paper: none. Why: as the truth.
+- events that correct groups*: not reported (`tracking.grouping.merge_split_events`); nor are enters of the first
+  second. Paper: none. Why: who was in one group by mistake neither met nor parts.
 """
 
 from __future__ import annotations
@@ -249,7 +256,7 @@ class Joint(PointTracker):
 
 def remembered(log_odds: Array, group: Ints, known: Array, share: float) -> Array:
     """Returns the log-odds (K, K) of pairs, raised for people who were in one group and lowered for others. group (K,):
-    reported group, -1 alone; known (K,): 1 for people reported before, else 0. share: factor of the change."""
+    estimated group, -1 alone; known (K,): 1 for people tracked before, else 0. share: factor of the change."""
     belief = default_belief()
     same = (group[:, None] >= 0) & (group[:, None] == group)
     return np.asarray(log_odds + share * np.outer(known, known) * np.where(same, belief.stay, -belief.come))

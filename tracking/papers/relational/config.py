@@ -61,14 +61,14 @@ class ParticleConfig(BackgroundSettings):
     detect_prob: float = param(0.95, (0.3, 1.0), "probability",
         "that a person who was measured in the last frame is measured (ours)")
     hidden_time: float = param(0.3, (0.05, 20.0), "s",
-        "mean time until a person who is not measured is measured again (ours)", "log")
+        "mean time until a missed person is measured again; how long a missed person is reported follows (ours)", "log")
     clutter_density: float = param(0.002, (0.0, 1.0), "1/m^2",
         "false alarms per frame and square metre; 0: none (ours)")
     birth_rate: float = param(0.003, (1e-5, 1.0), "1/(m^2 s)", "new people per square metre and second (ours)", "log")
     time_window: float = param(3.0, (0.1, 30.0), "s",
         "a person who is not measured for so long is removed (sec. 2.1.1)", "log")
     report_existence: float = param(0.5, (0.0, 1.0), "probability",
-        "people whose existence is at least so probable are reported (ours)")
+        "people who exist and have not left with at least this probability are reported (ours)")
 
     def check(self) -> None:
         """Raises InputError if clutter_density is 0 and detect_prob is below 1."""

@@ -27,18 +27,18 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
 - speed table: from simulated people, over 0.4 s, with rows of its own (`speed_ends`), times `noise_scale`. Paper: from
   observations in successive frames. Why: errors of observations are no motion.
 - time*: drift and diffusion per second. Paper: per frame. Why: any frame rate.
-- relations: pairs. Paper: one group for each person. Why: groups part in steps.
-- relation dynamics*: with the hazard `relation_rate` / 2 a person redraws all relations: to those whose g is above
-  one uniform number; in the preset the groups of these unite. Only near people start to walk together. Paper: not
-  stated; with a limited number of others. Why: it starts and stops at a rate.
+- relations: pairs (`relation_evidence`). Paper: one group for each person. Why: groups part in steps.
+- relation dynamics*: with the hazard `relation_rate` / 2 a person redraws all relations: to those whose g is above one
+  uniform number; in the preset the groups of these unite. Only near people start to walk together. Paper: not stated;
+  with a limited number of others. Why: it starts and stops at a rate.
 - evidence: for the relation dynamics, l is the belief about the tracks reported before this frame; the belief is also
   what `walking_together()` returns (`relation_evidence`). Paper: the particle's new state; the posterior. Why: it looks
   back for seconds.
 - unreported people: without a track in the belief's last step, relations stay as they are (`relation_evidence`). Paper:
   forecast. Why: no belief about them.
 - coupling: approached within `coupling_time`; partners weighted by existence and, with the belief
-  (`relation_evidence`), by g(l) of their state, less the filter's scatter. Paper: the group's mean velocity. Why:
-  members differ.
+  (`relation_evidence`), by g(l) of their state, less the filter's unweighted scatter. Paper: the group's mean velocity.
+  Why: members differ.
 - noise: a shared part (`common_noise`). Paper: independent. Why: a hidden member turns, too.
 - people*: slots common to all particles. Paper: each particle has a number of people. Why: few particles would have
   each newcomer.
@@ -49,12 +49,13 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
   err.
 - displaced points: a share `outlier_share`, away from the camera, without one in all directions, more if feet are
   covered. Paper: normal. Why: hidden feet.
-- misses: after a miss, detected again with `hidden_time`. Paper: all alike. Why: occlusions last.
+- misses: after a miss, detected again with `hidden_time`; who is behind something is not missed. Paper: all alike. Why:
+  occlusions last.
 - occluders: nobody is measured behind others, or behind known pillars and walls. Paper: none. Why: nobody is visible
   there.
-- sums*: exact up to a size, then belief propagation; in the preset each set of people and detections that are linked
-  by reach in some particle is mapped by itself, without pairs that are negligible beside the best mapping, else only
-  pairs in reach and not improbable. Paper: all mappings. Why: exponential cost; nobody becomes a newcomer far away.
+- sums*: exact up to a size, then belief propagation; in the preset each set of people and detections that are linked by
+  reach in some particle is mapped by itself, without pairs that are negligible beside the best mapping, else only pairs
+  in reach and not improbable. Paper: all mappings. Why: exponential cost; nobody becomes a newcomer far away.
 - pixels*: blobs; large ones are divided by k-means, small ones left out. In the image*: centres of boxes, at one scale.
   Paper: feet of boxes on the ground. Why: no calibration.
 - boxes*: reported in the image, with sizes that follow the measured ones. Paper: none. Why: they are shown and scored.
@@ -62,16 +63,17 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
   nobody could be seen.
 - births*: a detection in nobody's reach, or probably nobody's; no weight until the next frame. Paper: a new object.
   Why: not stated when.
-- deaths*: the window slows by the probability of being behind known pillars and walls, by default also people; a
-  person counts as measured with more than 1/2. Paper: after a window, which may depend on occlusion. Why: nobody is
-  visible there.
-- deaths, report: also below an existence; from `report_existence`, of existence times the probability that a missed
-  person has not left, by the rates of misses and of people who leave without their partners. Paper: after the window;
-  all. Why: false alarms; who has left the view is missed, too.
-- newcomers*: half of those near join a group, by g at the distance of the nearest member. Paper: half join a group.
-  Why: far groups are improbable.
-- weights: one for each person, others averaged; a missed person has the partners'. Paper: one for a particle. Why:
-  many people, few particles.
+- deaths*: the window slows by the probability of being behind known pillars and walls, by default also people; a person
+  counts as measured with more than 1/2. Paper: after a window, which may depend on occlusion. Why: nobody is visible
+  there.
+- deaths: also below an existence. Paper: after the window. Why: false alarms.
+- report: from `report_existence`, of existence times the probability that a missed person is hidden, not gone
+  (`detect_prob`, `hidden_time`); who has a measured partner is probably not gone. Missed people are reported longer at
+  higher frame rates. Paper: all. Why: who has left the view is missed, too.
+- newcomers*: at most half join a group, by g at the distance of the nearest member times existence. Paper: half join a
+  group. Why: far groups are improbable.
+- weights: one for each person, others averaged; a missed person has the partners'. Paper: one for a particle. Why: many
+  people, few particles.
 - resampling: of people with few effective particles, with a kernel. Paper: each frame. Why: equal particles.
 - resampled relations: drawn with each person alone. Paper: with the particle. Why: weights are people's.
 - groups*: reported ones are derived from the tracks. Paper: in the state. Why: particles differ in groups.
@@ -276,6 +278,8 @@ class Particle(PointTracker):
         return Tracks(frame.index, frame.t, self.plane, "person", id, alone, pos, vel, cov, box, score, seen=seen)
 
     def _stayed(self) -> Array:
+        """Returns the probability (K,) that each person has not left: hidden against gone since the first miss; 1 if
+        measured or with the paper's sensor."""
         c, missed = self.config, self.slots.missed
         stayed = (1 - c.detect_prob) * np.exp((self.dt - missed) / c.hidden_time)
         # people leave with their partners: whose partner is measured is hidden
