@@ -105,8 +105,8 @@ def associate(
 
     x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M) and
     region (G, 2, 2): of `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour
-    or place. owner (M,): the row of the only group that may have the point, a missed member that stands in, outside its
-    region; -1 for a point of this frame. claimants (M,): number of groups that may have the point. share (G, M):
+    or place. owner (M,): the row of the only group that may have the point, a missed member that stands in, whose d2 is
+    inf; -1 for a point of this frame. claimants (M,): number of groups that may have the point. share (G, M):
     probability that a point is the group's. rest (G,): True for groups whose extent and size must not change. rules:
     see association_mass_kernels.
 
@@ -137,6 +137,7 @@ def associate(
             feasible = np.ones(1, np.bool_)
         else:
             prior = rules[PRIOR_XX : PRIOR_YY + 1]
+            # m_g (eq. 4.1)
             feasible = prefixes(
                 mine, people, start, rules[LINK], rules[GATE], prior, rules[PRIOR_WEIGHT], rules[LEAST_WEIGHT]
             )[0]
@@ -151,12 +152,13 @@ def associate(
             if best >= 0:
                 state[g], taken = MEASURED, start + best
         elif (components(mine, people, rules[LINK])[1][:, WEIGHT] >= rules[LEAST_WEIGHT]).any():
-            state[g], taken = NULL, n
+            state[g], taken = NULL, n  # all m_g = 0: a split, if it lasts (sec. 4.2)
         for k in range(taken):
             chosen[g, order[k]] = True
     return state, chosen
 
 
+# The points that no other group claims, then the others in ascending order (sec. 4.1).
 @njit(cache=True)
 def _ordered_points(
     d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, share: Array, g: int, association: float
@@ -227,6 +229,7 @@ def _estimate(
     return best if matched > miss else -1
 
 
+# Mean and covariance over each association's Kalman update, as in the PDAF (sec. 4.3).
 @njit(cache=True)
 def _mix(beta: Array, mean: Array, S: Array, x: Array, P: Array) -> None:
     shift, spread, less = np.zeros(4), np.zeros((4, 4)), np.zeros((4, 4))
@@ -254,6 +257,7 @@ def _mix(beta: Array, mean: Array, S: Array, x: Array, P: Array) -> None:
             P[a, b] = P[b, a] = (P[a, b] + P[b, a]) / 2
 
 
+# Eq. 2.4, of the mean over the associations; the mass of the miss keeps the old.
 @njit(cache=True)
 def _adapt(beta: Array, total: float, people: Array, cov: Array, extent: Array, size: Array, rules: Array) -> None:
     target, count = np.zeros(3), 0.0
