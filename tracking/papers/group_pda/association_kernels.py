@@ -152,7 +152,8 @@ def associate(
             if best >= 0:
                 state[g], taken = MEASURED, start + best
         elif (components(mine, people, rules[LINK])[1][:, WEIGHT] >= rules[LEAST_WEIGHT]).any():
-            state[g], taken = NULL, n  # all m_g = 0: a split, if it lasts (sec. 4.2)
+            # all m_g = 0: a split, if it lasts (sec. 4.2)
+            state[g], taken = NULL, n
         for k in range(taken):
             chosen[g, order[k]] = True
     return state, chosen
