@@ -33,10 +33,11 @@ class TracksTable:
         """Returns the rows of known position, sorted by person, then frame."""
         return MotionRows.of(self.frame, self.column, self.pos, self.vel, self.group, self.length)
 
-    def measured_motion(self) -> MotionRows:
-        """Returns the rows of `motion` in which people are measured; all rows of people who never are."""
-        if self.seen is None:
-            return self.motion()
+    def measured_motion(self) -> MotionRows | None:
+        """Returns the rows of `motion` in which people are measured; all rows of people who never are. None: `motion`
+        itself, as everybody is measured always."""
+        if self.seen is None or self.seen.all():
+            return None
         known = self.seen | ~np.isin(self.column, self.column[self.seen])
         return replace(self, pos=np.where(known[:, None], self.pos, np.nan)).motion()
 
