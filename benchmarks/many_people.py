@@ -1,7 +1,7 @@
 """Time and memory of the trackers with many people: all come in the first frame, and walk on.
 
 `python -m benchmarks.many_people` prints a row for each tracker: CPU seconds of the slowest of 6 frames when 300 and
-when 1,000 people come at once, and with 2,000 people over 100 frames CPU seconds of the mean frame and the largest
+when 1,000 people come at once, and with 2,000 people over 40 frames CPU seconds of the mean frame and the largest
 memory of the process. Each run is a process of its own. People are spread with a density of 1 per 4 m^2, and measured
 with a noise of 5 cm; `--area 25` spreads them wider. `--trackers joint stereo` names trackers.
 """
@@ -23,7 +23,7 @@ from tracking.running.tracker_registry import find, names
 FPS, SCALE = 10.0, 40.0
 NEWCOMERS, SOON = (300, 1000), 6
 """People who come at once, and frames in which they are confirmed by every tracker."""
-CROWD, LONG = 2000, 100
+CROWD, LONG = 2000, 40
 """People and frames of the long run."""
 
 
@@ -71,7 +71,7 @@ def main() -> None:
     parser.add_argument("--area", type=float, default=4.0)
     parser.add_argument("--trackers", nargs="+", default=list(names()))
     options = parser.parse_args()
-    print("| tracker | 300 newcomers, s | 1,000 newcomers, s | 2,000 × 100 frames: s per frame | slowest | MB |")
+    print("| tracker | 300 newcomers, s | 1,000 newcomers, s | 2,000 × 40 frames: s per frame | slowest | MB |")
     print("|---|---|---|---|---|---|")
     for name in options.trackers:
         cells = []
