@@ -26,7 +26,24 @@ from scenarios.errors import WorkError
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario
 from tracking.stress.failures import Failure, Judgement
-from tracking.stress.reductions import STAGES, Stage, pinned, without
+from tracking.stress.reductions import (
+    Piece,
+    beginning,
+    defaults,
+    details,
+    difficulties,
+    obstacles,
+    people,
+    pinned,
+    script,
+    seconds,
+    without,
+)
+
+Stage = Callable[[Scenario], list[Piece]]
+
+# The kinds of pieces, in the order in which they are taken out.
+STAGES: tuple[Stage, ...] = (script, seconds, beginning, obstacles, difficulties, defaults, people, details)
 
 ALLOWED = 5  # one of so many confirming seeds may not fail
 ROUNDS = 3  # of fresh seeds
