@@ -122,6 +122,4 @@ def test_the_frames_that_hold_the_first_boxes_decide():
 def test_few_boxes_all_count_and_unknown_ones_do_not():
     frame = np.array([4, 4, 9, 30])
     assert scale_of_first_boxes(frame, np.array([17.0, np.nan, 34.0, 51.0])) == (pytest.approx(20.0), 30)
-    scale, last = scale_of_first_boxes(frame, np.full(4, np.nan))
-    assert np.isnan(scale)
-    assert last == 0
+    assert scale_of_first_boxes(frame, np.full(4, np.nan)) == (pytest.approx(np.nan, nan_ok=True), 0)
