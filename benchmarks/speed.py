@@ -23,7 +23,7 @@ from benchmarks.support.tables import head, row
 from benchmarks.support.timing import best_times, machine_load
 from scenarios.schema.scenario import Scenario
 from sim.crowd.world import run
-from sim.render import people_kernels, plants_and_shadows_kernels, renderer
+from sim.render import people_kernels, renderer
 from sim.render.renderer import Renderer
 from sim.scene.camera_placement import place_camera
 
@@ -40,7 +40,7 @@ ASKED: dict[str, Callable[[Renderer], Callable[[int], object]]] = {
 }
 RENDERING: Parts = {
     "places, outlines": [(renderer.Renderer, "_people")],
-    "shadows": [(plants_and_shadows_kernels, "draw_shadows")],
+    "shadows": [(people_kernels, "draw_shadows")],
     "people": [(people_kernels, "draw_people")],
     "blur, light, noise": [(renderer.Renderer, "_finish")],
     "truth of pixels": [(renderer, "pixel_truth")],

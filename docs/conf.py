@@ -40,7 +40,7 @@ nitpicky = True
 nitpick_ignore_regex = [
     ("py:.*", r"(?!(scenarios|sim|tracking)\.).*"),
     ("py:class", r"scenarios\.schema\.(values|sensor|picture|scenario)\.(?!Scenario$|ObservationSpec$)\w+"),
-    ("py:class", r"tracking\.(tuning\.(comparison|search_plan)|grouping\.belief)\.(?!Belief$)\w+"),
+    ("py:class", r"tracking\.(tuning\.(candidates|search_plan)|grouping\.belief)\.(?!Belief$)\w+"),
 ]
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"

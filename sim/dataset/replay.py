@@ -31,7 +31,7 @@ from scenarios.schema.values import Model, NonNegative, Positive
 from sim.crowd.heading import facings, headings
 from sim.dataset.splits import is_real
 from sim.hashing import canonical_hash
-from sim.io.formats.labels import centres
+from sim.io.formats.labelled_truth import centres
 from sim.rng import draw, rng
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.sequence import observe

@@ -16,7 +16,7 @@ from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.reading import is_present, require_regular
 from sim.io.files.own_files import is_hidden
-from sim.io.formats import biwi, caviar, mot_folder, people_texts, video
+from sim.io.formats import biwi, caviar, mot_folder, mot_text, people_texts, video
 from sim.io.formats.calibration import read_calibration
 from sim.io.formats.detector_boxes import with_boxes
 from sim.io.formats.options import BoxOptions, RecordingOptions, parse_box_scale, parse_classes
@@ -161,7 +161,7 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     layout = people_texts.layout_of(path)
     if layout is None:
         options.reject(path, "a text", "it has no pictures", "background")
-        return mot_folder.open_text(path, options)
+        return mot_text.open_text(path, options)
     if layout == "kitti":
         why = "its camera drives, and it has labels of people only"
         options.reject(path, "a text of KITTI", why, "camera background box_options")

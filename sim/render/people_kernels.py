@@ -1,4 +1,6 @@
-"""Compiled texture pages of clothing, and the drawing of people on a canvas. The tests hold a slow twin of the drawing.
+"""Compiled texture pages of clothing, and the drawing of people and their shadows on a canvas.
+
+The tests hold a slow twin of the drawing.
 
 A page says which garment and which shade is where on a body or head; a point of these is given by across (-1 left … 1
 right), along (1 front, -1 back) and up (-1 … 1).
@@ -7,6 +9,8 @@ People are drawn row by row of their outlines. A body part is a ball of radius 1
 each over its half axis). There the ray of pixel (u, v) is q = P (u, v, 1) + t D (u, v, 1), with P, D (3, 3) the
 matrices of ray origins and directions and t the depth in m along the camera's axis. It meets the ball at the smaller
 root t of |q| = 1; the nearest t is drawn. Only pixels inside the part's outline (`sim.scene.body.outlines`) are tested.
+
+`draw_shadows` casts the shadows of people; of several on a pixel only the darkest counts.
 """
 
 from __future__ import annotations
@@ -14,10 +18,10 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
-from sim.render.canvas import END_ROW, FIRST_ROW, MOST, UNIT
+from sim.render.canvas import END_COLUMN, END_ROW, FIRST_COLUMN, FIRST_ROW, MOST, UNIT
 from sim.render.canvas_kernels import mark_dirty, outline_columns
 from sim.render.texture_kernels import lattice_value, value_noise
-from sim.scene.body import BODY_PART, HEAD_PART
+from sim.scene.body import BODY_PART, HEAD_PART, XX, XY, YY
 
 SHOES, TROUSERS, SHIRT, SECOND, SKIN, HAIR = range(6)  # rows of a person's colours (6, 3)
 PLAIN, HOOPS, STRIPES, PATCHES, JACKET, DRESS = range(6)  # cuts
@@ -217,3 +221,58 @@ def draw_people(rows, seen, shadow, atlas, shade, label, canvas, ids, margin, am
                             second = np.float32(page[beneath + k]) * (one - a) + np.float32(page[beneath + 3 + k]) * a
                             c = (first * (one - b) + second * b) * light[n]
                             colour[v, u, k] = np.int16(np.int32(min(c, np.float32(MOST))))
+
+
+@njit(cache=True)
+def _shade_line(place, many, centre, shape, sx, sy, softness, shade):  # type: ignore[no-untyped-def]
+    """Raises shade (many,) to 255 times the share of the sun that one body part takes at places (many, 3) m."""
+    f = np.float32
+    x, y, z, a, b, c = f(centre[0]), f(centre[1]), f(centre[2]), f(shape[XX]), f(2 * shape[XY]), f(shape[YY])
+    slope_x, slope_y, zero, one, most = f(sx), f(sy), f(0.0), f(1.0), f(255.0)
+    edge, per = f(1.0 + softness), f(1.0 / max(2 * softness, 1e-6))
+    for k in range(many):
+        above = z - place[k, 2]
+        dx, dy = place[k, 0] - x + slope_x * above, place[k, 1] - y + slope_y * above
+        q = dx * dx * a + dx * dy * b + dy * dy * c
+        share = (edge - np.sqrt(max(q, zero))) * per
+        share = share if above > zero else zero
+        dark = most * min(max(share, zero), one)
+        shade[k] = max(shade[k], dark)
+
+
+@njit(cache=True)
+def draw_shadows(rows, place, direct, level, centre, shadows, sun, canvas, margin):  # type: ignore[no-untyped-def]
+    """Darkens the canvas where the people of these rows stand before the sun; of several shadows, the darkest counts.
+
+    place (H, W, 3) m, direct (H, W): of the empty scene. level: True if only level ground is in view. centre (N, 2, 3)
+    m: of the ellipsoids. shadows: PeopleShadows of N people.
+    """
+    width, colour, shaded = direct.shape[1], canvas.colour, canvas.shaded
+    outlines, bounds = shadows.outlines, shadows.outlines.bounds
+    sx, sy = sun[0] / sun[2], sun[1] / sun[2]
+    shade, half = np.empty(width, np.float32), np.float32(0.5)
+    for i in rows:
+        for v in range(bounds[i, FIRST_ROW], bounds[i, END_ROW]):
+            low, high = bounds[i, FIRST_COLUMN], bounds[i, END_COLUMN]
+            if level:
+                low, high = outline_columns(v, i, BODY_PART, outlines, width)
+                first, last = outline_columns(v, i, HEAD_PART, outlines, width)
+                if last > first:
+                    low, high = (min(low, first), max(high, last)) if high > low else (first, last)
+            if high <= low:
+                continue
+            shade[: high - low] = 0.0
+            for e in range(2):
+                shape, softness = shadows.shape[i, e], shadows.softness[i, e]
+                _shade_line(place[v, low:], high - low, centre[i, e], shape, sx, sy, softness, shade)
+            left, right = width, 0
+            for u in range(low, high):
+                new, old = int(shade[u - low] + half), int(shaded[v, u])
+                if new > old:
+                    left, right = min(left, u), u + 1
+                    shaded[v, u] = new
+                    part = direct[v, u] * np.float32(1.0 / 255.0)
+                    factor = (np.float32(1.0) - part * np.float32(new)) / (np.float32(1.0) - part * np.float32(old))
+                    for k in range(3):
+                        colour[v, u, k] = np.int16(np.int32(np.float32(colour[v, u, k]) * factor))
+            mark_dirty(canvas, v, left, right, margin)

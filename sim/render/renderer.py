@@ -208,7 +208,7 @@ class Renderer:
     def _moved_canvas(self, view: CameraView, index: int) -> FrameCanvas:
         canvas = view.take_canvas()
         if view.plants is not None:
-            from sim.render.plants_and_shadows_kernels import sway
+            from sim.render.plants_kernels import sway
 
             wind = view.wind(self._time(index))
             sway(view.empty_canvas, view.empty_scene.plants, view.plant_runs, wind, NODE_STEP, canvas, self._margin)
@@ -217,8 +217,7 @@ class Renderer:
     def _draw(
         self, view: CameraView, index: int, *, shade: bool, label: bool, disparity: bool = False
     ) -> tuple[Image, PixelTruth | None]:
-        from sim.render.people_kernels import draw_people
-        from sim.render.plants_and_shadows_kernels import draw_shadows
+        from sim.render.people_kernels import draw_people, draw_shadows
 
         (seen, shadows), rows = self._people(view, index)
         canvas = self._moved_canvas(view, index) if shade else view.take_canvas()

@@ -166,7 +166,7 @@ def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repea
     share = min(draw(picture.foliage, source), 1.0)
     if share <= 0:
         return None
-    from sim.render.plants_and_shadows_kernels import sample_plants
+    from sim.render.plants_kernels import sample_plants
 
     key = int(source.integers(1 << 20))
     width, height = camera.image

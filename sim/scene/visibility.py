@@ -6,16 +6,9 @@ step first. `sim.scene.body.occlusion_distance` orders people from near to far. 
 pillar hides people further away than the tangent to it. Stairs hide if the ray meets a step before the upright plane
 through the person that faces the camera. Seen from above, walls, pillars and stairs hide nobody.
 
-What the boxes of people tell where neither a camera nor the user does: the scale of the image, and who is visible.
-
-There are two rules of the scale on purpose. A tracker gets the scale of the first boxes (`scale_of_first_boxes`), so
-that it needs no later frame. The truth, which is read as a whole, takes that of all labelled boxes
-(`scale_of_all_boxes`). On PETS09-S2L1, TUD-Campus and TownCentre the scale of the first 100 boxes is within 11 % of
-that of all boxes, on CAVIAR's mwt1gt within 12 %.
-
-For visibility each box is taken for an upright person of `sim.scene.body` whose body and head fill it. Of two people,
-the one whose box ends lower in the image is the nearer (flat ground, a level camera). Only labelled people hide people
-here: walls and other objects are unknown.
+Who is visible in a recording follows from the boxes alone: each is taken for an upright person of `sim.scene.body`
+whose body and head fill it. Of two people, the one whose box ends lower in the image is the nearer (flat ground, a
+level camera). Only labelled people hide people here: walls and other objects are unknown.
 """
 
 from __future__ import annotations
@@ -66,28 +59,6 @@ def measure_visibility(
 def frame_starts(frame: Ints) -> Ints:
     """Returns the index of the first row of each of the F frames in frame (R,), which is sorted; then R. (F + 1,)."""
     return np.concatenate([[0], np.flatnonzero(np.diff(frame)) + 1, [len(frame)]]).astype(np.int64)
-
-
-BOXES = 100  # boxes that the first frames must hold together
-
-
-def scale_of_first_boxes(frame: Ints, height: Array) -> tuple[float, int]:
-    """Returns the image scale, px per m, and the last frame from which it was taken.
-
-    It is the median box height over 1.7 m, of the first frames that together hold 100 boxes (else all). frame, height
-    (R,): of each box, in any order; height in px, nan is ignored. (nan, 0) without boxes.
-    """
-    known = np.isfinite(height)
-    frame, height = frame[known], height[known]
-    if not len(frame):
-        return float("nan"), 0
-    last = int(np.sort(frame)[min(BOXES, len(frame)) - 1])
-    return float(np.median(height[frame <= last])) / body.PERSON_HEIGHT, last
-
-
-def scale_of_all_boxes(height: Array) -> float:
-    """Returns the image scale, px per m: the median of box heights (R,) px over 1.7 m; nan without boxes."""
-    return float(np.median(height)) / body.PERSON_HEIGHT if len(height) else float("nan")
 
 
 def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:

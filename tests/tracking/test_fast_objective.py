@@ -14,10 +14,10 @@ from sim.sequence import simulate
 from sim.types import Groups
 from tracking.fast_objective import ObjectiveScorer
 from tracking.grouping.belief import default_belief
+from tracking.grouping.group_events import TrackedMotion
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.grouping.grouping_choice import belief_groups, groups_now
-from tracking.grouping.merge_split_events import TrackedMotion
 from tracking.grouping.tracks_table import TracksTable
 from tracking.scoring import evaluate
 

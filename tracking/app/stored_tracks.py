@@ -10,7 +10,7 @@ from typing import Any
 
 from scenarios.errors import InputError, shortened
 from sim.io.files.own_files import is_hidden, output_paths
-from sim.io.formats.mot_folder import frame_rate
+from sim.io.formats.mot_text import frame_rate
 from sim.io.formats.options import BoxScale, refuse_options
 from sim.io.source import holds_sequences
 from sim.io.store.seal import AGAIN, RUN, WHOLE, check_run, is_run, is_sequence, read_run, run_folder, tracked_hash

@@ -2,7 +2,7 @@
 
 `with_groups` is the entry for runs and scores; `derive` does the work. Both are causal, apart from the last frame:
 - People are linked by the belief or the baseline rule (`grouping_choice`). Linked people form groups (`group_labels`).
-- Membership events follow from changes of the groups (`merge_split_events`).
+- Membership events follow from changes of the groups (`group_events`).
 - Crossings and queues are measured by `sim.truth.crossing_events` and `sim.truth.queue_detection`.
 
 What the tracker reports itself is decided once, so that no later frame changes an earlier one:
@@ -24,15 +24,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim.io.formats.labels import chords
+from sim.io.formats.labelled_truth import chords
 from sim.truth.crossing_events import SAME_BEFORE, crossings
 from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.queue_detection import ADVANCE_TIME, BRIDGE_TIME, queues
 from sim.types import EVENT_KINDS, GroupEvent, Groups, Tracks
+from tracking.grouping.group_events import TrackedMotion, events_of_labels
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.grouping_choice import Grouping, default_grouping, find_groups
-from tracking.grouping.merge_split_events import TrackedMotion, events_of_labels
 from tracking.grouping.tracks_table import TracksTable, tabulate
 
 # Kinds of events in which the membership of groups changes.

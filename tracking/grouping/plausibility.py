@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from sim.io.formats.labels import chords
+from sim.io.formats.labelled_truth import chords
 from sim.types import Tracks
 
 # m/s: a median speed above it is no crowd's. It is 0.6 to 1.4 in seq_hotel, zara01, mwt1gt, PETS09, TownCentre and

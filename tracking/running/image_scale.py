@@ -2,7 +2,7 @@
 
 Lengths in configs are metres. A tracker that works in the image plane multiplies them by this scale once, in `reset`.
 Rules (docs/reference/formats.md): the camera's scale at the image centre, else the scale that the recording states,
-else the median height of the given boxes of the first frames divided by 1.7 m (sim.scene.visibility).
+else the median height of the given boxes of the first frames divided by 1.7 m (sim.scene.camera).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
-from sim.scene.visibility import scale_of_first_boxes
+from sim.scene.camera import scale_of_first_boxes
 from sim.types import DetectionMode, Detections, Frame, Sequence, Tracks
 
 

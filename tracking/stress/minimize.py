@@ -25,8 +25,17 @@ from dataclasses import dataclass, field
 from scenarios.errors import WorkError
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario
+from tracking.stress import reductions
 from tracking.stress.failures import Failure, Judgement
-from tracking.stress.reductions import STAGES, Stage, pinned, without
+from tracking.stress.reductions import Piece, pinned, without
+
+Stage = Callable[[Scenario], list[Piece]]
+
+# The kinds of pieces, in the order in which they are taken out.
+STAGES: tuple[Stage, ...] = (
+    reductions.script, reductions.seconds, reductions.beginning, reductions.obstacles, reductions.difficulties,
+    reductions.defaults, reductions.people, reductions.details,
+)  # fmt: skip
 
 ALLOWED = 5  # one of so many confirming seeds may not fail
 ROUNDS = 3  # of fresh seeds

@@ -1,6 +1,6 @@
 """What can be taken out of a scenario, in pieces, and the scenario that is left.
 
-The pieces, in the order in which `tracking.stress.minimize` tries them:
+The kinds of pieces, in the order in which they are tried (`STAGES` of `tracking.stress.minimize`):
 
     script        a group, or an order of the script
     seconds       the last second of the duration
@@ -20,7 +20,7 @@ import math
 import operator
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial, reduce
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -73,9 +73,6 @@ class Piece:
         value = reduce(operator.getitem, self.path, table)
         key = ".".join(map(str, self.path))
         return key if isinstance(value, dict | list) else f"{key} = {value}"
-
-
-Stage = Callable[[Scenario], list[Piece]]
 
 
 def table_of(scenario: Scenario) -> Table:
@@ -225,6 +222,11 @@ def script(scenario: Scenario) -> list[Piece]:
     return [*reversed(_each([("event", EACH)], scenario)), *_each([("group", EACH)], scenario)]
 
 
+def obstacles(scenario: Scenario) -> list[Piece]:
+    """Returns one piece for the removal of each door, wall, pillar, flight of stairs and service point."""
+    return _each([("world", OBSTACLES, EACH)], scenario)
+
+
 def difficulties(scenario: Scenario) -> list[Piece]:
     """Returns a piece for each key that can be set to its easiest value (its default if no value is known to be
     easiest), and does not have it."""
@@ -273,10 +275,9 @@ def _least(size: Value) -> int:
     return max(1, round(low)) if math.isfinite(low) else 1
 
 
-STAGES: tuple[Stage, ...] = (
-    script, seconds, beginning, partial(_each, [("world", OBSTACLES, EACH)]), difficulties, defaults, people,
-    partial(_each, DETAILS),
-)  # fmt: skip
+def details(scenario: Scenario) -> list[Piece]:
+    """Returns one piece for the removal of each stop, point on a way, part of a split, and so on (`DETAILS`)."""
+    return _each(DETAILS, scenario)
 
 
 def _set(value: Any, *path: str | int) -> Piece:

@@ -20,7 +20,7 @@ from sim.hashing import installed
 from sim.io.files.atomic import write_file
 from sim.io.files.tables import plain
 from tracking.config import Config
-from tracking.tuning.comparison import Candidate, Comparison, TrialRecord
+from tracking.tuning.candidates import Candidate, Comparison, TrialRecord
 from tracking.tuning.search_plan import SearchPlan, seeds_text
 
 BLUE, ORANGE = "#0b6bcb", "#d4600a"

@@ -104,7 +104,7 @@ def _reflected(point: Array) -> Array:
 LEAST_SCENES = 2
 
 
-def surely_loses(gains: Sequence[float], p: float) -> bool:
+def should_prune(gains: Sequence[float], p: float) -> bool:
     """Returns True if a trial surely loses: at least 2 gains, a negative sum, and a signed-rank p-value below p. gains:
     by how much the trial is better than the best one on each scene that both were played on."""
     return len(gains) >= LEAST_SCENES and sum(gains) < 0 and signed_rank_p_value(gains) < p

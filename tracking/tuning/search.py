@@ -6,151 +6,27 @@
     tracks = tracking.track("blob", sequence, params=found.config)
 
 docs/reference/tuning.md describes the method and what may be concluded from its results.
-
-Candidates are then played on held-out scenes, which the search did not use: validation scenes first, then test scenes.
-`HeldOutEvaluator.validated` plays the best trials on the validation scenes. `simplified` resets the parameters of the
-winner that bring nothing there. `compared` measures the gain on the test scenes. The study keeps the episodes, so that
-a search that was killed after its last trial does not play them again.
+Candidates are played on validation and test scenes by `tracking.tuning.candidates`.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scenarios.errors import FlockscopeError, InputError, WorkError, counted
-from sim.dataset.generate import LEFT_OUT
+from scenarios.errors import InputError, counted
 from sim.io.files.own_files import Marks, output_file, refuse_foreign_file
 from sim.types import Tracker
-from tracking.config import Config
-from tracking.environment.episodes import Episode, Source
 from tracking.keyword_options import documented, from_keywords
-from tracking.tuning.comparison import Candidate, Comparison, Goal, TrialRecord, compare_episodes, pareto_front
+from tracking.tuning.candidates import Candidate, Goal, HeldOutEvaluator, TrialRecord, pareto_front
 from tracking.tuning.options import Scenes, TuneOptions
-from tracking.tuning.parallel_episodes import PlayEpisodes, episode_player
+from tracking.tuning.parallel_episodes import episode_player
 from tracking.tuning.result import TuningResult
 from tracking.tuning.search_plan import SearchPlan, search_plan
 
 if TYPE_CHECKING:
-    import optuna
-
     from tracking.tuning.study import SearchStudy
-
-
-# Scores that are compared on the test scenes beside the goals.
-COMPARED_KEYS = ("objective", "HOTA", "group_F1", "pairwise_F1", "event_F1")
-
-STORED = "judged "  # Prefix of the study attributes in which episodes are stored.
-
-
-@dataclass(frozen=True)
-class HeldOutEvaluator:
-    """Plays configs on the validation and test scenes, which the search did not use.
-
-    State: scenes, the keys of all scenes counted so far; left_out, by key, one line for each scene that was left out
-    because its script did not come true.
-    """
-
-    plan: SearchPlan
-    play: PlayEpisodes
-    study: optuna.Study
-    report: Callable[[str], None] = field(default=lambda text: None)
-    scenes: set[object] = field(default_factory=set)
-    left_out: dict[object, str] = field(default_factory=dict)
-
-    def validated(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Returns the candidates that can be played, with `validation` (values) and `gain` filled in. The first
-        candidate must be the defaults; gains are over them. Raises their error if they cannot be played."""
-        found = list[Candidate]()
-        defaults: Sequence[Episode] = ()
-        for k, candidate in enumerate(candidates):
-            self.report(f"validation, {k + 1} of {len(candidates)}")
-            episodes = self._validation(candidate.config)
-            if isinstance(episodes, FlockscopeError):
-                if k == 0:
-                    raise episodes
-                continue
-            defaults = defaults or episodes
-            values = tuple(goal.mean(episodes) for goal in self.plan.goals)
-            gain = compare_episodes("validation", self.plan.goals[0], defaults, episodes)
-            found.append(replace(candidate, validation=values, gain=gain))
-        return found
-
-    def simplified(self, config: Config, value: float, order: Sequence[str]) -> tuple[Config, float]:
-        """Returns the config with changed parameters reset to the default where validation is no worse, and its value.
-        value: the config's mean of the first goal on the validation scenes. order: names in the order to try."""
-        goal = self.plan.goals[0]
-        changed = [name for name in order if getattr(config, name) != self.plan.defaults[name]]
-        for k, name in enumerate(changed):
-            self.report(f"resetting changes without gain, {k + 1} of {len(changed)}")
-            try:
-                simpler = type(config).from_dict({**config.as_dict(), name: self.plan.defaults[name]})
-            except FlockscopeError:
-                continue
-            episodes = self._validation(simpler)
-            if not isinstance(episodes, FlockscopeError) and goal.gain(value, goal.mean(episodes)) >= 0:
-                config, value = simpler, goal.mean(episodes)
-        return config, value
-
-    def compared(self, config: Config) -> tuple[list[Comparison], list[str]]:
-        """Returns the comparisons of the config with the defaults on the test scenes, one per suite and score. Also
-        returns notes: one text for each suite that cannot be played with the config."""
-        found, notes = list[Comparison](), list[str]()
-        keys = [goal.key for goal in self.plan.goals]
-        goals = [*self.plan.goals, *(Goal(key) for key in COMPARED_KEYS if key not in keys)]
-        for name, sources in self.plan.tests.items():
-            self.report(f"test on {name}")
-            before = self._episodes(sources, self.plan.base, every_score=True)
-            if isinstance(before, FlockscopeError):
-                raise before
-            after = self._episodes(sources, config, every_score=True)
-            if isinstance(after, FlockscopeError):
-                notes.append(f"{name}: cannot be played with the new parameters: {after.line()}")
-                continue
-            made = [compare_episodes(name, goal, before, after) for goal in goals]
-            found += [comparison for comparison in made if comparison is not None]
-        return found, notes
-
-    def _validation(self, config: Config) -> list[Episode] | FlockscopeError:
-        return self._episodes(self.plan.validation, config, self.plan.needs_every_score)
-
-    def _episodes(
-        self, sources: Sequence[Source], config: Config, every_score: bool
-    ) -> list[Episode] | FlockscopeError:
-        """Returns one episode per source, stored in the study; or the error of a config that cannot be played."""
-        parts = ([source.key for source in sources], config.as_dict(), every_score)
-        key = STORED + hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()[:16]
-        found = [Episode(*fields) for fields in self.study.user_attrs.get(key, ())]
-        if not found:
-            kept = {*COMPARED_KEYS, *(goal.key for goal in self.plan.goals)}
-            for result in self.play(sources, config.as_dict(), every_score):
-                if isinstance(result, FlockscopeError):
-                    return result
-                found.append(replace(result, scores={k: v for k, v in result.scores.items() if k in kept}))
-            self.study.set_user_attr(key, [astuple(episode) for episode in found])
-        self.count(sources, [episode.left_out for episode in found])
-        return found
-
-    def count(self, sources: Sequence[Source], reasons: Sequence[str]) -> None:
-        """Counts the sources as scenes; reasons: for each source why it was left out, "" if it was not."""
-        self.scenes.update(source.key for source in sources)
-        for source, reason in zip(sources, reasons, strict=True):
-            if reason:
-                self.left_out[source.key] = f"{source.name} seed {source.seed}: {reason}"
-
-    def require_most(self) -> None:
-        """Raises WorkError if more than 5 % of the counted scenes were left out."""
-        if len(self.left_out) > LEFT_OUT * len(self.scenes):
-            first = next(iter(self.left_out.values()))
-            raise WorkError(
-                place="--suite", got=f"{len(self.left_out)} of {len(self.scenes)} scenes without their events: {first}",
-                expected="at most 5 % of the scenes left out", remedy="mend these scenes, or choose another suite",
-            )  # fmt: skip
 
 
 JOURNAL = ".journal"  # Suffix of the journal beside `--out`.

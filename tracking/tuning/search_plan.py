@@ -26,7 +26,7 @@ from sim.types import DetectionMode
 from tracking.config import Config, Param, Value
 from tracking.environment.episodes import Source, sources
 from tracking.parameter_space import space_of
-from tracking.tuning.comparison import FAST_KEYS, SPEED, Goal, goals_of
+from tracking.tuning.candidates import FAST_KEYS, SPEED, Goal, goals_of
 from tracking.tuning.options import TuneOptions
 from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 

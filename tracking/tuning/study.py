@@ -39,10 +39,10 @@ from optuna.trial import FrozenTrial, TrialState
 from scenarios.errors import FlockscopeError, InputError
 from tracking.environment.episodes import Episode
 from tracking.stats import mean_of_known
-from tracking.tuning.comparison import TrialRecord
+from tracking.tuning.candidates import TrialRecord
 from tracking.tuning.options import Progress
 from tracking.tuning.parallel_episodes import PlayEpisodes
-from tracking.tuning.sampler import PRUNED, distribution, propose, surely_loses, tpe_sampler
+from tracking.tuning.sampler import PRUNED, distribution, propose, should_prune, tpe_sampler
 from tracking.tuning.search_plan import SearchPlan
 
 SUFFIX = ".locks"  # What the name of the lock file adds to the name of the journal.
@@ -342,7 +342,7 @@ def _estimate_if_losing(study: SearchStudy, played: dict[int, Episode]) -> float
     best = study.optuna.best_trial
     both = [(best.intermediate_values[k], goal.of(e)) for k, e in played.items() if k in best.intermediate_values]
     gains = [goal.gain(theirs, own) for theirs, own in both if own == own]
-    if best.value is None or not surely_loses(gains, study.plan.options.prune):
+    if best.value is None or not should_prune(gains, study.plan.options.prune):
         return None
     loss = max(-mean_of_known(gains), LEAST_LOSS)
     return best.value - loss if goal.higher else best.value + loss

@@ -37,7 +37,7 @@ from sim.io.files.atomic import write_file
 from sim.io.files.numeric_text import number_or_nan
 from sim.io.files.own_files import refuse_foreign_file
 from sim.io.files.tables import parquet_bytes
-from sim.io.formats.labels import differentiate
+from sim.io.formats.labelled_truth import differentiate
 from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
 
 if TYPE_CHECKING:

@@ -20,6 +20,7 @@ from scenarios.reading import read_regular
 from sim.types import Array, Bools, Ints
 
 NAME_THEM = "name the columns in the first line, as frame,id,x,y or frame,id,left,top,width,height"
+NO_COMMENTS = f"remove the lines that begin with #, and {NAME_THEM}"
 
 LARGEST = 2**52  # whole numbers pass through float64
 CORRECT = "remove or correct it"
@@ -147,7 +148,7 @@ class TextRows:
             if bad or len(cells) not in fits:
                 got, expected = f"{len(cells)} columns", f"{width} columns, as in the first line"
                 got, expected = (bad[0], "a number") if bad else (got, expected)
-                remedy = f"remove the lines that begin with #, and {NAME_THEM}" if line.startswith("#") else CORRECT
+                remedy = NO_COMMENTS if line.startswith("#") else CORRECT
                 parts = line.split(";" if ";" in line else None)  # whatever the separator was taken to be
                 if bad and any("," in part and is_number_text(part.replace(",", ".")) for part in parts):
                     remedy = "write decimals with a point"

@@ -18,7 +18,7 @@ from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_rows, read_text
-from sim.io.formats.labels import labelled_sequence, labelled_truth_fields
+from sim.io.formats.labelled_truth import labelled_sequence, labelled_truth_fields
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.types import Ints, Sequence, Truth
 

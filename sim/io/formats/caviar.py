@@ -20,9 +20,9 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, bounded_number, person_ids, xml_root
-from sim.io.formats.labels import CHORD, differentiate, labelled_sequence, labelled_truth_fields
+from sim.io.formats.labelled_truth import CHORD, differentiate, labelled_sequence, labelled_truth_fields
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
-from sim.scene.visibility import scale_of_all_boxes, scale_of_first_boxes
+from sim.scene.camera import scale_of_all_boxes, scale_of_first_boxes
 from sim.truth.group_hulls import box_groups
 from sim.types import Array, Ints, Sequence, Truth
 

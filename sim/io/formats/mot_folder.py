@@ -1,11 +1,11 @@
-"""Readers for MOTChallenge folders (seqinfo.ini, img1/, gt/, det/) and for single MOT text files, as Sequences."""
+"""Reader for MOTChallenge folders (seqinfo.ini, img1/, gt/, det/), as Sequences."""
 
 from __future__ import annotations
 
 import configparser
 import warnings
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass
 from itertools import repeat
 from pathlib import Path
 from typing import Any
@@ -19,14 +19,11 @@ from scenarios.reading import is_present
 from sim.io.files.numeric_text import bounded_number, read_text
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
-from sim.io.formats.labels import labelled_sequence
 from sim.io.formats.mot_table import read_table, size_doubt
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
 from sim.types import Frame, Image, Ints, Sequence, Truth
-
-DEFAULT_FPS = 25.0
 
 
 @dataclass(frozen=True)
@@ -68,15 +65,6 @@ def read_seqinfo(path: Path) -> SeqInfo:
     return SeqInfo(name, rate, length, size, section.get("imdir", "img1"))
 
 
-def frame_rate(given: float | None, found: float | None = None) -> float:
-    """Returns the first of `given` (--fps) and `found` (in the recording) that is not None; else 25, with a warning."""
-    if given is None and found is None:
-        # The text names no path, so that a command over many recordings prints it once.
-        text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
-        warnings.warn(text, stacklevel=3)
-    return given or found or DEFAULT_FPS
-
-
 def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns a MOTChallenge folder (seqinfo.ini, img1/, gt/gt.txt, det/det.txt, each optional) as Sequence.
 
@@ -84,7 +72,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     last frame of texts and pictures. The truth is read, and checked, when asked for.
     """
     info, images, background = _info(path), options.images, options.background
-    rate = frame_rate(options.fps, info.fps)
+    rate = mot_text.frame_rate(options.fps, info.fps)
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found, of_boxes = None, options.box_options
     if is_present(det):
@@ -167,36 +155,6 @@ def _info(path: Path) -> SeqInfo:
 def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
     texts = is_present(path / "gt" / "gt.txt") or is_present(path / "det" / "det.txt")
     return find_pictures(path / info.image_dir, info.length, (lambda: _labelled_frames(path)) if texts else None)
-
-
-def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
-    """Returns a MOT text as Sequence without pictures: detections if every id is -1, else truth.
-
-    `options.camera` becomes its camera, unchanged.
-    """
-    rate, of_boxes = frame_rate(options.fps), options.box_options
-    table = read_table(path, boxless=True, box_scale=of_boxes.box_scale)
-    if not len(table.frame):
-        raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
-    length = int(table.frame.max())
-
-    def truth() -> Truth:
-        return mot_text.truth_of_table(table, path.stem, rate, length, options.scale, of_boxes.person_class)
-
-    sequence = replace(
-        labelled_sequence("mot text", path, path.stem, rate, length, truth, options.scale, **of_boxes.given()),
-        camera=options.camera,
-    )
-    mot_text.require_classes(table, of_boxes.person_class)
-    if not (table.id == -1).all():
-        options.reject(path, "a text of people with ids", "it is for detections", "min_score")
-        return sequence
-    found = mot_text.detections_of_table(table, of_boxes)
-
-    def frames() -> Iterator[Frame]:
-        return (Frame(k, (k - 1) / rate, detections=found.at(k, rate)) for k in range(1, length + 1))
-
-    return replace(sequence, frames=frames, load_truth=None, has_detections=True)
 
 
 def _labelled_frames(path: Path) -> Ints:

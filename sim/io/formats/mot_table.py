@@ -21,7 +21,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import CORRECT, NAME_THEM, NumericTable, TextRows, is_number_text, read_rows
+from sim.io.files.numeric_text import CORRECT, NAME_THEM, NO_COMMENTS, NumericTable, TextRows, is_number_text, read_rows
 from sim.io.formats.options import BoxScale
 from sim.types import LENGTH_UNITS, Array, Bools, Ints
 
@@ -181,7 +181,8 @@ def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> 
         if meaning is not None and not (words and meaning == "class"):
             found[meaning] = k
     if found.keys().isdisjoint(("frame", "time")):
-        _refuse(text.file, names, NAME_THEM if set(NAMES["time"]).isdisjoint(names) else SECONDS)
+        names_or_comment = NO_COMMENTS if text.text[0].startswith("#") else NAME_THEM
+        _refuse(text.file, names, names_or_comment if set(NAMES["time"]).isdisjoint(names) else SECONDS)
     rows = text.numbers((len(names),), first=1, layout="those that line 1 names", use=list(found.values()))
     column: dict[str, Column] = dict(zip(found, rows.values.T, strict=False))
     if words:

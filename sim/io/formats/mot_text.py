@@ -1,4 +1,4 @@
-"""Strict reader for MOTChallenge text: gt.txt and det.txt.
+"""Strict reader for MOTChallenge text: gt.txt and det.txt of a folder, and single texts as Sequences (`open_text`).
 
 Lines have 6 to 10 columns, the first of which are frame (from 1), id, and the box's left, top, width, height in px.
 Column 7 is a confidence or flag. 8 or 9 columns go on with class and visibility (from MOT16 on), 10 columns with the
@@ -17,7 +17,8 @@ people; other programs write categories, occlusion flags, zeros or pixels there.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,12 +27,12 @@ from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.biwi import labels_of
-from sim.io.formats.labels import CHORD, centres, differentiate, labelled_truth_fields
-from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, require_pixels
-from sim.io.formats.options import BoxOptions, Classes
-from sim.scene.visibility import scale_of_all_boxes
+from sim.io.formats.labelled_truth import CHORD, centres, differentiate, labelled_sequence, labelled_truth_fields
+from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, read_table, require_pixels
+from sim.io.formats.options import NO_OPTIONS, BoxOptions, Classes, RecordingOptions
+from sim.scene.camera import scale_of_all_boxes
 from sim.truth.group_hulls import box_groups
-from sim.types import Array, Bools, Detections, Ints, Plane, Truth, Unscored
+from sim.types import Array, Bools, Detections, Frame, Ints, Plane, Sequence, Truth, Unscored
 
 # step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
 LONGEST = 12.0
@@ -398,3 +399,45 @@ def _labelled(truth: Truth, label: Ints) -> Truth:
     known = labelled_truth_fields(*rows, pos, vel, fps=fps, length=length, px_per_m=truth.px_per_m)
     shapes = box_groups(*rows, pos, vel, truth.box, 1, length)
     return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))
+
+
+DEFAULT_FPS = 25.0
+
+
+def frame_rate(given: float | None, found: float | None = None) -> float:
+    """Returns the first of `given` (--fps) and `found` (in the recording) that is not None; else 25, with a warning."""
+    if given is None and found is None:
+        # The text names no path, so that a command over many recordings prints it once.
+        text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
+        warnings.warn(text, stacklevel=3)
+    return given or found or DEFAULT_FPS
+
+
+def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
+    """Returns a MOT text as Sequence without pictures: detections if every id is -1, else truth.
+
+    `options.camera` becomes its camera, unchanged.
+    """
+    rate, of_boxes = frame_rate(options.fps), options.box_options
+    table = read_table(path, boxless=True, box_scale=of_boxes.box_scale)
+    if not len(table.frame):
+        raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
+    length = int(table.frame.max())
+
+    def truth() -> Truth:
+        return truth_of_table(table, path.stem, rate, length, options.scale, of_boxes.person_class)
+
+    sequence = replace(
+        labelled_sequence("mot text", path, path.stem, rate, length, truth, options.scale, **of_boxes.given()),
+        camera=options.camera,
+    )
+    require_classes(table, of_boxes.person_class)
+    if not (table.id == -1).all():
+        options.reject(path, "a text of people with ids", "it is for detections", "min_score")
+        return sequence
+    found = detections_of_table(table, of_boxes)
+
+    def frames() -> Iterator[Frame]:
+        return (Frame(k, (k - 1) / rate, detections=found.at(k, rate)) for k in range(1, length + 1))
+
+    return replace(sequence, frames=frames, load_truth=None, has_detections=True)

@@ -27,7 +27,7 @@ from scenarios.limits import FRAME_RATES, is_number
 from scenarios.reading import parse_json
 from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_nan, read_rows, read_text
 from sim.io.formats.biwi import frame_numbers
-from sim.io.formats.labels import labelled_sequence
+from sim.io.formats.labelled_truth import labelled_sequence
 from sim.io.formats.mot_table import table_of_rows
 from sim.io.formats.mot_text import truth_of_table
 from sim.io.formats.options import RecordingOptions

@@ -26,7 +26,7 @@ from sim.io.files import tables
 from sim.io.files.atomic import lock_folder, replace_sealed
 from sim.io.files.tables import Column, Count, Rate, columns_of, table_bytes
 from sim.io.formats import people_texts
-from sim.io.formats.labels import centres, chords
+from sim.io.formats.labelled_truth import centres, chords
 from sim.io.formats.mot_table import read_table, require_pixels, table_of_rows
 from sim.io.formats.mot_text import ground_positions, of_class, reject_duplicate_ids, require_metres, unit_scores
 from sim.io.formats.options import BoxScale, Classes

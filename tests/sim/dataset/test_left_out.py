@@ -8,7 +8,7 @@ from scenarios.errors import OrderError, WorkError
 from sim.dataset import generate as sequence_job
 from sim.dataset.generate import generate
 from tests.tuning_toys import toy_plan
-from tracking.tuning.search import HeldOutEvaluator
+from tracking.tuning.candidates import HeldOutEvaluator
 
 store = sequence_job.simulate_and_store
 

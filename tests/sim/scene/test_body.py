@@ -1,4 +1,4 @@
-"""Bodies and stairs, and what boxes alone tell: the scale of the image, and who is visible."""
+"""Bodies and stairs, and who is visible by boxes alone."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from sim.scene.body import BODY, HEAD, ellipsoids, person_boxes
 from sim.scene.camera import project
 from sim.scene.terrain import height_at
-from sim.scene.visibility import BOXES, scale_of_first_boxes, with_visibility
+from sim.scene.visibility import with_visibility
 from sim.truth.label import bodies
 from sim.types import Camera, Scene, Stairs, Truth
 from tests.reference_sense import above, crowd, pinhole, surface
@@ -75,23 +75,6 @@ def test_beside_stairs_is_level_and_steps_are_felt() -> None:
         float(height_at(stairs(10), np.array([7.0, 5.0])))
     )
     assert height_at(Scene(np.array([5.0, 5.0])), np.zeros((3, 2, 2))).shape == (3, 2)
-
-
-def test_the_frames_that_hold_the_first_boxes_decide():
-    frame = np.repeat(np.arange(1, 61), 3)
-    height = np.where(frame <= 34, 17.0, 170.0)
-    assert scale_of_first_boxes(frame, height) == (pytest.approx(10.0), 34)
-    assert -(-BOXES // 3) == 34
-    shuffled = np.random.default_rng(0).permutation(len(frame))
-    assert scale_of_first_boxes(frame[shuffled], height[shuffled]) == (pytest.approx(10.0), 34)
-
-
-def test_few_boxes_all_count_and_unknown_ones_do_not():
-    frame = np.array([4, 4, 9, 30])
-    assert scale_of_first_boxes(frame, np.array([17.0, np.nan, 34.0, 51.0])) == (pytest.approx(20.0), 30)
-    scale, last = scale_of_first_boxes(frame, np.full(4, np.nan))
-    assert np.isnan(scale)
-    assert last == 0
 
 
 def stripped(truth: Truth) -> Truth:

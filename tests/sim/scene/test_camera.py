@@ -12,6 +12,7 @@ from sim.scene.camera import (
     project,
     px_per_m_at_centre,
     rays,
+    scale_of_first_boxes,
     to_ground,
     undistort,
 )
@@ -108,3 +109,17 @@ def test_the_jacobian_is_the_slope(k):
     slope = [(to_ground(camera, uv + d) - to_ground(camera, uv - d)) / (2 * step) for d in step * np.eye(2)]
     right = np.stack(slope, axis=2)
     assert ground_jacobian(camera, uv) == pytest.approx(right, rel=1e-5, abs=1e-8)
+
+
+def test_the_frames_that_hold_the_first_boxes_decide():
+    frame = np.repeat(np.arange(1, 61), 3)
+    height = np.where(frame <= 34, 17.0, 170.0)
+    assert scale_of_first_boxes(frame, height) == (pytest.approx(10.0), 34)  # frame of the 100th box
+    shuffled = np.random.default_rng(0).permutation(len(frame))
+    assert scale_of_first_boxes(frame[shuffled], height[shuffled]) == (pytest.approx(10.0), 34)
+
+
+def test_few_boxes_all_count_and_unknown_ones_do_not():
+    frame = np.array([4, 4, 9, 30])
+    assert scale_of_first_boxes(frame, np.array([17.0, np.nan, 34.0, 51.0])) == (pytest.approx(20.0), 30)
+    assert scale_of_first_boxes(frame, np.full(4, np.nan)) == (pytest.approx(np.nan, nan_ok=True), 0)

@@ -4,7 +4,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from sim.io.formats.labels import labelled_truth_fields
+from sim.io.formats.labelled_truth import labelled_truth_fields
 from sim.types import GroupEvent, Groups, Tracks
 from tests.reference_sense import paced
 from tracking.grouping.grouped_tracks import derive, with_groups

@@ -23,8 +23,8 @@ from tracking.app.commands.track import TrackerSetup
 from tracking.errors import groups
 from tracking.errors.people import PersonKind
 from tracking.stress.failures import Judgement, parse_failure, play_episode
-from tracking.stress.minimize import Minimizer
-from tracking.stress.reductions import STAGES, beginning, difficulties, pinned, script, without
+from tracking.stress.minimize import STAGES, Minimizer
+from tracking.stress.reductions import beginning, difficulties, pinned, script, without
 
 FAILURE = parse_failure("HOTA<0.5")
 Oracle = Callable[[Scenario, int], bool]

@@ -12,8 +12,8 @@ from scenarios.errors import WorkError
 from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import toy_plan, tune_arguments
 from tracking.environment.episodes import Episode
-from tracking.tuning.comparison import Candidate, Goal, compare_episodes, pareto_front
-from tracking.tuning.search import HeldOutEvaluator, tune
+from tracking.tuning.candidates import Candidate, Goal, HeldOutEvaluator, compare_episodes, pareto_front
+from tracking.tuning.search import tune
 from tracking.tuning.search_plan import SearchPlan
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import toy_plan
-from tracking.tuning.comparison import Candidate, TrialRecord
+from tracking.tuning.candidates import Candidate, TrialRecord
 from tracking.tuning.result import TuningResult
 
 DEFAULTS = {"reach": 0.1, "skip": 0, "colour": "red", "forbidden": 0.0}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import rankdata, wilcoxon
 
-from tracking.tuning.sampler import signed_rank_p_value, surely_loses
+from tracking.tuning.sampler import should_prune, signed_rank_p_value
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -35,8 +35,8 @@ def test_limits():
 
 
 def test_only_a_sure_loss_on_two_scenes_stops():
-    assert not surely_loses([-1.0] * 3, 0.1)
-    assert surely_loses([-1.0] * 4, 0.1)
-    assert not surely_loses([-1.0] * 4, 0.0)
-    assert not surely_loses([-1.0], 0.9)
-    assert not surely_loses([-1.0] * 6 + [9.0], 0.5)
+    assert not should_prune([-1.0] * 3, 0.1)
+    assert should_prune([-1.0] * 4, 0.1)
+    assert not should_prune([-1.0] * 4, 0.0)
+    assert not should_prune([-1.0], 0.9)
+    assert not should_prune([-1.0] * 6 + [9.0], 0.5)

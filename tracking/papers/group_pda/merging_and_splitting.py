@@ -36,7 +36,7 @@ from scipy.spatial import cKDTree
 from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition, regions_overlap
-from tracking.grouping.merge_split_events import ARRIVAL
+from tracking.grouping.group_events import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters

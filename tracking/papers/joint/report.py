@@ -19,8 +19,8 @@ from sim.truth.group_ids_and_changes import GroupChange, Identities, Members, Pe
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.motion_rows import MotionRows
 from sim.types import Array, GroupEvent, Groups, Ints
+from tracking.grouping.group_events import SEARCHED, Parts, TrackedMotion, corrects, event_of_change
 from tracking.grouping.group_labels import gone_people, part_sets
-from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, corrects, event_of_change
 from tracking.papers.joint import partition_labels_kernels
 
 

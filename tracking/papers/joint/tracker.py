@@ -88,7 +88,7 @@ Departures. A star marks those that stay in the preset `paper`:
 - weights of votes*: before step 2, by the rest, in the preset by w (`algorithm`). Paper: summed over i after step 2.
   Why: no noise of resampling.
 - ids, onsets*: ids of the truth; onsets dated back, but for enter and leave. Paper: none. Why: as the truth.
-- events that correct groups*: not reported (`tracking.grouping.merge_split_events`); nor are enters of the first
+- events that correct groups*: not reported (`tracking.grouping.group_events`); nor are enters of the first
   second. Paper: none. Why: who was in one group by mistake neither met nor parts.
 """
 
@@ -104,7 +104,7 @@ from tracking.detect.point_detections import PointTracker, boxes_at, followed_si
 from tracking.filters import existence
 from tracking.filters.person_streams import NOBODY, PersonStreams
 from tracking.grouping.belief import EVENTS, default_belief
-from tracking.grouping.pair_belief import PairBelief
+from tracking.grouping.online_belief import PairBelief
 from tracking.papers.joint import decentralised_filter, report
 from tracking.papers.joint.config import CONFIRMED, LEAST_PRESENCE, REPORTED, SCALES, SHARPNESS, JointConfig
 from tracking.papers.joint.decentralised_filter import Nested

@@ -96,7 +96,7 @@ from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
 from tracking.detect.point_detections import PersonTable, PointTracker, boxes_at, followed_sizes
 from tracking.filters.person_streams import PersonStreams, birth_keys
 from tracking.grouping.belief import UNSEEN
-from tracking.grouping.pair_belief import PairBelief
+from tracking.grouping.online_belief import PairBelief
 from tracking.papers.relational import particle_set, particle_set_kernels, sensor, transition_kernels
 from tracking.papers.relational.config import (
     BIRTH_DOUBT,

@@ -68,6 +68,7 @@ UNCLEAR = {
     "1;7;10,5;20,5;30,5;40,5\n": "line 1: got '10,5'; expected a number; write decimals with a point",
     "1\t7\t10,5\t20,5\t30,5\t40,5\n": "line 1: .* write decimals with a point",
     "<html>\n": "line 1: got columns <html>",
+    "# by me\nframe,id,x,y,w,h\n1,1,2,3,4,5\n": "line 1: got columns by,me; .*remove the lines that begin with #",
     "frame,id,u,v,w,h\n1,1,2,3,4,5\n": "line 1: got columns frame,id,u,v,w,h; expected frame ",
     "time,id,x,y,w,h\n1,1,2,3,4,5\n": "line 1: got columns time,id,x,y,w,h; expected frame .*time × frames per second",
     "frame,id,x,y\n0.4,1,2,3\n0.8,1,2,3\n": "line 2: got .*time × frames per second",

@@ -3,7 +3,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.formats import mot_text
-from sim.io.formats.labels import chords, differentiate
+from sim.io.formats.labelled_truth import chords, differentiate
 from sim.io.formats.mot_table import read_table
 from sim.io.formats.mot_text import unit_scores
 from sim.io.source import open_source

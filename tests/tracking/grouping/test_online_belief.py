@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracking.grouping.belief import DECISIONS, UNSEEN, beliefs_of_tracks, default_belief
-from tracking.grouping.pair_belief import PairBelief
+from tracking.grouping.online_belief import PairBelief
 
 FPS = 10.0
 

@@ -87,8 +87,6 @@ def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: flo
 
 def scale_groups(groups: Groups, factor: float) -> Groups:
     """Returns groups with positions, velocities and hulls multiplied by `factor`, and extents by its square."""
-    if factor == 1.0:
-        return groups
     hull, extent = tuple(h * factor for h in groups.hull), groups.extent * factor**2
     return groups.replace(pos=groups.pos * factor, vel=groups.vel * factor, extent=extent, hull=hull)
 
