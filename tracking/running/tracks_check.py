@@ -93,6 +93,8 @@ def _faults(tracks: Any, index: int, history: ReportHistory) -> Iterator[Any]:
     people = history.ids if tracks.unit == "person" else frozenset[int]()
     if tracks.groups is not None:
         yield from _group_faults(tracks.groups, d, people)
+    blind = tracks.unit == "group" and n and not (tracks.groups and tracks.groups.hull)
+    yield blind and ("rows of unit 'group' without hulls", "groups: sim.types.Groups with a hull for each group")
     good = isinstance(tracks.events, tuple) and all(isinstance(e, GroupEvent) for e in tracks.events)
     yield not good and (f"events {tracks.events!r}", "a tuple of sim.types.GroupEvent")
     for event in tracks.events:
