@@ -83,9 +83,11 @@ def test_groups_are_found_without_a_look_ahead(tmp_path, name):
 
 
 def test_a_folder_of_ndjson_is_a_dataset(tmp_path):
-    for name in ("a.ndjson", "b.ndjson"):
-        (tmp_path / name).write_text(TRAJNET)
-    assert [s.name for s in open_source(tmp_path)] == ["a", "b"]
+    for path in (tmp_path / "a.ndjson", tmp_path / "one" / "b.ndjson", tmp_path / "two" / "b.ndjson"):
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(TRAJNET)
+    with pytest.warns(UserWarning, match="b is the name of 2 sequences"):
+        assert [s.name for s in open_source(tmp_path)] == ["one", "two", "a"]
 
 
 BAD = {
