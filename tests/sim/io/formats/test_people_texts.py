@@ -172,9 +172,8 @@ def test_a_column_of_groups(tmp_path):
     assert pairs(truth) == set(PAIR.items())
     assert truth.labelled.all()
     assert all(some.id.tolist() == [5] and some.members[0].tolist() == [1, 2] for some in truth.groups)
-    wrong = text.replace("\n1,1,0.2,1.0,5", "\n1,1,0.2,1.0,-2")
     with pytest.raises(InputError, match=r"line 2: .*groups from 0, or -1 for alone"):
-        opened(tmp_path, "wrong.csv", wrong, fps=5).truth  # noqa: B018
+        opened(tmp_path, "wrong.csv", text.replace("0.2,1.0,5", "0.2,1.0,-2", 1), fps=5).truth  # noqa: B018
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
