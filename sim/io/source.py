@@ -106,16 +106,16 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
 
 
 def _distinct(sequences: list[Sequence]) -> list[Sequence]:
-    # MOTChallenge folders may share a name in seqinfo.ini; their folders do not.
-    count, named = Counter(s.name for s in sequences), list[Sequence]()
-    for each in sequences:
-        if count[each.name] > 1 and each.source["kind"] == "mot":
-            folder = Path(each.source["path"])
+    # Recordings may share a name, in seqinfo.ini or of files in several folders; their folders do not.
+    count = Counter(s.name for s in sequences)
+    for k, each in enumerate(sequences):
+        if count[each.name] > 1 and each.source["kind"] != "generated":
+            path = Path(each.source["path"])
+            folder = path if path.is_dir() else path.parent
             words = f"is the name of {count[each.name]} sequences; it is called {folder.name}, as its folder"
-            warnings.warn(f"{folder / 'seqinfo.ini'}: name: {each.name} {words}", stacklevel=3)
-            each = replace(each, name=folder.name)
-        named.append(each)
-    return named
+            warnings.warn(f"{path}: {each.name} {words}", stacklevel=3)
+            sequences[k] = replace(each, name=folder.name)
+    return sequences
 
 
 def holds_sequences(folder: Path) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -86,13 +87,14 @@ def _faults(tracks: Any, index: int, history: ReportHistory) -> Iterator[Any]:
     yield bool(np.isinf(tracks.vel).any()) and ("infinity in vel", "finite numbers, or nan for unknown")
     same = tracks.unit != "group" or np.array_equal(tracks.id, tracks.group)
     yield not same and ("group that is not id", "group equal to id where the unit is group")
-    least = int(tracks.group.min(initial=0))
-    yield least < -1 and (f"group {least}", "non-negative groups, -1 alone")
+    yield bool((tracks.group < -1).any()) and (f"group {tracks.group.min()}", "non-negative groups, -1 alone")
     yield _id_fault(tracks.id, "id")
     history.ids.update(tracks.id.tolist())
     people = history.ids if tracks.unit == "person" else frozenset[int]()
     if tracks.groups is not None:
         yield from _group_faults(tracks.groups, d, people)
+    blind = tracks.unit == "group" and n and not (tracks.groups and tracks.groups.hull)
+    yield blind and ("rows of unit 'group' without hulls", "groups: sim.types.Groups with a hull for each group")
     good = isinstance(tracks.events, tuple) and all(isinstance(e, GroupEvent) for e in tracks.events)
     yield not good and (f"events {tracks.events!r}", "a tuple of sim.types.GroupEvent")
     for event in tracks.events:
@@ -157,7 +159,6 @@ def _member_fault(members: Iterable[Any], people: Iterable[int], name: str) -> F
 def _event_faults(event: GroupEvent, index: int, people: Iterable[int]) -> Iterator[Any]:
     kind, start = event.kind, event.start
     yield kind not in EVENT_KINDS and (f"an event of kind {kind!r}", "one of " + ", ".join(EVENT_KINDS))
-    number = (int, float, np.integer, np.floating)
     checks = {
         "start": (_whole(start) and 1 <= start <= index, f"a whole number from 1 to {index}"),
         "end": (_whole(event.end) and _whole(start) and event.end >= start, f"a whole number, {start} or later"),
@@ -165,7 +166,7 @@ def _event_faults(event: GroupEvent, index: int, people: Iterable[int]) -> Itera
         "before": (_are_groups(event.before), "a tuple of group ids, -1 for a person alone"),
         "after": (_are_groups(event.after), "a tuple of group ids, -1 for a person alone"),
         "members": (isinstance(event.members, tuple), "a tuple of ids"),
-        "pos": (np.shape(event.pos) == (2,) and all(isinstance(v, number) for v in event.pos), "x, y"),
+        "pos": (np.shape(event.pos) == (2,) and all(isinstance(v, Real) for v in event.pos), "x, y"),
     }
     for name, (good, expected) in checks.items():
         yield not good and (f"{kind}: {name} {getattr(event, name)!r}", expected)

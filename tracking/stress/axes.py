@@ -77,7 +77,7 @@ AXES = {
         Axis("clutter", 0.0, 6.0, _key("sensor.clutter_rate"), about="false alarms per frame"),
         Axis("noise", 0.0, 5.0, _noise, about="errors of points and boxes; 1: the default ones"),
         Axis("occlusion", 0.0, 0.8, _key("sensor.min_visibility"), about="visible share below which people are missed"),
-        Axis("people", 1, 30, _key("group.passers.repeat"), whole=True, about="groups of strangers who walk about"),
+        Axis("people", 1, 30, _key("group.passers.repeat"), whole=True, about="groups `passers`, of strangers"),
         Axis("gap", 0.6, 1.6, _key("crowd.spacing"), about="m between neighbours in a group"),
         Axis("velocity-difference", 0.0, 0.6, _speeds, about="m/s, standard deviation of people's speeds"),
         Axis("frame-rate", 25.0, 1.0, _key("camera.fps"), about="frames per second"),

@@ -31,15 +31,19 @@ def test_without_axes_a_row_for_each_scenario(scene: str, capsys) -> None:
     data = json.loads(capsys.readouterr().out)
     assert data["by_scenario"]["oracle"].keys() == {"one", "two"}
     assert data["by_scenario"][FAKE]["one"]["scenes"] == 2
-    assert data["curves"][FAKE]["scenes"] == [4]
-    assert data["episodes"] == 4
+    assert (data["curves"][FAKE]["scenes"], data["episodes"]) == ([4], 4)
     assert data["matrix"] is data["found"] is None
     assert stress(scene, "--suite", "two.toml") == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines[2:5]] == ["one", "two", "all"]
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()[2:5]] == ["one", "two", "all"]
     assert pq.read_table("o/episodes.parquet").column_names[:6] == [
         "tracker", "scenario", "left_out", "failed", "traceback", "seed",
     ]  # fmt: skip
+
+
+def test_failed_episodes_of_a_tracker_are_one_line(scene: str, capsys) -> None:
+    crashing = FAKE.replace("Nearest", "Crashes")
+    assert run(["stress", crashing, "--suite", scene, "--seeds", "0:3", "--start", "3", "--out", "o"]) == 0
+    assert f"\n{crashing} failed in 3 episodes, the first one, seed 0: " in capsys.readouterr().out
 
 
 def test_two_axes_make_a_matrix(scene: str, capsys) -> None:

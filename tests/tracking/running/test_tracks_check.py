@@ -121,7 +121,8 @@ def test_trackers_of_groups():
     check(answer(unit="group", group=own, groups=group(members=()), events=(event(members=()),)))
     refused(answer(unit="group", group=own[::-1].copy()), "group that is not id")
     refused(answer(unit="group", group=own, groups=group()), "1 in groups.members")
-    refused(answer(unit="group", group=own, events=(event(),)), "1 in the members")
+    refused(answer(unit="group", group=own, groups=group(members=()), events=(event(),)), "1 in the members")
+    refused(answer(unit="group", group=own), "unit 'group' without hulls; expected groups")
 
 
 def test_right_answers_pass():

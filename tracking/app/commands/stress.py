@@ -27,7 +27,6 @@ from tracking.stress.worst_scenes import SearchedScene, search, worst
 
 EPISODES, TABLE, RESULT = "episodes.jsonl", "episodes.parquet", "stress.json"
 REPORT = "report.html"
-LISTED = 5  # failed episodes that are listed
 MOST_AXES = 2  # without a search
 
 
@@ -210,12 +209,15 @@ def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
 
 
 def _notes(data: dict[str, Any]) -> Iterator[str]:
-    for f in data["failures"][:LISTED]:
-        yield printable(f"{f['tracker']} failed on {f['scenario']}, seed {f['seed']}: {f['failed']}")
-    if data["left_out"]:
-        first = data["left_out"][0]
-        where = f"the first {first['scenario']}, seed {first['seed']}: {first['left_out']}"
-        yield printable(f"{counted(len(data['left_out']), 'scene')} left out, {where}")
+    for name in dict.fromkeys(f["tracker"] for f in data["failures"]):
+        failed = [f for f in data["failures"] if f["tracker"] == name]
+        yield _note(f"{name} failed in {counted(len(failed), 'episode')}", failed[0], "failed")
+    if left_out := data["left_out"]:
+        yield _note(f"{counted(len(left_out), 'scene')} left out", left_out[0], "left_out")
+
+
+def _note(words: str, first: Mapping[str, Any], key: str) -> str:
+    return printable(f"{words}, the first {first['scenario']}, seed {first['seed']}: {first[key]}")
 
 
 def _number(value: float | None) -> str:

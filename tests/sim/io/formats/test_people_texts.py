@@ -83,9 +83,11 @@ def test_groups_are_found_without_a_look_ahead(tmp_path, name):
 
 
 def test_a_folder_of_ndjson_is_a_dataset(tmp_path):
-    for name in ("a.ndjson", "b.ndjson"):
-        (tmp_path / name).write_text(TRAJNET)
-    assert [s.name for s in open_source(tmp_path)] == ["a", "b"]
+    for path in (tmp_path / "a.ndjson", tmp_path / "one" / "b.ndjson", tmp_path / "two" / "b.ndjson"):
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(TRAJNET)
+    with pytest.warns(UserWarning, match="b is the name of 2 sequences"):
+        assert [s.name for s in open_source(tmp_path)] == ["one", "two", "a"]
 
 
 BAD = {
@@ -170,9 +172,8 @@ def test_a_column_of_groups(tmp_path):
     assert pairs(truth) == set(PAIR.items())
     assert truth.labelled.all()
     assert all(some.id.tolist() == [5] and some.members[0].tolist() == [1, 2] for some in truth.groups)
-    wrong = text.replace("\n1,1,0.2,1.0,5", "\n1,1,0.2,1.0,-2")
     with pytest.raises(InputError, match=r"line 2: .*groups from 0, or -1 for alone"):
-        opened(tmp_path, "wrong.csv", wrong, fps=5).truth  # noqa: B018
+        opened(tmp_path, "wrong.csv", text.replace("0.2,1.0,5", "0.2,1.0,-2", 1), fps=5).truth  # noqa: B018
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
