@@ -15,6 +15,7 @@ from pathlib import Path
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.reading import is_present, require_regular
+from sim.io.files.numeric_text import NAME_THEM
 from sim.io.files.own_files import is_hidden
 from sim.io.formats import biwi, caviar, mot_folder, people_texts, video
 from sim.io.formats.calibration import read_calibration
@@ -156,7 +157,7 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
         return video.open_video(path, options)
     if suffix not in (".txt", ".csv", people_texts.NDJSON):
         of_boxes = "if these are boxes: flockscope track TRACKER VIDEO --boxes FILE"
-        remedy = of_boxes if suffix == ".json" else "check the path"
+        remedy = of_boxes if suffix == ".json" else f"if it holds rows of people, write them as .csv, and {NAME_THEM}"
         raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy=remedy)
     layout = people_texts.layout_of(path)
     if layout is None:

@@ -73,6 +73,18 @@ def labelled_truth_fields(
     return {"groups": groups, "events": events, "near": near, "labelled": np.ones(length, bool)}
 
 
+def with_box_groups(truth: Truth) -> Truth:
+    """Returns a truth of boxes (px) with its labelled groups, measured from the boxes' centres."""
+    from sim.truth.group_hulls import box_groups
+
+    assert truth.box is not None
+    rows, pos = (truth.frame, truth.id, truth.group), centres(truth.box)
+    vel = differentiate(truth.frame, truth.id, pos, truth.fps, CHORD)
+    known = labelled_truth_fields(*rows, pos, vel, fps=truth.fps, length=truth.length, px_per_m=truth.px_per_m)
+    shapes = box_groups(*rows, pos, vel, truth.box, 1, truth.length)
+    return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))
+
+
 def _names(measured: Ints, label: Ints) -> dict[int, int]:
     found, first = np.unique(measured, return_index=True)
     return {int(g): int(label[k]) for g, k in zip(found, first, strict=True) if g >= 0}

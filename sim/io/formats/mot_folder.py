@@ -22,9 +22,10 @@ from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.labels import labelled_sequence
 from sim.io.formats.mot_table import read_table, size_doubt
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
+from sim.io.formats.video import RATES
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
-from sim.types import Frame, Image, Ints, Sequence, Truth
+from sim.types import Array, Frame, Image, Ints, Sequence, Truth
 
 DEFAULT_FPS = 25.0
 
@@ -75,6 +76,16 @@ def frame_rate(given: float | None, found: float | None = None) -> float:
         text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
         warnings.warn(text, stacklevel=3)
     return given or found or DEFAULT_FPS
+
+
+def rate_of_times(path: Path, seconds: Array) -> float:
+    """Returns the frames per second at which times (N,) follow each other, where none is missing."""
+    step = np.diff(np.unique(np.round(seconds, 3)))  # times of one frame may differ by some us
+    rate = 1 / step[step < 1.5 * np.median(step)].mean() if len(step) else 1.0
+    if not RATES[0] <= rate <= RATES[1]:
+        got, expected = f"{rate:.3g} per second", "{:g} to {:g} times per second".format(*RATES)
+        raise InputError(file=path, place="times", got=got, expected=expected, remedy="give --fps, and times in s")
+    return round(float(rate), 3)
 
 
 def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
@@ -174,8 +185,15 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     `options.camera` becomes its camera, unchanged.
     """
-    rate, of_boxes = frame_rate(options.fps), options.box_options
-    table = read_table(path, boxless=True, box_scale=of_boxes.box_scale)
+    of_boxes, fps = options.box_options, options.fps
+
+    def frames_at(seconds: Array) -> Ints:
+        nonlocal fps
+        fps = fps or rate_of_times(path, seconds)
+        return np.asarray(np.round((seconds - seconds.min(initial=np.inf)) * fps) + 1, np.int64)
+
+    table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at)
+    rate = frame_rate(fps)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
     length = int(table.frame.max())

@@ -26,11 +26,10 @@ from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.biwi import labels_of
-from sim.io.formats.labels import CHORD, centres, differentiate, labelled_truth_fields
+from sim.io.formats.labels import centres, differentiate, labelled_truth_fields, with_box_groups
 from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, require_pixels
 from sim.io.formats.options import BoxOptions, Classes
 from sim.scene.visibility import scale_of_all_boxes
-from sim.truth.group_hulls import box_groups
 from sim.types import Array, Bools, Detections, Ints, Plane, Truth, Unscored
 
 # step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
@@ -389,12 +388,7 @@ def _labelled(truth: Truth, label: Ints) -> Truth:
     truth = truth.replace(group=label)
     if not len(label):
         return truth
-    rows, fps, length = (truth.frame, truth.id, label), truth.fps, truth.length
-    if truth.pos is not None and truth.vel is not None and np.isfinite(truth.pos).all():
-        return truth.replace(**labelled_truth_fields(*rows, truth.pos, truth.vel, fps=fps, length=length))
-    assert truth.box is not None, "a row without box has a position"
-    pos = centres(truth.box)
-    vel = differentiate(truth.frame, truth.id, pos, fps, CHORD)
-    known = labelled_truth_fields(*rows, pos, vel, fps=fps, length=length, px_per_m=truth.px_per_m)
-    shapes = box_groups(*rows, pos, vel, truth.box, 1, length)
-    return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))
+    if truth.pos is None or truth.vel is None or not np.isfinite(truth.pos).all():
+        return with_box_groups(truth)
+    rows = (truth.frame, truth.id, label, truth.pos, truth.vel)
+    return truth.replace(**labelled_truth_fields(*rows, fps=truth.fps, length=truth.length))

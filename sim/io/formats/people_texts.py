@@ -102,7 +102,7 @@ def _read_pedpy(path: Path, fps: float | None) -> People:
         expected = "frames per second from {:g} to {:g}".format(*FRAME_RATES)
         got = " and ".join(sorted(rates)) or "none"
         raise InputError(file=path, place="# framerate", got=got, expected=expected, remedy="correct it, or give --fps")
-    rows = read_rows(path, comments=True).numbers(range(4, 13), layout="id frame x y z")
+    rows = read_rows(path).numbers(range(4, 13), layout="id frame x y z")
     raw = rows.integers(1, "frame")
     centimetres = X_IN_CM.search(comments) or (IN_CM.search(comments) and not X_IN_M.search(comments))
     pos = rows.values[:, 2:4] * (0.01 if centimetres else 1.0)
