@@ -19,7 +19,7 @@ from scenarios.limits import FRAME_RATES
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_rows
-from sim.io.formats.labels import differentiate, labelled_sequence, labelled_truth_fields
+from sim.io.formats.labels import differentiate, labelled_sequence, with_labels
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.types import Ints, Sequence, Truth
 
@@ -97,8 +97,7 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     rows.reject(id < 0, "ids from 0", "correct the id")
     frame = frame_numbers(raw, id)
     rows.require_bounds(frame)
-    expected = "each id once in a frame, also where two frames are nearer than a step"
-    rows.reject(repeated_ids(frame, id), expected, CORRECT)
+    rows.reject(repeated_ids(frame, id), "each id once in a frame, also where frames are nearer than a step", CORRECT)
     order = np.lexsort((id, frame))
     return replace(rows, values=rows.values[order], line=rows.line[order]), frame[order], id[order]
 
@@ -128,10 +127,8 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
         group=np.full(len(id), -1, np.int64), pos=pos, vel=vel, box=None, visibility=np.ones(len(id)),
         z=np.zeros(len(id)), labelled=np.zeros(length, bool),
     )  # fmt: skip
-    if not is_present(folder / "groups.txt"):
-        return truth
-    label = labels_of(folder / "groups.txt", id)
-    return truth.replace(group=label, **labelled_truth_fields(frame, id, label, pos, vel, fps=fps, length=length))
+    groups = folder / "groups.txt"
+    return with_labels(truth, labels_of(groups, id)) if is_present(groups) else truth
 
 
 def open_folder(folder: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:

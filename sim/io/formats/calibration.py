@@ -136,11 +136,9 @@ SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios 
 
 def read_calibration(path: Path) -> Camera:
     """Returns the camera of a calibration file: Tsai's .xml, OpenCV's .yml of a rectified pair, or camera.json."""
-    expected = "a camera.json, or Tsai's calibration as .xml"
-    require_regular(path, f"check --camera: {expected}")
-    kind = path.suffix.lower()
+    require_regular(path, "check --camera: a camera.json, or Tsai's calibration as .xml")
     readers = {".yml": read_opencv_yaml, ".yaml": read_opencv_yaml, ".xml": read_tsai}
-    camera = readers.get(kind, read_camera)(path)
+    camera = readers.get(path.suffix.lower(), read_camera)(path)
     height = float(camera.position[2])
     # From so high, a person right below would be smaller than 2 px in any direction of view.
     person = camera.focal_px[1] * PERSON / height if camera.kind == "pinhole" else np.inf

@@ -19,7 +19,7 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, bounded_number, person_ids, xml_root
-from sim.io.formats.labels import labelled_sequence, with_box_groups
+from sim.io.formats.labels import labelled_sequence, with_labels
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.scene.visibility import scale_of_all_boxes, scale_of_first_boxes
 from sim.types import Array, Ints, Sequence, Truth
@@ -53,8 +53,7 @@ def read_xml(path: Path) -> CaviarRecording:
     if root.tag != "dataset" or root.find("frame") is None:
         got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
         raise InputError(file=path, got=got, expected="<dataset> of CAVIAR (CVML)", remedy="give another file")
-    rows: list[tuple[float, ...]] = []
-    length = 0
+    rows, length = list[tuple[float, ...]](), 0
     for element in root.iterfind("frame"):
         index = int(_number(path, "frame", element, "number", 0, FRAMES - 1, whole=True)) + 1
         length = max(length, index)
@@ -118,7 +117,7 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
         group=found.label, pos=None, vel=None, box=box, visibility=np.ones(len(box)),
         labelled=np.zeros(found.length, bool),
     )  # fmt: skip
-    return with_box_groups(truth) if found.labelled and len(box) else truth
+    return with_labels(truth, found.label) if found.labelled else truth
 
 
 def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:

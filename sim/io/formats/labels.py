@@ -73,15 +73,24 @@ def labelled_truth_fields(
     return {"groups": groups, "events": events, "near": near, "labelled": np.ones(length, bool)}
 
 
-def with_box_groups(truth: Truth) -> Truth:
-    """Returns a truth of boxes (px) with its labelled groups, measured from the boxes' centres."""
+def with_labels(truth: Truth, label: Ints) -> Truth:
+    """Returns a truth with the group labels (R,) of its rows, -1 for alone, and the groups and events that follow.
+
+    They are measured on the ground if all positions are known, else from the centres of the boxes (px).
+    """
     from sim.truth.group_hulls import box_groups
 
-    assert truth.box is not None
-    rows, pos = (truth.frame, truth.id, truth.group), centres(truth.box)
-    vel = differentiate(truth.frame, truth.id, pos, truth.fps, CHORD)
-    known = labelled_truth_fields(*rows, pos, vel, fps=truth.fps, length=truth.length, px_per_m=truth.px_per_m)
-    shapes = box_groups(*rows, pos, vel, truth.box, 1, truth.length)
+    truth = truth.replace(group=label)
+    rows, pos, vel, fps, length = (truth.frame, truth.id, label), truth.pos, truth.vel, truth.fps, truth.length
+    if not len(label):
+        return truth
+    if pos is not None and vel is not None and np.isfinite(pos).all():
+        return truth.replace(**labelled_truth_fields(*rows, pos, vel, fps=fps, length=length))
+    assert truth.box is not None, "a row without box has a position"
+    pos = centres(truth.box)
+    vel = differentiate(truth.frame, truth.id, pos, fps, CHORD)
+    known = labelled_truth_fields(*rows, pos, vel, fps=fps, length=length, px_per_m=truth.px_per_m)
+    shapes = box_groups(*rows, pos, vel, truth.box, 1, length)
     return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))
 
 
@@ -99,8 +108,6 @@ def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: flo
 
 def scale_groups(groups: Groups, factor: float) -> Groups:
     """Returns groups with positions, velocities and hulls multiplied by `factor`, and extents by its square."""
-    if factor == 1.0:
-        return groups
     hull, extent = tuple(h * factor for h in groups.hull), groups.extent * factor**2
     return groups.replace(pos=groups.pos * factor, vel=groups.vel * factor, extent=extent, hull=hull)
 

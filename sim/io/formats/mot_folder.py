@@ -27,7 +27,7 @@ from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
 from sim.types import Array, Frame, Image, Ints, Sequence, Truth
 
-DEFAULT_FPS = 25.0
+FPS = 25.0
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,12 @@ def read_seqinfo(path: Path) -> SeqInfo:
     return SeqInfo(name, rate, length, size, section.get("imdir", "img1"))
 
 
-def frame_rate(given: float | None, found: float | None = None) -> float:
-    """Returns the first of `given` (--fps) and `found` (in the recording) that is not None; else 25, with a warning."""
+def frame_rate(given: float | None, found: float | None, what: str = "MOTChallenge data", usual: float = FPS) -> float:
+    """Returns the first of `given` (--fps) and `found` (in the recording) that is not None; else `usual`, and warns."""
     if given is None and found is None:
         # The text names no path, so that a command over many recordings prints it once.
-        text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
-        warnings.warn(text, stacklevel=3)
-    return given or found or DEFAULT_FPS
+        warnings.warn(f"{what} without a frame rate: taken at {usual:g} fps (--fps says otherwise)", stacklevel=3)
+    return given or found or usual
 
 
 def rate_of_times(path: Path, seconds: Array) -> float:
@@ -193,7 +192,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         return np.asarray(np.round((seconds - seconds.min(initial=np.inf)) * fps) + 1, np.int64)
 
     table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at)
-    rate = frame_rate(fps)
+    rate = frame_rate(fps, None)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
     length = int(table.frame.max())

@@ -192,8 +192,8 @@ def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> 
         classes, code = np.unique(words, return_inverse=True)
         rows, column["class"] = replace(rows, classes=tuple(classes.tolist())), code.astype(float)
     if "time" in column and frames_at is not None:
-        second = 1000.0 if names[found["time"]].endswith("_ms") else 1.0
-        column["frame"] = frames_at(column.pop("time") / second).astype(float)
+        unit = 0.001 if names[found["time"]].endswith("_ms") else 1.0  # s
+        column["frame"] = frames_at(column.pop("time") * unit).astype(float)
         seen = column["frame"] > 0
         rows, column = replace(rows, line=rows.line[seen]), {name: v[seen] for name, v in column.items()}
     columns = _in_order(column, {axis: names[found[axis]].partition("_")[2] for axis in "xy" if axis in column})

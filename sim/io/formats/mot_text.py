@@ -26,7 +26,7 @@ from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.biwi import labels_of
-from sim.io.formats.labels import centres, differentiate, labelled_truth_fields, with_box_groups
+from sim.io.formats.labels import centres, differentiate, with_labels
 from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, require_pixels
 from sim.io.formats.options import BoxOptions, Classes
 from sim.scene.visibility import scale_of_all_boxes
@@ -373,22 +373,11 @@ def truth_of_table(
         labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip
     if table.group is not None:
-        return _labelled(truth, table.group[order])
+        return with_labels(truth, table.group[order])
     path = group_file(table.rows.file)
-    return _labelled(truth, labels_of(path, id)) if is_present(path) else truth
+    return with_labels(truth, labels_of(path, id)) if is_present(path) else truth
 
 
 def group_file(path: Path) -> Path:
     """Returns the path of a text's groups: groups.txt beside gt.txt, NAME.groups.txt beside any other NAME.txt."""
     return path.with_name("groups.txt" if path.name == LABELS else f"{path.stem}.groups.txt")
-
-
-def _labelled(truth: Truth, label: Ints) -> Truth:
-    """Returns a truth with groups: measured on the ground if all positions are known, else from the boxes' centres."""
-    truth = truth.replace(group=label)
-    if not len(label):
-        return truth
-    if truth.pos is None or truth.vel is None or not np.isfinite(truth.pos).all():
-        return with_box_groups(truth)
-    rows = (truth.frame, truth.id, label, truth.pos, truth.vel)
-    return truth.replace(**labelled_truth_fields(*rows, fps=truth.fps, length=truth.length))

@@ -3,7 +3,6 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.source import open_source
-from tests.recordings import mot_folder
 
 
 def opened(tmp_path, text):
@@ -40,16 +39,14 @@ def test_units_of_positions(tmp_path, unit, factor, names):
 @pytest.mark.parametrize(("name", "second"), [("t", 1), ("timestamp_ms", 1000)])
 def test_times_in_place_of_frames(tmp_path, name, second):
     """The first is frame 1. The rate is that of the usual step, here 1 s, or given."""
-    rows = "".join(f"{(1.7e9 + t) * second:.0f},1,{t / 10},2\n" for t in (0, 1, 2, 3, 9))
-    (tmp_path / "a.csv").write_text(f"{name},agent_id,pos_x,pos_y\n{rows}")
+    rows = [f"{(1.7e9 + t) * second:.0f},1,{t / 10},2" for t in (0, 1, 2, 3, 9)]
+    (tmp_path / "a.csv").write_text("\n".join([f"{name},agent_id,pos_x,pos_y", *rows]))
     for fps, expected in ((None, [1, 2, 3, 4, 10]), (2, [1, 3, 5, 7, 19])):
         (s,) = open_source(tmp_path / "a.csv", fps=fps)
         assert (s.fps, s.truth.frame.tolist()) == (fps or 1, expected)
     (tmp_path / "a.csv").write_text("t,id,x,y\n400,1,0,0\n800,1,0.1,0\n")
-    with pytest.raises(InputError, match="times: got 0.0025 per second; expected 0.1 to 300"):
+    with pytest.raises(InputError, match=r"times: got 0\.0025 per second; expected 0.1 to 300"):
         open_source(tmp_path / "a.csv")
-    with pytest.raises(InputError, match=r"got columns time,id,x,y; expected .*time × frames per second"):
-        open_source(mot_folder(tmp_path, "time,id,x,y\n1,1,2,3\n"), fps=25)
 
 
 WARNED = {

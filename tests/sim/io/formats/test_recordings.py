@@ -69,7 +69,7 @@ BAD_BIWI = [
     ("", [(1, 1, 1e200, 0)], "line 1: .*within 1e"),
     ("", [(1, -1, 0, 0)], "line 1: .*ids from 0"),
     ("", [(1, 1, 0, 0), (11, 1, 0, 0), (80_000_000, 1, 0, 0)], "frames from 1 to 1000000"),
-    ("", [(f, 1, f / 10, 1) for f in (0, 6, 12, 18, 24, 30, 31, 32, 33, 42, 48)], "nearer than a step"),
+    ("", [(f, 1, f / 10, 1) for f in (0, 6, 12, 18, 24, 30, 31, 32, 33, 42, 48)], "frames are nearer than a step"),
     ("", [], "no line"),
 ]
 
@@ -182,7 +182,6 @@ def test_biwi_of_other_frames_has_the_rate_of_its_velocities(tmp_path, step, rat
     folder = biwi_folder(tmp_path, "", [(f, i, f / 10, i) for f in range(1, 10 * step, step) for i in (1, 2)])
     with pytest.warns(UserWarning, match=f"it has {rate:.4g} frames per second, and not 2.5"):
         assert open_source(folder)[0].truth.fps == pytest.approx(rate)
-    assert open_source(folder, fps=2)[0].fps == 2
 
 
 def test_cvml_of_caviar_says_what_is_assumed(tmp_path):
