@@ -155,7 +155,7 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     if suffix in video.SUFFIXES:
         options.reject(path, "a video without --boxes", "it has no boxes", "box_options")
         return video.open_video(path, options)
-    if suffix not in (".txt", ".csv", people_texts.NDJSON):
+    if suffix not in (".txt", ".csv", ".tsv", people_texts.NDJSON):
         of_boxes = "if these are boxes: flockscope track TRACKER VIDEO --boxes FILE"
         remedy = of_boxes if suffix == ".json" else f"if it holds rows of people, write them as .csv, and {NAME_THEM}"
         raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy=remedy)
@@ -163,12 +163,10 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     if layout is None:
         options.reject(path, "a text", "it has no pictures", "background")
         return mot_folder.open_text(path, options)
-    if layout == "kitti":
-        why = "its camera drives, and it has labels of people only"
-        options.reject(path, "a text of KITTI", why, "camera background box_options")
-    else:
-        why = "it is in metres, without pictures"
-        options.reject(path, "a text of trajectories", why, "px_per_m camera background box_options")
+    kind, why, names = "KITTI", "its camera drives, and it has labels of people only", "camera background box_options"
+    if layout != "kitti":
+        kind, why, names = "trajectories", "it is in metres, without pictures", f"px_per_m {names}"
+    options.reject(path, f"a text of {kind}", why, names)
     return people_texts.open_text(path, layout, options)
 
 

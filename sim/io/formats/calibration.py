@@ -84,7 +84,7 @@ def read_opencv_yaml(path: Path) -> Camera:
     found = _opencv_numbers(path)
     missing = [key for key in KEYS if key not in found]
     if missing:
-        raise _wrong(path, ", ".join(missing), "nothing", f"the keys {', '.join(KEYS)}", "add them")
+        raise _wrong(path, ", ".join(missing), "nothing", f"the keys {', '.join(KEYS)}", "add them, or a camera.json")
     for key, shape in KEYS.items():
         if found[key].size != math.prod(shape) or not (np.abs(found[key]) <= COORDINATE).all():
             raise _wrong(path, key, f"{found[key].size} numbers", f"{math.prod(shape)} within {COORDINATE:g}")

@@ -77,9 +77,10 @@ def frame_rate(given: float | None, found: float | None, what: str = "MOTChallen
     return given or found or usual
 
 
-def rate_of_times(path: Path, seconds: Array) -> float:
-    """Returns the frames per second at which times (N,) follow each other, where none is missing."""
-    step = np.diff(np.unique(np.round(seconds, 3)))  # times of one frame may differ by some us
+def rate_of_times(path: Path, seconds: Array, id: Array) -> float:
+    """Returns the frames per second at which times (N,) of one id (N,) follow each other, where none is missing."""
+    id, seconds = np.unique(np.column_stack([id, seconds]), axis=0).T
+    step = np.diff(seconds)[np.diff(id) == 0]
     rate = 1 / step[step < 1.5 * np.median(step)].mean() if len(step) else 1.0
     if not RATES[0] <= rate <= RATES[1]:
         got, expected = f"{rate:.3g} per second", "{:g} to {:g} times per second".format(*RATES)
@@ -186,9 +187,9 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """
     of_boxes, fps = options.box_options, options.fps
 
-    def frames_at(seconds: Array) -> Ints:
+    def frames_at(seconds: Array, id: Array) -> Ints:
         nonlocal fps
-        fps = fps or rate_of_times(path, seconds)
+        fps = fps or rate_of_times(path, seconds, id)
         return np.asarray(np.round((seconds - seconds.min(initial=np.inf)) * fps) + 1, np.int64)
 
     table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at)

@@ -116,7 +116,7 @@ Column = np.ndarray[tuple[int], np.dtype[np.float64]]
 
 # meaning of a column, and the names it may have
 NAMES = {
-    "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_num", "frame_index", "frame_idx"),
+    "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_num", "fr", "frame_index", "frame_idx"),
     "time": ("t", "t_s", "t_ms", "time", "time_s", "time_ms", "timestamp", "timestamp_s", "timestamp_ms"),
     "id": ("id", "track_id", "trackid", "tracker_id", "person_id", "ped_id", "target_id", "object_id", "agent_id"),
     "score": ("score", "conf", "confidence"),
@@ -147,7 +147,7 @@ WORD_NAMES = ("label", "name", "class_name")
 
 PEOPLE = ("person", "pedestrian")  # words for the class of people
 
-FramesAt = Callable[[Column], Ints]  # frames (N,) from 1 of times (N,), s; 0: of no frame
+FramesAt = Callable[[Column, Column], Ints]  # frames (N,) from 1 of times (N,), s, and ids (N,); 0: of no frame
 
 SECONDS = "if the frames are times in s, write numbers of frames, from 1: time × frames per second + 1"
 
@@ -193,7 +193,8 @@ def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> 
         rows, column["class"] = replace(rows, classes=tuple(classes.tolist())), code.astype(float)
     if "time" in column and frames_at is not None:
         unit = 0.001 if names[found["time"]].endswith("_ms") else 1.0  # s
-        column["frame"] = frames_at(column.pop("time") * unit).astype(float)
+        seconds = column.pop("time") * unit
+        column["frame"] = frames_at(seconds, column.get("id", np.zeros_like(seconds))).astype(float)
         seen = column["frame"] > 0
         rows, column = replace(rows, line=rows.line[seen]), {name: v[seen] for name, v in column.items()}
     columns = _in_order(column, {axis: names[found[axis]].partition("_")[2] for axis in "xy" if axis in column})

@@ -38,10 +38,10 @@ def test_units_of_positions(tmp_path, unit, factor, names):
 
 @pytest.mark.parametrize(("name", "second"), [("t", 1), ("timestamp_ms", 1000)])
 def test_times_in_place_of_frames(tmp_path, name, second):
-    """The first is frame 1. The rate is that of the usual step, here 1 s, or given."""
-    rows = [f"{(1.7e9 + t) * second:.0f},1,{t / 10},2" for t in (0, 1, 2, 3, 9)]
+    """The first is frame 1. The rate is that of the usual step of a person, here 1 s, or given."""
+    rows = [f"{(1.7e9 + t + p / 8) * second:.3f},{p},{t / 10},2" for p in (0, 1) for t in (0, 1, 2, 3, 9)]
     (tmp_path / "a.csv").write_text("\n".join([f"{name},agent_id,pos_x,pos_y", *rows]))
-    for fps, expected in ((None, [1, 2, 3, 4, 10]), (2, [1, 3, 5, 7, 19])):
+    for fps, expected in ((None, [1, 1, 2, 2, 3, 3, 4, 4, 10, 10]), (2, [1, 1, 3, 3, 5, 5, 7, 7, 19, 19])):
         (s,) = open_source(tmp_path / "a.csv", fps=fps)
         assert (s.fps, s.truth.frame.tolist()) == (fps or 1, expected)
     (tmp_path / "a.csv").write_text("t,id,x,y\n400,1,0,0\n800,1,0.1,0\n")
