@@ -158,14 +158,14 @@ class TextRows:
 def read_rows(path: Path, heading: bool = False) -> TextRows:
     """Returns the rows of the text file `path`, without comments: lines that begin with #.
 
-    heading: True keeps the last comment before the first row, without its #, if it may name the columns: it has as many
+    heading: True keeps, without its #, the last comment before the first row that may name the columns: it has as many
     cells as that row, none of which is a number.
     """
     numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
     found = [(k, line) for k, line in numbered if line[:1] != "#"]
     if heading and found:
         above = [(k, line.lstrip("# ")) for k, line in numbered[: numbered.index(found[0])]]
-        found = [each for each in above[-1:] if _may_name(each[1], found[0][1])] + found
+        found = [each for each in above if _may_name(each[1], found[0][1])][-1:] + found
     return TextRows(path, tuple(line for _, line in found), np.array([k for k, _ in found], np.int64))
 
 

@@ -16,7 +16,7 @@ BOXES = {
     "id,frame,x1,y1,x2,y2": "7,{f},10,20,40,60",
     "frame,id,cx,cy,w,h": "{f},7,25,40,30,40",
     "# hall 3, May\n\nframe,id,x,y,w,h": "{f},7,10,20,30,40\n# a pause",
-    "# hall 3, May\n# frame_idx;tracker_id;x_min;y_min;x_max;y_max": "{f};7;10;20;40;60",
+    "# hall 3, May\n# frame_idx;tracker_id;x_min;y_min;x_max;y_max\n# px": "{f};7;10;20;40;60",
 }
 
 
