@@ -15,6 +15,7 @@ from pathlib import Path
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.reading import is_present, require_regular
+from sim.io.files.numeric_text import NAME_THEM
 from sim.io.files.own_files import is_hidden
 from sim.io.formats import biwi, caviar, mot_folder, mot_text, people_texts, video
 from sim.io.formats.calibration import read_calibration
@@ -154,20 +155,18 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     if suffix in video.SUFFIXES:
         options.reject(path, "a video without --boxes", "it has no boxes", "box_options")
         return video.open_video(path, options)
-    if suffix not in (".txt", ".csv", people_texts.NDJSON):
+    if suffix not in (".txt", ".csv", ".tsv", people_texts.NDJSON):
         of_boxes = "if these are boxes: flockscope track TRACKER VIDEO --boxes FILE"
-        remedy = of_boxes if suffix == ".json" else "check the path"
+        remedy = of_boxes if suffix == ".json" else f"if it holds rows of people, write them as .csv, and {NAME_THEM}"
         raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy=remedy)
     layout = people_texts.layout_of(path)
     if layout is None:
         options.reject(path, "a text", "it has no pictures", "background")
         return mot_text.open_text(path, options)
-    if layout == "kitti":
-        why = "its camera drives, and it has labels of people only"
-        options.reject(path, "a text of KITTI", why, "camera background box_options")
-    else:
-        why = "it is in metres, without pictures"
-        options.reject(path, "a text of trajectories", why, "px_per_m camera background box_options")
+    kind, why, names = "KITTI", "its camera drives, and it has labels of people only", "camera background box_options"
+    if layout != "kitti":
+        kind, why, names = "trajectories", "it is in metres, without pictures", f"px_per_m {names}"
+    options.reject(path, f"a text of {kind}", why, names)
     return people_texts.open_text(path, layout, options)
 
 

@@ -20,7 +20,6 @@ from scenarios.reading import read_regular
 from sim.types import Array, Bools, Ints
 
 NAME_THEM = "name the columns in the first line, as frame,id,x,y or frame,id,left,top,width,height"
-NO_COMMENTS = f"remove the lines that begin with #, and {NAME_THEM}"
 
 LARGEST = 2**52  # whole numbers pass through float64
 CORRECT = "remove or correct it"
@@ -81,7 +80,7 @@ def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
     try:
         text = read_regular(path, limit).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        place, remedy = f"byte {error.start}", "check the path"
+        place, remedy = f"byte {error.start}", "save it as UTF-8, or check the path"
         raise InputError(file=path, place=place, got="no UTF-8 text", expected="a text file", remedy=remedy) from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
@@ -97,7 +96,7 @@ class TextRows:
     @property
     def separator(self) -> str | None:
         """The separator of cells: a semicolon, else a comma, if the first row has one, else None: blanks."""
-        return next((mark for mark in ";," if self.text and mark in self.text[0]), None)
+        return _separator(self.text[0]) if self.text else None
 
     def cells(self) -> Iterator[list[str]]:
         """Yields the cells of each row as a list of texts."""
@@ -143,24 +142,40 @@ class TextRows:
     def _first_bad(self, fits: Container[int], use: list[int] | None) -> InputError:
         width = len(next(self.cells()))
         for number, line, cells in zip(self.line, self.text, self.cells(), strict=True):
-            read = [cells[k] for k in use] if use is not None and len(cells) in fits else cells
-            bad = [repr(cell.strip()) for cell in read if not is_number_text(cell)]
+            read = use if use is not None and len(cells) in fits else range(len(cells))
+            bad = [k for k in read if not is_number_text(cells[k])]
             if bad or len(cells) not in fits:
                 got, expected = f"{len(cells)} columns", f"{width} columns, as in the first line"
-                got, expected = (bad[0], "a number") if bad else (got, expected)
-                remedy = NO_COMMENTS if line.startswith("#") else CORRECT
+                if bad:
+                    got, expected = repr(cells[bad[0]].strip()), f"a number as cell {bad[0] + 1}"
                 parts = line.split(";" if ";" in line else None)  # whatever the separator was taken to be
-                if bad and any("," in part and is_number_text(part.replace(",", ".")) for part in parts):
-                    remedy = "write decimals with a point"
+                comma = bad and any("," in part and is_number_text(part.replace(",", ".")) for part in parts)
+                remedy = "write decimals with a point" if comma else CORRECT
                 return InputError(file=self.file, place=f"line {number}", got=got, expected=expected, remedy=remedy)
         return InputError(file=self.file, got="unreadable numbers", expected="rows of numbers", remedy="check the file")
 
 
-def read_rows(path: Path, comments: bool = False) -> TextRows:
-    """Returns the rows of the text file `path`. comments: True leaves out lines that begin with #."""
-    numbered = enumerate(read_text(path).splitlines(), 1)
-    found = [(k, line) for k, line in numbered if line.strip() and not (comments and line[:1] == "#")]
+def read_rows(path: Path, heading: bool = False) -> TextRows:
+    """Returns the rows of the text file `path`, without comments: lines that begin with #.
+
+    heading: True keeps, without its #, the last comment before the first row that may name the columns: it has as many
+    cells as that row, none of which is a number.
+    """
+    numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
+    found = [(k, line) for k, line in numbered if line[:1] != "#"]
+    if heading and found:
+        above = [(k, line.lstrip("# ")) for k, line in numbered[: numbered.index(found[0])]]
+        found = [each for each in above if _may_name(each[1], found[0][1])][-1:] + found
     return TextRows(path, tuple(line for _, line in found), np.array([k for k, _ in found], np.int64))
+
+
+def _may_name(heading: str, row: str) -> bool:
+    names, cells = (line.split(_separator(line)) for line in (heading, row))
+    return len(names) == len(cells) and not any(map(is_number_text, names))
+
+
+def _separator(line: str) -> str | None:
+    return next((mark for mark in ";," if mark in line), None)
 
 
 def is_number_text(cell: str) -> bool:

@@ -15,10 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.limits import FRAME_RATES
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_rows, read_text
-from sim.io.formats.labelled_truth import labelled_sequence, labelled_truth_fields
+from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_rows
+from sim.io.formats.labelled_truth import differentiate, labelled_sequence, with_labels
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.types import Ints, Sequence, Truth
 
@@ -61,7 +62,8 @@ def _parted(slot: Ints, people: list[set[int]]) -> Ints:
 def read_groups(path: Path) -> dict[int, int]:
     """Returns by person id the group label that a groups.txt gives each person; people alone have no entry."""
     label: dict[int, int] = {}
-    for number, line in enumerate(read_text(path).splitlines(), 1):
+    lines = read_rows(path)
+    for number, line in zip(lines.line, lines.text, strict=True):
         members = person_ids(path, f"line {number}", line)
         if len(members) < 2:
             continue
@@ -95,10 +97,21 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     rows.reject(id < 0, "ids from 0", "correct the id")
     frame = frame_numbers(raw, id)
     rows.require_bounds(frame)
-    expected = "each id once in a frame, also where two frames are nearer than a step"
-    rows.reject(repeated_ids(frame, id), expected, CORRECT)
+    rows.reject(repeated_ids(frame, id), "each id once in a frame, also where frames are nearer than a step", CORRECT)
     order = np.lexsort((id, frame))
     return replace(rows, values=rows.values[order], line=rows.line[order]), frame[order], id[order]
+
+
+def _rate(rows: NumericTable, frame: Ints, id: Ints) -> float:
+    """Returns FPS, or with a warning the multiple or part of it at which people are as fast as their velocities."""
+    way = np.hypot(*differentiate(frame, id, rows.values[:, (2, 4)], 1.0).T).sum()  # m per frame
+    told = np.hypot(*rows.values[:, (5, 7)].T).sum()  # m per s
+    ratio = float(np.clip(told / way, *FRAME_RATES)) / FPS if told and way else 1.0
+    rate = FPS * round(ratio) if ratio > 1 else FPS / round(1 / ratio)
+    if rate != FPS:
+        text = f"{rows.file}: by its velocities it has {rate:.4g} frames per second, and not {FPS:g}"
+        warnings.warn(f"{text} (--fps says otherwise)", stacklevel=3)
+    return rate
 
 
 def read_truth(folder: Path, fps: float = FPS) -> Truth:
@@ -114,15 +127,13 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
         group=np.full(len(id), -1, np.int64), pos=pos, vel=vel, box=None, visibility=np.ones(len(id)),
         z=np.zeros(len(id)), labelled=np.zeros(length, bool),
     )  # fmt: skip
-    if not is_present(folder / "groups.txt"):
-        return truth
-    label = labels_of(folder / "groups.txt", id)
-    return truth.replace(group=label, **labelled_truth_fields(frame, id, label, pos, vel, fps=fps, length=length))
+    groups = folder / "groups.txt"
+    return with_labels(truth, labels_of(groups, id)) if is_present(groups) else truth
 
 
 def open_folder(folder: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns the recording in `folder` as Sequence, without pictures and detections, by default at 2.5 fps."""
-    rate = options.fps or FPS
-    length = int(_table(folder)[1].max(initial=0))
+    rows, frame, id = _table(folder)
+    rate, length = options.fps or _rate(rows, frame, id), int(frame.max(initial=0))
 
     return labelled_sequence("biwi", folder, folder.name, rate, length, lambda: read_truth(folder, rate))

@@ -84,7 +84,7 @@ def read_opencv_yaml(path: Path) -> Camera:
     found = _opencv_numbers(path)
     missing = [key for key in KEYS if key not in found]
     if missing:
-        raise _wrong(path, ", ".join(missing), "nothing", f"the keys {', '.join(KEYS)}", "add them")
+        raise _wrong(path, ", ".join(missing), "nothing", f"the keys {', '.join(KEYS)}", "add them, or a camera.json")
     for key, shape in KEYS.items():
         if found[key].size != math.prod(shape) or not (np.abs(found[key]) <= COORDINATE).all():
             raise _wrong(path, key, f"{found[key].size} numbers", f"{math.prod(shape)} within {COORDINATE:g}")
@@ -136,11 +136,9 @@ SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios 
 
 def read_calibration(path: Path) -> Camera:
     """Returns the camera of a calibration file: Tsai's .xml, OpenCV's .yml of a rectified pair, or camera.json."""
-    expected = "a camera.json, or Tsai's calibration as .xml"
-    require_regular(path, f"check --camera: {expected}")
-    kind = path.suffix.lower()
+    require_regular(path, "check --camera: a camera.json, or Tsai's calibration as .xml")
     readers = {".yml": read_opencv_yaml, ".yaml": read_opencv_yaml, ".xml": read_tsai}
-    camera = readers.get(kind, read_camera)(path)
+    camera = readers.get(path.suffix.lower(), read_camera)(path)
     height = float(camera.position[2])
     # From so high, a person right below would be smaller than 2 px in any direction of view.
     person = camera.focal_px[1] * PERSON / height if camera.kind == "pinhole" else np.inf

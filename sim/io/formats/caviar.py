@@ -12,7 +12,6 @@ import warnings
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,10 +19,9 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, bounded_number, person_ids, xml_root
-from sim.io.formats.labelled_truth import CHORD, differentiate, labelled_sequence, labelled_truth_fields
+from sim.io.formats.labelled_truth import labelled_sequence, with_labels
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.scene.camera import scale_of_all_boxes, scale_of_first_boxes
-from sim.truth.group_hulls import box_groups
 from sim.types import Array, Ints, Sequence, Truth
 
 FPS = 25.0
@@ -38,7 +36,6 @@ class CaviarRecording:
 
     name: str  # that in the file, else the file's name without suffix
     length: int  # the last frame in the file
-    listed: Ints  # (L,) the frames in the file, ascending, each once
     frame: Ints  # (R,) from 1
     id: Ints  # (R,) the person's id
     label: Ints  # (R,) the id of the person's group, -1 for alone
@@ -56,11 +53,10 @@ def read_xml(path: Path) -> CaviarRecording:
     if root.tag != "dataset" or root.find("frame") is None:
         got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
         raise InputError(file=path, got=got, expected="<dataset> of CAVIAR (CVML)", remedy="give another file")
-    rows: list[tuple[float, ...]] = []
-    listed = set[int]()
+    rows, length = list[tuple[float, ...]](), 0
     for element in root.iterfind("frame"):
         index = int(_number(path, "frame", element, "number", 0, FRAMES - 1, whole=True)) + 1
-        listed.add(index)
+        length = max(length, index)
         label = _labels(path, index, element)
         rows += [_row(path, index, person, label) for person in element.iterfind("objectlist/object")]
     values = np.array(sorted(rows), np.float64).reshape(-1, 7)
@@ -70,7 +66,7 @@ def read_xml(path: Path) -> CaviarRecording:
     centre, size = values[:, 3:5], values[:, 5:7]
     own = root.find("frame/objectlist/object/hypothesislist") is not None
     return CaviarRecording(
-        root.get("name", path.stem), max(listed), np.array(sorted(listed)), frame, id, label_, centre, size,
+        root.get("name", path.stem), length, frame, id, label_, centre, size,
         root.find("frame/grouplist") is not None, own and bool(((centre >= 0) & (centre <= IMAGE_SIZE)).all()),
     )  # fmt: skip
 
@@ -110,8 +106,8 @@ def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> t
 def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> Truth:
     """Returns the truth of a CAVIAR file in the image: boxes in px, no positions on the ground, no velocities.
 
-    Groups have one hull around their members' boxes. Events are measured from the centres in the frames that the file
-    lists, which count as labelled. px_per_m: None: the median of the boxes' longer sides / 1.7 m.
+    Groups have one hull around their members' boxes. Events are measured from the centres. px_per_m: None: the median
+    of the boxes' longer sides / 1.7 m.
     """
     found = read_xml(path)
     scale = scale_of_all_boxes(found.size.max(axis=1)) if px_per_m is None else px_per_m
@@ -121,26 +117,7 @@ def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> T
         group=found.label, pos=None, vel=None, box=box, visibility=np.ones(len(box)),
         labelled=np.zeros(found.length, bool),
     )  # fmt: skip
-    if not found.labelled or not len(box):
-        return truth
-    vel = differentiate(found.frame, found.id, found.centre, fps, CHORD)
-    known = _measured(found, vel, fps, scale)
-    shapes = box_groups(found.frame, found.id, found.label, found.centre, vel, box, 1, found.length)
-    return truth.replace(groups_px=tuple(shapes), **known)
-
-
-def _measured(found: CaviarRecording, vel: Array, fps: float, px_per_m: float) -> dict[str, Any]:
-    listed = found.listed
-    # The listed frames count as evenly spaced in time.
-    rate = fps / float(np.diff(listed).mean()) if len(listed) > 1 else fps
-    turn = np.searchsorted(listed, found.frame) + 1
-    known = labelled_truth_fields(
-        turn, found.id, found.label, found.centre, vel, fps=rate, length=len(listed), px_per_m=px_per_m
-    )
-    events = (replace(e, start=int(listed[e.start - 1]), end=int(listed[e.end - 1])) for e in known["events"])
-    near = known["near"]
-    near = near.replace(start=listed[near.start - 1], end=listed[near.end - 1])
-    return {"events": tuple(events), "near": near, "labelled": np.isin(np.arange(1, found.length + 1), listed)}
+    return with_labels(truth, found.label) if found.labelled else truth
 
 
 def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:

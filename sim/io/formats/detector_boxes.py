@@ -76,7 +76,7 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     )  # fmt: skip
 
 
-def _frames_at(path: Path, sequence: Sequence, seconds: Array) -> Ints:
+def _frames_at(path: Path, sequence: Sequence, seconds: Array, _: Array) -> Ints:
     """Returns the frames (N,) from 1 of times (N,): the nearest within half a frame, 0 if none or of a nearer time."""
     times = np.array([frame.t for frame in sequence.without_pictures()])
     k = np.searchsorted((times[1:] + times[:-1]) / 2, seconds)

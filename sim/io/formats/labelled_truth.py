@@ -73,6 +73,27 @@ def labelled_truth_fields(
     return {"groups": groups, "events": events, "near": near, "labelled": np.ones(length, bool)}
 
 
+def with_labels(truth: Truth, label: Ints) -> Truth:
+    """Returns a truth with the group labels (R,) of its rows, -1 for alone, and the groups and events that follow.
+
+    They are measured on the ground if all positions are known, else from the centres of the boxes (px).
+    """
+    from sim.truth.group_hulls import box_groups
+
+    truth = truth.replace(group=label)
+    rows, pos, vel, fps, length = (truth.frame, truth.id, label), truth.pos, truth.vel, truth.fps, truth.length
+    if not len(label):
+        return truth
+    if pos is not None and vel is not None and np.isfinite(pos).all():
+        return truth.replace(**labelled_truth_fields(*rows, pos, vel, fps=fps, length=length))
+    assert truth.box is not None, "a row without box has a position"
+    pos = centres(truth.box)
+    vel = differentiate(truth.frame, truth.id, pos, fps, CHORD)
+    known = labelled_truth_fields(*rows, pos, vel, fps=fps, length=length, px_per_m=truth.px_per_m)
+    shapes = box_groups(*rows, pos, vel, truth.box, 1, length)
+    return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))
+
+
 def _names(measured: Ints, label: Ints) -> dict[int, int]:
     found, first = np.unique(measured, return_index=True)
     return {int(g): int(label[k]) for g, k in zip(found, first, strict=True) if g >= 0}

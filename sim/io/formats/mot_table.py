@@ -11,6 +11,7 @@ Other programs write corners, shares of the picture, or leave the ids out, so th
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import CORRECT, NAME_THEM, NO_COMMENTS, NumericTable, TextRows, is_number_text, read_rows
+from sim.io.files.numeric_text import CORRECT, NAME_THEM, NumericTable, TextRows, is_number_text, read_rows
 from sim.io.formats.options import BoxScale
 from sim.types import LENGTH_UNITS, Array, Bools, Ints
 
@@ -115,8 +116,8 @@ Column = np.ndarray[tuple[int], np.dtype[np.float64]]
 
 # meaning of a column, and the names it may have
 NAMES = {
-    "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_num", "frame_index", "frame_idx"),
-    "time": ("t", "t_s", "time", "time_s", "timestamp"),
+    "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_num", "fr", "frame_index", "frame_idx"),
+    "time": ("t", "t_s", "t_ms", "time", "time_s", "time_ms", "timestamp", "timestamp_s", "timestamp_ms"),
     "id": ("id", "track_id", "trackid", "tracker_id", "person_id", "ped_id", "target_id", "object_id", "agent_id"),
     "score": ("score", "conf", "confidence"),
     "class": ("class", "class_id", "cls", "category", "category_id", "object_category"),
@@ -129,8 +130,8 @@ NAMES = {
     "cx": ("cx", "xc", "x_center", "center_x"),
     "cy": ("cy", "yc", "y_center", "center_y"),
     "group": ("group", "group_id", "groupid"),
-    "x": ("x", *(f"x_{unit}" for unit in LENGTH_UNITS)),
-    "y": ("y", *(f"y_{unit}" for unit in LENGTH_UNITS)),
+    "x": ("x", "pos_x", *(f"x_{unit}" for unit in LENGTH_UNITS)),
+    "y": ("y", "pos_y", *(f"y_{unit}" for unit in LENGTH_UNITS)),
 }
 
 # columns of which a text has a box, the first four that it has all of
@@ -146,20 +147,23 @@ WORD_NAMES = ("label", "name", "class_name")
 
 PEOPLE = ("person", "pedestrian")  # words for the class of people
 
-FramesAt = Callable[[Column], Ints]  # frames (N,) from 1 of times (N,), s; 0: of no frame
+FramesAt = Callable[[Column, Column], Ints]  # frames (N,) from 1 of times (N,), s, and ids (N,); 0: of no frame
 
 SECONDS = "if the frames are times in s, write numbers of frames, from 1: time × frames per second + 1"
 
 EXPECTED = (
-    "frame (or, for --boxes, t in s) and a box (x,y,w,h, left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), "
+    "frame (or t in s, in sources and --boxes) and a box (x,y,w,h, left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), "
     "or frame,id,x,y in m (x_cm,y_cm in cm)"
 )
 
 
 def column_names(text: TextRows) -> list[str] | None:
-    """Returns the column names in a text's first line, in lower case; None if it has a number, and so no names."""
-    line = text.text[0].lstrip("# ") if text.text else ""  # numpy.savetxt writes # before its header
-    cells = [cell.strip().strip('"').lower() for cell in line.split(text.separator)]
+    """Returns the column names in a text's first row, in lower case; None if it has a number, and so no names.
+
+    Units are parts of names: `x [m]` and `x/m` are `x_m`.
+    """
+    row = next(text.cells(), [])
+    cells = [cell if is_number_text(cell) else re.sub(r"\W+", "_", cell).strip("_").lower() for cell in row]
     return cells if any(cells) and not any(map(is_number_text, cells)) else None
 
 
@@ -177,27 +181,28 @@ def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> 
         if meaning == "time" and (frames_at is None or not set(NAMES["frame"]).isdisjoint(names)):
             continue
         if meaning in found:
-            _refuse(text.file, names)
+            _refuse(text, names)
         if meaning is not None and not (words and meaning == "class"):
             found[meaning] = k
     if found.keys().isdisjoint(("frame", "time")):
-        names_or_comment = NO_COMMENTS if text.text[0].startswith("#") else NAME_THEM
-        _refuse(text.file, names, names_or_comment if set(NAMES["time"]).isdisjoint(names) else SECONDS)
-    rows = text.numbers((len(names),), first=1, layout="those that line 1 names", use=list(found.values()))
+        _refuse(text, names, NAME_THEM if set(NAMES["time"]).isdisjoint(names) else SECONDS)
+    rows = text.numbers((len(names),), first=1, layout="those that the first line names", use=list(found.values()))
     column: dict[str, Column] = dict(zip(found, rows.values.T, strict=False))
     if words:
         classes, code = np.unique(words, return_inverse=True)
         rows, column["class"] = replace(rows, classes=tuple(classes.tolist())), code.astype(float)
     if "time" in column and frames_at is not None:
-        column["frame"] = frames_at(column.pop("time")).astype(float)
+        unit = 0.001 if names[found["time"]].endswith("_ms") else 1.0  # s
+        seconds = column.pop("time") * unit
+        column["frame"] = frames_at(seconds, column.get("id", np.zeros_like(seconds))).astype(float)
         seen = column["frame"] > 0
         rows, column = replace(rows, line=rows.line[seen]), {name: v[seen] for name, v in column.items()}
     columns = _in_order(column, {axis: names[found[axis]].partition("_")[2] for axis in "xy" if axis in column})
     if columns is None:
-        _refuse(text.file, names)
+        _refuse(text, names)
     unused = [name for k, name in enumerate(names) if name and k not in (*found.values(), word_column)]
     if unused:
-        warnings.warn(f"{text.file}: line 1: columns that are not used: {', '.join(unused)}", stacklevel=4)
+        warnings.warn(f"{text.file}: line {text.line[0]}: columns that are not used: {', '.join(unused)}", stacklevel=4)
     if column["frame"].min(initial=1) == 0:
         columns[0] = columns[0] + 1
         warnings.warn(f"{text.file}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
@@ -234,14 +239,15 @@ def _in_order(column: dict[str, Column], units: dict[str, str]) -> list[Column] 
         w, h = w - left, h - top
     if "cx" in form:
         left, top = left - w / 2, top - h / 2
-    metres = form == BOXES[0] and "id" in have and "class" not in have and len(units) == 2 and all(units.values())
+    known = len(units) == 2 and {*units.values()} <= LENGTH_UNITS.keys()
+    metres = form == BOXES[0] and "id" in have and "class" not in have and known
     last = [*ground, np.zeros_like(frame)] if metres else [column["class"]]
     return [frame, column["id"], left, top, w, h, column["score"], *last]
 
 
-def _refuse(path: Path, names: list[str], remedy: str = NAME_THEM) -> NoReturn:
+def _refuse(text: TextRows, names: list[str], remedy: str = NAME_THEM) -> NoReturn:
     got = f"columns {','.join(names)}"
-    raise InputError(file=path, place="line 1", got=got, expected=EXPECTED, remedy=remedy)
+    raise InputError(file=text.file, place=f"line {text.line[0]}", got=got, expected=EXPECTED, remedy=remedy)
 
 
 GROUND_COLUMNS = 4  # columns of a text of ground positions alone: frame, id, x, y
@@ -288,7 +294,7 @@ def read_table(
     length: the last frame allowed. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors that make the
     boxes pixels. frames_at: as `read_named` takes it. Rows stay in the order of the file.
     """
-    text = read_rows(path)
+    text = read_rows(path, heading=True)
     named = column_names(text)
     if named is not None:
         rows, group = read_named(text, named, frames_at)

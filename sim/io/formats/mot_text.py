@@ -27,11 +27,11 @@ from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.formats.biwi import labels_of
-from sim.io.formats.labelled_truth import CHORD, centres, differentiate, labelled_sequence, labelled_truth_fields
+from sim.io.formats.labelled_truth import centres, differentiate, labelled_sequence, with_labels
 from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, read_table, require_pixels
 from sim.io.formats.options import NO_OPTIONS, BoxOptions, Classes, RecordingOptions
+from sim.io.formats.video import RATES
 from sim.scene.camera import scale_of_all_boxes
-from sim.truth.group_hulls import box_groups
 from sim.types import Array, Bools, Detections, Frame, Ints, Plane, Sequence, Truth, Unscored
 
 # step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
@@ -375,9 +375,9 @@ def truth_of_table(
         labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip
     if table.group is not None:
-        return _labelled(truth, table.group[order])
+        return with_labels(truth, table.group[order])
     path = group_file(table.rows.file)
-    return _labelled(truth, labels_of(path, id)) if is_present(path) else truth
+    return with_labels(truth, labels_of(path, id)) if is_present(path) else truth
 
 
 def group_file(path: Path) -> Path:
@@ -385,32 +385,26 @@ def group_file(path: Path) -> Path:
     return path.with_name("groups.txt" if path.name == LABELS else f"{path.stem}.groups.txt")
 
 
-def _labelled(truth: Truth, label: Ints) -> Truth:
-    """Returns a truth with groups: measured on the ground if all positions are known, else from the boxes' centres."""
-    truth = truth.replace(group=label)
-    if not len(label):
-        return truth
-    rows, fps, length = (truth.frame, truth.id, label), truth.fps, truth.length
-    if truth.pos is not None and truth.vel is not None and np.isfinite(truth.pos).all():
-        return truth.replace(**labelled_truth_fields(*rows, truth.pos, truth.vel, fps=fps, length=length))
-    assert truth.box is not None, "a row without box has a position"
-    pos = centres(truth.box)
-    vel = differentiate(truth.frame, truth.id, pos, fps, CHORD)
-    known = labelled_truth_fields(*rows, pos, vel, fps=fps, length=length, px_per_m=truth.px_per_m)
-    shapes = box_groups(*rows, pos, vel, truth.box, 1, length)
-    return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))
+FPS = 25.0
 
 
-DEFAULT_FPS = 25.0
-
-
-def frame_rate(given: float | None, found: float | None = None) -> float:
-    """Returns the first of `given` (--fps) and `found` (in the recording) that is not None; else 25, with a warning."""
+def frame_rate(given: float | None, found: float | None, what: str = "MOTChallenge data", usual: float = FPS) -> float:
+    """Returns the first of `given` (--fps) and `found` (in the recording) that is not None; else `usual`, and warns."""
     if given is None and found is None:
         # The text names no path, so that a command over many recordings prints it once.
-        text = f"MOTChallenge data without a frame rate is taken at {DEFAULT_FPS:g} fps (--fps says otherwise)"
-        warnings.warn(text, stacklevel=3)
-    return given or found or DEFAULT_FPS
+        warnings.warn(f"{what} without a frame rate: taken at {usual:g} fps (--fps says otherwise)", stacklevel=3)
+    return given or found or usual
+
+
+def rate_of_times(path: Path, seconds: Array, id: Array) -> float:
+    """Returns the frames per second at which times (N,) of one id (N,) follow each other, where none is missing."""
+    id, seconds = np.unique(np.column_stack([id, seconds]), axis=0).T
+    step = np.diff(seconds)[np.diff(id) == 0]
+    rate = 1 / step[step < 1.5 * np.median(step)].mean() if len(step) else 1.0
+    if not RATES[0] <= rate <= RATES[1]:
+        got, expected = f"{rate:.3g} per second", "{:g} to {:g} times per second".format(*RATES)
+        raise InputError(file=path, place="times", got=got, expected=expected, remedy="give --fps, and times in s")
+    return round(float(rate), 3)
 
 
 def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
@@ -418,8 +412,15 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     `options.camera` becomes its camera, unchanged.
     """
-    rate, of_boxes = frame_rate(options.fps), options.box_options
-    table = read_table(path, boxless=True, box_scale=of_boxes.box_scale)
+    of_boxes, fps = options.box_options, options.fps
+
+    def frames_at(seconds: Array, id: Array) -> Ints:
+        nonlocal fps
+        fps = fps or rate_of_times(path, seconds, id)
+        return np.asarray(np.round((seconds - seconds.min(initial=np.inf)) * fps) + 1, np.int64)
+
+    table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at)
+    rate = frame_rate(fps, None)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
     length = int(table.frame.max())

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -29,15 +28,13 @@ from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_
 from sim.io.formats.biwi import frame_numbers
 from sim.io.formats.labelled_truth import labelled_sequence
 from sim.io.formats.mot_table import table_of_rows
-from sim.io.formats.mot_text import truth_of_table
+from sim.io.formats.mot_text import frame_rate, truth_of_table
 from sim.io.formats.options import RecordingOptions
 from sim.types import Sequence, Truth
 
 NDJSON = ".ndjson"
 ETH_FPS = 2.5
 FRAMERATE = re.compile(r"framerate[^\w+-]*([-+]?\d[\d.]*(?:,\d+)?)", re.IGNORECASE)
-X_IN_CM, X_IN_M = (re.compile(rf"\bx[\W_]{{0,2}}{unit}\b", re.IGNORECASE) for unit in ("cm", "m"))
-IN_CM = re.compile(r"\bin cm\b", re.IGNORECASE)
 PEDPY = re.compile(r"#.*framerate|#\s*(id|persid)\s+(frame|fr)\b", re.IGNORECASE)
 
 KITTI_FPS = 10.0
@@ -53,11 +50,9 @@ def layout_of(path: Path) -> str | None:
     """Returns the key of LAYOUTS for a text, by its ending, comments or first line; None if none fits."""
     if path.suffix.lower() == NDJSON:
         return "trajnet"
-    lines = [line for line in islice(read_text(path).splitlines(), 1000) if line.strip()]
-    comments = [line for line in lines if line.startswith("#")]
-    if comments:
-        return "pedpy" if any(PEDPY.match(line) for line in comments) else None
-    cells = lines[0].split() if lines else []
+    if any(PEDPY.match(line) for line in islice(read_text(path).splitlines(), 1000)):
+        return "pedpy"
+    cells = next(iter(read_rows(path, heading=True).text), "").split()
     numbers = [not math.isnan(number_or_nan(cell)) for cell in cells[:4]]
     if len(cells) == 4 and all(numbers):
         return "eth"
@@ -69,10 +64,7 @@ def open_text(path: Path, layout: str, options: RecordingOptions) -> Sequence:
     rows, stated = LAYOUTS[layout](path, options.fps)
     if not len(rows.line):
         raise InputError(file=path, got="no row", expected="people with frame, id, x and y", remedy="restore it")
-    rate = options.fps or stated or ETH_FPS
-    if options.fps is None and stated is None:
-        text = f"trajectories without a frame rate are taken at {ETH_FPS:g} fps, as ETH and UCY (--fps says otherwise)"
-        warnings.warn(text, stacklevel=4)
+    rate = frame_rate(options.fps, stated, "trajectories", ETH_FPS)
     table = table_of_rows(rows, boxless=True)
     rows.reject(table.id < 0, "ids from 0", "correct the id")
     length = int(table.frame.max())
@@ -102,9 +94,10 @@ def _read_pedpy(path: Path, fps: float | None) -> People:
         expected = "frames per second from {:g} to {:g}".format(*FRAME_RATES)
         got = " and ".join(sorted(rates)) or "none"
         raise InputError(file=path, place="# framerate", got=got, expected=expected, remedy="correct it, or give --fps")
-    rows = read_rows(path, comments=True).numbers(range(4, 13), layout="id frame x y z")
+    rows = read_rows(path).numbers(range(4, 13), layout="id frame x y z")
     raw = rows.integers(1, "frame")
-    centimetres = X_IN_CM.search(comments) or (IN_CM.search(comments) and not X_IN_M.search(comments))
+    words = "_".join(re.findall(r"[^\W_]+", comments.lower())) + "_"
+    centimetres = "_x_cm_" in words or ("_in_cm_" in words and "_x_m_" not in words)
     pos = rows.values[:, 2:4] * (0.01 if centimetres else 1.0)
     return replace(rows, values=np.column_stack([raw - raw.min(initial=LARGEST) + 1, rows.values[:, 0], pos])), stated
 

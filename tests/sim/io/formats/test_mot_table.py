@@ -15,7 +15,8 @@ BOXES = {
     "Frame,ID,Left,Top,Width,Height": "{f},7,10,20,30,40",
     "id,frame,x1,y1,x2,y2": "7,{f},10,20,40,60",
     "frame,id,cx,cy,w,h": "{f},7,25,40,30,40",
-    "# frame_idx;tracker_id;x_min;y_min;x_max;y_max": "{f};7;10;20;40;60",
+    "# hall 3, May\n\nframe,id,x,y,w,h": "{f},7,10,20,30,40\n# a pause",
+    "# hall 3, May\n# frame_idx;tracker_id;x_min;y_min;x_max;y_max\n# px": "{f};7;10;20;40;60",
 }
 
 
@@ -27,11 +28,25 @@ def test_named_boxes(tmp_path, header):
     assert truth.box.tolist() == [[10, 20, 30, 40]] * 2
 
 
+@pytest.mark.parametrize("names", ["x_{0},y_{0}", "X [{0}],Y [{0}]", "x/{0},y/{0}"])
 @pytest.mark.parametrize(("unit", "factor"), [("m", 1), ("cm", 100), ("mm", 1000)])
-def test_units_of_positions(tmp_path, unit, factor):
+def test_units_of_positions(tmp_path, unit, factor, names):
     rows = f"1,1,{0.5 * factor},{factor}\n2,1,{0.6 * factor},{factor}\n"
-    truth = opened(tmp_path, f"frame,id,x_{unit},y_{unit}\n{rows}").truth
+    truth = opened(tmp_path, f"frame,id,{names.format(unit)}\n{rows}").truth
     assert truth.pos == pytest.approx(np.array([[0.5, 1], [0.6, 1]]))
+
+
+@pytest.mark.parametrize(("name", "second"), [("t", 1), ("timestamp_ms", 1000)])
+def test_times_in_place_of_frames(tmp_path, name, second):
+    """The first is frame 1. The rate is that of the usual step of a person, here 1 s, or given."""
+    rows = [f"{(1.7e9 + t + p / 8) * second:.3f},{p},{t / 10},2" for p in (0, 1) for t in (0, 1, 2, 3, 9)]
+    (tmp_path / "a.csv").write_text("\n".join([f"{name},agent_id,pos_x,pos_y", *rows]))
+    for fps, expected in ((None, [1, 1, 2, 2, 3, 3, 4, 4, 10, 10]), (2, [1, 1, 3, 3, 5, 5, 7, 7, 19, 19])):
+        (s,) = open_source(tmp_path / "a.csv", fps=fps)
+        assert (s.fps, s.truth.frame.tolist()) == (fps or 1, expected)
+    (tmp_path / "a.csv").write_text("t,id,x,y\n400,1,0,0\n800,1,0.1,0\n")
+    with pytest.raises(InputError, match=r"times: got 0\.0025 per second; expected 0.1 to 300"):
+        open_source(tmp_path / "a.csv")
 
 
 WARNED = {
@@ -65,16 +80,14 @@ def test_columns_without_a_name_are_not_used(tmp_path, header, row):
 
 
 UNCLEAR = {
-    "1;7;10,5;20,5;30,5;40,5\n": "line 1: got '10,5'; expected a number; write decimals with a point",
+    "1;7;10,5;20,5;30,5;40,5\n": "line 1: got '10,5'; expected a number as cell 3; write decimals with a point",
     "1\t7\t10,5\t20,5\t30,5\t40,5\n": "line 1: .* write decimals with a point",
-    "<html>\n": "line 1: got columns <html>",
-    "# by me\nframe,id,x,y,w,h\n1,1,2,3,4,5\n": "line 1: got columns by,me; .*remove the lines that begin with #",
+    "<html>\n": "line 1: got columns html",
     "frame,id,u,v,w,h\n1,1,2,3,4,5\n": "line 1: got columns frame,id,u,v,w,h; expected frame ",
-    "time,id,x,y,w,h\n1,1,2,3,4,5\n": "line 1: got columns time,id,x,y,w,h; expected frame .*time × frames per second",
     "frame,id,x,y\n0.4,1,2,3\n0.8,1,2,3\n": "line 2: got .*time × frames per second",
     "frame,frame_id,x,y,w,h\n1,1,2,3,4,5\n": "line 1: got columns frame,frame_id,x,y,w,h; expected frame ",
     "1,1,0.1,1,1\n2,1,0.2,1,1\n": "line 1: .*4, 6, 7, 8, 9, 10 columns.*name the columns in the first line",
-    "# x y of people\n1 1 20 30 170\n": "line 1: .*name the columns in the first line",
+    "# x y of people\n1 1 20 30 170\n": "line 2: .*name the columns in the first line",
     "1,1,3\n": "4, 6, 7, 8, 9, 10 columns",
     "frame,id,x,y,w,h\n": "no row",
     "\n": "no row",

@@ -67,10 +67,10 @@ def test_people_with_boxes(tmp_path):
 
 
 def test_the_rate_of_eth_is_assumed_with_a_warning(tmp_path):
-    with pytest.warns(UserWarning, match=r"taken at 2\.5 fps, as ETH and UCY"):
+    with pytest.warns(UserWarning, match=r"trajectories without a frame rate: taken at 2\.5 fps"):
         opened(tmp_path, "walk.txt", ETH)
     assert opened(tmp_path, "walk.txt", ETH, fps=5).fps == 5
-    assert opened(tmp_path, "walk.txt", ETH.replace("\t", " "), fps=5).truth.frame.tolist() == [1, 2, 2, 4]
+    assert opened(tmp_path, "walk.txt", "# Zara\n" + ETH.replace("\t", " "), fps=5).truth.frame.tolist() == [1, 2, 2, 4]
 
 
 @pytest.mark.filterwarnings("ignore:trajectories without a frame rate")

@@ -4,9 +4,8 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.formats import biwi, caviar
 from sim.io.source import open_source
-from tracking.scoring.annotated_frames import annotated_frames
 
-ROW = "{} {} {} 0 {} 1.0 0 0.0\n"
+ROW = "{} {} {} 0 {} 2.5 0 0.0\n"
 
 
 def biwi_folder(tmp_path, groups="", rows=None):
@@ -43,7 +42,7 @@ def check_groups(truth, groups):
 
 
 def test_biwi_groups_survive_their_traps(tmp_path):
-    folder = biwi_folder(tmp_path, "1 1 2\n3 3\n\n7 8\n")
+    folder = biwi_folder(tmp_path, "# pairs\n1 1 2\n3 3\n\n7 8\n")
     assert biwi.read_groups(folder / "groups.txt") == {1: 1, 2: 1, 7: 2, 8: 2}
     folder = biwi_folder(tmp_path, "1 2\n2 3\n")
     with pytest.warns(UserWarning, match="one group"):
@@ -56,7 +55,7 @@ def test_biwi_without_groups_is_not_labelled(tmp_path):
     (s,) = open_source(folder)
     assert s.length == 9
     assert s.truth.pos[4].tolist() == [1.1, 2]
-    assert s.truth.vel[4].tolist() == [1, 0]
+    assert s.truth.vel[4].tolist() == [2.5, 0]
     assert not s.truth.labelled.any()
     assert s.truth.groups is None
     assert (s.truth.group == -1).all()
@@ -70,7 +69,7 @@ BAD_BIWI = [
     ("", [(1, 1, 1e200, 0)], "line 1: .*within 1e"),
     ("", [(1, -1, 0, 0)], "line 1: .*ids from 0"),
     ("", [(1, 1, 0, 0), (11, 1, 0, 0), (80_000_000, 1, 0, 0)], "frames from 1 to 1000000"),
-    ("", [(f, 1, f / 10, 1) for f in (0, 6, 12, 18, 24, 30, 31, 32, 33, 42, 48)], "nearer than a step"),
+    ("", [(f, 1, f / 10, 1) for f in (0, 6, 12, 18, 24, 30, 31, 32, 33, 42, 48)], "frames are nearer than a step"),
     ("", [], "no line"),
 ]
 
@@ -146,26 +145,6 @@ def test_cvml_without_frames_is_refused(tmp_path):
             open_source(tmp_path / "clip.xml", fps=25)
 
 
-def test_cvml_of_every_fifth_frame(tmp_path):
-    """Groups and events are those of the frames in the file: people are not absent in between."""
-    pair = [GROUP.format(4, "1,2")]
-    near = [max(30, 200 - 20 * k) for k in range(40)]
-    frames = [
-        ([OBJECT.format(1, 20), OBJECT.format(2, x), OBJECT.format(3, 300)], pair if k > 12 else [])
-        for k, x in enumerate(near)
-    ]
-    every = open_source(xml(tmp_path, *frames), fps=5)[0].truth
-    text = (tmp_path / "clip.xml").read_text()
-    for k in reversed(range(40)):
-        text = text.replace(f'number="{k}"', f'number="{5 * k}"')
-    (tmp_path / "clip.xml").write_text(text)
-    fifth = open_source(tmp_path / "clip.xml", fps=25)[0].truth
-    assert np.flatnonzero(fifth.labelled).tolist() == list(range(0, 196, 5))
-    assert [e.kind for e in every.events] == [e.kind for e in fifth.events] == ["form"]
-    assert [(e.start - 1) * 5 + 1 for e in every.events] == [e.start for e in fifth.events]
-    assert annotated_frames(fifth).step == 5
-
-
 BAD_CAVIAR = [
     ((([OBJECT.format(1, "nan")], []),), "dataset", "a number"),
     ((([OBJECT.format("a", 1)], []),), "dataset", "a whole number"),
@@ -192,10 +171,17 @@ STEP = 6
 
 def test_biwi_that_changes_back_to_the_first_grid(tmp_path):
     """The same person at 813 and 816: 816 gets the next slot, as do the frames after it, up to the gap."""
-    rows = [(f, 1, f / 10, 1) for f in (780, 786, 792, 801, 807, 813, 816, 822, 828, 852, 858)]
+    rows = [(f, 1, f / STEP, 1) for f in (780, 786, 792, 801, 807, 813, 816, 822, 828, 852, 858)]
     (s,) = open_source(biwi_folder(tmp_path, "", rows))
     assert s.truth.frame.tolist() == [1, 2, 3, 5, 6, 7, 8, 9, 10, 13, 14]
     assert np.all(np.abs(s.truth.frame - 1 - (np.array([r[0] for r in rows]) - 780) / STEP) <= 1)
+
+
+@pytest.mark.parametrize(("step", "rate"), [(20, 1.25), (30, 2.5 / 3), (5, 5), (1, 25)])
+def test_biwi_of_other_frames_has_the_rate_of_its_velocities(tmp_path, step, rate):
+    folder = biwi_folder(tmp_path, "", [(f, i, f / 10, i) for f in range(1, 10 * step, step) for i in (1, 2)])
+    with pytest.warns(UserWarning, match=f"it has {rate:.4g} frames per second, and not 2.5"):
+        assert open_source(folder)[0].truth.fps == pytest.approx(rate)
 
 
 def test_cvml_of_caviar_says_what_is_assumed(tmp_path):
