@@ -23,7 +23,7 @@ from typing import ClassVar
 import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT
-from sim.scene.camera import ground_jacobian, project, seen_ground, standing_share
+from sim.scene.camera import project, seen_ground, standing_share
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Camera, Context, Ints, Scene
 from tracking.detect.person_size import upright
@@ -43,6 +43,7 @@ LEAST_VIEW = 5.0  # m: least width and height of the field of view
 DOUBLES = 0.05  # boxes per frame that a person has beside the own one, on average
 DOUBLE_SPREAD = 0.3  # m: standard deviation of centre, height and width of such a box
 HEIGHT_SPREAD = 0.1  # m: standard deviation of people's heights
+PLACE_SPREAD = 10.0  # m: standard deviation of the place on the ground before the first box
 NUDGE = 1e-4  # m: step of the numerical derivatives of `seen_boxes`
 SEEN = [0, 1, 4]  # the parts of `stand` on which a box depends
 
@@ -202,13 +203,13 @@ class TrackedPeople:
     def measure_on_ground(self, rows: Ints, box: Array, noise: Array) -> None:
         """Updates `stand` of the tracks at positions `rows` (K,), each at most once, with measured boxes (K, 4): centre
         x, y, height, width, px; noise: variances, m^2, (4,) or (K, 4). An extended Kalman filter."""
-        camera = self.context.camera
-        if camera is None:
+        if self.context.camera is None:
             return
+        # x, P: state and covariance; H: derivative of the box; R: noise; K: gain
         x, P = self.stand[rows], self.stand_cov[rows]
         near = np.repeat(x[:, None], 4, 1)
         near[:, range(1, 4), SEEN] += NUDGE
-        z = seen_boxes(camera, self.context.scene, near.reshape(-1, 5)).reshape(-1, 4, 3)
+        z = seen_boxes(self.context.camera, self.context.scene, near.reshape(-1, 5)).reshape(-1, 4, 3)
         H = np.zeros((len(x), 3, 5))
         H[:, :, SEEN] = np.swapaxes(z[:, 1:] - z[:, :1], 1, 2) / NUDGE
         R = (noise * np.square(self.scale[rows])[:, None])[:, :3, None] * np.eye(3)
@@ -217,20 +218,16 @@ class TrackedPeople:
         self.stand[rows] = x + (K @ (box[:, :3] - z[:, 0])[..., None])[..., 0]
         self.stand_cov[rows] = P - (K @ HP + np.swapaxes(K @ HP, 1, 2)) / 2
 
-    def place_on_ground(self, box: Array) -> None:
-        """Starts `stand` of the tracks that have none where their boxes (N, 4) stand: centre x, y, height, width, px."""
-        camera, new = self.context.camera, np.isnan(self.stand).any(1).nonzero()[0]
-        if camera is None or not len(new):
+    def place_on_ground(self, camera: Camera, box: Array) -> None:
+        """Starts `stand` of tracks without it where their boxes stand; box (N, 4): centre x, y, height, width, px."""
+        new = np.flatnonzero(np.isnan(self.stand).any(1))
+        if not len(new):
             return
-        lower = standing_share(camera) - 0.5
-        foot = box[new, :2] + np.column_stack([np.zeros(len(new)), lower * box[new, 2]])
-        ground, height = seen_ground(camera, foot, self.context.scene)
-        jacobian = ground_jacobian(camera, foot, height) * self.scale[new, None, None]
-        noise = np.diag([self.noise[0], self.noise[1] + lower**2 * self.noise[2]])
-        speed = self.dynamics.birth_rate_var[0]
+        foot = box[new, :2] + box[new, 2:3] * np.array([0.0, standing_share(camera) - 0.5])
+        ground, speed = seen_ground(camera, foot, self.context.scene)[0], self.dynamics.birth_rate_var[0]
         self.stand[new] = np.column_stack([ground, np.zeros((len(new), 2)), np.full(len(new), PERSON_HEIGHT)])
-        self.stand_cov[new] = np.diag([0, 0, speed, speed, HEIGHT_SPREAD**2])
-        self.stand_cov[new, :2, :2] = jacobian @ noise @ np.swapaxes(jacobian, 1, 2)
+        self.stand_cov[new] = np.diag([PLACE_SPREAD**2, PLACE_SPREAD**2, speed, speed, HEIGHT_SPREAD**2])
+        self.measure_on_ground(new, box[new], self.noise)
 
     def _scale_of(self, place: Array) -> Array:
         whole = self.px_per_m
