@@ -249,7 +249,7 @@ def test_reports_on_the_ground_where_the_camera_is_known(camera, high):
 
 
 def test_places_on_the_ground_are_steadier_than_feet_of_boxes():
-    from sim.scene.camera import seen_ground
+    from tracking.grouping.foot_points import feet
     from tracking.papers.blob import box_geometry
     from tracking.papers.blob.track_management import seen_boxes
 
@@ -259,9 +259,9 @@ def test_places_on_the_ground_are_steadier_than_feet_of_boxes():
     box[:, 1:3] += box[:, 2:3] * r.normal(0, [0.05, 0.09], (60, 2))
     context = Context(FPS, 30.0, camera, None, camera.image)
     frames = run(box_geometry.ltwh_from_centred(box), context=context)
-    feet = seen_ground(camera, box[:, :2] + box[:, 2:3] * [0, 0.5], None)[0]
-    got, raw = (np.abs(x[20:, 1] - path[20:, 1]).mean() for x in (np.array([t.pos[0] for t in frames]), feet))
-    assert got < 0.5 * raw
+    pos, below = np.array([(t.pos[0], feet(t.box, camera, None)[0]) for t in frames])[20:, :, 1].T
+    assert np.std(pos - path[20:, 1]) < np.std(below - path[20:, 1])
+    assert np.std(np.diff(pos, 2)) < 0.4 * np.std(np.diff(below, 2))
 
 
 @pytest.mark.parametrize("scale", [float("nan"), 0.0])
