@@ -23,11 +23,12 @@ from typing import ClassVar
 import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT
-from sim.scene.camera import project, seen_ground, standing_share
+from sim.scene.camera import project
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Camera, Context, Ints, Scene
 from tracking.detect.person_size import upright
 from tracking.filters import assignment, existence, kalman, track_uncertainty
+from tracking.grouping.foot_points import feet
 from tracking.papers.blob import box_geometry, person_look_kernels
 from tracking.papers.blob.config import BlobConfig
 
@@ -223,8 +224,8 @@ class TrackedPeople:
         new = np.flatnonzero(np.isnan(self.stand).any(1))
         if not len(new):
             return
-        foot = box[new, :2] + box[new, 2:3] * np.array([0.0, standing_share(camera) - 0.5])
-        ground, speed = seen_ground(camera, foot, self.context.scene)[0], self.dynamics.birth_rate_var[0]
+        ground = feet(box_geometry.ltwh_from_centred(box[new]), camera, self.context.scene)
+        speed = self.dynamics.birth_rate_var[0]
         self.stand[new] = np.column_stack([ground, np.zeros((len(new), 2)), np.full(len(new), PERSON_HEIGHT)])
         self.stand_cov[new] = np.diag([PLACE_SPREAD**2, PLACE_SPREAD**2, speed, speed, HEIGHT_SPREAD**2])
         self.measure_on_ground(new, box[new], self.noise)
