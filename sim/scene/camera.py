@@ -126,18 +126,16 @@ def to_ground(camera: Camera, uv: Array, z: float | Array = 0.0) -> Array:
     return np.asarray(origin[:, :2] + _reach(origin, direction, z)[:, None] * direction[:, :2])
 
 
-def seen_ground(camera: Camera, uv: Array, scene: Scene | None) -> tuple[Array, Array]:
-    """Returns the ground points x, y (N, 2) m, and their heights (N,) m, that are seen at image points uv (N, 2) px.
+def seen_ground(camera: Camera, uv: Array, scene: Scene | None) -> Array:
+    """Returns the ground points x, y (N, 2) m that are seen at image points uv (N, 2) px.
 
     The ground is level without a scene. x, y are nan where no ground is seen.
     """
-    z = np.zeros(len(uv))
-    xy = to_ground(camera, uv, z)
+    xy = to_ground(camera, uv)
     if scene is not None and scene.stairs:
         for _ in range(CLIMB):
-            z = height_at(scene, xy)
-            xy = to_ground(camera, uv, z)
-    return xy, z
+            xy = to_ground(camera, uv, height_at(scene, xy))
+    return xy
 
 
 def _reach(origin: Array, direction: Array, z: float | Array) -> Array:

@@ -144,7 +144,7 @@ def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> l
 
 def feet(box: Array, camera: Camera, scene: Scene | None) -> Array:
     """Returns the ground points x, y (R, 2), m, on which boxes (R, 4), px, stand; nan for a box that stands nowhere."""
-    return seen_ground(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]), scene)[0]
+    return seen_ground(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]), scene)
 
 
 def moved_events(events: Sequence[GroupEvent], id: Ints, pos: Array) -> tuple[GroupEvent, ...]:

@@ -31,17 +31,13 @@ def inscribed_ellipses(box: Array) -> Array:
 
 def standing(box: Array) -> Array:
     """Returns boxes (N, 4): x, foot, height, width, px, of centred boxes (N, 4): centre x, y, height, width, px."""
-    out = box.copy()
-    out[:, 1] += box[:, 2] / 2
-    return out
+    return np.asarray(box + box[:, 2:3] * np.array([0.0, 0.5, 0.0, 0.0]))
 
 
 def centred(standing_box: Array) -> Array:
     """Returns centred boxes (N, 4): centre x, y, height, width, px, of boxes (N, 4): x, foot (row of the lower edge),
     height, width, px."""
-    out = standing_box.copy()
-    out[:, 1] -= standing_box[:, 2] / 2
-    return out
+    return np.asarray(standing_box - standing_box[:, 2:3] * np.array([0.0, 0.5, 0.0, 0.0]))
 
 
 def covered_share(place: Array, others: Array) -> Array:

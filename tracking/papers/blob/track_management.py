@@ -23,9 +23,12 @@ from typing import ClassVar
 import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT
-from sim.types import Array, Bools, Context, Ints
+from sim.scene.camera import project
+from sim.scene.terrain import height_at
+from sim.types import Array, Bools, Camera, Context, Ints, Scene
 from tracking.detect.person_size import upright
 from tracking.filters import assignment, existence, kalman, track_uncertainty
+from tracking.grouping.foot_points import feet
 from tracking.papers.blob import box_geometry, person_look_kernels
 from tracking.papers.blob.config import BlobConfig
 
@@ -40,6 +43,20 @@ SIZE_SPREAD = 0.3  # m: standard deviation of height and width of false boxes
 LEAST_VIEW = 5.0  # m: least width and height of the field of view
 DOUBLES = 0.05  # boxes per frame that a person has beside the own one, on average
 DOUBLE_SPREAD = 0.3  # m: standard deviation of centre, height and width of such a box
+HEIGHT_SPREAD = 0.1  # m: standard deviation of people's heights
+PLACE_SPREAD = 10.0  # m: standard deviation of the place on the ground before the first box
+NUDGE = 1e-4  # m: step of the numerical derivatives of `seen_boxes`
+SEEN = [0, 1, 4]  # the parts of `stand` on which a box depends
+
+
+def seen_boxes(camera: Camera, scene: Scene | None, stand: Array) -> Array:
+    """Returns the boxes (N, 3) in which a camera sees people: centre x, y, height, px. stand (N, 5): as of
+    TrackedPeople."""
+    z = np.zeros(len(stand)) if scene is None or not scene.stairs else height_at(scene, stand[:, :2])
+    foot = np.column_stack([stand[:, :2], z])
+    ends, _ = project(camera, np.concatenate([foot, np.column_stack([stand[:, :2], z + stand[:, 4]])]))
+    foot, head = np.split(ends, 2)
+    return np.column_stack([(foot + head) / 2, np.abs(foot - head)[:, 1]])
 
 
 class TrackedPeople:
@@ -56,6 +73,8 @@ class TrackedPeople:
         states (3, N)       probabilities of a person who is shown, who is not, and of a false object (existence)
         confirmed (N,)      True if confirmed; else the track is tentative
         measured (N,)       True if measured in this frame
+        stand (N, 5)        with a camera: where the person stands on the ground, x, y, vx, vy, and how tall the person
+                            is, m and m/s; nan: above the horizon. stand_cov (N, 5, 5): covariance
         view_low, view_high (2,)   corners x, y of the field of view, px; inf and -inf before it is known
     detect_prob: that of the config, 0 in a frame that was not observed; detectable (N,): probability that a person who
     exists and is shown is measured in this frame; unseen_time: s, BIRTH_RATE times it is the expected number of people
@@ -65,7 +84,8 @@ class TrackedPeople:
 
     # Axis of the tracks in each column of the table.
     columns: ClassVar[dict[str, int]] = {
-        "bank": 1, "id": 0, "scale": 0, "rho": 0, "born": 0, "score": 0, "states": 1, "confirmed": 0, "measured": 0
+        "bank": 1, "id": 0, "scale": 0, "rho": 0, "born": 0, "score": 0, "states": 1, "confirmed": 0, "measured": 0,
+        "stand": 0, "stand_cov": 0,
     }  # fmt: skip
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
@@ -75,6 +95,7 @@ class TrackedPeople:
         self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
         self.scale, self.rho, self.born, self.score, self.detectable = np.zeros((5, 0))
         self.confirmed, self.measured = np.zeros((2, 0), bool)
+        self.stand, self.stand_cov = np.zeros((0, 5)), np.zeros((0, 5, 5))
         self.states, self.unseen_time = np.zeros((3, 0)), existence.LIFETIME
         self.follow(config, dynamics)
 
@@ -90,11 +111,17 @@ class TrackedPeople:
         self.tentative_limit = max(config.tentative_time, confirmation)
         frames = int(np.ceil(config.coast_time * self.context.fps - 1e-6))
         self.death_rho = track_uncertainty.after_misses(dynamics, frames - 1)
+        walk, noise = kalman.constant_velocity(dynamics.dt, 2)
+        self.walk, self.walk_noise = np.eye(5), np.zeros((5, 5))
+        self.walk[:4, :4], self.walk_noise[:4, :4] = walk, config.accel_noise**2 * self.context.fps * noise
 
     def predict(self, observed: bool = True) -> None:
         """Predicts all tracks one frame ahead, in place (eqs 1, 2), with their uncertainty rho and their existence.
         observed: False if nobody looks at this frame, so that nobody is detectable in it."""
         kalman.predict(self.bank, self.dynamics.dt, self.q)
+        if self.context.camera is not None:
+            self.stand = self.stand @ self.walk.T
+            self.stand_cov = self.walk @ self.stand_cov @ self.walk.T + self.walk_noise
         self.rho[:] = self.compute_rho()
         self.states[:] = self.transition @ self.states
         self.detect_prob = observed * self.config.detect_prob
@@ -174,6 +201,35 @@ class TrackedPeople:
         else:
             self.confirmed[rows] |= near & (self.rho[rows] <= self.config.confirm_ratio)
 
+    def measure_on_ground(self, rows: Ints, box: Array, noise: Array) -> None:
+        """Updates `stand` of the tracks at positions `rows` (K,), each at most once, with measured boxes (K, 4): centre
+        x, y, height, width, px; noise: variances, m^2, (4,) or (K, 4). An extended Kalman filter."""
+        if self.context.camera is None:
+            return
+        # x, P: state and covariance; H: derivative of the box; R: noise; K: gain
+        x, P = self.stand[rows], self.stand_cov[rows]
+        near = np.repeat(x[:, None], 4, 1)
+        near[:, range(1, 4), SEEN] += NUDGE
+        z = seen_boxes(self.context.camera, self.context.scene, near.reshape(-1, 5)).reshape(-1, 4, 3)
+        H = np.zeros((len(x), 3, 5))
+        H[:, :, SEEN] = np.swapaxes(z[:, 1:] - z[:, :1], 1, 2) / NUDGE
+        R = (noise * np.square(self.scale[rows])[:, None])[:, :3, None] * np.eye(3)
+        HP = H @ P
+        K = np.swapaxes(np.linalg.solve(HP @ np.swapaxes(H, 1, 2) + R, HP), 1, 2)
+        self.stand[rows] = x + (K @ (box[:, :3] - z[:, 0])[..., None])[..., 0]
+        self.stand_cov[rows] = P - (K @ HP + np.swapaxes(K @ HP, 1, 2)) / 2
+
+    def place_on_ground(self, camera: Camera, box: Array) -> None:
+        """Starts `stand` of tracks without it where their boxes stand; box (N, 4): centre x, y, height, width, px."""
+        new = np.flatnonzero(np.isnan(self.stand).any(1))
+        if not len(new):
+            return
+        ground = feet(box_geometry.ltwh_from_centred(box[new]), camera, self.context.scene)
+        speed = self.dynamics.birth_rate_var[0]
+        self.stand[new] = np.column_stack([ground, np.zeros((len(new), 2)), np.full(len(new), PERSON_HEIGHT)])
+        self.stand_cov[new] = np.diag([PLACE_SPREAD**2, PLACE_SPREAD**2, speed, speed, HEIGHT_SPREAD**2])
+        self.measure_on_ground(new, box[new], self.noise)
+
     def _scale_of(self, place: Array) -> Array:
         whole = self.px_per_m
         if self.top:
@@ -234,6 +290,7 @@ class TrackedPeople:
             id=np.arange(self.next_id, self.next_id + n), scale=self._scale_of(z), rho=np.full(n, self.birth_rho),
             born=np.full(n, t), score=score, states=existence.newborn(person),
             confirmed=self.by_existence & (person >= LIKELY), measured=np.ones(n, bool),
+            stand=np.full((n, 5), np.nan), stand_cov=np.full((n, 5, 5), np.nan),
         )  # fmt: skip
         self.next_id += n
 

@@ -41,8 +41,10 @@ switches it off, one holds in the preset `paper`, too.
   ones, missed or not, also after `tentative_time`. Paper: one value of ρ. Why: false alarms end early.
 - several boxes or blobs of one track, with "rho": the nearest counts. Paper: all are assigned (frame 367), not how.
   Why: a filter takes one.
-- places: with a camera on the ground, or on the scene's stairs, not of tracks above the horizon. Paper: px. Why:
-  scenes are in m.
+- places: with a camera on the ground, or on the scene's stairs, not of tracks above the horizon. A second filter has
+  the state x, y, x', y' on the ground and the person's height, 1.7 +- 0.1 m at first; an extended Kalman update takes
+  the centre and the height of each associated box, with R, `accel_noise` and `speed_prior`. Paper: px. Why: scenes are
+  in m, and motion in depth moves a box little.
 - `management`: by an existence probability (existence), of which a frame that nobody observed is no evidence; a track
   below 0.5 is tentative again. Paper: ρ. Why: rates hold at any frame rate and detector.
 - association: one to one, most likely, against false and new boxes. Paper: nearest gated track. Why: a wide gate must
@@ -101,7 +103,7 @@ from typing import ClassVar, cast
 
 import numpy as np
 
-from sim.types import Array, Bools, Camera, Context, Detections, Frame, Plane, Scene, Tracks
+from sim.types import Array, Context, Detections, Frame, Plane, Tracks
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
@@ -163,22 +165,23 @@ class Blob:
             self.people.follow(self.config, dynamics)
             self.updater.follow(self.config)
         self.updater.step(frame, detections)
+        camera, every = self.context.camera, np.arange(len(self.people.id))
+        if camera is not None:
+            self.people.place_on_ground(camera, self.updater.reported_boxes(every))
         return self._report(frame)
 
     def _report(self, frame: Frame) -> Tracks:
         people = self.people
         rows = people.rows_to_report()
         state, scale = people.bank.take(rows, 1), people.scale[rows]
-        camera = self.context.camera
-        place, alone = self.updater.reported_boxes(rows), np.full(len(rows), -1)
-        box = box_geometry.ltwh_from_centred(place)
-        if camera is None:
+        box, alone = box_geometry.ltwh_from_centred(self.updater.reported_boxes(rows)), np.full(len(rows), -1)
+        if self.context.camera is None:
             pos, vel = state[kalman.PLACE, :, :2].copy(), state[kalman.RATE, :, :2].copy()
             cov, plane = image_covariance(state, scale), "image"
         else:
-            state[kalman.PLACE] = place
-            pos, vel, cov, shown = on_ground(camera, self.context.scene, state, scale)
+            shown = np.isfinite(people.stand[rows]).all(1)
             rows, box, alone, plane = rows[shown], box[shown], alone[shown], "ground"
+            pos, vel, cov = people.stand[rows, :2], people.stand[rows, 2:4], people.stand_cov[rows, :4, :4]
         id, score, seen = people.id[rows], people.score[rows], people.measured[rows]
         return Tracks(
             frame.index, frame.t, cast(Plane, plane), "person", id, alone, pos, vel, cov, box, score, seen=seen
@@ -192,23 +195,3 @@ def image_covariance(state: Array, scale: Array) -> Array:
     cov[:, 0:6:5], cov[:, 10:16:5] = var, rate
     cov[:, 2:8:5] = cov[:, 8:14:5] = cross
     return cov.reshape(-1, 4, 4)
-
-
-def on_ground(camera: Camera, scene: Scene | None, state: Array, scale: Array) -> tuple[Array, Array, Array, Bools]:
-    """Returns ground positions (K, 2) m, velocities (K, 2) m/s, covariances (K, 4, 4), and flags (N,) of tracks that
-    have one."""
-    from sim.scene.camera import ground_jacobian, seen_ground, standing_share
-
-    # a person stands below the centre of the box by the share `lower` of its height
-    feet, lower = state.copy(), standing_share(camera) - 0.5
-    feet[: kalman.VAR, :, 1] += lower * state[: kalman.VAR, :, 2]
-    feet[kalman.VAR :, :, 1] += lower**2 * state[kalman.VAR :, :, 2]
-    ground, z = seen_ground(camera, feet[kalman.PLACE, :, :2], scene)
-    seen = np.asarray(np.isfinite(ground).all(1))
-    feet, cov = feet[:, seen, :2], image_covariance(feet, scale)[seen]
-    jacobian = ground_jacobian(camera, feet[kalman.PLACE], z[seen])
-    turn = np.zeros((len(cov), 4, 4))
-    turn[:, :2, :2] = turn[:, 2:, 2:] = jacobian
-    out = turn @ cov @ turn.transpose(0, 2, 1)
-    vel = np.einsum("nij,nj->ni", jacobian, feet[kalman.RATE])
-    return ground[seen], vel, (out + out.transpose(0, 2, 1)) / 2, seen

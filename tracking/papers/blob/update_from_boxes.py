@@ -52,6 +52,7 @@ class BoxUpdater:
         evidence, ratio, inside = people.evidence(d2, log_det), self.scores.ratios(score), d2 <= self.gate
         rows, columns = people.associate(np.where(inside, d2, np.inf), evidence, ratio)
         terms = kalman.update(people.bank, rows, z[columns], people.noise)
+        people.measure_on_ground(rows, z[columns], people.noise)
         near = np.add.reduce(terms, 1) / np.square(people.scale[rows]) <= self.confirm_gate
         people.record_measured(rows, near, score[columns], evidence[rows, columns], ratio[columns])
         free = np.ones(len(z), bool) if people.by_existence else ~inside.any(0)

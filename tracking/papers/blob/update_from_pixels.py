@@ -27,7 +27,7 @@ import numpy as np
 from sim.types import Array, Bools, Context, Detections, Frame, Image, Ints
 from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground, Segmented
-from tracking.detect.person_size import KEPT, PersonSize
+from tracking.detect.person_size import KEPT, PersonSize, upright
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry, person_look_kernels, person_template, person_template_kernels
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
@@ -155,6 +155,8 @@ class PixelUpdater:
         each = np.arange(len(made.rows))
         evidence = people.evidence(d2, log_det)[made.rows, each]
         away = people.update(made.rows, made.z, made.noise, made.angle_var)
+        boxes = self._person_boxes(upright(made.z[:, :4], made.z[:, 4]))
+        people.measure_on_ground(made.rows, boxes, made.noise)
         if split:
             self._relax_sizes()
             self._learn_looks(seen.image, made.rows)
