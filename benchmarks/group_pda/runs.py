@@ -10,7 +10,6 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -138,7 +137,7 @@ def tracked(sequence: Recording, variants: Iterable[Variant], mode: DetectionMod
     return found
 
 
-likeness, moment = merging_and_splitting.likeness, merging_and_splitting.moment
+likeness = merging_and_splitting.likeness
 
 
 def unbroken(moments: list[merging_and_splitting.PairMoment], alike: float) -> Array:
@@ -150,11 +149,6 @@ def evenly(bank: GroupBank, points: Array, *others: object) -> Array:
     """Replaces `place_density`: nothing is known of members' places."""
     del others
     return np.ones((len(bank), len(points)))
-
-
-def by_centroids(bank: GroupBank, *pair: Any) -> merging_and_splitting.PairMoment:
-    """Replaces `moment`: groups walk as their centroids do."""
-    return moment(replace(bank, anchor=np.zeros_like(bank.anchor)), *pair)
 
 
 def without_hiding(
@@ -176,7 +170,6 @@ def forgetful(
 REPLACED: Mapping[str, Replacement] = {
     "evidence over time: an unbroken time in its place": (merging_and_splitting, "likeness", unbroken),
     "members' places in shared points": (group_pda, "place_density", evenly),
-    "walks of the members seen in two frames": (merging_and_splitting, "moment", by_centroids),
     "hidden groups": (group_pda, "associate", without_hiding),
     "members' places in parts": (group_pda, "fall_apart", forgetful),
 }
