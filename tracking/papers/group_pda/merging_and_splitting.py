@@ -12,8 +12,7 @@ Groups that are not measured, or infeasible, do not merge.
 Splitting (sec. 3.3, 4.2): a group without feasible associations for `split_time` falls apart. An association (a set of
 points that may be a group's) is feasible if its points form one group under the group constraint G_y
 (tracking.filters.components). `fall_apart` partitions the points (M, 2) of such a group by G_y and replaces its row of
-the bank by one row per part. A group that G_y leaves whole stays. Each member's place, hidden or not, goes to the part
-with the nearest point, but for places nearest to noise (ours). With `corrections` the parts stay parts of one group
+the bank by one row per part. A group that G_y leaves whole stays. With `corrections` the parts stay parts of one group
 (ours), and so do newborn groups beside a member: misses, sway and noise take people apart for a moment. Each part is
 tracked by itself; the group is their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates
 become one row again. Sets of parts whose people have been more than 1.5 m from the rest's for `confirm_time` split off.
@@ -285,11 +284,6 @@ def fall_apart(
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
     parts.unshared = [part._replace(velocity=bank.x[row, 2:]) for part in parts.unshared]
-    places, members = bank.positions(row), bank.members[row]
-    of = group[cKDTree(points).query(places)[1]]
-    for k in range(len(parts)):
-        offset = places[of == k] - parts.x[k, :2]
-        parts.members[k] = MemberPlaces(offset, members.last_seen[of == k], members.known[of == k])
     if bank.id[row] != NO_ID:
         parts.parent[:] = bank.group[row]
         parts.parent[largest] = bank.parent[row]

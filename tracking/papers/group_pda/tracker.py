@@ -69,8 +69,8 @@ Departures. Those marked (c) are off with `corrections` off.
   over `extent_time`. Paper: future work. Why: similar groups cross.
 - places, (c): in the same, from points, too: where members have walked since none of the group's points could be
   another's. Paper: none. Why: groups that meet keep their people.
-- split: after `split_time`, until then predicted only; measured frames count back; members' places, colours and age go
-  along; (c) parent's velocity. Paper: after consecutive infeasible frames (Fig. 1: at once), at rest. Why: misses.
+- split: after `split_time`, until then predicted only; measured frames count back; colours and age go along; (c)
+  parent's velocity. Paper: after consecutive infeasible frames (Fig. 1: at once), at rest. Why: misses.
 - parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
   some have been more than 1.5 m from the rest for `confirm_time`; a part that is not measured, or infeasible, holds the
   others; R_x joins parts again. Paper: new groups at once. Why: misses and sway take people apart for a moment.
