@@ -31,10 +31,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
+from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition, regions_overlap
-from tracking.grouping.merge_split_events import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
@@ -152,10 +151,12 @@ class GroupChanges:
             moments = self.moments.get(_pair(bank, i, j)) or [moment(bank, i, j, scaled, t)]
             apart.append(moments[split_onset(moments)])
         first = max(apart, key=lambda m: m.t)
+        together = first.t - bank.first_seen[np.concatenate(parts)].min() > HOLD_TIME
         for rows, head in zip(parts, heads, strict=True):
             bank.parent[rows], bank.parent[head] = bank.id[head], NO_ID
         children = tuple(sorted(bank.id[heads].tolist()))
-        return WholeGroupEvent("split", first.t, (group,), children, tuple(first.middle.tolist()))
+        kind = "split" if together else "enter"
+        return WholeGroupEvent(kind, first.t, (group,), children, tuple(first.middle.tolist()))
 
     def _join_parts(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
         near = _overlapping(bank, np.flatnonzero(bank.confirmed & _measured(bank, t)), scaled.config.gate)
@@ -178,7 +179,7 @@ class GroupChanges:
         for ids in _connected(list(onset)):
             old = np.flatnonzero(np.isin(whole.id, ids))
             first = min((m for pair, m in onset.items() if pair[0] in ids), key=lambda m: m.t)
-            union, present = merged(whole, old), first.t - whole.first_seen[old] > ARRIVAL
+            union, present = merged(whole, old), first.t - whole.first_seen[old] > HOLD_TIME
             heir = int(union.id[0])
             bank.keep(~(np.isin(bank.group, ids) & _measured(bank, t)))
             bank.parent[np.isin(bank.parent, ids)] = heir

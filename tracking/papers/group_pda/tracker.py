@@ -89,8 +89,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - merge: of confirmed, feasible groups whose part with the id is measured; their measured parts become one state; (c)
   once the evidence of the last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing
   groups.
-- enter: so is a merge reported if at most one of the groups was there 1 s before the onset. Paper: none. Why: they came
-  together.
+- enter: so is a merge reported if at most one of the groups was there 2 s before the onset, and a split if the group
+  was not. Paper: none. Why: they came together, or were never one group.
 - hidden, (c): a group or part whose points are all more probably others' keeps x and P as predicted, and coasts. Paper:
   groups share points. Why: hidden groups follow others.
 - reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
