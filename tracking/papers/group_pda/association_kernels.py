@@ -101,11 +101,11 @@ def associate(
     """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (sec. 4.1 to 4.3).
 
     x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M) and
-    region (G, 2, 2): of `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour. owner
-    (M,): the row of the only group that may have the point, a missed member that stands in, whose d2 is inf; -1 for a
-    point of this frame. claimants (M,): number of groups that may have the point. share (G, M): probability that a
-    point is the group's. rest (G,): True for groups whose extent and size must not change. rules: see
-    association_mass_kernels.
+    region (G, 2, 2): of `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour
+    or place. owner (M,): the row of the only group that may have the point, a missed member that stands in, whose d2 is
+    inf; -1 for a point of this frame. claimants (M,): number of groups that may have the point. share (G, M):
+    probability that a point is the group's. rest (G,): True for groups whose extent and size must not change. rules:
+    see association_mass_kernels.
 
     Returns the state (G,) of each group and the points (G, M) bool of its likeliest association:
     - NOTHING = 0: the group has no points, only noise, or the miss has at least the mass of all associations. No points
