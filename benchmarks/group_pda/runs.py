@@ -143,6 +143,12 @@ def unbroken(moments: list[merging_and_splitting.PairMoment], alike: float) -> A
     return np.where(likeness(moments, alike) > 0, 1.0, -1e3)
 
 
+def evenly(bank: GroupBank, points: Array, *others: object) -> Array:
+    """Replaces `place_density`: nothing is known of members' places."""
+    del others
+    return np.ones((len(bank), len(points)))
+
+
 def without_hiding(
     bank: GroupBank, claims: PointClaims, region: Array, ratio: Array, scaled: ScaledParameters, t: float
 ) -> Bools:
@@ -153,6 +159,7 @@ def without_hiding(
 
 REPLACED: Mapping[str, Replacement] = {
     "evidence over time: an unbroken time in its place": (merging_and_splitting, "likeness", unbroken),
+    "members' places in shared points": (group_pda, "place_density", evenly),
     "hidden groups": (group_pda, "associate", without_hiding),
 }
 

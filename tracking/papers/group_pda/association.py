@@ -2,7 +2,7 @@
 
 Input: points (M, 2), in m on the ground or px, and the bank of G groups. Output: which points each group takes (a bool
 array); the groups' states in the bank are updated in place. Order in a frame: `search_regions`, `gated_distances`,
-`claimed`, `with_missed_members`, `log_ratio`, `associate`, `remember`. The masses and the update are
+`claimed`, `with_missed_members`, `place_density`, `log_ratio`, `associate`, `remember`. The masses and the update are
 in association_kernels and association_mass_kernels.
 
 Points of hidden feet are put below their heads first: `below_heads` (ours).
@@ -26,7 +26,7 @@ from sim.scene.camera import to_ground
 from sim.types import Array, Bools, Camera, Ints
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association_kernels import any_within
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared
 from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
 
 LOWEST_HEAD = 1.5  # m above the ground: only few people, mostly children, are shorter.
@@ -136,6 +136,23 @@ def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio
     return np.asarray(found)
 
 
+# Part of the density of a group's members that is even over its extent, of those who are not where they walked.
+LEAST_PLACES = 0.05
+MOST_PLACES = 64  # Places that are compared: bounds memory from pixels.
+
+
+def place_density(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> Array:
+    """Returns the density (G, M) of the points about the places to which each group's members have walked on since no
+    other group could have its points, and a little of it all over the group's extent."""
+    density = np.tile(LEAST_PLACES / np.sqrt(np.linalg.det(bank.extent))[:, None], len(points))
+    for row, (then, velocity, places) in enumerate(bank.unshared):
+        some = places[:: len(places) // MOST_PLACES + 1]
+        away = np.square(points[:, None] - some - (t - then) * velocity).sum(2)
+        var = 2 * scaled.point_sd**2 + np.square(scaled.scale * SPLIT_SPEED * (t - then))
+        density[row] += (np.exp(-away / var / 2) / var).mean(1)
+    return density
+
+
 def log_ratio(density: Array, claims: PointClaims) -> Array:
     """Returns log p(y | g) - log p(y | other groups) (G, M) of each shared point y, given p (G, M), and 0 of others."""
     ratio, shared = np.zeros(claims.d2.shape), np.flatnonzero(claims.claimants > 1)
@@ -197,6 +214,8 @@ def remember(
     """
     for row in np.flatnonzero(exclusive.any(1)).tolist():
         mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]
+        if not (exclusive[row] & (claims.claimants > 1)).any():
+            bank.unshared[row] = Unshared(t, bank.x[row, 2:].copy(), mine)
         offset, places = mine - bank.x[row, :2], bank.members[row].offset + predicted[row]
         known = any_within(mine, places, scaled.scale * scaled.config.carry_reach)
         parts = zip((offset, last_seen, known), _hidden_members(bank, row, claims.points, scaled, t), strict=True)

@@ -30,6 +30,14 @@ class MemberPlaces(NamedTuple):
     known: Bools
 
 
+class Unshared(NamedTuple):
+    """The points (K, 2) of a group, when no other group could have them, last: at time t, s, with its velocity (2,)."""
+
+    t: float
+    velocity: Array
+    points: Array
+
+
 @dataclass
 class GroupBank:
     """The state of G groups or parts of groups, a row each. Lengths: in the unit of the points (m or px), times: in s.
@@ -40,7 +48,7 @@ class GroupBank:
     (G,): of the last points. measured_time (G,): total time measured. null_time (G,): time without a feasible
     association, less measured frames in it. parent (G,): id of the group that the row is a part of, or NO_ID if it is
     no part (see merging_and_splitting). colour_hist (G, C): people by colour; C = 0 without colours. members: a
-    MemberPlaces of each group.
+    MemberPlaces of each group; unshared: an Unshared of each.
     """
 
     x: Array
@@ -55,6 +63,7 @@ class GroupBank:
     parent: Ints
     colour_hist: Array
     members: list[MemberPlaces]
+    unshared: list[Unshared]
 
     @classmethod
     def empty(cls, colour_bins: int = 0) -> GroupBank:
@@ -63,7 +72,7 @@ class GroupBank:
         four = np.zeros((0, 4))
         return cls(
             four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none,
-            ids, np.zeros((0, colour_bins)), [],
+            ids, np.zeros((0, colour_bins)), [], [],
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -140,9 +149,10 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
     P[:, [2, 3], [2, 3]] = (scaled.scale * SPEED_PRIOR) ** 2
     many = np.bincount(g, minlength=count).tolist()
     members = [MemberPlaces(d[g == k], np.full(n, t), np.zeros(n, bool)) for k, n in enumerate(many)]
+    unshared = [Unshared(t, np.zeros(2), y[g == k]) for k in range(count)]
     zero, now = np.zeros(count), np.full(count, t)
     return GroupBank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, NO_ID),
         now, now.copy(), zero + scaled.dt, zero, np.full(count, NO_ID),
-        np.zeros((count, scaled.colour_bins)), members,
+        np.zeros((count, scaled.colour_bins)), members, unshared,
     )  # fmt: skip

@@ -35,7 +35,7 @@ from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, SPLIT_DISTANC
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition, regions_overlap
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, newborn
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 # s before and after a moment for the difference of two groups' or parts' velocities: that of two steps in all.
@@ -244,7 +244,7 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1),
         bank.parent[one], bank.colour_hist[rows].sum(0, keepdims=True),
-        [MemberPlaces(offset, last_seen, known)],
+        [MemberPlaces(offset, last_seen, known)], [Unshared(float(bank.last_seen[rows].max()), x[2:], offset + x[:2])],
     )  # fmt: skip
 
 
@@ -284,6 +284,7 @@ def fall_apart(
     largest = int(np.lexsort((parts.x[:, 1], parts.x[:, 0], away, -parts.size))[0])
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
+    parts.unshared = [part._replace(velocity=bank.x[row, 2:]) for part in parts.unshared]
     if bank.id[row] != NO_ID:
         parts.parent[:] = bank.group[row]
         parts.parent[largest] = bank.parent[row]

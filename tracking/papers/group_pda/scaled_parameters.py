@@ -14,7 +14,7 @@ from tracking.papers.group_pda.config import GroupPdaConfig
 
 SPEED_PRIOR = 1.3  # m/s: standard deviation of a newborn group's velocity, per axis, that of walking people.
 # m/s: standard deviation of a part's velocity about its group's, and speed at which a group's region widens while it
-# has no feasible association (ours).
+# has no feasible association, and by which members' places grow uncertain (ours).
 SPLIT_SPEED = 0.5
 # sigma_n of m_N: the part that grows with N, per N; ours and, for next to none, with corrections off.
 COUNT_SHARE, PAPER_COUNT_SHARE = 0.15, 0.01

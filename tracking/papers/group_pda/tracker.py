@@ -67,6 +67,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - too much foreground: predicted only, if the background adapts. Paper: none. Why: the light has changed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels; learned from unshared points,
   over `extent_time`. Paper: future work. Why: similar groups cross.
+- places, (c): in the same, from points, too: where members have walked since none of the group's points could be
+  another's. Paper: none. Why: groups that meet keep their people.
 - split: after `split_time`, until then predicted only; measured frames count back; colours and age go along; (c)
   parent's velocity. Paper: after consecutive infeasible frames (Fig. 1: at once), at rest. Why: misses.
 - parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
@@ -120,6 +122,7 @@ from tracking.papers.group_pda.association import (
     claimed,
     gated_distances,
     log_ratio,
+    place_density,
     remember,
     search_regions,
     with_missed_members,
@@ -290,6 +293,8 @@ class GroupPda:
         claims = with_missed_members(claimed(points, weights, d2, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
         ratio = np.zeros(claims.d2.shape)
+        if self.config.corrections and (claims.claimants > 1).any():
+            ratio += log_ratio(place_density(bank, claims.points, scaled, t), claims)
         if scaled.colour_bins:
             ratio += self.config.appearance * log_ratio(colour_density(bank, self.colours), claims)
         mine = associate(bank, claims, region, ratio, scaled, t)

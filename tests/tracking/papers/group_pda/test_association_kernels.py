@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from collections import Counter
 from dataclasses import fields, replace
 
@@ -13,11 +14,11 @@ from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.association import PointClaims, point_log_density, shares
+from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, shares
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces
+from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
 from tracking.papers.group_pda.merging_and_splitting import merged
 from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
 
@@ -310,6 +311,24 @@ def test_whose_a_shared_point_is() -> None:
     assert shares(log_density, d2 > 0)[1] > 0.9  # the nearer by d2 is the diffuse one
     colours = point_log_density(np.full(2, 2.0), region, claims, np.array([[2.0], [-2.0]]))
     assert shares(colours, d2 > 0)[0] > 0.7
+
+
+def test_a_shared_point_is_of_the_group_whose_members_walked_there() -> None:
+    scaled, points = scale_parameters(GroupPdaConfig(), 10, 1.0), np.array([[0.0, 0.0], [2.0, 0.2]])
+    bank = newborn(points, np.ones(2), np.arange(2), scaled, 5.0)
+    bank.unshared = [Unshared(5.0, np.array([1 - 2 * k, 0.0]), points[k : k + 1]) for k in range(2)]
+    bank.x[:, 2:] *= -1  # of no account: they may have been led astray by shared points
+    soon, late = (place_density(bank, points + np.array([[t, 0.0], [-t, 0.0]]), scaled, 5 + t) for t in (0.5, 2.0))
+    assert (np.diag(soon) > 10 * soon[[1, 0], [0, 1]]).all()
+    assert late.max() < 0.2 * soon.max()
+    many = np.repeat(points, 2_000, 0)
+    bank.unshared = [group._replace(points=np.repeat(group.points, 2_000, 0)) for group in bank.unshared]
+    tracemalloc.start()
+    np.testing.assert_allclose(
+        place_density(bank, many, scaled, 5.0)[:, ::2_000], place_density(bank, points, scaled, 5.0)
+    )
+    assert tracemalloc.get_traced_memory()[1] < 2e7  # bytes; all pairs take more than 1e8
+    tracemalloc.stop()
 
 
 @pytest.mark.parametrize("seed", range(30))
