@@ -157,10 +157,17 @@ def without_hiding(
     return associate(bank, claims, region, ratio, shared, t)
 
 
+def as_given(points: Array, *others: object) -> Array:
+    """Replaces `below_heads`: the points of hidden feet stay where they are."""
+    del others
+    return points
+
+
 REPLACED: Mapping[str, Replacement] = {
     "evidence over time: an unbroken time in its place": (merging_and_splitting, "likeness", unbroken),
     "members' places in shared points": (group_pda, "place_density", evenly),
     "hidden groups": (group_pda, "associate", without_hiding),
+    "hidden feet below heads": (group_pda, "below_heads", as_given),
 }
 
 
