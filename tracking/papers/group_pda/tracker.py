@@ -82,8 +82,9 @@ Departures. Those marked (c) are off with `corrections` off.
   groups the largest, then the oldest. Paper: none. Why: tracks need ids.
 - walking out: a new group within reach of a member (2 m/s and 3 r) is a part of its group and as old, (c) with its
   velocity; without corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
-- like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`. Paper: SR_v
-  overlap. Why: P does not measure likeness; people sway with each step.
+- like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`; from points
+  of the members seen in both of two frames, stand-ins as predicted; of a group in parts, those of the part with its id.
+  Paper: SR_v overlap. Why: P does not measure likeness; people sway with each step; hidden members move the centroid.
 - SR_v, without corrections: of the updated velocity, with the gate's γ. Paper: of the predicted one; its size is not
   stated. Why: Fig. 1 merges after the update.
 - near groups, (c): people more than 1.5 m apart are evidence against one group, too. Paper: regions overlap. Why: no
