@@ -43,10 +43,8 @@ def test_the_gap_is_the_least_of_all_pairs(seed: int) -> None:
 
 @pytest.mark.parametrize(("since", "kind"), [(-2.5, "split"), (-1.5, "enter")])
 def test_who_was_there_for_less_than_2_s_was_never_one_group(since: float, kind: str) -> None:
-    scaled, changes, events = scale_parameters(GroupPdaConfig(), FPS, 1.0), GroupChanges(), []
+    scaled, changes = scale_parameters(GroupPdaConfig(), FPS, 1.0), GroupChanges()
     two = bank(size=np.ones(2), x=np.diag([0.0, 4.0])[:, [0, 1, 0, 0]])
-    two.parent[1], two.first_seen[:] = 0, since
-    for k in range(10):
-        two.last_seen[:] = k / FPS
-        events += changes.step(two, scaled, k / FPS)
+    two.parent[1], two.first_seen[:], two.last_seen[:] = 0, since, 1.0
+    events = [e for k in range(10) for e in changes.step(two, scaled, k / FPS)]
     assert [(e.kind, e.onset, e.before, e.after) for e in events] == [(kind, 0.0, (0,), (0, 1))]
