@@ -16,7 +16,6 @@ from tests import reference_components
 from tracking.filters.components import Constraint
 
 H = np.eye(2, 4)
-ASSOCIATIONS = {"pda": 0, "nearest": 1, "all": 2, "none": 3}
 NEWCOMERS = 0.02  # probability that the number of people is any
 
 
@@ -26,13 +25,12 @@ class Rules:
     noise: float  # standard deviation of one person's measured place
     count_noise: float
     count_share: float
-    detect: float
     miss: float  # probability of the miss before any measurement
     freeze: float  # share of N in others' points from which on extent and size rest
     keep: float
     correct: bool  # what the gate cuts off is put back
     redrawn: bool
-    association: str = "pda"  # or nearest, all, none
+    unconstrained: bool = False
     others: float = 1.0  # people beside one, of those who are there, at least
 
     @property
@@ -42,8 +40,8 @@ class Rules:
         cut = truncation(c.gate) if self.correct else 1.0
         return np.array([
             c.gate, c.link, P[0, 0], P[0, 1], P[1, 1], c.strength, c.least, self.noise, self.count_noise,
-            self.count_share, self.detect, self.miss, self.freeze, self.keep, cut, self.redrawn,
-            ASSOCIATIONS[self.association], self.others,
+            self.count_share, self.miss, self.freeze, self.keep, cut, self.redrawn,
+            self.unconstrained, self.others,
         ], float)  # fmt: skip
 
 
@@ -82,12 +80,9 @@ def shares(points, x, region, size, owner, may):
     return found
 
 
-def claims(d2, own, hits, share, g, rules):
-    """Unshared points of group g, and the shared ones in the order of their distance (4.1); of these the likeliest
-    group's alone with "nearest"."""
+def claims(d2, own, hits, g):
+    """Unshared points of group g, and the shared ones in the order of their distance (4.1)."""
     inside = [k for k in range(len(own)) if np.isfinite(d2[g, k]) or own[k] == g]
-    if rules.association == "nearest":
-        inside = [k for k in inside if hits[k] < 2 or g == share[:, k].argmax()]
     return [k for k in inside if hits[k] < 2], sorted((k for k in inside if hits[k] > 1), key=lambda k: d2[g, k])
 
 
@@ -107,11 +102,10 @@ def centroid_noise(seen, cov, extent, size, rules, fresh=None):
     np.fill_diagonal(true, np.maximum(np.diag(true), 0.0))
     if fresh is not None:
         noise = noise * (2 * seen - fresh) / fresh
-    n = size / rules.detect
-    if seen > n:
-        return noise / max(n, 1.0) + cov * (seen - n) / max(seen - 1, 1.0) / max(n, 1.0)
-    m = max(seen, min(1.0, n))
-    return noise / m + (true * (n - m) / max(n - 1, rules.others) / m if n > 1 else 0.0)
+    if seen > size:
+        return noise / max(size, 1.0) + cov * (seen - size) / max(seen - 1, 1.0) / max(size, 1.0)
+    m = max(seen, min(1.0, size))
+    return noise / m + (true * (size - m) / max(size - 1, rules.others) / m if size > 1 else 0.0)
 
 
 def moments(points, weights):
@@ -123,9 +117,9 @@ def moments(points, weights):
 def associations(mine, shared, points, weights, rules):
     """The feasible sets of points, largest last; rows of `points`."""
     sets = [mine + shared[:j] for j in range(len(shared) + 1)]
-    sets = sets if rules.association == "pda" else sets[-1:]
-    free = rules.association == "none"
-    return [s for s in sets if free or reference_components.is_group(points[s], weights[s], rules.constraint)]
+    if rules.unconstrained:
+        return sets[-1:]
+    return [s for s in sets if reference_components.is_group(points[s], weights[s], rules.constraint)]
 
 
 def masses(sets, mine, shared, points, weights, own, region, x, P, extent, size, rules):
@@ -156,7 +150,7 @@ def masses(sets, mine, shared, points, weights, own, region, x, P, extent, size,
 
 def update(g, points, weights, d2, own, hits, share, region, x, P, extent, size, hold, rules):
     """One group after its points: state, rows chosen, mass of the miss, x, P, extent, size."""
-    mine, shared = claims(d2, own, hits, share, g, rules)
+    mine, shared = claims(d2, own, hits, g)
     same = x, P, extent, size
     if not mine + shared:
         return "nothing", [], 0.0, *same

@@ -26,13 +26,11 @@ from sim.types import Sequence as Recording
 from sim.workers.pool import process_pool
 from tracking.detect import background
 from tracking.detect.background_training import Trained, train
-from tracking.grouping.whole_groups import GroupIds
 from tracking.papers.group_pda import merging_and_splitting
 from tracking.papers.group_pda import tracker as group_pda
 from tracking.papers.group_pda.association import PointClaims, associate
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import GroupBank
-from tracking.papers.group_pda.merging_and_splitting import fall_apart
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 from tracking.running.run import TrackingRun, track
 from tracking.scoring import evaluate
@@ -165,12 +163,10 @@ def without_hiding(
     return associate(bank, claims, region, ratio, shared, t)
 
 
-def forgetful(
-    bank: GroupBank, row: int, points: Array, weights: Array, scaled: ScaledParameters, t: float, ids: GroupIds
-) -> None:
-    """Replaces `fall_apart`: of no place of the parts is known whether a member was there before."""
-    bank.members[row] = bank.members[row]._replace(known=np.zeros(len(bank.members[row].known), bool))
-    fall_apart(bank, row, points, weights, scaled, t, ids)
+def as_given(points: Array, *others: object) -> Array:
+    """Replaces `below_heads`: the points of hidden feet stay where they are."""
+    del others
+    return points
 
 
 REPLACED: Mapping[str, Replacement] = {
@@ -178,7 +174,7 @@ REPLACED: Mapping[str, Replacement] = {
     "members' places in shared points": (group_pda, "place_density", evenly),
     "walks of the members seen in two frames": (merging_and_splitting, "moment", by_centroids),
     "hidden groups": (group_pda, "associate", without_hiding),
-    "members' places in parts": (group_pda, "fall_apart", forgetful),
+    "hidden feet below heads": (group_pda, "below_heads", as_given),
 }
 
 

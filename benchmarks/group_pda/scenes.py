@@ -31,8 +31,6 @@ Column = Callable[[Sequence[Row]], str]
 WITHOUT: Mapping[str, Mapping[str, object]] = {
     "corrections": {"corrections": False},
     "missed and hidden members": {"carry_time": 0.0},
-    "association by masses: the most probable group": {"association": "nearest"},
-    "association by masses: all points": {"association": "all"},
     "association and group constraint": {"association": "none"},
     "all that is ours: preset paper": GroupPdaConfig.preset("paper").as_dict(),
 }

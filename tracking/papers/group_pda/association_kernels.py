@@ -16,7 +16,6 @@ from sim.elementary_kernels import sort_by
 from sim.types import Array, Bools, Ints
 from tracking.filters.components_kernels import AROUND, WEIGHT, cells, components, prefixes, unset
 from tracking.papers.group_pda.association_mass_kernels import (
-    ASSOCIATION,
     COUNT_SD,
     COUNT_SHARE,
     FREEZE_SHARE,
@@ -25,8 +24,6 @@ from tracking.papers.group_pda.association_mass_kernels import (
     KEEP,
     LEAST_WEIGHT,
     LINK,
-    NEAREST,
-    PREFIXES,
     PRIOR_WEIGHT,
     PRIOR_XX,
     PRIOR_YY,
@@ -120,7 +117,7 @@ def associate(
     groups, m = d2.shape
     state, chosen = np.zeros(groups, np.int64), np.zeros((groups, m), np.bool_)
     for g in range(groups):
-        order, start = _ordered_points(d2[g], log_ratio[g], owner, claimants, share, g, rules[ASSOCIATION])
+        order, start = _ordered_points(d2[g], log_ratio[g], owner, claimants, g)
         n = len(order)
         if n == 0:
             continue
@@ -132,7 +129,7 @@ def associate(
             people[k], fresh[k] = weights[p], weights[p] if owner[p] < 0 else 0.0
             colour[k] = log_ratio[g, p] * weights[p]
             others += weights[p] * (1 - share[g, p])
-        if rules[ASSOCIATION] == UNCONSTRAINED:
+        if rules[UNCONSTRAINED]:
             start = n
             feasible = np.ones(1, np.bool_)
         else:
@@ -141,8 +138,6 @@ def associate(
             feasible = prefixes(
                 mine, people, start, rules[LINK], rules[GATE], prior, rules[PRIOR_WEIGHT], rules[LEAST_WEIGHT]
             )[0]
-            if rules[ASSOCIATION] != PREFIXES:
-                feasible[:-1] = False
         taken = 0
         if feasible.any():
             best = _estimate(
@@ -161,20 +156,12 @@ def associate(
 
 # The points that no other group claims, then the others in ascending order (sec. 4.1).
 @njit(cache=True)
-def _ordered_points(
-    d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, share: Array, g: int, association: float
-) -> tuple[Ints, int]:
+def _ordered_points(d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, g: int) -> tuple[Ints, int]:
     order, distance = np.empty(len(d2), np.int64), np.empty(len(d2))
     own = shared = 0
     for shares in (False, True):  # first the points that no other group claims
         for n in range(len(d2)):
             if not (d2[n] < np.inf or owner[n] == g) or (claimants[n] > 1) != shares:
-                continue
-            likeliest = 0
-            for other in range(len(share)):
-                if share[other, n] > share[likeliest, n]:
-                    likeliest = other
-            if association == NEAREST and shares and likeliest != g:
                 continue
             distance[n] = d2[n] - 2 * log_ratio[n]
             order[own + shared] = n

@@ -16,25 +16,20 @@ import numpy as np
 from sim.compiler import njit
 from sim.types import Array
 
-(GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, PRIOR_WEIGHT, LEAST_WEIGHT, POINT_SD, COUNT_SD, COUNT_SHARE, DETECT_PROB,
- MISS_PROB, FREEZE_SHARE, KEEP, GATE_FACTOR, REDRAWN, ASSOCIATION, LEAST_OTHERS) = range(18)  # fmt: skip
+(GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, PRIOR_WEIGHT, LEAST_WEIGHT, POINT_SD, COUNT_SD, COUNT_SHARE,
+ MISS_PROB, FREEZE_SHARE, KEEP, GATE_FACTOR, REDRAWN, UNCONSTRAINED, LEAST_OTHERS) = range(17)  # fmt: skip
 RULES = LEAST_OTHERS + 1
 """Slots of the array `rules`, RULES in all; tracking.papers.group_pda.scaled_parameters fills them.
 
 GATE: squared Mahalanobis radius in the group constraint, gamma / GATE_FACTOR. LINK: 2 r of R_0. PRIOR_XX, _XY, _YY:
 covariance that extents are shrunk to, with the weight PRIOR_WEIGHT in people. LEAST_WEIGHT: people below which a
 component is noise. POINT_SD: standard deviation of one person's measured position. COUNT_SD (people), COUNT_SHARE:
-sigma_n^2 = COUNT_SD^2 + (COUNT_SHARE N)^2. DETECT_PROB: probability that a member is among the points. MISS_PROB: prior
-probability of the miss hypothesis, 0 without it. FREEZE_SHARE: share of N in points of other groups above which extent
-and size rest. KEEP: alpha_s = alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that
-a Gaussian keeps inside the gate. REDRAWN: 1 if members are drawn anew in each frame. ASSOCIATION: one of PREFIXES,
-NEAREST, ALL, UNCONSTRAINED. LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
+sigma_n^2 = COUNT_SD^2 + (COUNT_SHARE N)^2. MISS_PROB: prior probability of the miss hypothesis, 0 without it.
+FREEZE_SHARE: share of N in points of other groups above which extent and size rest. KEEP: alpha_s = alpha_N of eq. 2.4
+per frame. GATE_FACTOR: share of its covariance that a Gaussian keeps inside the gate. REDRAWN: 1 if members are drawn
+anew in each frame. UNCONSTRAINED: 1 if a group takes all points in its region, without the group constraint (sec.
+5.2.1). LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
 """
-
-PREFIXES, NEAREST, ALL, UNCONSTRAINED = range(4)
-"""Which associations a group has: the unshared points with the j nearest shared ones, for every j (sec. 4.1); with the
-shared points that are most probably of this group, alone; with all shared points, alone; as ALL, without the group
-constraint (sec. 5.2.1)."""
 NEWCOMERS = 0.02
 """Probability that a group's number of people does not depend on its number before."""
 
@@ -80,11 +75,11 @@ def log_count(people: float, size: float, width: float) -> float:
 def centroid_noise(
     counted: float, seen: float, cov: Array, extent: Array, size: float, rules: Array
 ) -> tuple[float, float, float]:
-    """Returns R (xx, xy, yy), the covariance of the centroid of m = `counted` people about that of all n people there.
+    """Returns R (xx, xy, yy), the covariance of the centroid of m = `counted` people about that of the n = `size`.
 
-    Of the people counted, `seen` > 0 were measured in this frame; the others are missed members. n = size /
-    DETECT_PROB, size: people of the group that are counted on average. cov (3,): covariance xx, xy, yy of the people
-    counted; extent (2, 2): Sigma, covariance of the members; rules: parameters; r: its POINT_SD.
+    Of the people counted, `seen` > 0 were measured in this frame; the others are missed members. cov (3,): covariance
+    xx, xy, yy of the people counted; extent (2, 2): Sigma, covariance of the members; rules: parameters; r: its
+    POINT_SD.
     - REDRAWN, n_y of eq. 2.3 if eq. 2.1 is read literally: Sigma / m.
     - Members keep their places (ours): r^2 / m + (1 - m / n) n / (n - 1) Sigma / m, the variance of a mean of m drawn
       out of n without replacement, with Sigma less r^2 (at least 0). m is at least 1, or n if that is less.
@@ -100,13 +95,12 @@ def centroid_noise(
     if rules[REDRAWN] > 0:
         return extent[0, 0] / counted, xy / counted, extent[1, 1] / counted
     noise *= 1 + 2 * (counted - seen) / seen
-    there = size / rules[DETECT_PROB]
-    if counted > there:  # some of them are strangers
-        strange = (counted - there) / max(counted - 1, 1.0) / max(there, 1.0)
-        own = noise / max(there, 1.0)
+    if counted > size:  # some of them are strangers
+        strange = (counted - size) / max(counted - 1, 1.0) / max(size, 1.0)
+        own = noise / max(size, 1.0)
         return own + strange * cov[0], strange * cov[1], own + strange * cov[2]
-    m = max(counted, min(1.0, there))
-    unseen = (there - m) / max(there - 1, rules[LEAST_OTHERS]) / m if there > 1 else 0.0
+    m = max(counted, min(1.0, size))
+    unseen = (size - m) / max(size - 1, rules[LEAST_OTHERS]) / m if size > 1 else 0.0
     return noise / m + unseen * xx, unseen * xy, noise / m + unseen * yy
 
 

@@ -32,10 +32,8 @@ class GroupPdaConfig(BackgroundSettings):
     extent_time: float = param(1.0, (0.05, 20.0), "s",
         "time constant of extent, number of people and colours, alpha_s and alpha_N of eq. 2.4", "log")
     count_noise: float = param(0.5, (0.05, 5.0), "people", "sigma_n of m_N: the part that does not grow with N", "log")
-    detect_prob: float = param(0.95, (0.3, 1.0), "probability",
-        "from points: that a member is measured in a frame (ours)", sees="points")
-    association: str = param("pda", ("pda", "nearest", "all", "none"), "",
-        "pda: by masses (sec. 4.2); nearest, all: one association; none: no constraint (sec. 5.2.1)", "categorical")
+    association: str = param("pda", ("pda", "none"), "",
+        "pda: by masses (sec. 4.2); none: all points in the region, without the constraint (sec. 5.2.1)", "categorical")
     corrections: bool = param(True, (True, False), "",
         "R, misses, noise, extents, parts, places, hidden groups, velocities: departures (c) (ours)", "categorical")
     appearance: float = param(0.5, (0.0, 5.0), "",

@@ -13,8 +13,7 @@ that are not measured, or infeasible, do not merge.
 Splitting (sec. 3.3, 4.2): a group without feasible associations for `split_time` falls apart. An association (a set of
 points that may be a group's) is feasible if its points form one group under the group constraint G_y
 (tracking.filters.components). `fall_apart` partitions the points (M, 2) of such a group by G_y and replaces its row of
-the bank by one row per part. A group that G_y leaves whole stays. Each member's place, hidden or not, goes to the part
-with the nearest point, but for places nearest to noise (ours). With `corrections` the parts stay parts of one group
+the bank by one row per part. A group that G_y leaves whole stays. With `corrections` the parts stay parts of one group
 (ours), and so do newborn groups beside a member: misses, sway and noise take people apart for a moment. Each part is
 tracked by itself; the group is their union (eq. 3.1), which is reported and merges with others. Parts that R_x relates
 become one row again. Sets of parts whose people have been more than 1.5 m from the rest's for `confirm_time` split off.
@@ -33,10 +32,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
+from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition, regions_overlap
-from tracking.grouping.group_events import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
@@ -154,10 +152,12 @@ class GroupChanges:
             moments = self.moments.get(_pair(bank, i, j)) or [moment(bank, i, j, scaled, t)]
             apart.append(moments[split_onset(moments)])
         first = max(apart, key=lambda m: m.t)
+        together = first.t - bank.first_seen[np.concatenate(parts)].min() > HOLD_TIME
         for rows, head in zip(parts, heads, strict=True):
             bank.parent[rows], bank.parent[head] = bank.id[head], NO_ID
         children = tuple(sorted(bank.id[heads].tolist()))
-        return WholeGroupEvent("split", first.t, (group,), children, tuple(first.middle.tolist()))
+        kind = "split" if together else "enter"
+        return WholeGroupEvent(kind, first.t, (group,), children, tuple(first.middle.tolist()))
 
     def _join_parts(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
         near = _overlapping(bank, np.flatnonzero(bank.confirmed & _measured(bank, t)), scaled.config.gate)
@@ -180,7 +180,7 @@ class GroupChanges:
         for ids in _connected(list(onset)):
             old = np.flatnonzero(np.isin(whole.id, ids))
             first = min((m for pair, m in onset.items() if pair[0] in ids), key=lambda m: m.t)
-            union, present = merged(whole, old), first.t - whole.first_seen[old] > ARRIVAL
+            union, present = merged(whole, old), first.t - whole.first_seen[old] > HOLD_TIME
             heir = int(union.id[0])
             bank.keep(~(np.isin(bank.group, ids) & _measured(bank, t)))
             bank.parent[np.isin(bank.parent, ids)] = heir
@@ -288,11 +288,6 @@ def fall_apart(
     parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
     parts.anchor[:] = bank.anchor[row] + bank.x[row, :2] - parts.x[:, :2]
     parts.unshared = [part._replace(velocity=bank.x[row, 2:]) for part in parts.unshared]
-    places, members = bank.positions(row), bank.members[row]
-    of = group[cKDTree(points).query(places)[1]]
-    for k in range(len(parts)):
-        offset = places[of == k] - parts.x[k, :2]
-        parts.members[k] = MemberPlaces(offset, members.last_seen[of == k], members.known[of == k])
     if bank.id[row] != NO_ID:
         parts.parent[:] = bank.group[row]
         parts.parent[largest] = bank.parent[row]

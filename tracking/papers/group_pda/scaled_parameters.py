@@ -23,10 +23,6 @@ MISS_PROB = 0.02  # Prior probability of the miss hypothesis (ours).
 FREEZE_SHARE = 0.1
 LEAST_PEOPLE = 0.25  # From pixels: components with less foreground, in people, are noise (ours).
 COLOUR_BINS = 64  # Bins of a group's colour histogram (tracking.papers.group_pda.from_pixels).
-# Slot ASSOCIATION of the kernels' rules by value of the config's `association`.
-ASSOCIATIONS = {
-    "pda": kernels.PREFIXES, "nearest": kernels.NEAREST, "all": kernels.ALL, "none": kernels.UNCONSTRAINED
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -35,7 +31,7 @@ class ScaledParameters:
 
     config: the GroupPdaConfig they come from. dt: s between frames. scale: units per metre (1 on the ground).
     constraint: the rule G_y by which points are one group (sec. 3.3). point_sd: standard deviation of one person's
-    measured position. kernel_rules (18,): the array `rules` of the kernels (gates, priors, noises). F, Q (4, 4):
+    measured position. kernel_rules (17,): the array `rules` of the kernels (gates, priors, noises). F, Q (4, 4):
     transition and process noise covariance of x, y, vx, vy, eq. 2.3. from_pixels: True if the points are foreground
     pixels, not people. metres_per_unit (2,): metres on the ground per unit along x and along y (depth in an image).
     colour_bins: bins of colour histograms (64), 0 if colours are not used.
@@ -95,14 +91,12 @@ def _kernel_rules(
         c.count_noise,
         COUNT_SHARE if c.corrections else PAPER_COUNT_SHARE,
     )
-    looks = 1 + c.carry_time * fps  # a member counts as present if measured in one of these frames
-    rules[kernels.DETECT_PROB] = 1.0 if pixels else 1 - (1 - c.detect_prob) ** looks
     ours = c.corrections and c.association != "none"
     rules[kernels.MISS_PROB], rules[kernels.FREEZE_SHARE] = (MISS_PROB, FREEZE_SHARE) if ours else (0.0, np.inf)
     rules[kernels.KEEP] = np.exp(-1 / fps / c.extent_time)
     rules[kernels.GATE_FACTOR] = factor
     rules[kernels.REDRAWN] = not c.corrections
-    rules[kernels.ASSOCIATION] = ASSOCIATIONS[c.association]
+    rules[kernels.UNCONSTRAINED] = c.association == "none"
     rules[kernels.LEAST_OTHERS] = 1e-9 if pixels else 1.0
     return rules
 

@@ -45,16 +45,12 @@ Departures. Those marked (c) are off with `corrections` off.
 - m_d: covariance H P H' + R, with the R of each association's m. Paper: one P_yc. Why: fewer people measure a centroid
   worse.
 - m_N: σ_n grows with N, (c) by 15 %, else 1 %; heavy tails. Paper: normal, σ_n. Why: several join at once.
-- `association` nearest, all: one association, with the shared points that are most probably the group's, or with all.
-  Paper: none. Why: comparison.
 - α_s and α_N: equal, from `extent_time`. Paper: two constants. Why: one parameter less.
 - missed detections: (c) a miss hypothesis, which shares in the means; if it outweighs all associations, the group
   coasts; from points, missed members who were seen twice stand in for `carry_time` while the group has points, and
   their places stay the group's for `coast_time`. Paper: not considered. Why: detectors miss people.
 - stand-ins: associations of stand-ins alone leave x and P as they are, and are no infeasible time. Paper: none. Why:
   their places come from x.
-- size: N over the probability that a member is seen (`detect_prob`) within `carry_time`, from points. Paper: N. Why:
-  detectors miss people.
 - Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated. Why:
   they would swell.
 - no points: coasts, lost after `coast_time`; frames without detections are predicted only. Paper: null masses, as
@@ -73,8 +69,8 @@ Departures. Those marked (c) are off with `corrections` off.
   over `extent_time`. Paper: future work. Why: similar groups cross.
 - places, (c): in the same, from points, too: where members have walked since none of the group's points could be
   another's. Paper: none. Why: groups that meet keep their people.
-- split: after `split_time`, until then predicted only; measured frames count back; members' places, colours and age go
-  along; (c) parent's velocity. Paper: after consecutive infeasible frames (Fig. 1: at once), at rest. Why: misses.
+- split: after `split_time`, until then predicted only; measured frames count back; colours and age go along; (c)
+  parent's velocity. Paper: after consecutive infeasible frames (Fig. 1: at once), at rest. Why: misses.
 - parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
   some have been more than 1.5 m from the rest for `confirm_time`; a part that is not measured, or infeasible, holds the
   others; R_x joins parts again. Paper: new groups at once. Why: misses and sway take people apart for a moment.
@@ -96,8 +92,8 @@ Departures. Those marked (c) are off with `corrections` off.
 - merge: of confirmed, feasible groups whose part with the id is measured; their measured parts become one state; (c)
   once the evidence of the last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing
   groups.
-- enter: so is a merge reported if at most one of the groups was there 1 s before the onset. Paper: none. Why: they came
-  together.
+- enter: so is a merge reported if at most one of the groups was there 2 s before the onset, and a split if the group
+  was not. Paper: none. Why: they came together, or were never one group.
 - hidden, (c): a group or part whose points are all more probably others' keeps x and P as predicted, and coasts. Paper:
   groups share points. Why: hidden groups follow others.
 - reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
@@ -120,7 +116,6 @@ from sim.geometry.hull_kernels import convex_hulls
 from sim.geometry.polygons import FOOTPRINT
 from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Plane, Tracks
 from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, whole_group_tracks
-from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.association import (
     PointClaims,
     associate,
@@ -236,8 +231,7 @@ class GroupPda:
             P, extent = both @ P @ np.swapaxes(both, 1, 2), J @ extent @ np.swapaxes(J, 1, 2)
             x = np.hstack([view.image(x[:, :2]), np.einsum("gij,gj->gi", J, x[:, 2:])])
             events = [replace(e, pos=tuple(view.image(np.array([e.pos]))[0].tolist())) for e in events]
-        size = bank.size[rows] / scaled.kernel_rules[kernels.DETECT_PROB]
-        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], extent, size, hulls)
+        groups = Groups(bank.id[rows], (no_ids(),) * len(rows), x[:, :2], x[:, 2:], extent, bank.size[rows], hulls)
         return whole_group_tracks(frame, self.plane, self.context.fps, groups, P, events)
 
     def _points(self, frame: Frame, detections: Detections | None) -> tuple[Array | None, Array]:

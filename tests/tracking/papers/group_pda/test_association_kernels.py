@@ -23,9 +23,7 @@ from tracking.papers.group_pda.merging_and_splitting import merged
 from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
 
 STATES = ["nothing", "null", "measured"]
-PLAIN = reference.Rules(
-    Constraint(1.5, 9.21, 0.09 * np.eye(2), 3.0), 0.06, 0.5, 0.15, 1.0, 0.0, np.inf, 0.9, True, False
-)
+PLAIN = reference.Rules(Constraint(1.5, 9.21, 0.09 * np.eye(2), 3.0), 0.06, 0.5, 0.15, 0.0, np.inf, 0.9, True, False)
 
 
 def positive(r, n, scale=1.0):
@@ -35,16 +33,14 @@ def positive(r, n, scale=1.0):
 
 def random_rules(r, seed):
     """All options and kinds of association together, one combination after the other."""
-    miss, freeze, correct, redrawn = (bool(seed >> k & 1) for k in range(4))
-    association = list(reference.ASSOCIATIONS)[seed // 16 % 4]
-    every = association == "none"
+    miss, freeze, correct, redrawn, every = (bool(seed >> k & 1) for k in range(5))
     constraint = Constraint(
         r.uniform(0.6, 2), r.uniform(6, 14), positive(r, 2, 0.4), r.uniform(0.5, 4), r.choice([0, 1.2])
     )
     return reference.Rules(
-        constraint, r.uniform(0.02, 0.3), r.uniform(0.2, 2), r.uniform(0.05, 0.4), r.uniform(0.6, 1),
+        constraint, r.uniform(0.02, 0.3), r.uniform(0.2, 2), r.uniform(0.05, 0.4),
         r.uniform(0.01, 0.5) if miss and not every else 0.0, r.uniform(0, 0.8) if freeze and not every else np.inf,
-        r.uniform(0.1, 0.99), correct, redrawn, association, float(r.choice([1e-9, 1.0])),
+        r.uniform(0.1, 0.99), correct, redrawn, every, float(r.choice([1e-9, 1.0])),
     )  # fmt: skip
 
 
@@ -118,9 +114,9 @@ def test_two_hundred_random_cases() -> None:
             seen["moved"] += not np.array_equal(after[2][g], extent[g])
             seen["carried"] += bool((own[expected[1]] >= 0).any())
             seen["shared"] += bool(((hits > 1) & np.isfinite(d2[g])).any())
-            seen[rules.association, rules.miss > 0, rules.freeze < np.inf, rules.correct, rules.redrawn] += 1
+            seen[rules.unconstrained, rules.miss > 0, rules.freeze < np.inf, rules.correct, rules.redrawn] += 1
     options = [n for key, n in seen.items() if isinstance(key, tuple)]
-    assert len(options) == 4 * (3 * 4 + 1)  # without group constraint there is neither miss nor freezing
+    assert len(options) == 4 * (4 + 1)  # without group constraint there is neither miss nor freezing
     assert min(seen[k] for k in ("nothing", "null", "measured", "missed", "moved", "shared", "carried")) > 5, seen
 
 

@@ -10,8 +10,15 @@ from tests import painted
 from tests.painted import TALL, Person
 from tests.tracking.papers.group_pda.test_association_kernels import bank
 from tests.tracking.papers.group_pda.test_tracker import track
-from tracking.papers.group_pda.association import associate, claimed, gated_distances, search_regions
+from tracking.papers.group_pda.association import (
+    associate,
+    claimed,
+    gated_distances,
+    search_regions,
+    with_missed_members,
+)
 from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.papers.group_pda.group_bank import MemberPlaces
 from tracking.papers.group_pda.scaled_parameters import scale_parameters
 from tracking.papers.group_pda.tracker import GroupPda
 
@@ -60,16 +67,19 @@ def test_a_group_whose_only_point_is_more_probably_anothers_is_predicted_only() 
 
 
 def test_an_infeasible_group_without_points_of_its_own_coasts() -> None:
-    scaled, t = scale_parameters(GroupPdaConfig(association="all"), FPS, 1.0), 1.0
-    points = np.array([[-2.0, 0.0], [2.0, 0.0]])
+    scaled, t = scale_parameters(GroupPdaConfig(), FPS, 1.0), 1.0
+    points, stand_ins = np.array([[-2.0, 0.0], [2.0, 0.0]]), np.array([[-2.0, 0.8], [2.0, 0.8]])
+    places = points[:0], points[:0], stand_ins
     three = bank(
+        members=[MemberPlaces(p, np.full(len(p), 0.5), np.ones(len(p), bool)) for p in places],
         size=np.ones(3), x=np.array([[-2.0, 0, 0, 0], [2, 0, 0, 0], [0, 0, 0, 0]]), null_time=np.array([0.0, 0, 0.2]),
         P=np.tile(0.05 * np.eye(4), (3, 1, 1)), extent=np.array([[[0.1]], [[0.1]], [[1.5]]]) * np.eye(2),
     )  # fmt: skip
     region = search_regions(three, scaled)
     claims = claimed(points, np.ones(2), gated_distances(three, points, region, scaled), t)
-    associate(three, claims, region, np.zeros((3, 2)), scaled, t)
-    assert claims.claimants.tolist() == [2, 2]
+    claims = with_missed_members(claims, three, scaled, t)
+    associate(three, claims, region, np.zeros((3, 4)), scaled, t)
+    assert claims.claimants.tolist() == [2, 2, 1, 1]
     assert three.last_seen.tolist() == [t, t, 0.0]
     assert three.null_time[2] == pytest.approx(0.2)
 

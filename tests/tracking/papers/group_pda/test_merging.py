@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from tests.tracking.papers.group_pda.test_association_kernels import bank
-from tracking.grouping.whole_groups import GroupIds
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import MemberPlaces
-from tracking.papers.group_pda.merging_and_splitting import GroupChanges, fall_apart, moment
+from tracking.papers.group_pda.merging_and_splitting import GroupChanges, moment
 from tracking.papers.group_pda.scaled_parameters import scale_parameters
 
 FPS = 10.0
@@ -42,10 +41,10 @@ def test_the_gap_is_the_least_of_all_pairs(seed: int) -> None:
     assert moment(two, 0, 1, scaled, 0.0).gap == pytest.approx(expected, rel=1e-12)
 
 
-def test_parts_of_a_group_keep_the_places_of_its_members() -> None:
-    scaled, points = scale_parameters(GroupPdaConfig(), FPS, 1.0), np.array([[0.0, 0.0], [0.0, 0.6], [4.0, 0.0]])
-    places = MemberPlaces(np.vstack([points, [[3.8, 0.6]]]), np.array([5.0, 5, 5, 3.9]), np.array([1, 1, 1, 1], bool))
-    one = bank(size=np.array([4.0]), members=[places], x=np.zeros((1, 4)))
-    fall_apart(one, 0, points, np.ones(3), scaled, 5.0, GroupIds())
-    assert np.sort(np.concatenate([one.positions(k) for k in range(2)]), 0) == pytest.approx(np.sort(places.offset, 0))
-    assert sorted(m.last_seen.tolist() for m in one.members) == [[5.0, 3.9], [5.0, 5.0]]
+@pytest.mark.parametrize(("since", "kind"), [(-2.5, "split"), (-1.5, "enter")])
+def test_who_was_there_for_less_than_2_s_was_never_one_group(since: float, kind: str) -> None:
+    scaled, changes = scale_parameters(GroupPdaConfig(), FPS, 1.0), GroupChanges()
+    two = bank(size=np.ones(2), x=np.diag([0.0, 4.0])[:, [0, 1, 0, 0]])
+    two.parent[1], two.first_seen[:], two.last_seen[:] = 0, since, 1.0
+    events = [e for k in range(10) for e in changes.step(two, scaled, k / FPS)]
+    assert [(e.kind, e.onset, e.before, e.after) for e in events] == [(kind, 0.0, (0,), (0, 1))]
