@@ -33,7 +33,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
+from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_VELOCITY
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition, regions_overlap
 from tracking.grouping.merge_split_events import ARRIVAL
@@ -98,8 +98,7 @@ def split_onset(moments: list[PairMoment]) -> PairMoment:
 
     Its time may be before the first moment; the rest is that of the next known moment."""
     now, speed = moments[-1], np.hypot(*moments[-1].velocity)
-    near = MERGE_DISTANCE if speed > SPLIT_VELOCITY else SPLIT_DISTANCE
-    t = float(now.t - max(now.gap - near, 0.0) / max(speed, SPLIT_VELOCITY))
+    t = float(now.t - max(now.gap - MERGE_DISTANCE, 0.0) / max(speed, SPLIT_VELOCITY))
     return next(m for m in moments if m.t >= t)._replace(t=t)
 
 
