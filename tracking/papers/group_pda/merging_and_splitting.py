@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, SPLIT_DISTANCE, SPLIT_VELOCITY
+from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, SPLIT_VELOCITY
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition, regions_overlap
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
@@ -91,12 +91,13 @@ def chords(t: Array, d: Array, half: float) -> Array:
     return np.asarray(np.hypot(*(d[last] - d[first]).T) / np.maximum(t[last] - t[first], 1e-9))
 
 
-def split_onset(moments: list[PairMoment]) -> int:
-    """Returns the index of the moment since which two parts of a group have been apart."""
-    t, gap = np.array([m.t for m in moments]), np.array([m.gap for m in moments])
-    slow = chords(t, np.array([m.way for m in moments]), WALK_TIME) < SPLIT_VELOCITY
-    together = np.flatnonzero((gap <= MERGE_DISTANCE) | ((gap <= SPLIT_DISTANCE) & slow))
-    return min(int(together.max(initial=-1)) + 1, len(moments) - 1)
+def split_onset(moments: list[PairMoment]) -> PairMoment:
+    """Returns the moment since which two parts of a group have been apart, if they parted as fast as they do now.
+
+    Its time may be before the first moment; the rest is that of the next known moment."""
+    now, speed = moments[-1], np.hypot(*moments[-1].velocity)
+    t = float(now.t - max(now.gap - MERGE_DISTANCE, 0.0) / max(speed, SPLIT_VELOCITY))
+    return next(m for m in moments if m.t >= t)._replace(t=t)
 
 
 HISTORY_TIME = 5.0  # s of a pair's past that are kept.
@@ -150,7 +151,7 @@ class GroupChanges:
         apart = []
         for i, j in (pair for two in combinations(parts, 2) for pair in product(*two)):
             moments = self.moments.get(_pair(bank, i, j)) or [moment(bank, i, j, scaled, t)]
-            apart.append(moments[split_onset(moments)])
+            apart.append(split_onset(moments))
         first = max(apart, key=lambda m: m.t)
         together = first.t - bank.first_seen[np.concatenate(parts)].min() > HOLD_TIME
         for rows, head in zip(parts, heads, strict=True):

@@ -98,8 +98,8 @@ Departures. Those marked (c) are off with `corrections` off.
   groups share points. Why: hidden groups follow others.
 - reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
   search region. Why: lost groups are guesses.
-- onsets: dated back; a split to when the last two parts came to be over 1.5 m apart and parting, or over 2.5 m. Paper:
-  none. Why: decisions lag.
+- onsets: dated back; a split to when the last two parts, as fast as they part when it is decided, came to be over 1.5 m
+  apart. Paper: none. Why: decisions lag.
 - depth of points in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px.
   Why: oblique views.
 """
