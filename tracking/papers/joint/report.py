@@ -9,18 +9,20 @@ known then. Changes that only correct the groups are no events.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
-from sim.truth.group_ids_and_changes import GroupChange, Identities, Members, PersonSet
+from sim.truth.group_ids_and_changes import Identities, Members, PersonSet
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.motion_rows import MotionRows
-from sim.types import Array, GroupEvent, Groups, Ints
+from sim.types import Array, Bools, GroupEvent, Groups, Ints
+from tracking.grouping.belief import EVENTS, UNSEEN, default_belief
+from tracking.grouping.belief_kernels import linked_groups
 from tracking.grouping.group_labels import gone_people, part_sets
 from tracking.grouping.merge_split_events import SEARCHED, Parts, TrackedMotion, corrects, event_of_change
+from tracking.grouping.pair_belief import PairBelief
 from tracking.papers.joint import partition_labels_kernels
 
 
@@ -50,29 +52,34 @@ CHORD = 0.5  # Time over which velocities are measured, s.
 
 
 class ReportedEvents:
-    """Makes events from changes of the reported groups. State: recent, ids (K,) and positions (K, 2), m, of the last
+    """Makes events from changes of the reported groups. State: recent, ids (K,), positions (K, 2), m, and who was measured (K,) of the last
     frames; first, by id, the frame (from 0) in which each person was first tracked; frames, their number so far;
     evidence, by pair of ids in one group, the sum of its log-odds in that time; fps."""
 
     def __init__(self, fps: float) -> None:
         self.fps, self.frames = fps, 0
-        self.recent: deque[tuple[Ints, Array]] = deque(maxlen=frames_of(SEARCHED, fps) + frames_of(CHORD, fps))
+        self.recent: deque[tuple[Ints, Array, Bools]] = deque(maxlen=frames_of(SEARCHED, fps) + frames_of(CHORD, fps))
         self.first: dict[int, int] = {}
         self.evidence: dict[tuple[int, int], float] = {}
+        self.identities, self.belief = Identities(), PairBelief(fps, EVENTS)
 
-    def add(self, id: Ints, pos: Array) -> None:
-        """Adds a frame: ids (K,) and places (K, 2), m, of the people tracked."""
-        self.recent.append((id.copy(), pos.copy()))
+    def add(self, id: Ints, pos: Array, seen: Bools) -> None:
+        """Adds a frame: ids (K,), places (K, 2), m, and who was measured (K,) of the people tracked."""
+        self.recent.append((id.copy(), pos.copy(), seen))
+        self.belief.see(np.where(seen[:, None], pos, np.nan))
         for person in id.tolist():
             self.first.setdefault(person, self.frames)
         self.frames += 1
 
-    def events(
-        self, changes: Iterable[GroupChange], old: Members, new: Members, log_odds: Array, scale: float
-    ) -> tuple[GroupEvent, ...]:
-        """Returns the events of the changes of groups in the last frame added; their members are ids of people.
-        log_odds (K, K): that two of its people belong together. To be called for each frame."""
-        parted = self._parted(new, log_odds)
+    def events(self, shown: Members, scale: float) -> tuple[GroupEvent, ...]:
+        """Returns the events of the last frame added; their members are ids of people. shown: the groups reported in the
+        frame before, whose ids new groups take over. To be called for each frame."""
+        id, old = self.recent[-1][0], self.identities.groups
+        log_odds, seen = self.belief.log_odds, self.belief.seen()
+        known = (seen[:, None] & seen) | (log_odds != UNSEEN)
+        changes = self.identities.step(self.frames, frozenset(id.tolist()), self._lasting(id, log_odds, known), shown)
+        new = self.identities.groups
+        parted = self._parted(new, np.where(known, log_odds, 0.0))
         changes = [c for c in changes if not corrects(c, parted)]
         if not changes:
             return ()
@@ -97,6 +104,15 @@ class ReportedEvents:
                 ))  # fmt: skip
         return tuple(out)
 
+    def _lasting(self, id: Ints, log_odds: Array, known: Bools) -> list[PersonSet]:
+        belief, group = default_belief(), np.full((2, len(id)), -1)
+        group[0] = known_groups(self.identities.groups, id)
+        # what cannot be seen changes nothing
+        value = np.where(known, log_odds, (belief.come - belief.stay) / 2)
+        a, b = np.nonzero(np.triu(value != UNSEEN, 1))
+        linked_groups(np.array([0, 0, len(a)]), a, b, value[a, b], UNSEEN, belief.stay, belief.come, group)
+        return [frozenset(id[group[1] == g].tolist()) for g in np.unique(group[1][group[1] >= 0])]
+
     def _parted(self, groups: Members, log_odds: Array) -> dict[PersonSet, bool]:
         row = {person: k for k, person in enumerate(self.recent[-1][0].tolist())}
         before, pairs = self.evidence, [p for people in groups.values() for p in combinations(sorted(people), 2)]
@@ -104,19 +120,22 @@ class ReportedEvents:
         return {frozenset(pair): before[pair] > 0 for pair in before.keys() - self.evidence.keys()}
 
     def _motion(self) -> tuple[list[int], TrackedMotion]:
-        ids = sorted({person for id, _ in self.recent for person in id.tolist()})
-        pos = np.full((len(self.recent), len(ids), 2), np.nan)
-        for t, (id, place) in enumerate(self.recent):
-            pos[t, np.searchsorted(ids, id)] = place
+        ids = sorted({person for id, _, _ in self.recent for person in id.tolist()})
+        pos, measured = np.full((len(self.recent), len(ids), 2), np.nan), np.zeros((len(self.recent), len(ids)), bool)
+        for t, (id, place, seen) in enumerate(self.recent):
+            column = np.searchsorted(ids, id)
+            pos[t, column], measured[t, column] = place, seen
         chord, vel = frames_of(CHORD, self.fps), np.full_like(pos, np.nan)
         vel[chord:] = (pos[chord:] - pos[:-chord]) * self.fps / chord
-        rows = MotionRows.of_table(pos, vel, np.isfinite(pos[..., 0]), np.full(pos.shape[:2], -1))
-        return ids, TrackedMotion(rows, self.fps)
+        there, alone = np.isfinite(pos[..., 0]), np.full(pos.shape[:2], -1)
+        measured[:, ~measured.any(axis=0)] = True
+        rows, known = (MotionRows.of_table(pos, vel, present, alone) for present in (there, there & measured))
+        return ids, TrackedMotion(rows, self.fps, known)
 
 
-def known_groups(identities: Identities, ids: Ints) -> Ints:
-    """Returns the id of each person's group, (N,), as `identities` has it, -1 for a person alone; ids (N,)."""
-    group_of = {person: group for group, people in identities.groups.items() for person in people}
+def known_groups(groups: Members, ids: Ints) -> Ints:
+    """Returns the id of each person's group, (N,), -1 for a person alone; ids (N,)."""
+    group_of = {person: group for group, people in groups.items() for person in people}
     return np.array([group_of.get(person, -1) for person in ids.tolist()], np.int64)
 
 
