@@ -49,8 +49,8 @@ Departures. A star marks those that stay in the preset `paper`:
   Paper: restarted from the truth. Why: no truth.
 - frames without measurement*: X is predicted, nobody counts as missed, Z changes as ever. Paper: each frame is
   observed. Why: nobody could be seen.
-- existence in the filter*: unreported people count fully in partitions, votes and events. Paper: all exist. Why: one
-  state for all.
+- existence in the filter*: unreported people count fully in partitions, votes and events; for events they stay in
+  their groups. Paper: all exist. Why: one state for all.
 - p(y | x)*: normal about the place; 1 if missed. Paper: colour templates. Why: input is points.
 - pixels*: each blob one detection (`pixel_noise`). Paper: boxes. Why: no detector.
 - boxes*: reported in the image, with sizes that follow the measured ones. Paper: a template's box at the state. Why:
@@ -87,7 +87,8 @@ Departures. A star marks those that stay in the preset `paper`:
   own. Why: a group keeps its least member.
 - weights of votes*: before step 2, by the rest, in the preset by w (`algorithm`). Paper: summed over i after step 2.
   Why: no noise of resampling.
-- ids, onsets*: ids of the truth; onsets dated back, but for enter and leave. Paper: none. Why: as the truth.
+- ids, onsets*: events of groups that change late, by the belief; ids as in the truth; onsets dated back, those of leave
+  to the last measurement. Paper: none. Why: as the truth.
 - events that correct groups*: not reported (`tracking.grouping.merge_split_events`); nor are enters of the first
   second. Paper: none. Why: who was in one group by mistake neither met nor parts.
 """
@@ -127,9 +128,9 @@ class Joint(PointTracker):
     """The tracker `joint`: people and the groups they form, from points or from pixels.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
-    particles after step 2; people, the tracked people; newcomers, people who are not confirmed yet; groups, the
-    people of each reported group, by id; events, which makes the events; belief, of pairs; streams, the random numbers; shown (K, 4), boxes of the
-    people reported last, px, or None.
+    particles after step 2; people, the tracked people; newcomers, people who are not confirmed yet; groups, the people
+    of each reported group, by id; events, which makes the events; belief, of pairs; streams, the random numbers; shown
+    (K, 4), boxes of the people reported last, px, or None.
     """
 
     config_class: ClassVar[type[JointConfig]] = JointConfig
@@ -196,7 +197,7 @@ class Joint(PointTracker):
 
     def _before(self) -> tuple[Ints, Array]:
         id = self.people.id
-        known = np.isin(id, np.array(sorted(self.events.identities.people), np.int64)).astype(float)
+        known = np.isin(id, np.array(sorted(self.events.people.identities.people), np.int64)).astype(float)
         return report.known_groups(self.groups, id), known
 
     def _resample(self) -> None:
@@ -240,7 +241,7 @@ class Joint(PointTracker):
         self.events.add(id, mean[:, :2], seen)
         events = self.events.events(self.groups, self.unit)
         parts = [frozenset(id[rows].tolist()) for rows in self._groups()]
-        self.groups = self.events.identities.name(frame.index, parts, self.groups)
+        self.groups = self.events.people.identities.name(frame.index, parts, self.groups)
         shown = self.people.existence >= REPORTED
         id, group, mean, cov = id[shown], report.known_groups(self.groups, id[shown]), mean[shown], cov[shown]
         pos, vel, cov = mean[:, :2] * self.unit, mean[:, 2:] * self.unit, cov * self.unit**2
