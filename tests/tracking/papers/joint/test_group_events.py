@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -196,22 +196,15 @@ def test_many_newcomers_join_as_with_a_look_at_all_clusters():
 FPS = 10.0
 
 
-class Given(ReportedEvents):
-    parts = ()
-
-    def _lasting(self, id, log_odds):
-        return [frozenset(part) for part in self.parts]
-
-
 def reported(pos, partitions, log_odds=1.0, measured=1000):
     """The events of a sequence; pos (T, P, 2), nan where absent; partitions: frame (from 0) to groups, from then on;
     log_odds: of all pairs; measured: frames in which people are measured."""
-    report, out = Given(FPS), []
+    report, parts, out = ReportedEvents(FPS), [], []
     for t, place in enumerate(pos):
         there = np.flatnonzero(np.isfinite(place[:, 0]))
-        report.parts = partitions.get(t, report.parts)
-        odds, every = np.full((len(there),) * 2, log_odds), np.ones(len(there), bool)
-        report.belief = SimpleNamespace(see=len, seen=every.copy, log_odds=odds)
+        parts, every = partitions.get(t, parts), np.ones(len(there), bool)
+        report._lasting = Mock(return_value=[frozenset(p) for p in parts])
+        report.belief = Mock(log_odds=np.full((len(there),) * 2, log_odds), seen=every.copy)
         report.add(there + 11, place[there], every & (t < measured))
         out += report.events({}, 2.0)
     return out
@@ -262,9 +255,8 @@ def test_what_is_more_than_the_searched_time_ago_is_forgotten():
 def test_a_leave_is_dated_by_the_last_measurement():
     pos = two(np.ones(80))
     pos[70:] = np.nan
-    assert [(e.kind, e.start, e.emitted) for e in reported(pos, {0: [(11, 12)], 70: []}, measured=50)] == [
-        ("leave", 50, 71)
-    ]
+    (leave,) = reported(pos, {0: [(11, 12)], 70: []}, measured=50)
+    assert (leave.kind, leave.start, leave.emitted) == ("leave", 50, 71)
 
 
 @pytest.mark.parametrize(("measured", "kinds"), [(60, []), (1000, ["dissolve"])])
