@@ -1,26 +1,31 @@
 """What `joint` reports: the state estimate (sec. 4), groups and their ids, and events.
 
-The estimate has means of the individuals and one partition for all particles. Group ids follow the identity rule of the
-truth, frame by frame. Onsets of events are dated back by the rules of the truth (ours): a merge or split is reported
-when the partition changes. Its start is the frame in which the parts came together, or parted, in the past that is
-known then. Changes that only correct the groups are no events.
+The estimate has means of the individuals and one partition for all particles. Events (ours) follow from groups that
+change late: those of the belief about events, with its memory, in which a missed person stays where the person was.
+Group ids follow the identity rule of the truth, frame by frame; the estimated groups take over the ids of these.
+
+Onsets of events are dated back by the rules of the truth: a merge or split is reported when the groups change. Its
+start is the frame in which the parts came together, or parted, in the past that is known then. Changes that only
+correct the groups are no events.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
-from sim.truth.group_ids_and_changes import GroupChange, Identities, Members, PersonSet
+from sim.truth.group_ids_and_changes import Members, PersonSet
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.motion_rows import MotionRows
-from sim.types import Array, GroupEvent, Groups, Ints
+from sim.types import Array, Bools, GroupEvent, Groups, Ints
+from tracking.grouping.belief import EVENTS, UNSEEN, default_belief
+from tracking.grouping.belief_kernels import linked_groups
 from tracking.grouping.group_events import SEARCHED, Parts, TrackedMotion, corrects, event_of_change
-from tracking.grouping.group_labels import gone_people, part_sets
+from tracking.grouping.group_labels import LinkedPeople, parts_of_change
+from tracking.grouping.online_belief import PairBelief
 from tracking.papers.joint import partition_labels_kernels
 
 
@@ -50,43 +55,44 @@ CHORD = 0.5  # Time over which velocities are measured, s.
 
 
 class ReportedEvents:
-    """Makes events from changes of the reported groups. State: recent, ids (K,) and positions (K, 2), m, of the last
-    frames; first, by id, the frame (from 0) in which each person was first tracked; frames, their number so far;
-    evidence, by pair of ids in one group, the sum of its log-odds in that time; fps."""
+    """Makes events from changes of groups that change late. State: recent, ids (K,), positions (K, 2), m, and who was
+    measured (K,) of the last frames; frames, their number so far; people, who is present since which frame (from 0),
+    and their groups; belief, about events, of measured people; evidence, by pair of ids in one group, the sum of its
+    log-odds in that time; fps."""
 
     def __init__(self, fps: float) -> None:
         self.fps, self.frames = fps, 0
-        self.recent: deque[tuple[Ints, Array]] = deque(maxlen=frames_of(SEARCHED, fps) + frames_of(CHORD, fps))
-        self.first: dict[int, int] = {}
+        self.recent: deque[tuple[Ints, Array, Bools]] = deque(maxlen=frames_of(SEARCHED, fps) + frames_of(CHORD, fps))
         self.evidence: dict[tuple[int, int], float] = {}
+        self.people, self.belief = LinkedPeople(), PairBelief(fps, EVENTS)
 
-    def add(self, id: Ints, pos: Array) -> None:
-        """Adds a frame: ids (K,) and places (K, 2), m, of the people tracked."""
-        self.recent.append((id.copy(), pos.copy()))
-        for person in id.tolist():
-            self.first.setdefault(person, self.frames)
+    def add(self, id: Ints, pos: Array, seen: Bools) -> None:
+        """Adds a frame: ids (K,), places (K, 2), m, and who was measured (K,) of the people tracked."""
+        self.recent.append((id.copy(), pos.copy(), seen))
+        self.belief.see(np.where(seen[:, None], pos, np.nan))
+        self.people.present = {p: self.people.present.get(p, self.frames) for p in id.tolist()}
         self.frames += 1
 
-    def events(
-        self, changes: Iterable[GroupChange], old: Members, new: Members, log_odds: Array, scale: float
-    ) -> tuple[GroupEvent, ...]:
-        """Returns the events of the changes of groups in the last frame added; their members are ids of people.
-        log_odds (K, K): that two of its people belong together. To be called for each frame."""
-        parted = self._parted(new, log_odds)
+    def events(self, shown: Members, scale: float) -> tuple[GroupEvent, ...]:
+        """Returns the events of the last frame added; their members are ids of people. shown: the groups reported in
+        the frame before, whose ids new groups take over. To be called for each frame."""
+        id, identities = self.recent[-1][0], self.people.identities
+        old, log_odds, seen = identities.groups, self.belief.log_odds, self.belief.seen()
+        # new people are judged by their first frame
+        known = (seen[:, None] & seen) | (log_odds != UNSEEN)
+        lasting = self._lasting(id, np.where(known, log_odds, np.nan))
+        changes = identities.step(self.frames, frozenset(id.tolist()), lasting, shown)
+        parted = self._parted(identities.groups, np.where(known, log_odds, 0.0))
         changes = [c for c in changes if not corrects(c, parted)]
         if not changes:
             return ()
         ids, motion = self._motion()
         column = {person: k for k, person in enumerate(ids)}
-        begin, now = self.frames - len(self.recent), set(self.recent[-1][0].tolist())
-        out = []
+        begin, out = self.frames - len(self.recent), []
         for change in changes:
-            there = frozenset(change.members) & now
-            sets = part_sets(change, old, new, there)
-            since = max((min(self.first[p] for p in part) for part in sets), default=0) - begin
-            sets.append(gone_people(change, old, now))
-            *known, gone = (frozenset(column[p] for p in part if p in column) for part in sets)
-            parts = Parts(known, since, gone)
+            found = parts_of_change(change, old, self.people)
+            *sets, gone = (frozenset(column[p] for p in part if p in column) for part in (*found.sets, found.gone))
+            parts = Parts(sets, found.since - begin if found.sets else 0, gone)
             own = replace(change, members=tuple(sorted(column[p] for p in change.members if p in column)))
             event = event_of_change(own, len(self.recent) - 1, parts, motion)
             if event is not None:
@@ -97,6 +103,15 @@ class ReportedEvents:
                 ))  # fmt: skip
         return tuple(out)
 
+    def _lasting(self, id: Ints, log_odds: Array) -> list[PersonSet]:
+        belief, group = default_belief(), np.full((2, len(id)), -1)
+        group[0] = known_groups(self.people.identities.groups, id)
+        # the memory decides of people who are missed: what cannot be seen changes nothing
+        value = np.where(np.isnan(log_odds), (belief.come - belief.stay) / 2, log_odds)
+        a, b = np.nonzero(np.triu(value != UNSEEN, 1))
+        linked_groups(np.array([0, 0, len(a)]), a, b, value[a, b], UNSEEN, belief.stay, belief.come, group)
+        return [frozenset(id[group[1] == g].tolist()) for g in np.unique(group[1][group[1] >= 0])]
+
     def _parted(self, groups: Members, log_odds: Array) -> dict[PersonSet, bool]:
         row = {person: k for k, person in enumerate(self.recent[-1][0].tolist())}
         before, pairs = self.evidence, [p for people in groups.values() for p in combinations(sorted(people), 2)]
@@ -104,19 +119,22 @@ class ReportedEvents:
         return {frozenset(pair): before[pair] > 0 for pair in before.keys() - self.evidence.keys()}
 
     def _motion(self) -> tuple[list[int], TrackedMotion]:
-        ids = sorted({person for id, _ in self.recent for person in id.tolist()})
-        pos = np.full((len(self.recent), len(ids), 2), np.nan)
-        for t, (id, place) in enumerate(self.recent):
-            pos[t, np.searchsorted(ids, id)] = place
+        ids = sorted({person for id, _, _ in self.recent for person in id.tolist()})
+        pos, measured = np.full((len(self.recent), len(ids), 2), np.nan), np.zeros((len(self.recent), len(ids)), bool)
+        for t, (id, place, seen) in enumerate(self.recent):
+            column = np.searchsorted(ids, id)
+            pos[t, column], measured[t, column] = place, seen
         chord, vel = frames_of(CHORD, self.fps), np.full_like(pos, np.nan)
         vel[chord:] = (pos[chord:] - pos[:-chord]) * self.fps / chord
-        rows = MotionRows.of_table(pos, vel, np.isfinite(pos[..., 0]), np.full(pos.shape[:2], -1))
-        return ids, TrackedMotion(rows, self.fps)
+        there, alone = np.isfinite(pos[..., 0]), np.full(pos.shape[:2], -1)
+        measured[:, ~measured.any(axis=0)] = True
+        rows, known = (MotionRows.of_table(pos, vel, present, alone) for present in (there, there & measured))
+        return ids, TrackedMotion(rows, self.fps, known)
 
 
-def known_groups(identities: Identities, ids: Ints) -> Ints:
-    """Returns the id of each person's group, (N,), as `identities` has it, -1 for a person alone; ids (N,)."""
-    group_of = {person: group for group, people in identities.groups.items() for person in people}
+def known_groups(groups: Members, ids: Ints) -> Ints:
+    """Returns the id of each person's group, (N,), -1 for a person alone; ids (N,)."""
+    group_of = {person: group for group, people in groups.items() for person in people}
     return np.array([group_of.get(person, -1) for person in ids.tolist()], np.int64)
 
 

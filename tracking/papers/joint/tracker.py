@@ -49,8 +49,8 @@ Departures. A star marks those that stay in the preset `paper`:
   Paper: restarted from the truth. Why: no truth.
 - frames without measurement*: X is predicted, nobody counts as missed, Z changes as ever. Paper: each frame is
   observed. Why: nobody could be seen.
-- existence in the filter*: unreported people count fully in partitions, votes and events. Paper: all exist. Why: one
-  state for all.
+- existence in the filter*: unreported people count fully in partitions, votes and events; for events they stay in
+  their groups. Paper: all exist. Why: one state for all.
 - p(y | x)*: normal about the place; 1 if missed. Paper: colour templates. Why: input is points.
 - pixels*: each blob one detection (`pixel_noise`). Paper: boxes. Why: no detector.
 - boxes*: reported in the image, with sizes that follow the measured ones. Paper: a template's box at the state. Why:
@@ -87,7 +87,8 @@ Departures. A star marks those that stay in the preset `paper`:
   own. Why: a group keeps its least member.
 - weights of votes*: before step 2, by the rest, in the preset by w (`algorithm`). Paper: summed over i after step 2.
   Why: no noise of resampling.
-- ids, onsets*: ids of the truth; onsets dated back, but for enter and leave. Paper: none. Why: as the truth.
+- ids, onsets*: events of groups that change late, by the belief; ids as in the truth; onsets dated back, those of leave
+  to the last measurement. Paper: none. Why: as the truth.
 - events that correct groups*: not reported (`tracking.grouping.group_events`); nor are enters of the first
   second. Paper: none. Why: who was in one group by mistake neither met nor parts.
 """
@@ -98,7 +99,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.truth.group_ids_and_changes import Identities
+from sim.truth.group_ids_and_changes import Members
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
 from tracking.detect.point_detections import PointTracker, boxes_at, followed_sizes
 from tracking.filters import existence
@@ -127,9 +128,9 @@ class Joint(PointTracker):
     """The tracker `joint`: people and the groups they form, from points or from pixels.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
-    particles after step 2; people, the tracked people; newcomers, people who are not confirmed yet; identities, the
-    groups; events, which makes their events; belief, of pairs; streams, the random numbers; shown (K, 4), boxes of the
-    people reported last, px, or None.
+    particles after step 2; people, the tracked people; newcomers, people who are not confirmed yet; groups, the people
+    of each reported group, by id; events, which makes the events; belief, of pairs; streams, the random numbers; shown
+    (K, 4), boxes of the people reported last, px, or None.
     """
 
     config_class: ClassVar[type[JointConfig]] = JointConfig
@@ -144,7 +145,8 @@ class Joint(PointTracker):
         self.begin(context, divide=False)
         self.shown: Array | None = None
         self.nested = Nested.empty((c.particles, c.partitions), STATE)
-        self.people, self.newcomers, self.identities = People(), Newcomers(), Identities()
+        self.people, self.newcomers = People(), Newcomers()
+        self.groups: Members = {}
         self.events = ReportedEvents(context.fps)
         self.belief = PairBelief(context.fps, EVENTS)
         self.streams = PersonStreams(seed)
@@ -170,7 +172,7 @@ class Joint(PointTracker):
             self.people.weigh(rows, density, self.config.detect_prob)
             self.people.size[rows] = followed_sizes(self.people.size[rows], sizes[columns], self.dt)
         self._filter(z)
-        tracks = self._report(frame)
+        tracks = self._report(frame, np.isfinite(z[:, 0]))
         self._resample()
         if detections is not None:
             free = np.setdiff1d(np.arange(len(points)), columns)
@@ -195,8 +197,8 @@ class Joint(PointTracker):
 
     def _before(self) -> tuple[Ints, Array]:
         id = self.people.id
-        known = np.isin(id, np.array(sorted(self.identities.people), np.int64)).astype(float)
-        return report.known_groups(self.identities, id), known
+        known = np.isin(id, np.array(sorted(self.events.people.identities.people), np.int64)).astype(float)
+        return report.known_groups(self.groups, id), known
 
     def _resample(self) -> None:
         if len(self.people.id):
@@ -209,6 +211,7 @@ class Joint(PointTracker):
         self.nested = self.nested.kept(rows)
         self.people.keep(rows)
         self.belief.keep(rows)
+        self.events.belief.keep(rows)
 
     def _newcomers(self, points: Array, sizes: Array) -> None:
         new = self.newcomers
@@ -227,25 +230,25 @@ class Joint(PointTracker):
         self.nested = n = self.nested.joined(self.newcomers.draw(rows, normals))
         self.people.add(self.newcomers, rows)
         self.belief.add(n.x.mean(axis=0))
+        self.events.belief.add(n.x.mean(axis=0))
         uniforms = self.streams.uniforms(PLACING, key, n.log_q.size, 1).reshape(*n.log_q.shape, len(key))
         place_newcomers(n.x, n.z, uniforms, SHARPNESS, SCALES)
 
-    def _report(self, frame: Frame) -> Tracks:
+    def _report(self, frame: Frame, seen: Bools) -> Tracks:
         n, c, id = self.nested, self.config, self.people.id
         mean, cov = report.moments(n.x, n.component_weights(c.own_weights))
-        old = self.identities.groups
-        parts = [frozenset(id[rows].tolist()) for rows in self._groups()]
-        changes = self.identities.step(frame.index, frozenset(id.tolist()), parts)
         self.belief.see(mean[:, :2])
-        self.events.add(id, mean[:, :2])
-        events = self.events.events(changes, old, self.identities.groups, self.belief.log_odds, self.unit)
+        self.events.add(id, mean[:, :2], seen)
+        events = self.events.events(self.groups, self.unit)
+        parts = [frozenset(id[rows].tolist()) for rows in self._groups()]
+        self.groups = self.events.people.identities.name(frame.index, parts, self.groups)
         shown = self.people.existence >= REPORTED
-        id, group, mean, cov = id[shown], report.known_groups(self.identities, id[shown]), mean[shown], cov[shown]
+        id, group, mean, cov = id[shown], report.known_groups(self.groups, id[shown]), mean[shown], cov[shown]
         pos, vel, cov = mean[:, :2] * self.unit, mean[:, 2:] * self.unit, cov * self.unit**2
         self.shown = boxes_at(pos, self.people.size[shown]) if self.plane == "image" else None
         return Tracks(
             frame.index, frame.t, self.plane, "person", id, group, pos, vel, cov, self.shown, np.ones(len(id)),
-            report.no_groups(group), events, own_events=OWN_EVENTS,
+            report.no_groups(group), events, own_events=OWN_EVENTS, seen=seen[shown],
         )  # fmt: skip
 
     def _groups(self) -> list[Ints]:

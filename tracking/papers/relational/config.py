@@ -23,7 +23,6 @@ RESAMPLE_SHARE = 0.5
 # Least probability that a detection is nobody's for it to start a person; the paper does not say which starts one.
 BIRTH_DOUBT = 0.5
 LEAST_EXISTENCE = 0.02  # A person whose existence is less probable is removed (ours).
-LEAVING_RATE = 0.05  # 1/s: rate at which people leave who are not beside a measured partner (ours).
 NEWCOMER_SHARE = 0.5  # Probability that a new person near a group belongs to it (sec. 3.2).
 # m: half the width of a body that hides others from a known camera (ours); not with the paper's sensor.
 BODY_RADIUS = 0.25

@@ -68,8 +68,8 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
   there.
 - deaths: also below an existence. Paper: after the window. Why: false alarms.
 - report: from `report_existence`, of existence times the probability that a missed person is hidden, not gone
-  (`detect_prob`, `hidden_time`); who has a measured partner is probably not gone. Missed people are reported longer at
-  higher frame rates. Paper: all. Why: who has left the view is missed, too.
+  (`hidden_time`); who has a measured partner is probably not gone. Paper: all. Why: who has left the view is missed,
+  too.
 - newcomers*: at most half join a group, by g at the distance of the nearest member times existence. Paper: half join a
   group. Why: far groups are improbable.
 - weights: one for each person, others averaged; a missed person has the partners'. Paper: one for a particle. Why: many
@@ -94,6 +94,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
 from tracking.detect.point_detections import PersonTable, PointTracker, boxes_at, followed_sizes
+from tracking.filters import existence
 from tracking.filters.person_streams import PersonStreams, birth_keys
 from tracking.grouping.belief import UNSEEN
 from tracking.grouping.online_belief import PairBelief
@@ -103,7 +104,6 @@ from tracking.papers.relational.config import (
     BODY_RADIUS,
     KERNEL_WIDTH,
     LEAST_EXISTENCE,
-    LEAVING_RATE,
     NEWCOMER_SHARE,
     RESAMPLE_SHARE,
     SPEED_PRIOR,
@@ -278,13 +278,12 @@ class Particle(PointTracker):
         return Tracks(frame.index, frame.t, self.plane, "person", id, alone, pos, vel, cov, box, score, seen=seen)
 
     def _stayed(self) -> Array:
-        """Returns the probability (K,) that each person has not left: hidden against gone since the first miss; 1 if
-        measured or with the paper's sensor."""
+        """Returns the probability (K,) that each person has not left: hidden since the last measurement against gone
+        then, by the rates of `existence`; 1 if measured or with the paper's sensor."""
         c, missed = self.config, self.slots.missed
-        stayed = (1 - c.detect_prob) * np.exp((self.dt - missed) / c.hidden_time)
         # people leave with their partners: whose partner is measured is hidden
         alone = 1 - (self.particles.together() * (missed == 0)).max(axis=1, initial=0.0)
-        gone = LEAVING_RATE * self.dt * alone / (stayed + np.finfo(float).tiny)
+        gone = alone * existence.SHOWN_TIME / existence.LIFETIME * np.exp(missed / c.hidden_time)
         return np.where((missed == 0) | c.certain_sensor, 1.0, 1 / (1 + gone))
 
     def _follow(self, state: Array) -> None: ...

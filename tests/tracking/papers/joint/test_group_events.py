@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
-from sim.truth.group_ids_and_changes import Identities
 from tests.reference_joint import all_partitions, label_of, validity
 from tracking.papers.joint import division_kernels
 from tracking.papers.joint import group_proposal_kernels as events
@@ -195,17 +196,17 @@ def test_many_newcomers_join_as_with_a_look_at_all_clusters():
 FPS = 10.0
 
 
-def reported(pos, partitions, log_odds=1.0):
+def reported(pos, partitions, log_odds=1.0, measured=1000):
     """The events of a sequence; pos (T, P, 2), nan where absent; partitions: frame (from 0) to groups, from then on;
-    log_odds: of all pairs."""
-    report, identities, parts, out = ReportedEvents(FPS), Identities(), [], []
+    log_odds: of all pairs; measured: frames in which people are measured."""
+    report, parts, out = ReportedEvents(FPS), [], []
     for t, place in enumerate(pos):
         there = np.flatnonzero(np.isfinite(place[:, 0]))
-        parts = partitions.get(t, parts)
-        old = identities.groups
-        changes = identities.step(t + 1, frozenset((there + 11).tolist()), [frozenset(p) for p in parts])
-        report.add(there + 11, place[there])
-        out += report.events(changes, old, identities.groups, np.full((len(there),) * 2, log_odds), 2.0)
+        parts, every = partitions.get(t, parts), np.ones(len(there), bool)
+        report._lasting = Mock(return_value=[frozenset(p) for p in parts])
+        report.belief = Mock(log_odds=np.full((len(there),) * 2, log_odds), seen=every.copy)
+        report.add(there + 11, place[there], every & (t < measured))
+        out += report.events({}, 2.0)
     return out
 
 
@@ -249,3 +250,21 @@ def test_members_of_an_event_are_those_of_its_parts():
 def test_what_is_more_than_the_searched_time_ago_is_forgotten():
     gap = np.concatenate([np.ones(50), np.linspace(1, 6, 50), np.full(400, 6)])
     assert not reported(two(gap), {0: [(11, 12)], 440: []})
+
+
+def test_a_leave_is_dated_by_the_last_measurement():
+    pos = two(np.ones(80))
+    pos[70:] = np.nan
+    (leave,) = reported(pos, {0: [(11, 12)], 70: []}, measured=50)
+    assert (leave.kind, leave.start, leave.emitted) == ("leave", 50, 71)
+
+
+@pytest.mark.parametrize(("measured", "kinds"), [(60, []), (1000, ["dissolve"])])
+def test_who_is_missed_stays_in_the_group(measured, kinds):
+    pos, report, out = two(np.concatenate([np.ones(60), np.linspace(1, 8, 40)])), ReportedEvents(FPS), []
+    pos[:, :, 0] = np.arange(100)[:, None] / FPS
+    report.belief.add(np.concatenate([pos[0], [[1.0, 0.0]] * 2], axis=1))
+    for t in range(100):
+        report.add(np.array([1, 2]), pos[t], np.array([True, t < measured]))
+        out += report.events({}, 1.0)
+    assert [e.kind for e in out] == kinds

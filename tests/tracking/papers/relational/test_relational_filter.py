@@ -190,13 +190,19 @@ def test_who_is_only_predicted_is_not_seen(kind):
     assert [t.seen.tolist() for t in tracks[4:]] == [[True, True], [False, False], [True, False], [True, True]]
 
 
-@pytest.mark.parametrize(("apart", "frames"), [(9.0, 7), (0.7, 21)])
+@pytest.mark.parametrize(("apart", "frames"), [(9.0, 8), (0.7, 21)])
 def test_a_missed_person_is_reported_while_probably_there_and_longer_beside_a_partner(apart, frames):
-    """Alone for m s: 0.05 exp(-(m - 0.1) / 0.3), hidden, above 0.05 x 0.1, gone, up to m = 0.79 s."""
+    """Alone for m s: exp(-m / 0.3), hidden once a second, above 1 / 15, gone once in 15 s, up to m = 0.81 s."""
     walk = [[(0.1 * k, 0.0), (0.1 * k, apart)] for k in range(51)]
     tracks = stepped(Relational(), [*walk[:30], *[people[:1] for people in walk[30:50]], None, walk[50]])
     assert [len(t.id) for t in tracks[30:51]] == [2] * frames + [1] * (21 - frames)
     assert tracks[51].id.tolist() == tracks[29].id.tolist()
+
+
+@pytest.mark.parametrize("fps", [4, 10, 25])
+def test_missed_people_are_reported_for_one_time_at_all_frame_rates(fps):
+    tracks = stepped(Relational(), [[(k / fps, 0.0)] for k in range(3 * fps)] + [[]] * (2 * fps), fps=fps)
+    assert sum(len(t.id) for t in tracks[3 * fps :]) == int(0.3 * np.log(15) * fps)
 
 
 @pytest.mark.parametrize("detect", [np.zeros(2), np.full(2, 0.9)])
