@@ -52,8 +52,7 @@ class TrackedMotion:
         seen = np.maximum.accumulate(np.where(there, np.arange(len(pos)), 0))
         near, *rules = (self._lasting(holds[seen]) for holds in (found.distance < MERGE_DISTANCE, apart, together))
         # parts that are far apart when they are first seen may have been so for long
-        far = np.logical_and.accumulate(found.distance[seen] > SPLIT_DISTANCE)
-        rules[0] |= far & np.logical_or.accumulate(there)
+        rules[0] |= np.logical_and.accumulate(found.distance[seen] > SPLIT_DISTANCE) & np.logical_or.accumulate(there)
         before, after = rules if joins else rules[::-1]
         if not before.any():
             return None

@@ -105,9 +105,7 @@ def test_split_after_two_seconds_apart():
     assert events(made) == [(116, "split", 97, (1,), (-1, 1), (1, 2, 3))]
 
 
-@pytest.mark.parametrize(
-    ("apart", "since", "told"), [(1.8, 8, []), (2.8, 8, ["merge"]), (2.8, 0, ["merge"]), (2.4, 0, [])]
-)
+@pytest.mark.parametrize(("apart", "since", "told"), [(1.8, 8, []), (2.8, 8, ["merge"]), (2.8, 0, ["merge"])])
 def test_who_was_never_apart_does_not_merge(apart, since, told):
     near = paced((since, (1, 0)), (4, (1, (0.8 - apart) / 4)), (16 - since, (1, 0)), start=(0, 0.7 + apart))
     made = derive(tracks([*side_by_side(), near]), FPS, rule=RULE)
