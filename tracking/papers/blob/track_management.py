@@ -7,11 +7,20 @@ Two kinds of `management`:
   more likely than that it is false or new. A track is reported if it is a person, and where predicted, with the
   probability LIKELY. A person whose feet are nearer to the camera hides others.
 
+With a camera (ours): an extended Kalman filter of each person on the ground, with the state s = (x, y, x', y', height)
+and the measurement z = (u, v, h), centre and height of the box, px:
+
+    s = F s,  P = F P F' + Q                                 F, Q: constant velocity; the height stays
+    K = P H' (H P H' + R)^-1,  s = s + K (z - f(s)),  P = (I - K H) P
+
+f(s) is the box between the projected foot and head (`seen_boxes`), H its derivative. It does not change the filters of
+the bank, from which gates, association and boxes follow.
+
 Also here: the tracks of `blob` from pixels, with a direction and a nominal covariance for each track.
 
 The state's h, w are the axes of the person's ellipse, the longer one first as measured, and theta is the direction of h
 from the abscissa, v down, modulo pi. theta is a random walk (Gonzalez et al. 2006, sec. 4.1). The box of a track is the
-bounding box of its ellipse. The filter's covariance also knows that a partly hidden person is measured with more noise,
+bounding box of its ellipse. The filter's covariance contains that a partly hidden person is measured with more noise,
 and that axes return to expected ones (both ours). So rho, which counts measurements (sec. 4.5), is computed from a
 second, nominal covariance, which is updated with the nominal R (variance of a measurement) only.
 """
@@ -69,7 +78,7 @@ class TrackedPeople:
         rho (N,)            uncertainty: sqrt|S| (innovation covariance) over its asymptote at the last prediction,
                             in the frame of birth that of every new track
         born (N,)           time of the first measurement, s
-        score (N,)          score of the last measurement, 0 to 1
+        score (N,)          score of the last measurement, 0 to 1; from pixels its support
         states (3, N)       probabilities of a person who is shown, who is not, and of a false object (existence)
         confirmed (N,)      True if confirmed; else the track is tentative
         measured (N,)       True if measured in this frame
