@@ -7,7 +7,7 @@ Merging (eqs 13 to 15, sec. 3.5): regions of the full state that overlap.
 MR_i is the ellipsoid (x - X_i)' Sigma_i^-1 (x - X_i) <= merge_gate in six dimensions, and n_i = N_i / sum N.
 Two ellipsoids are tested exactly, see below.
 
-Tentative groups merge, too: without an event, as nobody knows of them (ours). The paper has no tentative groups: a new
+Tentative groups merge, too: without an event, as they are not reported (ours). The paper has no tentative groups: a new
 one is a tracker from its first frame on (sec. 3.4). The paper does not say what P of a merged group is: here it is that
 of a weighted mean, sum of n_i^2 P_i. The confirmed group with most points keeps its id (ours).
 
