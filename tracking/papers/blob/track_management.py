@@ -13,8 +13,8 @@ and the measurement z = (u, v, h), centre and height of the box, px:
     s = F s,  P = F P F' + Q                                 F, Q: constant velocity; the height stays
     K = P H' (H P H' + R)^-1,  s = s + K (z - f(s)),  P = (I - K H) P
 
-f(s) is the box between the projected foot and head (`seen_boxes`), H its derivative. It does not change the filters of
-the bank, from which gates, association and boxes follow.
+f(s) is the box between the projected foot and head (`seen_boxes`), H its derivative at the height of the ground there.
+It does not change the filters of the bank, from which gates, association and boxes follow.
 
 Also here: the tracks of `blob` from pixels, with a direction and a nominal covariance for each track.
 
@@ -34,7 +34,7 @@ import numpy as np
 from sim.scene.body import PERSON_HEIGHT
 from sim.scene.camera import project
 from sim.scene.terrain import height_at
-from sim.types import Array, Bools, Camera, Context, Ints, Scene
+from sim.types import Array, Bools, Camera, Context, Ints
 from tracking.detect.person_size import upright
 from tracking.filters import assignment, existence, kalman, track_uncertainty
 from tracking.grouping.foot_points import feet
@@ -58,10 +58,9 @@ NUDGE = 1e-4  # m: step of the numerical derivatives of `seen_boxes`
 SEEN = [0, 1, 4]  # the parts of `stand` on which a box depends
 
 
-def seen_boxes(camera: Camera, scene: Scene | None, stand: Array) -> Array:
+def seen_boxes(camera: Camera, stand: Array, z: Array) -> Array:
     """Returns the boxes (N, 3) in which a camera sees people: centre x, y, height, px. stand (N, 5): as of
-    TrackedPeople."""
-    z = np.zeros(len(stand)) if scene is None or not scene.stairs else height_at(scene, stand[:, :2])
+    TrackedPeople; z (N,): height of the ground, m."""
     foot = np.column_stack([stand[:, :2], z])
     ends, _ = project(camera, np.concatenate([foot, np.column_stack([stand[:, :2], z + stand[:, 4]])]))
     foot, head = np.split(ends, 2)
@@ -219,7 +218,9 @@ class TrackedPeople:
         x, P = self.stand[rows], self.stand_cov[rows]
         near = np.repeat(x[:, None], 4, 1)
         near[:, range(1, 4), SEEN] += NUDGE
-        z = seen_boxes(self.context.camera, self.context.scene, near.reshape(-1, 5)).reshape(-1, 4, 3)
+        # A flight of stairs has edges, at which its slope says nothing.
+        ground = np.zeros(len(x)) if self.context.scene is None else height_at(self.context.scene, x[:, :2])
+        z = seen_boxes(self.context.camera, near.reshape(-1, 5), np.repeat(ground, 4)).reshape(-1, 4, 3)
         H = np.zeros((len(x), 3, 5))
         H[:, :, SEEN] = np.swapaxes(z[:, 1:] - z[:, :1], 1, 2) / NUDGE
         R = (noise * np.square(self.scale[rows])[:, None])[:, :3, None] * np.eye(3)

@@ -124,7 +124,7 @@ def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> Whole
     X, kept.spread = pooled(np.stack([g.ekf.x[:, 0] for g in parts]), np.stack([g.spread for g in parts]), counts)
     kept.ekf.x, kept.ekf.P = X[:, None], np.einsum("k,kij->ij", n**2, np.stack([g.ekf.P for g in parts]))
     kept.members = np.concatenate([g.members + p for g, p in zip(parts, old, strict=True)]) - kept.pos
-    kept.count = float(counts.sum())
+    kept.count, kept.rise = float(counts.sum()), float(n @ [g.rise for g in parts])
     kept.first_seen, kept.last_seen = min(g.first_seen for g in parts), max(g.last_seen for g in parts)
     kept.measured_time = max(g.measured_time for g in parts)
     gone = {id(g) for g in parts if g is not kept}
