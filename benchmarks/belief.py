@@ -263,26 +263,19 @@ def ablation(seeds: range, check: range, data: Path) -> None:
         fits[f"no {family}" if words else family] = fit_belief(*samples, used)
     parts = (fits, {"default": default, **{name: replace(default, **change) for name, change in CHANGED.items()}})
     truths = [_truth(data / folder) for folder in (HOTEL, ZARA)]
-    head(
-        [
-            "",
-            "standard, pairwise F1",
-            "event F1",
-            "merges right, wrong, missed",
-            "streets, pairwise F1",
-            "seq_hotel",
-            "zara01",
-        ]
-    )
+    events = ["event F1", "merges right, wrong, missed"]
+    head(["", *(f"standard, {word}" for word in ("pairwise F1", *events)), "friends-meet, pairwise F1",
+          "streets, pairwise F1", f"streets, {events[1]}", "seq_hotel", "zara01"])  # fmt: skip
     for groupings in parts:
-        standard, streets = (scores_of(name, check, groupings) for name in ("standard", "streets"))
+        suites = [scores_of(name, check, groupings) for name in ("standard", "friends-meet", "streets")]
         base = next(iter(groupings))
         for name, grouping in groupings.items():
             write, minus = (interval, 0.0) if name == base else (signed, 1.0)
-            near, far = (_cells(write, found[name][0] - minus * found[base][0]) for found in (standard, streets))
+            near, meet, far = (_cells(write, found[name][0] - minus * found[base][0]) for found in suites)
             row(
-                [name, near[0], near[2], standard[name][1], far[0], *(number(_f1(truth, grouping)) for truth in truths)]
-            )
+                [name, near[0], near[2], suites[0][name][1], meet[0], far[0], suites[2][name][1],
+                 *(number(_f1(truth, grouping)) for truth in truths)]
+            )  # fmt: skip
 
 
 def _f1(truth: Truth, grouping: Grouping) -> float:

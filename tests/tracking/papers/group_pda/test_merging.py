@@ -41,10 +41,12 @@ def test_the_gap_is_the_least_of_all_pairs(seed: int) -> None:
     assert moment(two, 0, 1, scaled, 0.0).gap == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize(("since", "kind"), [(-2.5, "split"), (-1.5, "enter")])
+@pytest.mark.parametrize(("since", "kind"), [(-3.0, "split"), (-2.0, "enter")])
 def test_who_was_there_for_less_than_2_s_was_never_one_group(since: float, kind: str) -> None:
     scaled, changes = scale_parameters(GroupPdaConfig(), FPS, 1.0), GroupChanges()
-    two = bank(size=np.ones(2), x=np.diag([0.0, 4.0])[:, [0, 1, 0, 0]])
+    two = bank(size=np.ones(2), x=np.diag([0.0, 2.2])[:, [0, 1, 0, 0]])
     two.parent[1], two.first_seen[:], two.last_seen[:] = 0, since, 1.0
     events = [e for k in range(10) for e in changes.step(two, scaled, k / FPS)]
-    assert [(e.kind, e.onset, e.before, e.after) for e in events] == [(kind, 0.0, (0,), (0, 1))]
+    assert [(e.kind, e.onset, e.before, e.after) for e in events] == [
+        (kind, pytest.approx(0.4 - 0.7 / 0.7), (0,), (0, 1))
+    ]
