@@ -225,12 +225,12 @@ class TrackedPeople:
         if not len(new):
             return
         ground = feet(box_geometry.ltwh_from_centred(box[new]), camera, self.context.scene)
+        if camera.kind == "pinhole":  # just below the horizon feet say little: the height of a box says how far at most
+            away, most = ground - camera.position[:2], camera.focal_px[1] * PERSON_HEIGHT / box[new, 2]
+            far = np.hypot(*away.T)
+            ground -= away * np.where(far > most + PLACE_SPREAD, 1 - most / np.maximum(far, most), 0.0)[:, None]
         speed = self.dynamics.birth_rate_var[0]
         self.stand[new] = np.column_stack([ground, np.zeros((len(new), 2)), np.full(len(new), PERSON_HEIGHT)])
-        # just below the horizon feet say little: the height of the box says how far at most
-        away = ground - camera.position[:2]
-        nearer = 1 - seen_boxes(camera, self.context.scene, self.stand[new])[:, 2] / box[new, 2]
-        self.stand[new, :2] -= away * np.where(np.hypot(*away.T) * nearer > PLACE_SPREAD, nearer, 0.0)[:, None]
         self.stand_cov[new] = np.diag([PLACE_SPREAD**2, PLACE_SPREAD**2, speed, speed, HEIGHT_SPREAD**2])
         self.measure_on_ground(new, box[new], self.noise)
 
