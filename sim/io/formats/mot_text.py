@@ -419,7 +419,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         nonlocal fps
         fps = fps or rate_of_times(path, seconds, id)
         frame = np.round((seconds - seconds.min(initial=np.inf)) * fps) + 1
-        return np.minimum(frame, LARGEST).astype(np.int64)
+        return np.asarray(np.minimum(frame, LARGEST), np.int64)
 
     table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at)
     rate = frame_rate(fps, None)
