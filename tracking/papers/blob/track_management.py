@@ -235,6 +235,10 @@ class TrackedPeople:
         if not len(new):
             return
         ground = feet(box_geometry.ltwh_from_centred(box[new]), camera, self.context.scene)
+        if camera.kind == "pinhole":  # just below the horizon feet say little: the height of a box says how far at most
+            away, most = ground - camera.position[:2], camera.focal_px[1] * PERSON_HEIGHT / box[new, 2]
+            far = np.hypot(*away.T)
+            ground -= away * np.where(far > most + PLACE_SPREAD, 1 - most / np.maximum(far, most), 0.0)[:, None]
         speed = self.dynamics.birth_rate_var[0]
         self.stand[new] = np.column_stack([ground, np.zeros((len(new), 2)), np.full(len(new), PERSON_HEIGHT)])
         self.stand_cov[new] = np.diag([PLACE_SPREAD**2, PLACE_SPREAD**2, speed, speed, HEIGHT_SPREAD**2])

@@ -48,10 +48,10 @@ without a parameter that switches it off holds in the preset `paper`, too.
 - several boxes or blobs of one track, with "rho": the nearest counts. Paper: all are assigned (frame 367), not how.
   Why: a filter takes one.
 - places: where a camera is known, reported on the ground, or on the scene's stairs. A second filter has the state x, y,
-  x', y' and the person's height, 1.7 +- 0.1 m at first. An extended Kalman update takes the centre and the height of
-  each associated box, with R; `accel_noise` and `speed_prior` are those of the first filter. Gates, association and
-  boxes are those of the first filter alone. Tracks above the horizon are not reported. Paper: px. Why: scenes are in m,
-  and motion in depth moves a box little.
+  x', y' and the person's height, 1.7 +- 0.1 m at first, below the box, but not where the box would be too high by far.
+  An extended Kalman update takes the centre and the height of each associated box, with R; `accel_noise` and
+  `speed_prior` are those of the first filter. Gates, association and boxes are those of the first filter alone. Tracks
+  above the horizon are not reported. Paper: px. Why: scenes are in m, and motion in depth moves a box little.
 - `management`: by an existence probability (existence), of which a frame that nobody observed is no evidence; a track
   below 0.5 is tentative again, one below 0.01 is deleted. Paper: ρ. Why: rates hold at any frame rate and detector.
 - association: one to one, most likely, against false and new boxes. Paper: nearest gated track. Why: a wide gate must
