@@ -107,15 +107,15 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
 
 
 def _distinct(sequences: list[Sequence]) -> list[Sequence]:
-    # Recordings may share a name, in seqinfo.ini or of files in several folders; their folders do not.
+    # Recordings may share a name, in their files or of files in several folders; the files or folders do not.
     count = Counter(s.name for s in sequences)
     for k, each in enumerate(sequences):
         if count[each.name] > 1 and each.source["kind"] != "generated":
-            path = Path(each.source["path"])
-            folder = path if path.is_dir() else path.parent
-            words = f"is the name of {count[each.name]} sequences; it is called {folder.name}, as its folder"
+            path = Path(each.source["path"]).absolute()
+            name = path.name if path.is_dir() else path.stem if path.stem != each.name else path.parent.name
+            words = f"is the name of {count[each.name]} sequences; it is called {name}, as its folder or file"
             warnings.warn(f"{path}: {each.name} {words}", stacklevel=3)
-            sequences[k] = replace(each, name=folder.name)
+            sequences[k] = replace(each, name=name)
     return sequences
 
 

@@ -9,7 +9,7 @@ distortion, its colour's distance from the line through E in sigmas.
    the frames differ most: so all channels are those of the same frames. Then inliers, E and sigma are computed in turn
    until they settle. Of the other frames the same is done once more; the colour with more inliers is E, the other one
    is kept as the second colour. People who stand through most of the sample are E, and the ground is the second colour
-   (tracking.detect.ghosts).
+   (tracking.detect.ghosts). A pixel whose first sigma is above WIDEST = 20 grey levels has no background (ours).
 2. a_i and b_i of each pixel i: the RMS of alpha - 1 and of CD over the inliers (eqs 7, 8). a_i is kept as
    s_i = a_i sqrt(sum (E / sigma)^2), which is 1 for independent Gaussian noise and holds at any gain (ours). Neither is
    less than noise of FLOOR would give; sigma is at least FLOOR = 2 grey levels (ours).

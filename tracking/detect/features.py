@@ -4,7 +4,9 @@
 KLT is OpenCV's pyramidal Lucas-Kanade tracker on corners of Shi and Tomasi. A feature is followed forwards and
 backwards; it ends where it does not come back to its place, and where it leaves the mask. Each feature keeps its
 world points of the last frames. Its velocity is the slope of the line of least squares through those of the time
-window. Features that have not lived through the time window are not used (Fig. 3).
+window. Features that have not lived through the time window are not used (Fig. 3). A feature also needs a disparity in
+this frame and in more than half of the window's frames (ours). Of features that come close to each other the oldest
+stays (ours).
 
 Each point has a covariance of its own, C = J^-1 R J^-T with the Jacobian J of the pair (sim.scene.camera) and R of
 (u, v, d): along the line of sight it grows with the squared depth. Of n measurements at times t_k the slope has the

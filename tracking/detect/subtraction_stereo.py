@@ -37,7 +37,8 @@ class SubtractionStereo:
 
     def match(self, left: Image, right: Image, mask: Bools) -> Disparities:
         """Returns the disparities (H, W), px, inside `mask` (H, W), the foreground of the left picture; nan without a
-        match."""
+        match. All are nan if the picture is not wider than `disparities` and `block` together, or not higher than
+        `block`."""
         found = np.full(mask.shape, np.nan, np.float32)
         rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         reach = self.disparities + self.block  # of a match to the left, and of what it is checked against to the right

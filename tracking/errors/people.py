@@ -10,8 +10,8 @@ matched is a *gap*. It is named by what comes before and after:
     matched      the same track        fragment
     matched      another track         switch    a switch without a gap has no frames without a match
 
-A stretch of frames in which a track is reported and not matched is a *ghost*. So the numbers of switches and fragments
-are IDSW and (with the switches after a gap) Frag, and the gaps together are FN, the ghosts FP.
+A stretch of frames in which a track is reported and not matched is a *ghost*. The number of switches is IDSW, that of
+fragments and of switches after a gap is Frag. The frames of all gaps sum to FN, those of all ghosts to FP.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Repairs of errors: the stretch of an error is replaced by the truth, and the result is scored again.
 
-A gap of a person gets the true places, and a switch joins the tracks before and after it; a ghost goes; people of a
-wrong group, or of a wrong hull, get the true one; a false group goes. When all errors are repaired, only errors of
+A gap gets the person's true places, and a switch joins the tracks before and after it. Ghosts and false groups are
+removed. People of a wrong group, or of a wrong hull, get the true one. When all errors are repaired, only errors of
 position are left. Repaired tracks never take an id that is in use in the same frame, so that each of two people who
 swapped tracks is repaired alone. A wrong lineage has no repair and no cost: none of these scores counts lineages.
 """

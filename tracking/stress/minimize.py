@@ -4,10 +4,10 @@ Pieces of one kind (tracking.stress.reductions) are taken out in chunks: all of 
 ones. What is left is kept if the tracker still fails with the scene's own seed, and with enough of the confirming
 seeds; else the chunk is put back. All kinds are tried again until no single piece can be taken out (1-minimal).
 
-Groups that are drawn are replaced by those of the own seed as soon as the tracker still fails then. A piece that is
+Drawn groups are replaced by those of the scene's own seed once the tracker still fails with them. A piece that is
 taken out of the script then leaves all others where they are.
 
-The confirming seeds are the N after the own one. As many of them as fail at the start must fail after each step. A
+The confirming seeds are the N after the scene's own. As many of them as fail at the start must fail after each step. A
 result is then played on N seeds that the search has not seen. If fewer than 80 % of these fail (or than the share at
 the start, if that is less), they become confirming seeds, too, and the search goes on from the last accepted scene that
 holds on all. After three rounds it stops there. The seeds on which the last result is shown are always new.

@@ -11,7 +11,7 @@ The kinds of pieces, in the order in which they are tried (`STAGES` of `tracking
     people        a person of a group (of a drawn size first those above the least), a copy of a group with `repeat`
     details       a stop or point on a group's way, a part of a split, a group of a merge or queue, a hidden time
 
-What names a group or an order that is gone goes with it.
+Keys that name a removed group or order are removed, too.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 Without an axis, the scenes are played as they are. Along one axis, values are placed where the curve breaks. First all
 scenes are played at five values. Then, in turn, the widest uncertainty is reduced: if a curve breaks and its breaking
 point's interval is wider than the distance of the two values beside it, more seeds are played; else a value is added in
-the middle of them. So no value is added because a few scenes happen to be alike. Over two axes, all scenes are played
-at a grid of five by five values, then with more seeds while there is budget.
+the middle of them. Over two axes, all scenes are played at a grid of five by five values, then with more seeds while
+there is budget.
 
 The oracle has the detections that the first tracker gets, and the true ids: what is lost in its score is not the
 tracker's fault. It does not count as an episode of the budget. Every episode is stored when it is played, so a sweep

@@ -104,8 +104,8 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
 
 def _rate(rows: NumericTable, frame: Ints, id: Ints) -> float:
     """Returns FPS, or with a warning the multiple or part of it at which people are as fast as their velocities."""
-    way = np.hypot(*differentiate(frame, id, rows.values[:, (2, 4)], 1.0).T).sum()  # m per frame
-    told = np.hypot(*rows.values[:, (5, 7)].T).sum()  # m per s
+    step = np.hypot(*differentiate(frame, id, rows.values[:, (2, 4)], 1.0).T)  # m per frame; 0: alone, or at rest
+    way, told = step.sum(), np.hypot(*rows.values[:, (5, 7)].T)[step > 0].sum()  # told: m per s
     ratio = float(np.clip(told / way, *FRAME_RATES)) / FPS if told and way else 1.0
     rate = FPS * round(ratio) if ratio > 1 else FPS / round(1 / ratio)
     if rate != FPS:

@@ -11,6 +11,7 @@ that of the positions per second.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -84,6 +85,10 @@ def with_labels(truth: Truth, label: Ints) -> Truth:
     rows, pos, vel, fps, length = (truth.frame, truth.id, label), truth.pos, truth.vel, truth.fps, truth.length
     if not len(label):
         return truth
+    steps = np.diff(np.unique(truth.frame))
+    if len(steps) and steps.min() > 1:
+        words = "people come and go in each: number the frames 1, 2, 3, … for groups and events"
+        warnings.warn(f"{truth.name}: labels are {steps.min()} frames apart or more; {words}", stacklevel=2)
     if pos is not None and vel is not None and np.isfinite(pos).all():
         return truth.replace(**labelled_truth_fields(*rows, pos, vel, fps=fps, length=length))
     assert truth.box is not None, "a row without box has a position"

@@ -26,6 +26,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
+from sim.io.files.numeric_text import LARGEST
 from sim.io.formats.biwi import labels_of
 from sim.io.formats.labelled_truth import centres, differentiate, labelled_sequence, with_labels
 from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, read_table, require_pixels
@@ -417,7 +418,8 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     def frames_at(seconds: Array, id: Array) -> Ints:
         nonlocal fps
         fps = fps or rate_of_times(path, seconds, id)
-        return np.asarray(np.round((seconds - seconds.min(initial=np.inf)) * fps) + 1, np.int64)
+        frame = np.round((seconds - seconds.min(initial=np.inf)) * fps) + 1
+        return np.asarray(np.minimum(frame, LARGEST), np.int64)
 
     table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at)
     rate = frame_rate(fps, None)

@@ -97,7 +97,7 @@ def _read_pedpy(path: Path, fps: float | None) -> People:
     rows = read_rows(path).numbers(range(4, 13), layout="id frame x y z")
     raw = rows.integers(1, "frame")
     words = "_".join(re.findall(r"[^\W_]+", comments.lower())) + "_"
-    centimetres = "_x_cm_" in words or ("_in_cm_" in words and "_x_m_" not in words)
+    centimetres = ("_x_cm_" in words or "_in_cm_" in words) and "_x_m_" not in words
     pos = rows.values[:, 2:4] * (0.01 if centimetres else 1.0)
     return replace(rows, values=np.column_stack([raw - raw.min(initial=LARGEST) + 1, rows.values[:, 0], pos])), stated
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from tests import reference_components as reference
 from tracking.filters.components import Constraint, linked, partition, prefixes
@@ -50,17 +49,6 @@ def test_partitions_of_random_sets() -> None:
         joined += group.max() < label.max()
         noise += group.min() < 0
     assert min(joined, noise) > 15
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_the_order_of_points_changes_nothing(seed: int) -> None:
-    r = np.random.default_rng(seed)
-    points, weights, rule = random_set(r)
-    order = r.permutation(len(points))
-    group, moved = partition(points, weights, rule), partition(points[order], weights[order], rule)
-    assert np.array_equal(reference.by_first(group[order]), moved)
-    verdict = [prefixes(p, w, len(p), rule)[0] for p, w in ((points, weights), (points[order], weights[order]))]
-    assert verdict[0] == verdict[1]
 
 
 def test_nobody_one_and_all_at_the_same_place() -> None:

@@ -7,11 +7,20 @@ Two kinds of `management`:
   more likely than that it is false or new. A track is reported if it is a person, and where predicted, with the
   probability LIKELY. A person whose feet are nearer to the camera hides others.
 
+With a camera (ours): an extended Kalman filter of each person on the ground, with the state s = (x, y, x', y', height)
+and the measurement z = (u, v, h), centre and height of the box, px:
+
+    s = F s,  P = F P F' + Q                                 F, Q: constant velocity; the height stays
+    K = P H' (H P H' + R)^-1,  s = s + K (z - f(s)),  P = (I - K H) P
+
+f(s) is the box between the projected foot and head (`seen_boxes`), H its derivative at the height of the ground there.
+It does not change the filters of the bank, from which gates, association and boxes follow.
+
 Also here: the tracks of `blob` from pixels, with a direction and a nominal covariance for each track.
 
 The state's h, w are the axes of the person's ellipse, the longer one first as measured, and theta is the direction of h
 from the abscissa, v down, modulo pi. theta is a random walk (Gonzalez et al. 2006, sec. 4.1). The box of a track is the
-bounding box of its ellipse. The filter's covariance also knows that a partly hidden person is measured with more noise,
+bounding box of its ellipse. The filter's covariance contains that a partly hidden person is measured with more noise,
 and that axes return to expected ones (both ours). So rho, which counts measurements (sec. 4.5), is computed from a
 second, nominal covariance, which is updated with the nominal R (variance of a measurement) only.
 """
@@ -25,7 +34,7 @@ import numpy as np
 from sim.scene.body import PERSON_HEIGHT
 from sim.scene.camera import project
 from sim.scene.terrain import height_at
-from sim.types import Array, Bools, Camera, Context, Ints, Scene
+from sim.types import Array, Bools, Camera, Context, Ints
 from tracking.detect.person_size import upright
 from tracking.filters import assignment, existence, kalman, track_uncertainty
 from tracking.grouping.foot_points import feet
@@ -49,10 +58,9 @@ NUDGE = 1e-4  # m: step of the numerical derivatives of `seen_boxes`
 SEEN = [0, 1, 4]  # the parts of `stand` on which a box depends
 
 
-def seen_boxes(camera: Camera, scene: Scene | None, stand: Array) -> Array:
+def seen_boxes(camera: Camera, stand: Array, z: Array) -> Array:
     """Returns the boxes (N, 3) in which a camera sees people: centre x, y, height, px. stand (N, 5): as of
-    TrackedPeople."""
-    z = np.zeros(len(stand)) if scene is None or not scene.stairs else height_at(scene, stand[:, :2])
+    TrackedPeople; z (N,): height of the ground, m."""
     foot = np.column_stack([stand[:, :2], z])
     ends, _ = project(camera, np.concatenate([foot, np.column_stack([stand[:, :2], z + stand[:, 4]])]))
     foot, head = np.split(ends, 2)
@@ -69,7 +77,7 @@ class TrackedPeople:
         rho (N,)            uncertainty: sqrt|S| (innovation covariance) over its asymptote at the last prediction,
                             in the frame of birth that of every new track
         born (N,)           time of the first measurement, s
-        score (N,)          score of the last measurement, 0 to 1
+        score (N,)          score of the last measurement, 0 to 1; from pixels its support
         states (3, N)       probabilities of a person who is shown, who is not, and of a false object (existence)
         confirmed (N,)      True if confirmed; else the track is tentative
         measured (N,)       True if measured in this frame
@@ -210,7 +218,9 @@ class TrackedPeople:
         x, P = self.stand[rows], self.stand_cov[rows]
         near = np.repeat(x[:, None], 4, 1)
         near[:, range(1, 4), SEEN] += NUDGE
-        z = seen_boxes(self.context.camera, self.context.scene, near.reshape(-1, 5)).reshape(-1, 4, 3)
+        # A flight of stairs has edges, at which its slope says nothing.
+        ground = np.zeros(len(x)) if self.context.scene is None else height_at(self.context.scene, x[:, :2])
+        z = seen_boxes(self.context.camera, near.reshape(-1, 5), np.repeat(ground, 4)).reshape(-1, 4, 3)
         H = np.zeros((len(x), 3, 5))
         H[:, :, SEEN] = np.swapaxes(z[:, 1:] - z[:, :1], 1, 2) / NUDGE
         R = (noise * np.square(self.scale[rows])[:, None])[:, :3, None] * np.eye(3)
@@ -225,6 +235,10 @@ class TrackedPeople:
         if not len(new):
             return
         ground = feet(box_geometry.ltwh_from_centred(box[new]), camera, self.context.scene)
+        if camera.kind == "pinhole":  # just below the horizon feet say little: the height of a box says how far at most
+            away, most = ground - camera.position[:2], camera.focal_px[1] * PERSON_HEIGHT / box[new, 2]
+            far = np.hypot(*away.T)
+            ground -= away * np.where(far > most + PLACE_SPREAD, 1 - most / np.maximum(far, most), 0.0)[:, None]
         speed = self.dynamics.birth_rate_var[0]
         self.stand[new] = np.column_stack([ground, np.zeros((len(new), 2)), np.full(len(new), PERSON_HEIGHT)])
         self.stand_cov[new] = np.diag([PLACE_SPREAD**2, PLACE_SPREAD**2, speed, speed, HEIGHT_SPREAD**2])

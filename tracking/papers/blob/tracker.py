@@ -4,7 +4,7 @@ Gonzalez, Rowe, Andrade, Villanueva, "Efficient management of multiple agent tra
 2006. State of a track (sec. 4.1): (x, x', y, y', h, h', w, w'), constant speed with white acceleration; places in image
 px, covariances in m and s. The measurement is z = (x, y, h, w): centre, height and width of a box. A box has no
 direction; the paper's ninth state, the angle theta, is measured from pixels only. There h and w are the full axes
-of a blob's ellipse.
+of a blob's ellipse. With a camera each track has a second filter, of the person on the ground (ours).
 
     (A, Q: transition and process noise; P: covariance of x; C: picks the measured coordinates; R: measurement noise;
     y = z - C x: innovation; S = C P C' + R its covariance; K: gain; d^2: squared Mahalanobis distance; chi2:
@@ -16,42 +16,51 @@ of a blob's ellipse.
                                                                                degrees of freedom, 5 with theta
     associate  measurements and gated tracks                   sec. 4.4        track_management.associate
     update     K = P C' S^-1,  x = x + K y,  P = (I - K C) P   eqs 3 to 7      tracking.filters.kalman
+    ground     x, y, x', y' and height of the person, by an    ours            track_management.measure_on_ground
+               extended Kalman filter, where a camera is known
     manage     rho = sqrt|S| / asymptote: confirmed if rho     secs. 4.5, 5    track_management,
                and d^2 are low, deleted if rho is high                         tracking.filters.track_uncertainty
                or by existence                                 ours            existence
     pixels     background, classes, cleaning, ellipses         secs. 3.1-3.3   tracking.detect
 
 Readings: eq. 4 lacks brackets. Eq. 9 has row and column exchanged; eq. 5 of theta is modulo pi. The "Mahalanobis
-radius" of sec. 4.3 is the quantile of chi2. The nearest track (sec. 4.4) is that of least d^2. A percentage of the
-asymptotic value (sec. 5) may be above 100 % (`confirm_ratio`). The "given ellipsoid variance" of secs. 4.5 and 5 is the
-quantile 0.99 of chi2. With "rho" a confirmed track stays confirmed, and all confirmed tracks are reported.
+radius" of sec. 4.3 is the quantile of chi2. The nearest track (sec. 4.4) is that of least d^2. The percentage of the
+asymptotic value (sec. 5) is above 100 % (`confirm_ratio`), as rho falls to 1. The "given ellipsoid variance" of secs.
+4.5 and 5 is the quantile 0.99 of chi2. With "rho" a confirmed track stays confirmed, and all confirmed tracks are
+reported.
 
-Departures, from boxes and from pixels. Those from `management` on hold unless it is "rho"; without a parameter that
-switches it off, one holds in the preset `paper`, too.
+Departures, from boxes and from pixels. In this list those from `management` on hold unless it is "rho". A departure
+without a parameter that switches it off holds in the preset `paper`, too.
 
 - input: also boxes, without θ. Paper: blobs. Why: detectors report boxes.
-- noises: in m at the person and per root second, those of x, y, h, w independent. Paper: no values. Why: any scale
+- noises: in m at the person and per root second, those of x, y, h, w, θ independent. Paper: no values. Why: any scale
   and frame rate.
 - scale of a track: its longer side is 1.7 m, but at most a factor of 2 from the image's scale; from straight above the
-  image's. Paper: none. Why: near people are larger.
-- first P: R, `speed_prior` and 0.2 m/s for sizes, at rest; with "rho" one measurement after birth never confirms.
-  Paper: not stated. Why: a filter needs it.
+  image's. An unknown scale of the image follows from the first boxes, or from lone blobs. Paper: none. Why: near people
+  are larger.
+- first P: R, `speed_prior` and 0.2 m/s for sizes, at rest. With "rho", values by which the first measurement after
+  birth would confirm raise InputError, unless a frame is longer than `tentative_time`. Paper: not stated. Why: a filter
+  needs it.
 - deletion: also missed tracks outside the image. Paper: ρ. Why: they do not come back.
-- deletion, with "rho": missed tracks by ρ, tentative ones at that of their birth, confirmed ones 2 % early; tentative
-  ones, missed or not, also after `tentative_time`. Paper: one value of ρ. Why: false alarms end early.
+- deletion, with "rho": missed tracks by ρ: confirmed ones 2 % below its value after `coast_time` of misses from the
+  steady state, tentative ones at its value at birth; tentative ones, missed or not, also after `tentative_time`. Paper:
+  one value of ρ, by a number of frames. Why: false alarms end early.
 - several boxes or blobs of one track, with "rho": the nearest counts. Paper: all are assigned (frame 367), not how.
   Why: a filter takes one.
-- places: with a camera on the ground, or on the scene's stairs, not of tracks above the horizon. A second filter has
-  the state x, y, x', y' on the ground and the person's height, 1.7 +- 0.1 m at first; an extended Kalman update takes
-  the centre and the height of each associated box, with R, `accel_noise` and `speed_prior`. Paper: px. Why: scenes are
-  in m, and motion in depth moves a box little.
+- places: where a camera is known, reported on the ground, or on the scene's stairs. A second filter has the state x, y,
+  x', y' and the person's height, 1.7 +- 0.1 m at first, below the box, but not where the box would be too high by far.
+  An extended Kalman update takes the centre and the height of each associated box, with R; `accel_noise` and
+  `speed_prior` are those of the first filter. Gates, association and boxes are those of the first filter alone. Tracks
+  above the horizon are not reported. Paper: px. Why: scenes are in m, and motion in depth moves a box little.
 - `management`: by an existence probability (existence), of which a frame that nobody observed is no evidence; a track
-  below 0.5 is tentative again. Paper: ρ. Why: rates hold at any frame rate and detector.
+  below 0.5 is tentative again, one below 0.01 is deleted. Paper: ρ. Why: rates hold at any frame rate and detector.
 - association: one to one, most likely, against false and new boxes. Paper: nearest gated track. Why: a wide gate must
   not win.
-- scores of boxes: likelihood ratios, learned from the existence of the boxes' tracks. Paper: none. Why: any unit.
+- scores of boxes: likelihood ratios, learned from the existence of the boxes' tracks. Paper: none. Why: scores are no
+  probabilities.
 - births: the first existence is by the odds of new people to false boxes and second boxes of people; boxes start tracks
-  from 0.01, also inside gates. Paper: a measurement in no gate. Why: people near others must start tracks.
+  from 0.01, also inside gates; from 0.5 a new track is confirmed at once. Paper: a measurement in no gate starts a
+  tentative track. Why: people near others must start tracks.
 - hidden people: detected as far as no other in front covers them, and not at all for `hidden_time`. Paper: none. Why:
   misses come in rows.
 - rates of height and width, from boxes: return to zero. Paper: constant. Why: a missed person's size settles.
@@ -66,8 +75,8 @@ Departures from pixels only:
 - unsteady pixels, first σ above 20 grey levels: always background. Paper: none. Why: they show no background.
 - light: gain of each frame; far brighter pixels are foreground; ghosts are replaced, also those of the sample
   (`background`). Paper: none. Why: light and scene change.
-- dark foreground: by the brightness itself (`dark`), beyond the lower threshold, too. Paper: normalised. Why: noise
-  must not move the limit.
+- dark foreground: by the brightness itself (`dark`), and only below the lower threshold. Paper: a normalised threshold.
+  Why: noise must not move the limit.
 - grey samples: no shadows or highlights. Paper: colour. Why: no chromaticity.
 - opening: none up to 40 px per m. Paper: opening. Why: it removes heads.
 - cleaning: windows and least area in m. Paper: not stated. Why: any scale.
@@ -75,9 +84,9 @@ Departures from pixels only:
 - θ: noise by the blob's moments and 8°; not used if it is 30° or more, nor in the gates of association from straight
   above. Paper: one R, gates with θ. Why: a circle has no direction.
 - noise of θ: 30° at birth, then 15° per root second, 90° from straight above. Paper: no values. Why: as above.
-- lone blobs (`split`): once the size of a person is known, a blob is a measurement only if it has that size, is not cut
-  by the image's edge, and at most one confirmed track is expected in it. Paper: each blob. Why: others are not one
-  whole person.
+- lone blobs (`split`): once the size of a person is known, from a camera or from earlier lone blobs, a blob is a
+  measurement only if it has that size, is not cut by the image's edge, and at most one confirmed track is expected in
+  it. Paper: each blob. Why: others are not one whole person.
 - shared blobs (`split`): in the rest templates share the foreground: each moves to the most support, confirmed tracks
   first; no gate. Paper: one measurement for each blob; event management, not printed. Why: people merge in the mask.
 - size of templates (`split`): as predicted, 0.75 to 1.3 of a person's. Paper: none. Why: they measure none.
@@ -85,16 +94,17 @@ Departures from pixels only:
   where nobody hides them. Paper: none. Why: people who meet in the mask must not change places.
 - misses (`split`): too little foreground under the template. Paper: no blob in the gate. Why: templates always fit
   somewhere.
-- noise of templates (`split`): R over the square of the visible share; 25 times that for h, w; 25° for θ, which
-  is not measured from straight above. Paper: R. Why: hidden parts are not measured, templates measure no size.
+- noise of templates (`split`): R over the square of the visible share, at least 0.2; 25 times that for h, w; 25° for θ,
+  which is not measured from straight above. Paper: R. Why: hidden parts are not measured, templates measure no size.
 - births (`split`): also a lone blob inside a gate; other unexplained foreground, by templates. Paper: a blob outside
   all gates. Why: people enter as one blob.
 - sizes (`split`): return to those of a person at that place. Paper: free. Why: templates measure none.
 - ρ: of a nominal covariance without θ. Paper: of the filter. Why: noise must not count.
-- report from pixels: boxes, by the usual ratio to ellipses. Paper: ellipses. Why: scores need boxes.
+- report from pixels: boxes, by the median ratio of lone blobs' boxes to ellipses. Paper: ellipses. Why: scores need
+  boxes.
 - too much foreground (`background`): nobody is observed, and no track starts. Paper: none. Why: light has changed.
-- background: adapts where no confirmed track is, ghosts anywhere (`background`). Paper: trained once. Why: light
-  changes.
+- background: adapts where no confirmed track is, foreground ten times as slowly, ghosts anywhere (`background`). Paper:
+  trained once. Why: light changes.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """One frame of `blob` from boxes: the cascade of Gonzalez et al. (2006) on a detector's boxes.
 
 Order of a frame, with the paper's sections: predict (sec. 4.2, eqs 1, 2), gate (sec. 4.3, eqs 8 to 10), associate (sec.
-4.4), update (sec. 4.2, eqs 3 to 7), manage the tracks (secs. 4.5, 5; track_management). A measurement z is a centred
-box (x, y, h, w), px, with a score from 0 to 1.
+4.4), update (sec. 4.2, eqs 3 to 7), update on the ground where a camera is known (ours; track_management), manage the
+tracks (secs. 4.5, 5, or by existence, ours; track_management). A measurement z is a centred box (x, y, h, w), px, with
+a score from 0 to 1.
 """
 
 from __future__ import annotations

@@ -7,15 +7,16 @@ Order of a frame, with the paper's sections:
     other foreground: split among the tracks expected there, by templates     ours (person_template)
     foreground that no track explains, as large as a person: new tracks       ours (person_template)
     update with the ellipses                                                  sec. 4.2, eqs 3 to 7
+    where a camera is known: update on the ground with their boxes            ours (track_management)
     axes return towards those of a person at the track's place                ours (track_management)
     looks: the colours of people, where nobody hides them, are learned        ours (person_look_kernels)
-    rho: confirm, delete, start tracks                                        secs. 4.5, 5 (track_management)
+    by existence (ours) or rho: confirm, delete, start tracks                 secs. 4.5, 5 (track_management)
     adapt the background, except where confirmed tracks are                   ours
     learn the size of a person, and an unknown scale, from lone blobs         ours (detect.person_size)
 
 A blob that is associated with no track may start one; without `split` no blob inside any gate does. At frame 367 of
 Gonzalez et al. (2006, sec. 5) pieces "still lie within the gate" and "are assigned to the existing tracker"; the paper
-does not say how. Here the nearest one is the measurement.
+does not say how. Here one of them is the measurement: the nearest one with "rho", else the most likely one.
 """
 
 from __future__ import annotations

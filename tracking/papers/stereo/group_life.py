@@ -7,7 +7,7 @@ Merging (eqs 13 to 15, sec. 3.5): regions of the full state that overlap.
 MR_i is the ellipsoid (x - X_i)' Sigma_i^-1 (x - X_i) <= merge_gate in six dimensions, and n_i = N_i / sum N.
 Two ellipsoids are tested exactly, see below.
 
-Tentative groups merge, too: without an event, as nobody knows of them (ours). The paper has no tentative groups: a new
+Tentative groups merge, too: without an event, as they are not reported (ours). The paper has no tentative groups: a new
 one is a tracker from its first frame on (sec. 3.4). The paper does not say what P of a merged group is: here it is that
 of a weighted mean, sum of n_i^2 P_i. The confirmed group with most points keeps its id (ours).
 
@@ -124,7 +124,7 @@ def _merge(groups: list[SpaceGroup], parts: list[SpaceGroup], t: float) -> Whole
     X, kept.spread = pooled(np.stack([g.ekf.x[:, 0] for g in parts]), np.stack([g.spread for g in parts]), counts)
     kept.ekf.x, kept.ekf.P = X[:, None], np.einsum("k,kij->ij", n**2, np.stack([g.ekf.P for g in parts]))
     kept.members = np.concatenate([g.members + p for g, p in zip(parts, old, strict=True)]) - kept.pos
-    kept.count = float(counts.sum())
+    kept.count, kept.rise = float(counts.sum()), float(n @ [g.rise for g in parts])
     kept.first_seen, kept.last_seen = min(g.first_seen for g in parts), max(g.last_seen for g in parts)
     kept.measured_time = max(g.measured_time for g in parts)
     gone = {id(g) for g in parts if g is not kept}

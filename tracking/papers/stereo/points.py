@@ -6,8 +6,8 @@ sec. 2).
 A region is a blob of the foreground. Its height is the range of its points' world z, its width their range across the
 line of sight: that between the 10 % and 90 % quantiles over 0.8. The points' own errors widen a range. A region is too
 low or too narrow if even the measured range is, and too high only if the range without them is. The paper prints
-neither its measure nor limits. Ours: a region that the edge of the image cuts is not too small for a person, and a
-region of several people may be of any width.
+neither its measure nor limits. Ours: a region that the edge of the image cuts is not too small for a person, a region
+of several people may be of any width, and one with fewer than LEAST_POINTS disparities is nobody.
 
 Also here: points of `stereo` from detections: each detection is one point in space, linked from frame to frame (ours).
 

@@ -1,10 +1,11 @@
-"""A group of `stereo`: its extended Kalman filter, its spread, and the clocks of its life.
+"""A group of `stereo`: its extended Kalman filter, its spread, and its association with points.
 
     X_k+1 = Phi X_k + noise                                  constant velocity (eqs 2, 3)
     Z = f(X_k) + noise                                       (u, v, d) of the mean of the group's points (eqs 4 to 6)
     Sigma <- alpha_s Sigma + (1 - alpha_s) C_y               covariance of its points' positions and velocities (eq. 7)
 
-The filter is filterpy's. P is the covariance of the centroid, Sigma that of the members.
+The filter is filterpy's. P is the covariance of the centroid, Sigma that of the members, which changes in frames in
+which the group is measured.
 
 The measurement (eqs 4 to 6): from pictures Z = (u, v, d), the projection of the mean of the group's points in space.
 The mean of their (u, v, d) would be biased, as the depth b f / d is no linear function of d (the bias is -var(z) / z).

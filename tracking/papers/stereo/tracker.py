@@ -7,7 +7,7 @@ State of a group: an extended Kalman filter of position and velocity, X = (x, x'
 covariance of its points' positions and velocities; N, the number of its points.
 
     X_k+1 = Phi X_k + noise                                eqs 2, 3            space_group
-    Z = (u, v, d) = f(X) + noise                           eqs 4 to 6          measurement, sim.scene.camera
+    Z = (u, v, d) = f(X) + noise                           eqs 4 to 6          space_group, sim.scene.camera
     Sigma <- alpha Sigma + (1 - alpha) C_y                 eq. 7               space_group
     (y - xi)' S^-1 (y - xi) < gamma                        eq. 8               space_group
     m_total = p(y)^k_p p(lambda)^k_v, the largest wins     eqs 9 to 11         space_group
@@ -17,25 +17,26 @@ covariance of its points' positions and velocities; N, the number of its points.
 C_y is the covariance of the points' positions y and velocities lambda. S is Sigma + P, of the members and of the
 filter, with the point's covariance added (`point_covariance`). Spheres have the radius `radius`; groups merge whose
 regions of X overlap (`merge_gate`). The foreground, subtraction stereo (sec. 2) and KLT (sec. 3.1) are in
-tracking.detect.
+tracking.detect, person or not (sec. 2) in points.
 
 Readings: eq. 6 is printed with y for x, and takes world for camera coordinates; here f contains the camera's pose and
 the image's centre. A feature has the covariance J^-1 R J^-T, with the Jacobian J of (u, v, d) and R from `pixel_noise`
 and `disparity_noise`: its error grows with the squared depth. The mean position of sec. 3.3 is that of (x, y, z),
 projected by f: the mean disparity would be biased in depth. The threshold of updates (sec. 3.3) is that of sec. 4: more
 than two points. Sec. 3.3 names the size and velocity of groups as cues; eqs 9 to 11, as here, have position and
-velocity. C_y of eq. 7 is that of the current frame. The number of sec. 3.4 (`group_points`) is that of the points of a
-connected component. I_n of eq. 13 is transitive. The filter is an extended one, as f is not linear. The text does not
-state the order of steps in a frame; here it is that of secs. 3.3 to 3.5: association, update, new groups, merging. So a
-new group can merge in its first frame. Groups that overlap only after a merger can merge in the next frame.
+velocity. C_y of eq. 7 is that of the current frame; Sigma of a group that is not measured stays. The number of sec. 3.4
+(`group_points`) is that of the points of a connected component. I_n of eq. 13 is transitive. The filter is an extended
+one, as f is not linear. The text does not state the order of steps in a frame; here it is that of secs. 3.3 to 3.5:
+association, update, new groups, merging. So a new group can merge in its first frame. Groups that overlap only after a
+merger can merge in the next frame.
 
 Departures. Without a parameter that switches it off, one holds in the preset `paper`, too; `density_width`,
 `spread_weight`, `split_time` and `coast_time` only make theirs weak there:
 
 - subtraction: in the left picture only. Paper: not stated. Why: one background model.
 - foreground: that of `blob` (five classes, cleaning, least area). Paper: background subtraction. Why: shared.
-- matching: OpenCV's block matching with its checks, blocks of 0.27 m, up to the disparity of `nearest`. Paper: not
-  stated. Why: speed, wrong matches.
+- matching: OpenCV's block matching of grey values with its checks, blocks of 0.27 m, up to the disparity of `nearest`.
+  Paper: not stated. Why: speed, wrong matches.
 - scale: blocks, spacing of features and least areas are in px by one scale of the image. Paper: none. Why: any camera.
 - person or not: fixed limits, by quantiles; the highest one without the errors of points; any width; regions cut by the
   edge are not too small; fewer than 5 disparities are nobody. Paper: by height and width. Why: no limits printed.
@@ -49,19 +50,19 @@ Departures. Without a parameter that switches it off, one holds in the preset `p
 - γ, MR, spheres: constants (`gate`, `merge_gate`, `radius`, `point_radius`). Paper: γ, spheres by scene; MR not
   printed. Why: no tuning.
 - visible side: points moved away from the camera (`surface_offset`). Paper: none. Why: the camera sees surfaces.
-- mean: inverse density on the ground (`density_width`). Paper: all features count alike. Why: textured people have
-  more features.
+- mean position: features count by their inverse density on the ground (`density_width`); in the first velocity, in C_y
+  and in N all count alike. Paper: all count alike. Why: textured people have more features.
 - height: reported from the top of the features (`top_offset`); the filter has their mean. Paper: the mean. Why: other
   people and the edge of the picture hide legs, so that the mean height changes; the result is the middle of bodies.
-- errors of points: added in eqs 8 to 10, taken off C_y (`point_covariance`); R, first P and density have them always.
-  Paper: none. Why: depth is uncertain.
+- errors of points: added in eqs 8 to 10, taken off C_y, whose eigenvalues then are at least 0 (`point_covariance`); R,
+  first P and density have them always. Paper: none. Why: depth is uncertain.
 - P and Σ: P of the filter, Σ of the members; search regions and eqs 9, 10 use their sum, merging Σ. Paper: Σ in eqs 7
   and 8, P in 9 and 10, both the tracker's covariance. Why: a member is no centroid; where a hidden group is, is unsure.
 - merged P: that of the weighted mean, sum of n² P_i. Paper: one covariance, eq. 15. Why: P is of the centroid.
 - Σ: shrunk to a prior (`spread_weight`) of `person_spread` and 0.25 m/s; C_y divides by n; 1e-6 is added to its
   diagonal. Paper: sample covariance. Why: few points in six dimensions.
-- N: of the last frame in which the group was measured, also when a hidden group merges. Paper: of every frame. Why: a
-  hidden group would have no weight.
+- N: of the last frame in which the group was measured, also when a hidden group merges; of a merged group the sum.
+  Paper: of every frame. Why: a hidden group would have no weight.
 - R: of the mean of the points, and `centroid_noise`. Paper: one, not printed. Why: points come and go.
 - first P: of the points' mean position and velocity, members' velocities varying by 0.25 m/s. Paper: covariance of the
   points. Why: a member is no centroid.
@@ -69,7 +70,8 @@ Departures. Without a parameter that switches it off, one holds in the preset `p
 - merged id: of the largest confirmed group. Paper: a new number (Fig. 7). Why: a group keeps its identity, as in the
   scores.
 - young groups: tentative ones merge without event, and a known group keeps its id; with `confirm_time` 0 those of this
-  frame. Paper: a new group is a tracker at once (sec. 3.4), and merges as all do. Why: nobody knows of them.
+  frame. Paper: a new group is a tracker at once (sec. 3.4), and merges as all do. Why: only confirmed groups are
+  reported.
 - events: enter, leave, merge, split. Paper: none. Why: they are scored.
 - report: groups that are measured in the frame. Paper: ellipses round associated points; of others not stated. Why: a
   hidden group has no places of members.
@@ -83,8 +85,9 @@ Departures. Without a parameter that switches it off, one holds in the preset `p
   ellipses. Why: features lie all over a body.
 - background: adapts, but not where people are, except for ghosts and in frames with too much foreground
   (`background`). Paper: not stated. Why: light changes.
-- points as input: linked between frames, at most 2 m/s and 3 `point_noise` off; used at once, one is enough; Z is their
-  place; velocity 0 when new; spheres of `point_radius`. Paper: none. Why: other detectors.
+- points as input: linked between frames, at most 2 m/s and 3 `point_noise` off; no detections end all links; used at
+  once, one is enough; Z is their place, and all count alike; velocity 0 when new; spheres of `point_radius`. Paper:
+  none. Why: other detectors.
 """
 
 from __future__ import annotations

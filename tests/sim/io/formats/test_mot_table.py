@@ -89,6 +89,7 @@ UNCLEAR = {
     "1,1,0.1,1,1\n2,1,0.2,1,1\n": "line 1: .*4, 6, 7, 8, 9, 10 columns.*name the columns in the first line",
     "# x y of people\n1 1 20 30 170\n": "line 2: .*name the columns in the first line",
     "1,1,3\n": "4, 6, 7, 8, 9, 10 columns",
+    "t,id,x,y\n0,1,0,0\n1,1,0,0\n1e30,1,0,0\n": "line 4: .*frames from 1 to 1000000",
     "frame,id,x,y,w,h\n": "no row",
     "\n": "no row",
     "1,9007199254740993,10,20,30,40\n": "a whole number within 4503599627370496 as id",

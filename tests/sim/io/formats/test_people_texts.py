@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -133,9 +134,9 @@ def test_bad_input_is_one_line(tmp_path, case):
 UNITS = dict.fromkeys(["X [cm] Y [cm]", "x (cm)", "x_cm y_cm", "x/cm y/cm", "x y, in cm"], 1)
 
 
-@pytest.mark.parametrize(("words", "factor"), (UNITS | {"x/m y/m; heights in cm": 100}).items())
+@pytest.mark.parametrize(("words", "factor"), (UNITS | {"x/m y/m; heights in cm, max_x_cm: 9": 100}).items())
 def test_comments_state_centimetres(tmp_path, words, factor):
-    """Heights in centimetres are no positions in centimetres."""
+    """Heights and limits in centimetres are no positions in centimetres."""
     truth = opened(tmp_path, "hall.txt", PETRACK.replace("x/cm y/cm z/cm", words)).truth
     assert truth.pos == pytest.approx(factor * np.array([p[2:] for p in PLACES]))
 
@@ -172,6 +173,8 @@ def test_a_column_of_groups(tmp_path):
     assert pairs(truth) == set(PAIR.items())
     assert truth.labelled.all()
     assert all(some.id.tolist() == [5] and some.members[0].tolist() == [1, 2] for some in truth.groups)
+    with pytest.warns(UserWarning, match="labels are 5 frames apart or more; people come and go"):
+        opened(tmp_path, "apart.csv", re.sub(r"^(\d+)", lambda k: f"{5 * int(k[1])}", text, flags=re.M), fps=5).truth  # noqa: B018
     with pytest.raises(InputError, match=r"line 2: .*groups from 0, or -1 for alone"):
         opened(tmp_path, "wrong.csv", text.replace("0.2,1.0,5", "0.2,1.0,-2", 1), fps=5).truth  # noqa: B018
 

@@ -255,11 +255,19 @@ def test_places_on_the_ground_are_steadier_than_feet_of_boxes():
 
     camera, r = pinhole(4.0, at=(0.0, 0.0, 1.2)), np.random.default_rng(30_000)
     path = np.array([[-2 + 0.1 * k, 12 + 0.03 * k, 0, 0, 1.8] for k in range(60)])
-    box = np.insert(seen_boxes(camera, None, path), 3, 20, axis=1)
+    box = np.insert(seen_boxes(camera, path, np.zeros(len(path))), 3, 20, axis=1)
     box[:, 1:3] += box[:, 2:3] * r.normal(0, [0.05, 0.09], (60, 2))
     frames = run(box_geometry.ltwh_from_centred(box), context=Context(FPS, 30.0, camera, None, camera.image))
     pos, below = np.array([(t.pos[0], feet(t.box, camera, None)[0]) for t in frames])[20:, :, 1].T
     assert np.std(np.diff(pos, 2)) < 0.4 * np.std(np.diff(below, 2))
+
+
+def test_whose_feet_come_into_sight_just_below_the_horizon_is_not_lost_far_away():
+    camera, box = pinhole(0.0, at=(0.0, 0.0, 1.2)), np.tile([300.0, 219.0, 28.0, 71.0], (80, 1))  # 12 m away
+    box[:, 3] *= np.minimum(0.3 + np.arange(80) / 40, 1)
+    frames = run(box[:, None], context=Context(FPS, 30.0, camera, None, camera.image))
+    assert max(np.hypot(*t.pos[0]) for t in frames if len(t.pos)) < 60
+    assert frames[-1].pos[0, 1] == pytest.approx(12, abs=1)
 
 
 @pytest.mark.parametrize("scale", [float("nan"), 0.0])

@@ -32,16 +32,6 @@ def test_equals_brute_force(seed):
             np.testing.assert_allclose(found, shares, rtol=0, atol=1e-12)
 
 
-def test_permutations_change_nothing():
-    rng = np.random.default_rng(1)
-    W, miss, spare = rng.exponential(size=(5, 7)), rng.random(5), rng.random(7)
-    i, j = rng.permutation(5), rng.permutation(7)
-    log_sum, found = summed(sparse_sum, W, miss, spare)
-    other, moved = summed(sparse_sum, np.ascontiguousarray(W[i][:, j]), miss[i], spare[j])
-    assert other == pytest.approx(log_sum, rel=1e-13)
-    np.testing.assert_allclose(moved, found[i][:, j], atol=1e-13)
-
-
 def test_nobody_detected_ever():
     log_sum, found = summed(sparse_sum, np.zeros((3, 4)), np.ones(3), np.ones(4))
     assert log_sum == 0.0
