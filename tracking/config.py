@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Literal, Self, cast
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
-from scenarios.loading.toml_files import closest, parse, toml_value
+from scenarios.loading.toml_files import did_you_mean, parse, toml_value
 from sim.io.files.numeric_text import read_number
 from tracking.running.user_code import tracker_failed, user_code
 
@@ -154,7 +154,7 @@ class Config:
         declared = cls.params()
         if name in declared:
             return declared[name]
-        remedy = f"did you mean {closest(name, declared)}?" if declared else "it has no parameters"
+        remedy = did_you_mean(name, declared) if declared else "it has no parameters"
         raise InputError(file=file, place=name, got=repr(name), expected=f"a parameter of {cls.tracker}", remedy=remedy)
 
     @classmethod

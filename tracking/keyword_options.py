@@ -17,7 +17,7 @@ from dataclasses import MISSING, Field, field, fields
 from typing import Any, TypeVar
 
 from scenarios.errors import InputError
-from scenarios.loading.toml_files import closest
+from scenarios.loading.toml_files import did_you_mean
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
@@ -46,7 +46,7 @@ def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
     names = [f.name for f in known]
     for name in given:
         if name not in names:
-            expected, remedy = f"one of {', '.join(names)}", f"did you mean {closest(name, names)}?"
+            expected, remedy = f"one of {', '.join(names)}", did_you_mean(name, names, "choose one of them")
             raise InputError(place=f"{function}(…)", got=f"{name}=…", expected=expected, remedy=remedy)
     for f in known:
         if required(f) and f.name not in given:

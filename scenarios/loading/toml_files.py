@@ -54,18 +54,14 @@ def suite_names() -> list[str]:
     return sorted(path.stem for path in SUITES.glob("*.toml"))
 
 
-def did_you_mean(word: str, known: list[str]) -> str:
-    """Returns a remedy for an unknown name `word`: "did you mean …?" with similar `known` names, else all."""
-    close = difflib.get_close_matches(word, known, n=3, cutoff=0.5)
-    if close:
-        return "did you mean " + " or ".join(repr(name) for name in close) + "?"
-    return "choose one of " + ", ".join(known) if known else "there is none to choose from"
-
-
-def closest(word: str, known: Iterable[str]) -> str:
-    """Returns the name in `known` that is most similar to `word`, ignoring upper and lower case; "" without names."""
-    names = {name.casefold(): name for name in known}
-    return names[difflib.get_close_matches(word.casefold(), names, 1, 0.0)[0]] if names else ""
+def did_you_mean(word: str, known: Iterable[str], otherwise: str = "") -> str:
+    """Returns a remedy for an unknown name `word`: "did you mean …?" with the `known` name that differs in upper and
+    lower case only, else similar ones; without one `otherwise`, by default all names."""
+    names = list(known)
+    same = [name for name in names if name.casefold() == word.casefold()]
+    if close := same or difflib.get_close_matches(word, names, n=3, cutoff=0.5):
+        return f"did you mean {' or '.join(close)}?"
+    return otherwise or ("choose one of " + ", ".join(names) if names else "there is none to choose from")
 
 
 def find(name: str | Path, beside: Path | None = None) -> Path:

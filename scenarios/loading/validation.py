@@ -17,7 +17,7 @@ from scenarios.loading.toml_files import KeyPath, Table, did_you_mean, place_of
 TAGS = {"number", "distribution", "point", "meet"}  # of the discriminators of values, in pydantic's locations
 # our words for those of pydantic's messages
 WORDS = {
-    "^(Input should be |Value error, )": "", "a valid tuple": "a list",
+    "^(Input should be |Value error, )": "", "a valid tuple": "a list, see docs/reference/scenario-files.md",
     "^String should match pattern.*": "a name: a letter, then letters, digits, '_', '.' or '-'",
     r"a valid dictionary or instance of \w+": "a table",
     r"^Tuple should have (at \w+ \d+ items?).*": r"\1",

@@ -19,7 +19,7 @@ from gymnasium.spaces import Box
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError, OrderError
-from scenarios.loading.toml_files import closest
+from scenarios.loading.toml_files import did_you_mean
 from sim.dataset.generate import LEFT_OUT
 from sim.dataset.splits import split_of
 from sim.types import DetectionMode, Tracker
@@ -276,5 +276,5 @@ def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | Non
 def _check_choice(place: str, got: object, known: Iterable[object]) -> None:
     known = tuple(known)
     if got not in known:
-        remedy = f"did you mean {closest(str(got), map(str, known))}?" if known else "remove it"
+        remedy = did_you_mean(str(got), map(str, known), "choose one of them") if known else "remove it"
         raise InputError(place=place, got=repr(got), expected=f"one of {', '.join(map(str, known))}", remedy=remedy)

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from scenarios.errors import InputError
-from scenarios.loading.toml_files import closest
+from scenarios.loading.toml_files import did_you_mean
 from sim.types import Tracker
 from tracking.config import Config
 from tracking.running.user_code import tracker_failed, user_code, what_was_raised
@@ -41,7 +41,7 @@ def find(spec: str) -> type[Tracker]:
     target = REGISTRY.get(spec, spec)
     where, colon, class_name = target.rpartition(":")
     if not colon:
-        remedy = f"did you mean {closest(spec, REGISTRY)}? Your own: file.py:Class or package.module:Class"
+        remedy = did_you_mean(spec, REGISTRY, "choose one.") + " Your own: file.py:Class or package.module:Class"
         raise InputError(place="tracker", got=spec, expected="one of " + ", ".join(REGISTRY), remedy=remedy)
     module = _from_file(Path(where)) if where.endswith(".py") else _from_module(where)
     with user_code(lambda error: _import_failed(where, error)):  # a module may have a __getattr__

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.loading.toml_files import closest
+from scenarios.loading.toml_files import did_you_mean
 from sim.types import Array
 from tracking.stats import mean_interval
 
@@ -104,7 +104,7 @@ def parse_axis(text: str) -> Axis:
     known, expected = AXES.get(name), f"one of {', '.join(AXES)}, or KEY=EASY:HARD"
     if not equals:
         if known is None:
-            remedy = f"did you mean {closest(name, [*AXES])}?"
+            remedy = did_you_mean(name, AXES, "choose one of them")
             raise InputError(place="--vary", got=repr(text), expected=expected, remedy=remedy)
         return known
     ends = [float(part) for part in span.split(":") if NUMBER.fullmatch(part)]

@@ -4,30 +4,32 @@
 false group in a scene without true groups is no failure of group_F1. `late split` is a kind of error of `flockscope
 errors` that occurs at least once, `switch:hidden` one of this kind with this cause. `crash` is an error that the
 tracker raises.
+
+An error that the start explains does not count: it must last until its people have been in view for the time that a
+tracker needs to report them, 0.5 s, or their group, 2 s. Else each failure would become a scene of a few frames.
 """
 
 from __future__ import annotations
 
-import operator
 import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from operator import ge, gt, le, lt
 from typing import get_args
 
 from scenarios.errors import FlockscopeError, InputError, WorkError
-from scenarios.loading.toml_files import closest, did_you_mean
+from scenarios.loading.toml_files import did_you_mean
 from scenarios.schema.scenario import Scenario
-from sim.types import Sequence
+from sim.truth.merge_split_rules import HOLD_TIME
+from sim.types import Sequence, Truth
 from tracking.errors import groups
-from tracking.errors.causes import CAUSES
-from tracking.errors.people import PersonKind
+from tracking.errors.causes import CAUSES, CONFIRMED, CUT
+from tracking.errors.people import PersonError, PersonKind
 from tracking.running.run import TrackingRun
 from tracking.scoring.catalogue import CATALOGUE
 
-OPERATORS: dict[str, Callable[[float, float], bool]] = {
-    "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge
-}  # fmt: skip
+OPERATORS: dict[str, Callable[[float, float], bool]] = {"<": lt, "<=": le, ">": gt, ">=": ge}
 COMPARISON = re.compile(r"\s*([\w-]+)\s*(<=|>=|<|>)\s*(-?[0-9.]+)\s*")
 CRASH = "crash"
 KINDS = (*get_args(PersonKind), *groups.KINDS, CRASH)
@@ -80,13 +82,13 @@ def parse_failure(text: str) -> Failure:
     if found is None:
         kind, _, cause = (part.strip() for part in text.partition(":"))
         if kind not in KINDS:
-            raise _wrong(text, expected, did_you_mean(kind, list(KINDS)))
+            raise _wrong(text, expected, did_you_mean(kind, KINDS))
         if ":" in text and (cause not in CAUSES or kind == CRASH):
-            raise _wrong(text, f"a cause: {', '.join(CAUSES)}", did_you_mean(cause, list(CAUSES)))
+            raise _wrong(text, f"a cause: {', '.join(CAUSES)}", did_you_mean(cause, CAUSES))
         return Failure(text.strip(), kind=kind, cause=cause)
     score, beyond, number = found.groups()
     if score not in CATALOGUE:
-        raise _wrong(text, "a score of docs/reference/metrics.md", f"did you mean {closest(score, CATALOGUE)}?")
+        raise _wrong(text, "a score of docs/reference/metrics.md", did_you_mean(score, CATALOGUE, "choose one of them"))
     try:
         return Failure(f"{score}{beyond}{number}", score, beyond, float(number))
     except ValueError:
@@ -127,12 +129,12 @@ def play_episode(
             if failure.score and failure.holds(Judgement(scores)):
                 best = scorer.evaluate(oracle(sequence, tracked.info))[failure.score]
                 scores = {key: value for key, value in scores.items() if key != failure.score or best == best}
-        return Judgement(scores, _errors(failure, sequence, tracked), people)
+        return Judgement(scores, _errors(failure, sequence, truth, tracked), people)
     except FlockscopeError as error:
         return Judgement(problem=error)
 
 
-def _errors(failure: Failure, sequence: Sequence, run: TrackingRun) -> frozenset[tuple[str, str]]:
+def _errors(failure: Failure, sequence: Sequence, truth: Truth, run: TrackingRun) -> frozenset[tuple[str, str]]:
     from tracking.errors.found import errors_of_run, find_errors
 
     if failure.kind in ("", CRASH):
@@ -140,4 +142,12 @@ def _errors(failure: Failure, sequence: Sequence, run: TrackingRun) -> frozenset
     # Only causes need the oracle, which says who was detected.
     quick = not failure.cause and all(t.unit == "person" for t in run)
     found = (find_errors if quick else errors_of_run)(sequence, run, costs=0, causes=False)
-    return frozenset((one.error.kind, one.cause.name) for one in found.errors)
+    return frozenset((one.error.kind, one.cause.name) for one in found.errors if _outlasts_start(one.error, truth))
+
+
+def _outlasts_start(error: PersonError | groups.GroupError, truth: Truth) -> bool:
+    """Returns True if an error goes on when its people have been in view for long enough to be reported."""
+    people, time = ((error.person,), CONFIRMED) if isinstance(error, PersonError) else (error.people, HOLD_TIME)
+    inside = truth.truncation is None or truth.truncation <= CUT
+    seen = (truth.frame[(truth.id == person) & inside].tolist() for person in people)  # a ghost concerns nobody
+    return error.end - max((min(frames, default=0) for frames in seen), default=0) >= time * truth.fps

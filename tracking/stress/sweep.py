@@ -114,9 +114,8 @@ class Sweep:
         for tracker in self.trackers.values():
             tracker.check_input(first, plan.detections, None)
         for k, axis in enumerate(plan.axes):
-            (other, *_) = sources(
-                plan.scenarios, plan.seeds[:1], plan.settings_at((*easy[:k], axis.hard, *easy[k + 1 :]))
-            )
+            hard = (*easy[:k], axis.hard, *easy[k + 1 :])
+            (other, *_) = sources(plan.scenarios, plan.seeds[:1], plan.settings_at(hard))
             if plan.detections != "image" and _content(first) == _content(other):
                 raise InputError(
                     place="--vary", got=axis.name, expected="an axis that changes the scenes",
@@ -156,9 +155,7 @@ class Sweep:
         if name == ORACLE:
             return OracleTask(str(self._first.tracker), source, self.plan.detections)
         tracker = self.trackers[name]
-        return EpisodeTask(
-            tracker.tracker, source, {}, self.plan.detections, True, tracker.code, tracker.step_timeout
-        )  # fmt: skip
+        return EpisodeTask(tracker.tracker, source, {}, self.plan.detections, True, tracker.code, tracker.step_timeout)
 
     @property
     def _first(self) -> TunedTracker:

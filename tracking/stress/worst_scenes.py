@@ -63,16 +63,13 @@ class SearchedScene:
         return max(0.0, 1 - apart / NEAR)
 
 
-def search(
-    sweep: Sweep, count: int, seed: int = 0, sampler: optuna.samplers.BaseSampler | None = None
-) -> list[SearchedScene]:
+def search(sweep: Sweep, count: int, seed: int = 0) -> list[SearchedScene]:
     """Searches for scenes in which the first tracker of a sweep falls short of the oracle.
 
     Args:
         sweep: Gives the plan, the trackers and the store of episodes. The search ends early if its budget is spent.
         count: Number of scenes to play.
         seed: Seed of the search.
-        sampler: Optuna's sampler that draws scenes; None takes TPE.
 
     Returns:
         All scenes on which both scores are known, in the order in which they were drawn.
@@ -92,7 +89,7 @@ def search(
     tracker, found = next(iter(sweep.trackers)), list[SearchedScene]()
     with quiet_optuna():
         tpe = optuna.samplers.TPESampler(seed=seed, n_startup_trials=0, multivariate=True, constant_liar=True)
-        study = optuna.create_study(direction="maximize", sampler=sampler or tpe)
+        study = optuna.create_study(direction="maximize", sampler=tpe)
         for first in range(0, count, BATCH):
             if sweep.spent():
                 break
@@ -123,9 +120,8 @@ def worst(found: Sequence[SearchedScene], most: int = LISTED) -> list[SearchedSc
 
 def _quarters(found: Sequence[SearchedScene]) -> int:
     """Returns how many of four scenes the sampler draws: 2, 3 if its mean shortfall is greater, 1 if it is smaller."""
-    drawn, random = (
-        np.array([failure.shortfall for failure in found if failure.sampled is sampled]) for sampled in (True, False)
-    )
+    drawn = np.array([failure.shortfall for failure in found if failure.sampled])
+    random = np.array([failure.shortfall for failure in found if not failure.sampled])
     if len(drawn) < 2 or len(random) < 2:
         return 2
     gain = drawn.mean() - random.mean()

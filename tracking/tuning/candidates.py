@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scenarios.errors import FlockscopeError, InputError, WorkError, counted
-from scenarios.loading.toml_files import closest
+from scenarios.loading.toml_files import did_you_mean
 from sim.dataset.generate import LEFT_OUT
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source
@@ -74,7 +74,7 @@ def goals_of(keys: Iterable[str]) -> tuple[Goal, ...]:
     allowed = [SPEED, *(key for key, score in CATALOGUE.items() if score.better != "neither")]
     for key in dict.fromkeys(keys):
         if key not in allowed:
-            remedy = f"did you mean {closest(key, allowed)}? docs/reference/metrics.md lists them"
+            remedy = did_you_mean(key, allowed, "choose another:") + " docs/reference/metrics.md lists them"
             expected = f"a score with a better direction, or {SPEED}"
             raise InputError(place="--objective", got=key, expected=expected, remedy=remedy)
         found.append(Goal(key, key == SPEED or CATALOGUE[key].better == "higher"))

@@ -45,9 +45,10 @@ def test_a_file_is_loaded_anew_where_it_has_changed(tmp_path):
 
 
 SPECS = [
-    ("blop", "did you mean blob"), ("{mine}:None_", "a class of this module"), ("{mine}:", "a class of this module"),
-    ("{mine}:Nothing", "no needs, reset, step"), ("{mine}:function", "got a function; expected a class"),
-    ("{leaves}:Mine", "SystemExit: 3"), (":Mine", "Empty module name"), ("{missing}:Mine", "no such file"),
+    ("blop", "did you mean blob"), ("nope", "choose one. Your"), ("{mine}:None_", "a class of this module"),
+    ("{mine}:", "a class of this module"), ("{mine}:Nothing", "no needs, reset, step"),
+    ("{mine}:function", "got a function; expected a class"), ("{leaves}:Mine", "SystemExit: 3"),
+    (":Mine", "Empty module name"), ("{missing}:Mine", "no such file"),
     ("{alone}:Mine", "No module named 'wE_missing'; .*put its file beside the tracker's"),
     ("{broken}:Mine", "ZeroDivisionError"), ("no.such.module:Mine", "ModuleNotFoundError"),
 ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -136,8 +137,9 @@ def _sequence_of(info: Mapping[str, Any]) -> Path | None:
 def _write(out: Path, search: Minimizer, scene: Scene, setup: TrackerSetup) -> Scenario:
     """Writes the smallest scene as a scenario file, and returns it as it is read again."""
     about = f"{scene.scenario.name} made small: {setup.tracker} has {search.failure.text}"
-    small = search.smallest.model_copy(update={"about": about})
-    write_file(out, f"# {_command(out, scene, setup)}\n{dump(small, defaults=False)}".encode())
+    small = dump(search.smallest.model_copy(update={"about": about}), defaults=False)
+    small = re.sub(r"^(size = \d+)\.0$", r"\1", small, flags=re.MULTILINE)  # of groups
+    write_file(out, f"# {_command(out, scene, setup)}\n{small}".encode())
     return load(out)
 
 

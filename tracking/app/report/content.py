@@ -22,6 +22,7 @@ class Played:
 
     name: str
     scenario: str
+    scene: str  # scenario and seed, the same at all values of the axes of a sweep
     sequence: str
     score: float  # nan where unknown
     best: float  # the oracle's score, nan without one

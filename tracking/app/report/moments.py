@@ -31,19 +31,19 @@ Runs = Callable[[Played, str], tuple[Sequence, Run, Run | None]]  # the sequence
 
 def chosen(played: SequenceOf[Played], most: int = MOST) -> list[Played]:
     """Returns at most `most` runs to show. The trackers take turns; each time a tracker's worst run that is left is
-    taken, if possible of a scenario not yet shown for it. Runs that are no worse than the oracle are left out."""
-    waiting: dict[str, list[Played]] = {}
+    taken, if possible of a scenario not yet shown for it. Each scene is shown once, by its worst run. Runs that are no
+    worse than the oracle are left out."""
+    waiting: dict[str, dict[str, Played]] = {}  # by tracker and scene, worst first
     bad = [one for one in played if not one.why and one.shortfall > 0]
     for one in sorted(bad, key=lambda one: -one.shortfall):
-        waiting.setdefault(one.name, []).append(one)
+        waiting.setdefault(one.name, {}).setdefault(one.scene, one)
     shown: list[Played] = []
     while len(shown) < most and any(waiting.values()):
         for name, left in waiting.items():
             if left and len(shown) < most:
                 seen = {one.scenario for one in shown if one.name == name}
-                new = next((one for one in left if one.scenario not in seen), left[0])
-                left.remove(new)
-                shown.append(new)
+                new = next((one for one in left.values() if one.scenario not in seen), next(iter(left.values())))
+                shown.append(left.pop(new.scene))
     return sorted(shown, key=lambda one: -one.shortfall)
 
 

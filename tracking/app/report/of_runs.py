@@ -91,4 +91,5 @@ def _played(ranked: RankedRuns) -> Iterator[Played]:
         for k, sequence in enumerate(c.sequences):
             score = float(c.scores[name][k][ranked.key])
             best = next((float(row[ranked.key]) for rows in oracles if (row := rows[k]) is not None), math.nan)
-            yield Played(name, scenario[k], sequence, score, best, "" if math.isfinite(score) else "not scored")
+            why = "" if math.isfinite(score) else "not scored"
+            yield Played(name, scenario[k], sequence, sequence, score, best, why)

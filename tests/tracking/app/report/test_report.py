@@ -19,7 +19,7 @@ EMPTY = content.Report("Two trackers", "about", "HOTA", [])
 
 
 def candidate(name: str, scenario: str, score: float) -> content.Played:
-    return content.Played(name, scenario, f"{scenario}-s{score}", score, 0.9)
+    return content.Played(name, scenario, f"{scenario}-s{score}", f"{scenario}-s{score}", score, 0.9)
 
 
 def full(name: str) -> content.Report:
@@ -77,6 +77,7 @@ def test_moments_are_shared_among_trackers_and_scenarios() -> None:
     found = chosen([*bad, *good], most=3)
     assert [(one.name, one.scenario) for one in found] == [("a", "merge"), ("a", "split"), ("b", "merge")]
     assert len(chosen([*bad, *good])) == 10, "without other scenarios the same one again"
+    assert [p.score for p in chosen([replace(p, scene="seed 1") for p in bad])] == [0.1], "a scene once, its worst run"
 
 
 def test_a_report_stays_small(monkeypatch: pytest.MonkeyPatch) -> None:
