@@ -17,7 +17,7 @@ import numpy as np
 
 from sim.truth.group_ids_and_changes import GroupChange, PersonSet, group_changes
 from sim.truth.merge_split_events import connected
-from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, SPLIT_DISTANCE, frames_of, separation, stretches
+from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, frames_of, separation, stretches
 from sim.truth.motion_rows import MotionRows, frames_of_change
 from sim.types import Bools, GroupEvent, Ints
 
@@ -51,8 +51,6 @@ class TrackedMotion:
         # while a part is hidden, what was seen last still holds
         seen = np.maximum.accumulate(np.where(there, np.arange(len(pos)), 0))
         near, *rules = (self._lasting(holds[seen]) for holds in (found.distance < MERGE_DISTANCE, apart, together))
-        # parts that are far apart when they are first seen may have been so for long
-        rules[0] |= np.logical_and.accumulate(found.distance[seen] > SPLIT_DISTANCE) & np.logical_or.accumulate(there)
         before, after = rules if joins else rules[::-1]
         if not before.any():
             return None
