@@ -116,6 +116,6 @@ def test_settings_with_dots_are_keys_of_a_table(merge):
     )
     assert all(map(np.array_equal, whole, dotted))
     assert not any(map(np.array_equal, whole, exact))
-    for sensor, words in (({"noise_px": 3}, "or 'box_noise'"), ({"noise_m.x": 3}, "sensor.noise_m")):
+    for sensor, words in (({"noise_px": 3}, "or box_noise"), ({"noise_m.x": 3}, "sensor.noise_m")):
         with pytest.raises(InputError, match=words):
             from_truth(merge, sensor, 0)
