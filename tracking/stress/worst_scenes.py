@@ -63,13 +63,16 @@ class SearchedScene:
         return max(0.0, 1 - apart / NEAR)
 
 
-def search(sweep: Sweep, count: int, seed: int = 0) -> list[SearchedScene]:
+def search(
+    sweep: Sweep, count: int, seed: int = 0, sampler: optuna.samplers.BaseSampler | None = None
+) -> list[SearchedScene]:
     """Searches for scenes in which the first tracker of a sweep falls short of the oracle.
 
     Args:
         sweep: Gives the plan, the trackers and the store of episodes. The search ends early if its budget is spent.
         count: Number of scenes to play.
         seed: Seed of the search.
+        sampler: Optuna's sampler that draws scenes; None takes TPE.
 
     Returns:
         All scenes on which both scores are known, in the order in which they were drawn.
@@ -89,7 +92,7 @@ def search(sweep: Sweep, count: int, seed: int = 0) -> list[SearchedScene]:
     tracker, found = next(iter(sweep.trackers)), list[SearchedScene]()
     with quiet_optuna():
         tpe = optuna.samplers.TPESampler(seed=seed, n_startup_trials=0, multivariate=True, constant_liar=True)
-        study = optuna.create_study(direction="maximize", sampler=tpe)
+        study = optuna.create_study(direction="maximize", sampler=sampler or tpe)
         for first in range(0, count, BATCH):
             if sweep.spent():
                 break
