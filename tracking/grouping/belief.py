@@ -59,6 +59,11 @@ class Belief:
     come: float = 1.2
     memory: float = 1.0  # (s): a missed member stays so long in the group
 
+    @property
+    def neutral(self) -> float:
+        """Log-odds that change nothing: in the middle between linking two people and separating them."""
+        return (self.come - self.stay) / 2
+
     def as_dict(self) -> dict[str, object]:
         """Returns the entries of run.json about the belief: kind, bias, its numbers, and a hash of `toml_text`."""
         text, numbers = self.toml_text().encode(), {name: getattr(self, name) for name in NUMBERS}

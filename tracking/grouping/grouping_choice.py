@@ -102,7 +102,7 @@ def belief_groups(
     row = np.concatenate([np.arange(len(pair)), order[row]])
     step = np.concatenate([found.step, at])
     # What cannot be seen changes nothing: such pairs are linked if they were in one group in the step before.
-    log_odds = np.concatenate([found.log_odds[:, 1], np.full(len(at), (belief.come - belief.stay) / 2)])
+    log_odds = np.concatenate([found.log_odds[:, 1], np.full(len(at), belief.neutral)])
     order = np.argsort(step, kind="stable")
     row, step, log_odds = row[order], step[order], log_odds[order]
     pairs = (step, found.a[row], found.b[row])

@@ -156,12 +156,17 @@ class TextRows:
 
 
 def read_rows(path: Path, heading: bool = False) -> TextRows:
-    """Returns the rows of the text file `path`, without comments: lines that begin with #.
+    """Returns the rows of the text file `path`. heading: as of `rows_among`."""
+    return rows_among(path, read_text(path).splitlines(), heading)
+
+
+def rows_among(path: Path, lines: list[str], heading: bool = False) -> TextRows:
+    """Returns the rows among the first lines of the text file `path`, without comments: lines that begin with #.
 
     heading: True keeps, without its #, the last comment before the first row that may name the columns: it has as many
     cells as that row, none of which is a number.
     """
-    numbered = [(k, line) for k, line in enumerate(read_text(path).splitlines(), 1) if line.strip()]
+    numbered = [(k, line) for k, line in enumerate(lines, 1) if line.strip()]
     found = [(k, line) for k, line in numbered if line[:1] != "#"]
     if heading and found:
         above = [(k, line.lstrip("# ")) for k, line in numbered[: numbered.index(found[0])]]

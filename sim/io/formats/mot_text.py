@@ -30,8 +30,7 @@ from sim.io.files.numeric_text import LARGEST
 from sim.io.formats.biwi import labels_of
 from sim.io.formats.labelled_truth import centres, differentiate, labelled_sequence, with_labels
 from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, read_table, require_pixels
-from sim.io.formats.options import NO_OPTIONS, BoxOptions, Classes, RecordingOptions
-from sim.io.formats.video import RATES
+from sim.io.formats.options import NO_OPTIONS, RATES, BoxOptions, Classes, RecordingOptions
 from sim.scene.camera import scale_of_all_boxes
 from sim.types import Array, Bools, Detections, Frame, Ints, Plane, Sequence, Truth, Unscored
 

@@ -14,6 +14,7 @@ from sim.io.pictures.background_sample import BackgroundChoice
 from sim.types import Camera
 
 Classes = tuple[str, ...]  # words, in lower case, or numbers as words
+RATES = (0.1, 300.0)  # plausible frames/s of a recording whose times are known
 BoxScale = tuple[float, float]  # factors of x and y that make the boxes of a text pixels of the pictures
 
 

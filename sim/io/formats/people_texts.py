@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, is_number
 from scenarios.reading import parse_json
-from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_nan, read_rows, read_text
+from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_nan, read_rows, read_text, rows_among
 from sim.io.formats.biwi import frame_numbers
 from sim.io.formats.labelled_truth import labelled_sequence
 from sim.io.formats.mot_table import table_of_rows
@@ -50,9 +49,11 @@ def layout_of(path: Path) -> str | None:
     """Returns the key of LAYOUTS for a text, by its ending, comments or first line; None if none fits."""
     if path.suffix.lower() == NDJSON:
         return "trajnet"
-    if any(PEDPY.match(line) for line in islice(read_text(path).splitlines(), 1000)):
+    lines = read_text(path).splitlines()
+    if any(PEDPY.match(line) for line in lines[:1000]):
         return "pedpy"
-    cells = next(iter(read_rows(path, heading=True).text), "").split()
+    first = next((k for k, line in enumerate(lines) if line.strip() and line[:1] != "#"), 0)
+    cells = next(iter(rows_among(path, lines[: first + 1], heading=True).text), "").split()
     numbers = [not math.isnan(number_or_nan(cell)) for cell in cells[:4]]
     if len(cells) == 4 and all(numbers):
         return "eth"

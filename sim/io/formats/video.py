@@ -15,7 +15,7 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.formats.calibration import scaled_to_image
-from sim.io.formats.options import NO_OPTIONS, RecordingOptions
+from sim.io.formats.options import NO_OPTIONS, RATES, RecordingOptions
 from sim.io.pictures import video_files
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import fill_gaps, require_size, size_of
@@ -25,7 +25,6 @@ SUFFIXES = (
     ".mp4", ".m4v", ".mov", ".3gp", ".mkv", ".webm", ".avi", ".wmv", ".flv", ".ogv", ".mpg", ".mpeg",
     ".ts", ".mts", ".m2ts", ".h264", ".h265", ".hevc", ".y4m",
 )  # fmt: skip
-RATES = (0.1, 300.0)  # plausible frames/s
 AGREE = 0.02  # relative difference allowed between the container's rate and that of the time stamps
 GAP, GAPS = 1.0, 5.0  # a gap without frames is reported if longer than 1 s and than 5 usual steps
 DEFAULT_FPS = 25.0

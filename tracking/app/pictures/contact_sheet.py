@@ -156,12 +156,12 @@ def _draw_title(area: Image, layer: Layer, index: int, fps: float) -> None:
     events = sorted(near, key=lambda event: SHOWN_KINDS[event.kind])
     words = f"{(index - 1) / fps:.1f} s" + "".join(f"   {event_words(event, layer.prefix)}" for event in events)
     ink = kind_colour(events[0].kind) if events else QUIET
-    text(area, shortened(words), (2, TITLE - 12), 0.72, ink, 2 if events else 1)
+    text(area, fitting_title(words), (2, TITLE - 12), 0.72, ink, 2 if events else 1)
     border = (ink, 5) if events else (THING, 2)
     cv2.rectangle(area, (0, TITLE), (area.shape[1] - 1, area.shape[0] - 1), *border)
 
 
-def shortened(title: str) -> str:
+def fitting_title(title: str) -> str:
     """Returns a title of at most 62 letters, with as many whole events as fit."""
     return title if len(title) <= 62 else f"{title[:59].rpartition('   ')[0]} ..."
 

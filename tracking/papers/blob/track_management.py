@@ -227,7 +227,8 @@ class TrackedPeople:
         HP = H @ P
         K = np.swapaxes(np.linalg.solve(HP @ np.swapaxes(H, 1, 2) + R, HP), 1, 2)
         self.stand[rows] = x + (K @ (box[:, :3] - z[:, 0])[..., None])[..., 0]
-        self.stand_cov[rows] = P - (K @ HP + np.swapaxes(K @ HP, 1, 2)) / 2
+        known = K @ HP
+        self.stand_cov[rows] = P - (known + np.swapaxes(known, 1, 2)) / 2
 
     def place_on_ground(self, camera: Camera, box: Array) -> None:
         """Starts `stand` of tracks without it where their boxes stand; box (N, 4): centre x, y, height, width, px."""

@@ -107,7 +107,7 @@ class ReportedEvents:
         belief, group = default_belief(), np.full((2, len(id)), -1)
         group[0] = known_groups(self.people.identities.groups, id)
         # the memory decides of people who are missed: what cannot be seen changes nothing
-        value = np.where(np.isnan(log_odds), (belief.come - belief.stay) / 2, log_odds)
+        value = np.where(np.isnan(log_odds), belief.neutral, log_odds)
         a, b = np.nonzero(np.triu(value != UNSEEN, 1))
         linked_groups(np.array([0, 0, len(a)]), a, b, value[a, b], UNSEEN, belief.stay, belief.come, group)
         return [frozenset(id[group[1] == g].tolist()) for g in np.unique(group[1][group[1] >= 0])]

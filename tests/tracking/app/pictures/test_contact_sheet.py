@@ -39,7 +39,7 @@ def test_onsets_come_first_and_gaps_are_filled() -> None:
 def test_events_of_all_parts_are_shown_and_titles_have_whole_ones() -> None:
     layer = layer_of_truth(bare(1000, dict.fromkeys(range(20, 1000, 20), "merge")))
     assert max(np.diff([1, *contact_sheet.choose_frames(layer, 1000, 10.0, 8), 1000])) < 300
-    assert contact_sheet.shortened("1.0 s" + "   split G1 -> G2" * 4) == "1.0 s" + "   split G1 -> G2" * 3 + " ..."
+    assert contact_sheet.fitting_title("1.0 s" + "   split G1 -> G2" * 4) == "1.0 s" + "   split G1 -> G2" * 3 + " ..."
 
 
 @settings(deadline=None)
