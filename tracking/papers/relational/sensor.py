@@ -1,8 +1,9 @@
 """The weights of `relational` (secs. 2.1, 3.3): how well each particle explains a frame's detections.
 
 The paper sums, over every mapping of detections to people, the product of the probabilities of the pairs. This sum is
-p(z_t | s^a_t) of eq. 6. Ours, without effect on the paper's sensor: missed people and false alarms; the probability
-that each person exists, which is computed for each particle and not drawn; a sum for each person, all others averaged.
+p(z_t | s^a_t) of eqs 6 and 12. Ours, without effect on the paper's sensor: missed people and false alarms; displaced
+detections; the probability that each person exists, which is computed for each particle and not drawn; a sum for each
+person, all others averaged; factors of the partners of missed people.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 Cattelani, Manfredotti, Messina, "Multiple object tracking with relations", ICPRAM 2012. The state of a particle is s =
 (s^a, s^r) (eq. 5): attributes s^a, place x and velocity v of each person; relations s^r, which pairs of people walk
-together. z are the detections of a frame, w the weights. The steps of a frame:
+together. z are the detections of a frame, w the weights. The steps of a frame sample eq. 14, those of `particle` eq. 4;
+eqs 1 to 3 and 9 to 13 derive them:
 
     forecast  s^a ~ p(s^a_t | s^a_t-1, s^r_t-1)  attributes from old relations  eq. 8, sec. 3.2      transition_kernels
               v = u - B u / |u| + C e, x = x + v dt; u the old mean velocity of the group, B and C the row of
@@ -14,12 +15,13 @@ together. z are the detections of a frame, w the weights. The steps of a frame:
     estimate  means over particles                                                                   particle_set
     resample  residual sampling                                                 sec. 2.1             filters.resampling
 
-Readings: eqs 2, 8 and 10 condition on earlier states only. Eq. 13 lacks the normaliser of eqs 4 and 14. Eq. 14 ends
-with the posterior of the frame before. Table 3 is read with B and C in m per frame, and C per axis; the mean speed of a
-group is the mean of velocity vectors, and its members have the row of this mean. If people and detections differ in
-number, a mapping maps all of the fewer ones. The sensor's noise is the same along both axes and everywhere; a
-newcomer's place has it, too. Positions advance by the new velocity. A newcomer is alone with probability 1/2; people
-alone are groups of one. The estimate is the mean over the particles before they are resampled.
+Readings: eqs 2 and 10 condition on earlier states, too; eq. 8 on earlier states and detections only. Eq. 13 lacks the
+normaliser of eqs 4 and 14. Eq. 14 ends with the posterior of the frame before. Table 3 is read with B and C in m per
+frame, and C per axis; the mean speed of a group is the mean of velocity vectors, and its members have the row of this
+mean. If people and detections differ in number, a mapping maps all of the fewer ones. The sensor's noise is the same
+along both axes and everywhere; a newcomer's place has it, too. Positions advance by the new velocity. A newcomer is
+alone with probability 1/2; people alone are groups of one. The estimate is the mean over the particles before they are
+resampled.
 
 Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_distance` x distance -
 `relation_velocity` x difference of velocities. A star marks those that stay in the preset `paper`:
@@ -31,9 +33,9 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
 - relation dynamics*: with the hazard `relation_rate` / 2 a person redraws all relations: to those whose g is above one
   uniform number; in the preset the groups of these unite. Only near people start to walk together. Paper: not stated;
   with a limited number of others. Why: it starts and stops at a rate.
-- evidence: for the relation dynamics, l is the belief about the tracks reported before this frame; the belief is also
-  what `walking_together()` returns (`relation_evidence`). Paper: the particle's new state; the posterior. Why: it looks
-  back for seconds.
+- evidence: for the relation dynamics, l is the belief about the tracks reported before this frame, the same in all
+  particles; `walking_together()` returns that belief with this frame (`relation_evidence`). Paper: the particle's new
+  state (eq. 7); the posterior. Why: the belief looks back for seconds.
 - unreported people: without a track in the belief's last step, relations stay as they are (`relation_evidence`). Paper:
   forecast. Why: no belief about them.
 - coupling: approached within `coupling_time`; partners weighted by existence and, with the belief
@@ -56,8 +58,8 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
 - sums*: exact up to a size, then belief propagation; in the preset each set of people and detections that are linked by
   reach in some particle is mapped by itself, without pairs that are negligible beside the best mapping, else only pairs
   in reach and not improbable. Paper: all mappings. Why: exponential cost; nobody becomes a newcomer far away.
-- pixels*: blobs; large ones are divided by k-means, small ones left out. In the image*: centres of boxes, at one scale.
-  Paper: feet of boxes on the ground. Why: no calibration.
+- pixels*: blobs of a background that adapts (`background`; not in the preset); large ones are divided by k-means, small
+  ones left out. In the image*: centres of boxes, at one scale. Paper: feet of boxes on the ground. Why: no calibration.
 - boxes*: reported in the image, with sizes that follow the measured ones. Paper: none. Why: they are shown and scored.
 - frames without measurement*: forecast alone; the window of deaths stands still. Paper: each frame is measured. Why:
   nobody could be seen.
@@ -72,15 +74,16 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
   too.
 - newcomers*: at most half join a group, by g at the distance of the nearest member times existence. Paper: half join a
   group. Why: far groups are improbable.
-- weights: one for each person, others averaged; a missed person has the partners'. Paper: one for a particle. Why: many
-  people, few particles.
+- weights: one for each person, others averaged; that of a missed person is multiplied by the likelihoods of partners
+  who are related in the particle. Paper: one for a particle, by attributes alone (eq. 6). Why: many people, few
+  particles.
 - resampling: of people with few effective particles, with a kernel. Paper: each frame. Why: equal particles.
 - resampled relations: drawn with each person alone. Paper: with the particle. Why: weights are people's.
 - groups*: reported ones are derived from the tracks. Paper: in the state. Why: particles differ in groups.
 
-Fitted, as the paper leaves them open (see the presets): B and C of the rows of Table 3 and the sensor's noise at our
-frame rate, on fitting seeds (the preset `caviar-25fps` has Table 3 as printed); the relation's rate, bias and weights
-of distance and velocity, on training seeds. Not fitted: `time_window`, the spread of a newcomer's velocity, the number
+Fitted, as the paper leaves them open (see the presets): B and C of Table 3, in the preset `paper` also the noise of
+positions, on fitting seeds (the preset `caviar-25fps` has Table 3 as printed); the relation's rate, bias and weights of
+distance and velocity, on training seeds. Not fitted: `time_window`, the spread of a newcomer's velocity, the number
 of particles (the paper: 500 to 4000).
 """
 
