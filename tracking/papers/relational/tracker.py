@@ -33,9 +33,9 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
 - relation dynamics*: with the hazard `relation_rate` / 2 a person redraws all relations: to those whose g is above one
   uniform number; in the preset the groups of these unite. Only near people start to walk together. Paper: not stated;
   with a limited number of others. Why: it starts and stops at a rate.
-- evidence: for the relation dynamics, l is the belief about the tracks reported before this frame, the same in all
-  particles; `walking_together()` returns that belief with this frame (`relation_evidence`). Paper: the particle's new
-  state (eq. 7); the posterior. Why: the belief looks back for seconds.
+- evidence: for the relation dynamics, l is the belief about the tracks reported before this frame, measured or
+  predicted, the same in all particles; `walking_together()` returns that belief with this frame (`relation_evidence`).
+  Paper: the particle's new state (eq. 7); the posterior. Why: the belief looks back for seconds.
 - unreported people: without a track in the belief's last step, relations stay as they are (`relation_evidence`). Paper:
   forecast. Why: no belief about them.
 - coupling: approached within `coupling_time`; partners weighted by existence and, with the belief
