@@ -15,8 +15,8 @@ KINDS = {
     "x264.mp4": {}, "long-groups.mp4": {"options": {"g": "250", "bf": "3"}}, "h264-in.avi": {},
     "mpeg4.avi": {"codec": "mpeg4"}, "jpegs.avi": {"codec": "mjpeg", "pix_fmt": "yuvj420p"},
     "mpeg2.mpg": {"codec": "mpeg2video", "rate": 25}, "transport.ts": {"rate": 25}, "bare.h264": {"rate": 25},
-    "bare.y4m": {"codec": "wrapped_avframe"}, "media.wmv": {"codec": "wmv2"}, "vp9.webm": {"codec": "libvpx-vp9"}, "vp8.webm": {"codec": "libvpx"},
-    "quick.mov": {"audio": True}, "grey.mkv": {"codec": "ffv1", "pix_fmt": "gray"},
+    "bare.y4m": {"codec": "wrapped_avframe"}, "media.wmv": {"codec": "wmv2"}, "vp9.webm": {"codec": "libvpx-vp9"},
+    "vp8.webm": {"codec": "libvpx"}, "quick.mov": {"audio": True}, "grey.mkv": {"codec": "ffv1", "pix_fmt": "gray"},
     "10-bit.mkv": {"codec": "ffv1", "pix_fmt": "yuv420p10le"},
 }  # fmt: skip
 
