@@ -156,9 +156,9 @@ DRAWS = {
 
 WITHOUT_ARITHMETIC = {
     "scipy.optimize.linear_sum_assignment", "scipy.sparse.coo_array", "scipy.sparse.csgraph.connected_components",
-    "scipy.sparse.csgraph.dijkstra",
+    "scipy.sparse.csgraph.dijkstra", "scipy.spatial.cKDTree",
 }  # fmt: skip
-"""Of scipy only what adds and compares."""
+"""Of scipy only what adds and compares, or proposes."""
 
 
 def by_processor(node: ast.AST) -> str | None:

@@ -260,9 +260,6 @@ def _low_ground(camera: Camera) -> Array:
 ROTATION_TOLERANCE = 0.01  # difference of R Rᵀ from the identity: rotations are often written with three decimals
 FOCAL = (0.1, 100.0)  # focal length in widths of the image: a fisheye has some 0.3, a telescope 50
 ASPECT = 2.0  # greatest ratio of the two focal lengths
-CENTRE = 1.0  # by how many image sizes the image centre may lie outside the image
-FOLD = -1 / 3  # least radial r² at the image's corner: below it the lens would show two points at one place
-BULGE = 10.0  # greatest radial r² there
 DOWN = 0.99  # least downward part of the forward axis of a camera of kind "top"
 
 
@@ -300,16 +297,11 @@ def _facts(camera: Camera) -> Iterator[tuple[str, bool, str, str]]:
 
 
 def _lens(camera: Camera) -> Iterator[tuple[str, bool, str, str]]:
-    size, focal, centre = np.array(camera.image), np.array(camera.focal_px), np.array(camera.centre_px)
+    size, focal = np.array(camera.image), np.array(camera.focal_px)
     (w, h), low, high = camera.image, FOCAL[0] * size.max(), FOCAL[1] * size.max()
     got = f"focal_px {list(camera.focal_px)}, centre_px {list(camera.centre_px)} for {w}×{h}"
     alike = ((focal >= low) & (focal <= high)).all() and focal.max() <= ASPECT * focal.min()
     yield "focal_px", bool(alike), got, f"two like focal lengths from {low:g} to {high:g} px"
-    near = ((centre >= -CENTRE * size) & (centre <= (1 + CENTRE) * size)).all()
-    yield "centre_px", bool(near), got, "an image centre near the image"
-    bend = camera.radial * float(np.square(np.maximum(np.abs(centre), np.abs(size - centre)) / focal).sum())
-    got, expected = f"a lens with radial r² = {bend:.3g} at the image's corner", f"from {FOLD:.2f} to {BULGE:g} there"
-    yield "radial", FOLD < bend <= BULGE, got, expected
 
 
 def project_pair(camera: Camera, xyz: Array) -> Array:

@@ -8,7 +8,6 @@ over time; its methods apply the rules frame by frame; `holds_for` finds the fra
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,46 +78,22 @@ def mean_of_present(values: Array) -> Array:
         return np.asarray(total / there.sum(axis=1)[:, None])
 
 
-CHUNK = 200_000  # rows handled together: bounds memory
-
-
 def close_pairs(frame: Ints, pos: Array, reach: float) -> tuple[Ints, Ints]:
     """Returns the indices i and j, (K,) each, of all pairs of rows in the same frame that are less than `reach` apart.
 
     i < j, and pairs are sorted by i, then j. frame (R,): ascending. pos (R, 2): finite, in the unit of `reach`.
     """
-    found = [_pairs_of(frame, pos, low, high, reach) for low, high in _portions(frame)]
-    i, j = (np.concatenate([np.zeros(0, np.int64), *(f[k] for f in found)]) for k in (0, 1))
+    from scipy.spatial import cKDTree
+
+    # One tree for all frames, which lie further apart than `reach` along its first axis. It only proposes pairs: the
+    # result is the same on every processor.
+    tree = cKDTree(np.column_stack([frame * (2 * reach), pos]))
+    i, j = tree.query_pairs(reach * (1 + 1e-9), output_type="ndarray").T
+    apart = pos[i] - pos[j]
+    close = dot(apart, apart) < reach * reach
+    i, j = i[close], j[close]
     order = np.lexsort((j, i))
     return i[order], j[order]
-
-
-def _portions(frame: Ints) -> Iterator[tuple[int, int]]:
-    """Yields half-open ranges of rows that hold whole frames, of about CHUNK rows."""
-    low = 0
-    while low < len(frame):
-        high = int(np.searchsorted(frame, frame[min(low + CHUNK, len(frame)) - 1], side="right"))
-        yield low, high
-        low = high
-
-
-def _pairs_of(frame: Ints, pos: Array, low: int, high: int, reach: float) -> tuple[Ints, Ints]:
-    # Sorted by frame and by the cells of a grid as wide as `reach`, all neighbours of a row lie in two runs of rows
-    # behind it.
-    f, p = frame[low:high] - frame[low], pos[low:high]
-    cell = np.floor((p - p.min(axis=0)) / reach).astype(np.int64) + 1
-    rows, columns = int(cell[:, 1].max()) + 2, int(cell[:, 0].max()) + 2
-    key = (f * columns + cell[:, 0]) * rows + cell[:, 1]
-    order = np.argsort(key, kind="stable")
-    key = key[order]
-    here = np.arange(len(key))
-    i1, j1 = runs(here + 1, np.searchsorted(key, key + 1, side="right"))
-    i2, j2 = runs(np.searchsorted(key, key + rows - 1), np.searchsorted(key, key + rows + 1, side="right"))
-    i, j = order[np.concatenate([i1, i2])], order[np.concatenate([j1, j2])]
-    apart = p[i] - p[j]
-    close = dot(apart, apart) < reach * reach
-    i, j = i[close] + low, j[close] + low
-    return np.minimum(i, j), np.maximum(i, j)
 
 
 def runs(first: Ints, end: Ints) -> tuple[Ints, Ints]:

@@ -26,7 +26,7 @@ from sim.io.source import open_source, split_and_name
 from sim.io.store.seal import read_whole_manifest
 from sim.scene.visibility import image_size_of_boxes
 from sim.streams import file_name
-from sim.types import Array, Ints, Sequence, Truth
+from sim.types import Array, Bools, Sequence, Truth
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
 
@@ -111,7 +111,7 @@ def _picture_files(sequence: Sequence) -> dict[int, Path]:
 def _annotations(
     sequence: Sequence, truth: Truth, boxes: Array, size: tuple[int, int], index: int
 ) -> Iterator[dict[str, Any]]:
-    counts: dict[int, list[int]] | None = None
+    ids = None if sequence.load_pixels is None else sequence.load_pixels(index).ids
     for row in range(*truth.rows(index).indices(len(boxes))):
         box = [round(v, 2) for v in boxes[row].tolist()]
         left, top, right, bottom = _inside(boxes[row], size)
@@ -119,9 +119,8 @@ def _annotations(
             continue
         person, area = int(truth.id[row]), round(box[2] * box[3], 2)
         segmentation: Any = [[left, top, right, top, right, bottom, left, bottom]]
-        if sequence.load_pixels is not None:
-            counts = run_lengths(sequence.load_pixels(index).ids) if counts is None else counts
-            mask = counts.get(person, [size[0] * size[1]])
+        if ids is not None:
+            mask = run_lengths(ids == person)
             segmentation, area = {"size": [size[1], size[0]], "counts": mask}, sum(mask[1::2])
         yield {
             "bbox": box, "segmentation": segmentation, "area": area, "iscrowd": 0, "track_id": person,
@@ -134,16 +133,8 @@ def _inside(box: Array, size: tuple[int, ...]) -> tuple[float, ...]:
     return tuple(np.round([*low, *high], 2).tolist())
 
 
-def run_lengths(ids: Ints) -> dict[int, list[int]]:
-    """Returns by person id the mask of the person in an id map (H, W), as COCO's uncompressed run lengths."""
-    # COCO counts pixels down the columns; numbers outside and inside the mask alternate.
-    flat = ids.ravel(order="F")
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(flat)) + 1]) if len(flat) else np.zeros(0, np.int64)
-    ends = np.append(starts[1:], len(flat))
-    found: dict[int, list[int]] = {}
-    reached: dict[int, int] = {}
-    for person, start, end in zip(flat[starts].tolist(), starts.tolist(), ends.tolist(), strict=True):
-        if person > 0:
-            found.setdefault(person, []).extend((start - reached.get(person, 0), end - start))
-            reached[person] = end
-    return {person: [*runs, len(flat) - reached[person]] for person, runs in found.items()}
+def run_lengths(mask: Bools) -> list[int]:
+    """Returns a mask (H, W) as COCO's uncompressed run lengths: down the columns, first outside the mask."""
+    edges = np.flatnonzero(np.diff(mask.ravel(order="F"), prepend=False, append=False))
+    lengths: list[int] = np.diff(edges, prepend=0, append=mask.size).tolist()
+    return lengths

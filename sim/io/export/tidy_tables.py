@@ -429,9 +429,6 @@ def crossings(frame: Ints, id: Ints, pos: Array, line: Array, downwards: bool) -
 
 def inside(pos: Array, zone: Array) -> Bools:
     """Returns flags (N,): True for points pos (N, 2) inside the polygon `zone` (K, 2)."""
-    x, y = pos[:, 0, None], pos[:, 1, None]
-    a, b = zone, np.roll(zone, -1, axis=0)
-    level = (a[:, 1] > y) != (b[:, 1] > y)
-    rise = np.where(a[:, 1] == b[:, 1], 1.0, b[:, 1] - a[:, 1])
-    beyond = x < a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / rise
-    return np.asarray((level & beyond).sum(axis=1) % 2 == 1)
+    from matplotlib.path import Path as Outline
+
+    return np.asarray(Outline(zone).contains_points(pos[:, :2]))

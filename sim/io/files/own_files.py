@@ -11,10 +11,8 @@ is called, never where it is written. `file_name` turns any label into a name in
 
 from __future__ import annotations
 
-import hashlib
 import re
 import struct
-import unicodedata
 import zlib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -115,7 +113,6 @@ def _video(path: Path) -> bool:
 
 LONGEST = 200  # bytes of a file name made from a label: 255 less temporary prefixes and our suffixes
 FORBIDDEN = frozenset('/\\:*?"<>|')  # by Windows, or on network drives
-RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)  # devices of Windows
 
 
 def file_name(label: str) -> str:
@@ -125,12 +122,7 @@ def file_name(label: str) -> str:
     """
     name = "".join("_" if c in FORBIDDEN or is_control(c) else c for c in label)
     name = re.sub(r"^(\.|$)|[. ]$", "_", name)
-    name = "_" + name if RESERVED.fullmatch(name) else name
-    body = name.encode()
-    if len(body) <= LONGEST:
-        return name
-    digest = hashlib.sha256(label.encode("utf-8", "surrogatepass")).hexdigest()[:16]
-    return body[: LONGEST - 17].decode("utf-8", "ignore") + "-" + digest
+    return name.encode()[:LONGEST].decode("utf-8", "ignore")
 
 
 def output_path(folder: str | Path, label: str, ending: str = "") -> Path:
@@ -143,8 +135,7 @@ def output_paths(folder: str | Path, labels: Iterable[str], ending: str = "", so
     paths, seen = [], dict[str, str]()
     for label in labels:
         path = output_path(folder, label, ending)
-        # Some file systems keep only one of two names that differ in case or in composed accents alone.
-        key = unicodedata.normalize("NFC", path.name).casefold()
+        key = path.name.casefold()  # some file systems keep only one of two names that differ in case alone
         if key in seen:
             both = f"the name {label!r} twice" if label == seen[key] else f"the names {seen[key]!r} and {label!r}"
             got = f"{both}, for one {path.name}"

@@ -94,8 +94,6 @@ def read_opencv_yaml(path: Path) -> Camera:
     apart[0, 3] = 0
     if not (fx > 0 and apart.max() <= SAME * fx and right[0, 3] < 0):
         raise _wrong(path, "P2", "another pair", "P1 and P2 equal but for P2[0, 3] < 0", "rectify the pair")
-    if width % 1 or height % 1:
-        raise _wrong(path, "image_width", f"{width:g}×{height:g}", "whole numbers of px")
     camera = Camera(
         kind="pinhole", image=(int(width), int(height)), focal_px=(fx, fy),
         # OpenCV's pixel coordinates begin at the centre of the first pixel, ours at its corner.

@@ -26,7 +26,7 @@ SUFFIXES = (
     ".ts", ".mts", ".m2ts", ".h264", ".h265", ".hevc", ".y4m",
 )  # fmt: skip
 AGREE = 0.02  # relative difference allowed between the container's rate and that of the time stamps
-GAP, GAPS = 1.0, 5.0  # a gap without frames is reported if longer than 1 s and than 5 usual steps
+GAP, GAPS = 1.0, 5.0  # a step longer than 1 s and than 5 usual steps is a gap, and no part of the rate
 DEFAULT_FPS = 25.0
 
 
@@ -41,13 +41,12 @@ def open_video(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     if first is None:
         got = f"{length} frames, none of which can be decoded" if length else "no frame"
         raise InputError(file=path, got=got, expected="a video with pictures", remedy=video_files.REMEDY)
-    for words in missing(index):
+    if words := missing(index):
         warnings.warn(f"{path.name}: {words}", stacklevel=2)
     if index.aspect != 1:
         words = f"pixels of shape {index.aspect.numerator}:{index.aspect.denominator} are made square"
         warnings.warn(f"{path.name}: {words}: pictures of {size_of(first)[0]}×{size_of(first)[1]} px", stacklevel=2)
-    # Some packets of VP8 are not shown, so the length is unknown.
-    size, known = size_of(first), None if index.codec in video_files.HIDDEN else length
+    size = size_of(first)
     rate, words = frame_rate(path.name, options.fps, index)
     choice = (options.background or BackgroundChoice()).of(length, path, size)
     times = None if options.fps is not None or index.ranks() is None or is_steady(index.times()) else index.times()
@@ -56,35 +55,25 @@ def open_video(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         return Frame(k, (k - 1) / rate if times is None else float(times[k - 1] - times[0]))
 
     def frames() -> Iterator[Frame]:
-        for k, picture in enumerate(fill_gaps(_pictures(path, index, size), known, path.name), 1):
+        for k, picture in enumerate(fill_gaps(_pictures(path, index, size), length, path.name), 1):
             yield bare(k).replace(image=picture)
 
     return Sequence(
-        name=path.stem, fps=rate, length=known, frames=frames,
+        name=path.stem, fps=rate, length=length, frames=frames,
         image_size=size, has_images=True,
         camera=options.camera and scaled_to_image(options.camera, size, path, index.aspect), px_per_m=options.scale,
         load_background=BackgroundSample(choice, length, path, lambda wanted: _pictures(path, index, size, wanted)),
         source={"kind": "video", "path": str(path), "fps": words, "background": str(choice)},
-        bare=None if known is None else lambda: map(bare, range(1, known + 1)),
+        bare=lambda: map(bare, range(1, length + 1)),
     )  # fmt: skip
 
 
-def missing(index: video_files.PacketIndex) -> Iterator[str]:
-    """Yields a warning text if the end of a video is missing, and one if there are gaps in time."""
-    times, length = index.times(), len(index.stamps)
-    step = np.diff(times)
-    usual = float(np.median(step)) if len(step) else 0.0
-    shown = float(times[-1]) + usual if len(times) else index.seconds
+def missing(index: video_files.PacketIndex) -> str:
+    """Returns a warning if the end of a video is missing, else ""."""
+    length = len(index.stamps)
     if index.broken:
-        yield f"breaks off after {length} frames ({index.broken})"
-    elif length < index.promised:
-        yield f"ends after {length} of the {index.promised} frames it promises"
-    elif not index.promised and index.seconds - shown > max(GAP, GAPS * usual):
-        yield f"ends after {shown:.1f} of the {index.seconds:.1f} s it promises"
-    gaps = np.flatnonzero(_is_gap(step)) + 1
-    if len(gaps):
-        more = f" ({len(gaps) - 1} more such)" if len(gaps) > 1 else ""
-        yield f"nothing for {step[gaps[0] - 1]:.1f} s after frame {gaps[0]}{more}; frames are numbered without the gap"
+        return f"breaks off after {length} frames ({index.broken})"
+    return f"ends after {length} of the {index.promised} frames it promises" if length < index.promised else ""
 
 
 def frame_rate(name: str, given: float | None, index: video_files.PacketIndex) -> tuple[float, str]:

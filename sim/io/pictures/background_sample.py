@@ -121,9 +121,6 @@ class BackgroundSample:
             words = f"only {count} of the {len(wanted)} frames of the background sample have a readable picture"
             remedy = "number the pictures 1, 2, 3, …, or choose other frames with --background"
             warnings.warn(f"{self.path}: {words}; {remedy}", stacklevel=2)
-        if self.length < BACKGROUNDS and not self.choice.asked:
-            words = f"shorter than a background sample of {BACKGROUNDS} frames; all {self.length} are taken"
-            warnings.warn(f"{self.path.name}: {words}", stacklevel=2)
         found = found[:count]
         return found if self.choice.picture is None else with_copies(found, self.choice.empty(size_of(found[0])))
 

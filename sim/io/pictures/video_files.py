@@ -12,7 +12,6 @@ or takes only a part, as on a full disk, so the pictures of the finished video a
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -29,7 +28,7 @@ from sim.io.pictures.picture_folder import require_size
 from sim.types import Array, Image
 
 COVER = "attached_pic"
-HIDDEN = ("vp8",)  # codecs with packets that are never shown
+SHOWN = 0x10  # bit of the first byte of a VP8 packet, 0 in those that are never shown
 BT601, NARROW = (2, 5, 6), (0, 1)  # libav's numbers of colour matrices (2: unknown) and ranges (0: unknown)
 EXACT = 2 | 0x2000 | 0x40000  # swscale flags: bilinear, full chroma, accurate rounding
 REMEDY = "give a video that a player plays to its end"
@@ -44,10 +43,8 @@ class PacketIndex:
     keys: tuple[bool, ...]  # True where a group of packets begins that can be decoded by itself
     time_base: Fraction
     rate: float  # frames per second;
-    promised: int  # number of frames;
-    seconds: float  # duration; these three by the header, 0 if missing
+    promised: int  # number of frames; these two by the header, 0 if missing
     broken: str  # why reading stopped before the end of the file, "" if it did not
-    codec: str  # libav's name of the codec
     reorders: bool  # True if packets may be stored in another order than they are shown
     aspect: Fraction = Fraction(1)  # width / height of a stored pixel, 1 if unknown
 
@@ -60,7 +57,7 @@ class PacketIndex:
         known = [s for s in self.stamps if s is not None]
         # Packets that may be reordered, and yet have ascending stamps: the container made them up.
         ascending = known == sorted(known)
-        if len(set(known)) < len(self.stamps) or (self.reorders and ascending) or self.codec in HIDDEN:
+        if len(set(known)) < len(self.stamps) or (self.reorders and ascending):
             return None
         return {stamp: k for k, stamp in enumerate(sorted(known), 1)}
 
@@ -109,19 +106,20 @@ def index_packets(path: Path) -> PacketIndex:
 
     found, broken = [], ""
     with open_stream(path) as (container, stream):
+        context = stream.codec_context
+        vp8 = context.name == "vp8"
         try:
             for p in container.demux(stream):
-                if p.size and not p.is_discard:
+                if p.size and not p.is_discard and (not vp8 or bytes(p)[0] & SHOWN):
                     found.append((p.pts, bool(p.is_keyframe)))
                 if len(found) > FRAMES:
                     got, expected = f"more than {FRAMES} frames", f"at most {FRAMES}"
                     raise InputError(file=path, got=got, expected=expected, remedy="cut the video")
         except av.FFmpegError as error:
             broken = _reason(error)
-        context = stream.codec_context
         return PacketIndex(
             tuple(pts for pts, _ in found), tuple(key for _, key in found), stream.time_base or Fraction(1, 1000),
-            float(stream.average_rate or 0), int(stream.frames), _seconds(stream), broken, context.name,
+            float(stream.average_rate or 0), int(stream.frames), broken,
             bool(context.has_b_frames), _aspect(stream),
         )  # fmt: skip
 
@@ -133,14 +131,6 @@ def _aspect(stream: Any) -> Fraction:
 def square_size(width: int, height: int, aspect: Fraction) -> tuple[int, int]:
     """Returns the (width, height) that a picture gets when its pixels, of width / height `aspect`, are made square."""
     return (round(width * aspect), height) if aspect >= 1 else (width, round(height / aspect))
-
-
-def _seconds(stream: Any) -> float:
-    if stream.duration is not None:
-        return float(stream.duration * stream.time_base)
-    # Matroska has the duration as a tag.
-    found = re.fullmatch(r"([0-9]+):([0-9][0-9]):([0-9][0-9](?:\.[0-9]+)?)", stream.metadata.get("DURATION", ""))
-    return 3600.0 * int(found[1]) + 60.0 * int(found[2]) + float(found[3]) if found else 0.0
 
 
 def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:

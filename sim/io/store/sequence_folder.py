@@ -23,7 +23,6 @@ from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.stored_pictures import NO_PICTURES, StoredPictures, WrittenPictures, write_pictures
 from sim.io.store import seal, truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
-from sim.io.store.group_files import read_script
 from sim.io.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
 from sim.streams import check_streams, is_picture
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, Image, Sequence, Truth
@@ -141,8 +140,6 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     load_background, words = _background(pictures, background, length)
     special: dict[str, Any] = {key: manifest[key] for key in ("origin", "stride") if key in manifest}
 
-    scripted = "gt/script.json" in has and "origin" not in special
-
     def require_length(name: str, found: int) -> None:
         if found != length:
             expected = f"{length} frames, as manifest.json says"
@@ -178,7 +175,6 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         scene=read_scene(folder / "scene.json") if "scene.json" in has else None,
         px_per_m=tables.none_to_nan(about["px_per_m"]),
         has_images=left, has_right=right, has_detections="det/det.parquet" in has, load_background=load_background,
-        load_people=(lambda: _people(folder, manifest)) if scripted else None,
         source={
             "kind": "generated", "path": str(folder), "seed": manifest["seed"], "repeat": manifest["repeat"],
             "truth_hash": manifest["truth_hash"], "streams": list(pictures.streams), "images": manifest.get("images"),
@@ -213,12 +209,3 @@ def _light(folder: Path, manifest: dict[str, Any]) -> Array:
 
     light, about = Light.model_validate(parse(folder / "scenario.toml").get("light", {})), manifest["sequence"]
     return brightness(light, manifest["seed"], manifest["repeat"], about["fps"], about["length"])
-
-
-def _people(folder: Path, manifest: dict[str, Any]) -> dict[str, tuple[int, ...]]:
-    # Computed again from the stored scenario, scene and script.
-    from scenarios import load
-    from sim.crowd.population import named_people
-
-    scene, orders = read_scene(folder / "scene.json"), read_script(folder / "gt" / "script.json")
-    return named_people(load(folder / "scenario.toml"), scene, manifest["seed"], manifest["repeat"], orders)

@@ -71,9 +71,6 @@ def test_layout_seqmap_and_reading(tmp_path, simulate):
     assert [s.name for s in open_source(tmp_path / "flockscope-test")] == sorted(names)
     assert open_source(made[2])[0].source["repeat"] == 2
     assert validate(tmp_path) == validate(tmp_path / "flockscope-test") == validate(made[0]) == []
-    (tmp_path / "seqmaps/flockscope-test.txt").unlink()
-    (tmp_path / "seqmaps").rmdir()
-    assert [p.file for p in validate(tmp_path)] == [str(tmp_path / "seqmaps/flockscope-test.txt")]
 
 
 def test_complete_sequences_are_kept_and_others_redone(tmp_path, simulate):

@@ -42,7 +42,6 @@ def test_a_dataset_like_any_other(walk: Sequence, tmp_path: Path) -> None:
     assert is_real(stored)
     assert stored.truth.labelled.all()
     assert next(iter(stored)).image is not None
-    assert stored.load_people is None
 
 
 def test_same_bytes_again_and_what_is_there_is_kept(walk: Sequence, tmp_path: Path) -> None:

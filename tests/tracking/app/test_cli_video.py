@@ -63,7 +63,6 @@ STRANGE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "plain": (film, ""),
     "16 bits": (lambda f: jpegs(f / "mot", [sixteen(k) for k in range(60)], ".png"), ""),
     "grey": (lambda f: jpegs(f / "mot", [picture(k)[..., 1] for k in range(60)]), ""),
-    "shorter than the sample": (lambda f: film(f, 30), "shorter than a background sample"),
     "damaged": (lambda f: damage(film(f), 0.7, 300), "lost"),
 }
 

@@ -72,7 +72,7 @@ def test_a_folder_with_right_pictures_is_a_stereo_recording(tmp_path) -> None:
     right = [f.right for f in frames]
     assert right[6] is None
     assert np.array_equal(right[7], made["img1_right"][7])
-    with pytest.warns(UserWarning, match="frame 7"), pytest.warns(UserWarning, match="background sample"):
+    with pytest.warns(UserWarning, match="frame 7"):
         assert len(track("stereo", sequence, detections="image")) == 12
 
 

@@ -1,7 +1,6 @@
 import json
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 
@@ -189,27 +188,16 @@ def relisted(folder, change):
     (folder / "manifest.json").write_text(json.dumps(with_hash(whole)))
 
 
-@pytest.mark.parametrize("name", ["img1/000003.png", "ids/000003.png", "disparity/000003.png", "background/000003.png"])
-def test_validate_looks_at_every_exact_picture(tmp_path, name):
-    """Even one whose hash the manifest was made to name."""
-    folder = tmp_path / "a"
-    stored(folder, make_pictured(3, ALL), images="png")
-    image = cv2.imread(str(folder / name), cv2.IMREAD_UNCHANGED)
-    image[5, 5] += 1
-    body = cv2.imencode(".png", image)[1].tobytes()
-    (folder / name).write_bytes(body)
-    facts = {"sha256": file_hash(body), "bytes": len(body)}
-    relisted(folder, lambda m: m["files"].update({name: facts}))
-    (problem,) = validate(folder)
-    assert "other pixels" in problem.got
-
-
 @pytest.mark.parametrize("images", ["jpg", "png", "mp4"])
-def test_validate_counts_and_measures(tmp_path, images):
+def test_reading_counts_and_measures(tmp_path, images):
+    def refused(words):
+        with pytest.raises(InputError, match=words):
+            (open_source(folder)[0].background(), list(open_source(folder)[0]))
+
     folder = tmp_path / "a"
     stored(folder, make_pictured(3, ("left",)), ("left",), images)
     relisted(folder, lambda m: m["sequence"].update(image_size=[32, 48]))
-    assert any("64×48" in p.got for p in validate(folder))
+    refused("64×48")
     relisted(folder, lambda m: m["sequence"].update(image_size=[64, 48]))
     assert validate(folder) == []
     if images == "mp4":
@@ -217,9 +205,9 @@ def test_validate_counts_and_measures(tmp_path, images):
         movie.write_bytes((folder / "left.mp4").read_bytes())
         facts = {"sha256": file_hash(movie.read_bytes()), "bytes": movie.stat().st_size}
         relisted(folder, lambda m: m["files"].update({"background.mp4": facts}))
-        assert ["12 pictures" in p.got for p in validate(folder)] == [True]
+        refused("12 pictures")
     else:
         name = f"img1/000012.{images}"
         (folder / name).unlink()
         relisted(folder, lambda m: m["files"].pop(name))
-        assert [p.file for p in validate(folder)] == [str(folder / name)]
+        refused(name)
