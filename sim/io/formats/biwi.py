@@ -15,10 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.limits import FRAME_RATES
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_rows
-from sim.io.formats.labelled_truth import labelled_sequence, with_labels
+from sim.io.formats.labelled_truth import differentiate, labelled_sequence, with_labels
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.types import Ints, Sequence, Truth
 
@@ -101,6 +102,18 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     return replace(rows, values=rows.values[order], line=rows.line[order]), frame[order], id[order]
 
 
+def _rate(rows: NumericTable, frame: Ints, id: Ints) -> float:
+    """Returns FPS, or with a warning the multiple or part of it at which people are as fast as their velocities."""
+    step = np.hypot(*differentiate(frame, id, rows.values[:, (2, 4)], 1.0).T)  # m per frame; 0: alone, or at rest
+    way, told = step.sum(), np.hypot(*rows.values[:, (5, 7)].T)[step > 0].sum()  # told: m per s
+    ratio = float(np.clip(told / way, *FRAME_RATES)) / FPS if told and way else 1.0
+    rate = FPS * round(ratio) if ratio > 1 else FPS / round(1 / ratio)
+    if rate != FPS:
+        text = f"{rows.file}: by its velocities it has {rate:.4g} frames per second, and not {FPS:g}"
+        warnings.warn(f"{text} (--fps says otherwise)", stacklevel=3)
+    return rate
+
+
 def read_truth(folder: Path, fps: float = FPS) -> Truth:
     """Returns the truth of a recording: positions m and velocities m/s on the ground, no boxes.
 
@@ -120,5 +133,7 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
 
 def open_folder(folder: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns the recording in `folder` as Sequence, without pictures and detections, by default at 2.5 fps."""
-    rate, length = options.fps or FPS, int(_table(folder)[1].max(initial=0))
+    rows, frame, id = _table(folder)
+    rate, length = options.fps or _rate(rows, frame, id), int(frame.max(initial=0))
+
     return labelled_sequence("biwi", folder, folder.name, rate, length, lambda: read_truth(folder, rate))

@@ -177,6 +177,14 @@ def test_biwi_that_changes_back_to_the_first_grid(tmp_path):
     assert np.all(np.abs(s.truth.frame - 1 - (np.array([r[0] for r in rows]) - 780) / STEP) <= 1)
 
 
+@pytest.mark.parametrize(("step", "rate"), [(20, 1.25), (30, 2.5 / 3), (5, 5), (1, 25)])
+def test_biwi_of_other_frames_has_the_rate_of_its_velocities(tmp_path, step, rate):
+    brief = [(1, i, i, 0) for i in range(3, 40)]  # in one frame: their velocities tell nothing
+    folder = biwi_folder(tmp_path, "", brief + [(f, i, f / 10, i) for f in range(1, 10 * step, step) for i in (1, 2)])
+    with pytest.warns(UserWarning, match=f"it has {rate:.4g} frames per second, and not 2.5"):
+        assert open_source(folder)[0].truth.fps == pytest.approx(rate)
+
+
 def test_cvml_of_caviar_says_what_is_assumed(tmp_path):
     path = xml(tmp_path, ([OBJECT.format(1, 10)], []))
     with pytest.warns(UserWarning, match="taken at 25 fps, with pictures of 384×288 px"):
