@@ -14,7 +14,7 @@ from scenarios.loading.resolve import dump, load_observation, resolve
 from sim.io.formats.calibration import read_calibration
 from sim.io.source import open_source
 from sim.io.store.camera_files import read_scene
-from sim.io.store.group_files import read_events, read_near, read_script
+from sim.io.store.group_files import read_events, read_groups_csv, read_near, read_script
 from sim.io.store.track_files import read_tracks
 from sim.io.store.truth_files import read_detections, read_truth
 from sim.scene.camera import ground_jacobian, px_per_m_at_centre, to_ground
@@ -108,6 +108,7 @@ READERS: dict[str, Callable[[Path], object]] = {
     "labelled-text": _source("people.csv"),
     "tracks-text": read_tracks,
     "events": lambda folder: read_events(folder / "events.json"),
+    "groups": lambda folder: read_groups_csv(folder / "groups.csv", 4),
     "near": lambda folder: read_near(folder / "near.csv"),
     "script": lambda folder: read_script(folder / "script.json"),
     "scene": lambda folder: read_scene(folder / "scene.json"),

@@ -6,6 +6,7 @@ A file with a wrong row raises InputError, which names the first wrong line.
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Collection, Container, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -196,6 +197,12 @@ def read_number(text: str) -> float:
     if "_" in text or not text.strip().isascii():
         raise ValueError(f"{text!r} is no number")
     return float(text)
+
+
+def whole_or_number(text: str) -> int | float | str:
+    """Returns an int for a whole number of up to 18 digits, a float for another number, else the text itself."""
+    whole = re.fullmatch("[-+]?[0-9]{1,18}", text.strip())  # more digits may not fit into 64 bits
+    return int(text) if whole else read_number(text) if is_number_text(text) else text
 
 
 def number_or_nan(text: str | None) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Sequence as Series
 from itertools import zip_longest
 from pathlib import Path
@@ -17,13 +18,13 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, INTEGER
 from sim.io.files import tables
-from sim.io.files.numeric_text import read_rows
-from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, StoredTable, columns_of, validated
+from sim.io.files.numeric_text import is_number_text, read_number, read_rows, read_text, whole_or_number
+from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, Pair, StoredTable, columns_of, validated
 from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
@@ -65,7 +66,7 @@ def read_near(path: Path) -> Near:
     text = read_rows(path)
     header = "".join(text.text[:1])
     if header != NEAR_COLUMNS:
-        raise InputError(file=path, place="line 1", got=repr(header), expected=NEAR_COLUMNS, remedy="restore it")
+        raise _bad(path, 1, repr(header), NEAR_COLUMNS)
     rows = text.numbers((4,), first=1, layout=NEAR_COLUMNS)
     start, end, a, b = (rows.integers(k, name) for k, name in enumerate(NEAR_COLUMNS.split(",")))
     wrong = (start < 1) | (end < start) | (end > FRAMES) | (np.minimum(a, b) < 0)
@@ -168,6 +169,16 @@ def wkt(hull: Array, digits: int) -> str:
     return f"POLYGON (({', '.join([*points, points[0]])}))" if points else "POLYGON EMPTY"
 
 
+def parse_wkt(text: str) -> list[list[float]]:
+    """Returns the vertices [x, y] of a WKT POLYGON of one ring, [] if it is EMPTY; ValueError for other texts."""
+    body = re.fullmatch(r"\s*POLYGON\s*(?:EMPTY|\(\s*\(([^()]*)\)\s*\))\s*", text)
+    points = [point.split() for point in (body[1] or "").split(",") if point.strip()] if body else [[]]
+    if not all(len(xy) == 2 and all(map(is_number_text, xy)) for xy in points):
+        raise ValueError("POLYGON ((x y, …)), pairs of numbers")
+    ring = [[read_number(v) for v in xy] for xy in points]
+    return ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
+
+
 def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None] | None, first: int = 1) -> bytes:
     """Returns groups.csv for consecutive frames from `first` on; nan and unknown values are empty.
 
@@ -192,3 +203,67 @@ def groups_csv(ground: Series[Groups | None] | None, image: Series[Groups | None
 
 def _cell(value: float) -> str:
     return "" if value != value else f"{value:.3f}".rstrip("0").rstrip(".")
+
+
+def _value(text: str) -> int | float | str | None:
+    value = whole_or_number(text)
+    return None if value in ("", "nan") or value != value else value
+
+
+def _ids(text: str | None) -> list[Any]:
+    return [whole_or_number(word) for word in (text or "").split()]
+
+
+def _hull(text: str | None) -> Any:
+    return parse_wkt(text) if text else ()
+
+
+class _GroupRow(BaseModel):
+    """A row of groups.csv."""
+
+    frame: Annotated[FrameNumber, BeforeValidator(_value)]
+    group: Annotated[Id, BeforeValidator(_value)]
+    members: Annotated[list[Id], BeforeValidator(_ids)]
+    x: Annotated[Number | None, BeforeValidator(_value)] = None
+    y: Annotated[Number | None, BeforeValidator(_value)] = None
+    hull: Annotated[tuple[Pair, ...], BeforeValidator(_hull)] = ()
+    size: Annotated[Annotated[Number, Field(ge=0)] | None, BeforeValidator(_value)] = None
+
+
+def read_groups_csv(path: Path, length: int) -> list[Groups]:
+    """Reads a groups.csv, ours or another program's, as the Groups of each frame from 1 to `length`.
+
+    The file has no velocities and extents: they are 0 and nan. Groups and members are sorted by id.
+    """
+    reader = csv.DictReader(io.StringIO(read_text(path)))
+    frames: dict[int, dict[int, _GroupRow]] = {k: {} for k in range(1, length + 1)}
+    try:
+        wanted = [c for c in CSV_COLUMNS[:6] if c not in (reader.fieldnames or [])]
+        if wanted:
+            raise _bad(path, 1, f"no column {', '.join(wanted)}", ",".join(CSV_COLUMNS))
+        for cells in reader:
+            given = {name: cell for name, cell in cells.items() if name and cell is not None}
+            row = validated(path, given, _GroupRow, "correct the line", f"line {reader.line_num}")
+            if row.frame > length or row.group in frames[row.frame]:
+                got, expected = f"group {row.group} in frame {row.frame}", f"frames to {length}, each group once in one"
+                raise _bad(path, reader.line_num, got, expected)
+            frames[row.frame][row.group] = row
+    except csv.Error as error:
+        raise _bad(path, reader.line_num, str(error), "cells of text") from None
+    nobody = Groups.none()
+    return [_from_rows([rows[id] for id in sorted(rows)]) if rows else nobody for rows in frames.values()]
+
+
+def _from_rows(rows: list[_GroupRow]) -> Groups:
+    still, unknown = np.zeros((len(rows), 2)), np.full((len(rows), 2, 2), np.nan)
+    return Groups(
+        np.array([row.group for row in rows], np.int64),
+        tuple(np.unique(np.array(row.members, np.int64)) for row in rows),
+        np.array([(row.x, row.y) for row in rows], np.float64), still, unknown,
+        np.array([row.size for row in rows], np.float64),
+        tuple(np.array(row.hull, np.float64).reshape(-1, 2) for row in rows),
+    )  # fmt: skip
+
+
+def _bad(path: Path, line: int, got: str, expected: str) -> InputError:
+    return InputError(file=path, place=f"line {line}", got=got, expected=expected, remedy="correct the line")

@@ -274,6 +274,20 @@ def read_track_text(
     return [Tracks(k + 1, k / fps, plane, "person", *arrays(a, b)) for k, (a, b) in frames]
 
 
+def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
+    """Returns the tracks of `found` with the groups of the file `path` (groups.csv) filled in.
+
+    A person listed in two groups of a frame gets the group with the higher id. Members without a track are kept.
+    """
+    made = list[Tracks]()
+    for tracks, groups in zip(found, group_files.read_groups_csv(path, len(found)), strict=True):
+        group = tracks.group.copy()
+        for name, members in zip(groups.id, groups.members, strict=True):
+            group[np.isin(tracks.id, members)] = name
+        made.append(tracks.replace(group=group, groups=groups))
+    return made
+
+
 def write_tracks(
     folder: str | Path, tracks: Iterable[Tracks], *, fps: float, camera: Camera | None = None,
     scene: Scene | None = None, info: dict[str, Any] | None = None, pairs: bytes | None = None,
@@ -336,7 +350,7 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
 
     Args:
         path: A folder that `write_tracks` wrote, a file of it, or a text. Of a text, velocities are differences over
-            0.5 s, covariances nan, and everybody is alone. Beside a tracks.txt, events.json is read.
+            0.5 s, covariances nan, and everybody is alone. Beside a tracks.txt, groups.csv and events.json are read.
         fps: Frames per second of a text; None: 25.
         length: Frames of a text; None: to the last frame in the file.
 
@@ -368,7 +382,10 @@ def read_checked_tracks(
         got, expected = "no tracks", "tracks.parquet, tracks.txt or a MOTChallenge text"
         raise InputError(file=path, got=got, expected=expected, remedy="give the folder that `flockscope track` made")
     found = read_track_text(text, 25.0 if fps is None else fps, length, person_class, box_scale)
-    return _with_events(found, folder) if whole else found
+    if not whole:
+        return found
+    groups = folder / "groups.csv"
+    return _with_events(with_groups(found, groups) if groups.is_file() else found, folder)
 
 
 def _with_events(found: list[Tracks], folder: Path) -> list[Tracks]:

@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
-from sim.io.store.group_files import read_events, read_near, read_script
+from sim.io.store.group_files import read_events, read_groups_csv, read_near, read_script
 from sim.scene.camera import camera_rotation
 from sim.types import Camera, Scene
 from tests.made_up import make_sequence, same
@@ -59,6 +59,32 @@ def test_pairs(line, tmp_path):
     path.write_text(f"start,end,a,b\n1,3,1,2\n{line}\n1,3,1,2\n")
     with pytest.raises(InputError, match="line 3"):
         read_near(path)
+
+
+GROUP_ROWS = [
+    "1,1,1 -2,,,,2", "1,1,9223372036854775808,,,,", "1,1,1_0,,,,", "²,1,1,,,,", "1,1,1,1e200,0,,", "1,1,1,0,inf,,",
+    '1,1,1,0,0,"POLYGON ((1e200 0, 1 1, 0 1))",', "1,1,1,0,0,,-2", "1,1,1,0,0,,inf", '1,1,"1' + "x" * 200_000 + '"',
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("row", GROUP_ROWS)
+def test_groups(row, tmp_path):
+    path = tmp_path / "groups.csv"
+    path.write_text(f"frame,group,members,x,y,hull,size\n2,1,1 2,,,,2\n{row}\n")
+    with pytest.raises(InputError) as error:
+        read_groups_csv(path, 3)
+    assert error.value.place.startswith("line ")
+
+
+@pytest.mark.parametrize(
+    "hull", ["POLYGON (())", "POLYGON EMPTY", "", "POLYGON((0 0, 2 0, 1 1, 0 0))", "POLYGON ((0 0, 2 0, 1 1,))"]
+)
+def test_hulls_of_other_programs(hull, tmp_path):
+    (tmp_path / "groups.csv").write_text(f'frame,group,members,x,y,hull\n1,1,1 2,,,"{hull}"\n')
+    same(
+        read_groups_csv(tmp_path / "groups.csv", 1)[0].hull,
+        (np.array([[0.0, 0], [2, 0], [1, 1]])[: 3 * ("0" in hull)],),
+    )
 
 
 def test_cameras_and_scenes_come_back_exactly(tmp_path):

@@ -94,6 +94,7 @@ def test_text_alone(tmp_path):
     live = make_tracks(4)
     files = tracks_files(live, fps=10.0)
     (tmp_path / "tracks.txt").write_bytes(files["tracks.txt"])
+    (tmp_path / "groups.csv").write_bytes(files["groups.csv"])
     read = read_tracks(tmp_path, fps=10.0, length=len(live))
     assert len(read) == len(live)
     for a, b in zip(live, read, strict=True):
@@ -101,6 +102,8 @@ def test_text_alone(tmp_path):
         assert np.array_equal(a.id[order], b.id)
         assert b.plane == "ground"
         np.testing.assert_allclose(a.pos[order], b.pos, atol=6e-4)
+        known = a.groups.id if a.groups is not None else []
+        assert np.array_equal(known, b.groups.id)
 
 
 def test_groups_in_a_column_of_a_text_are_the_tracker_s_own(tmp_path):
