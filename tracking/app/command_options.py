@@ -128,7 +128,6 @@ class ScenariosOptions(Options, words="scenarios"):
     name: str | None = ARGUMENT("Scenario, *.toml file or suite to explain.", None)
     settings: list[str] = SET()
     out: Path | None = option("Write a drawing of the plan, with the orders.", None, metavar="FILE.svg")
-    schema: bool = option("Print the keys of scenario files as a JSON schema.", False)
 
 
 class GenerateOptions(PictureOptions, WorkerOptions, words="generate", run="datasets:generate"):
