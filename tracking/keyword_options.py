@@ -1,8 +1,8 @@
 """Options of a public function, class or command, declared once as the fields of a frozen dataclass.
 
 The dataclass holds name, type, default, range and help text of every option. A function takes `**options`, builds the
-dataclass with `from_keywords`, and gets its signature and the list of options in its docstring from `documented`. A
-command is made of it by `tracking.app.command_line`.
+dataclass of them, and gets its signature and the list of options in its docstring from `documented`. A command is made
+of it by `tracking.app.command_line`.
 
     @dataclass(frozen=True, kw_only=True)
     class FitOptions:
@@ -12,15 +12,13 @@ command is made of it by `tracking.app.command_line`.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import MISSING, Field, field, fields
 from typing import Any, TypeVar
 
 from scenarios.errors import InputError
-from scenarios.loading.toml_files import did_you_mean
 
 F = TypeVar("F", bound=Callable[..., Any])
-T = TypeVar("T")
 
 
 def option(help: str, default: Any = MISSING, **more: Any) -> Any:
@@ -37,21 +35,6 @@ def option(help: str, default: Any = MISSING, **more: Any) -> Any:
     return (
         field(default_factory=list, metadata=metadata) if default == [] else field(default=default, metadata=metadata)
     )
-
-
-def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
-    """Returns an instance of the options dataclass `kind` with the given values by name, and defaults for the others.
-    Raises InputError if a name is unknown or a required option is missing; function: its name, for the message."""
-    known = fields(kind)  # type: ignore[arg-type]
-    names = [f.name for f in known]
-    for name in given:
-        if name not in names:
-            expected, remedy = f"one of {', '.join(names)}", did_you_mean(name, names, "choose one of them")
-            raise InputError(place=f"{function}(…)", got=f"{name}=…", expected=expected, remedy=remedy)
-    for f in known:
-        if required(f) and f.name not in given:
-            raise InputError(place=f"{function}(…)", got="nothing", expected=f"{f.name}=…", remedy=f"give {f.name}")
-    return kind(**given)
 
 
 def check_ranges(options: Any) -> None:

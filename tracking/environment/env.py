@@ -27,7 +27,7 @@ from tracking.config import Config
 from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, Source, SourceCache, SourceSpec, sources
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
-from tracking.keyword_options import documented, from_keywords, option
+from tracking.keyword_options import documented, option
 from tracking.parameter_space import Space, decode, decode_and_build, space_of
 from tracking.running.detection_mode import choose_mode
 from tracking.running.prepare import Params, config_of
@@ -77,10 +77,10 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         """Makes the environment; the first episode begins with `reset`.
 
         Raises:
-            InputError: An argument is unknown or wrong, no parameter can be searched, a source is unreadable or lacks
+            InputError: An argument is wrong, no parameter can be searched, a source is unreadable or lacks
                 the detections, or simulated sources have seeds of two splits.
         """
-        given = from_keywords(TuningEnvOptions, "TuningEnv", {"tracker": tracker, "suite": suite, **options})
+        given = TuningEnvOptions(tracker=tracker, suite=suite, **options)
         self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
         self.options, self.decision_every = given, given.decision_every
         self.config_class = config_class(self.tracker, self.tracker.__name__)
