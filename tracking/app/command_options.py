@@ -392,7 +392,6 @@ class FitJointOptions(Options, words="fit joint", run="fit:fit_joint"):
     names: list[str] = NAMES()
     out: Path = TOML("File to write: parameters of joint, for --params.")
     seeds: str = SEEDS("Seeds of the scenes to fit to.", "30000:30002")
-    check: str | None = option("Other seeds, to score the fit with.", None, metavar="A:B")
 
 
 class FitGroupingOptions(FitJointOptions, words="fit grouping", run="fit:fit_grouping"):
