@@ -207,7 +207,7 @@ class SourceCache:
         key = (*source.key, streams)
         if key not in self._opened:
             held = self.bytes
-            while held > self.limit:
+            while self._opened and held > self.limit:
                 dropped, _ = self._opened.popitem(last=False)
                 held -= self._bytes.pop(dropped)
             self._opened[key] = OpenedSource(source, streams)
