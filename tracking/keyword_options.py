@@ -50,14 +50,13 @@ def check_ranges(options: Any) -> None:
 
 def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
     """Returns a decorator that gives a function the signature and, in its docstring, the options of a dataclass. In the
-    signature the first `positional` options may be given by position. A first parameter `self` is kept."""
+    signature the first `positional` options may be given by position."""
 
     def decorate(function: F) -> F:
         kinds = [inspect.Parameter.POSITIONAL_OR_KEYWORD] * positional + [inspect.Parameter.KEYWORD_ONLY] * 99
-        own = [p for p in inspect.signature(function).parameters.values() if p.name == "self"]
         options = [signature_parameter(f, k) for f, k in zip(fields(kind), kinds, strict=False)]
         made: Any = function
-        made.__signature__ = inspect.Signature([*own, *options])
+        made.__signature__ = inspect.Signature(options)
         made.__doc__ = f"{inspect.getdoc(function)}\n\nOptions:\n\n{options_text(kind)}\n"
         return function
 
