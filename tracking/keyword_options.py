@@ -1,8 +1,8 @@
-"""Options of a public function, class or command, declared once as the fields of a frozen dataclass.
+"""Options of a public function or command, declared once as the fields of a frozen dataclass.
 
 The dataclass holds name, type, default, range and help text of every option. A function takes `**options`, builds the
-dataclass of them, and gets its signature and the list of options in its docstring from `documented`. A command is made
-of it by `tracking.app.command_line`.
+dataclass of them, and gets the list of options in its docstring from `documented`. A command is made of it by
+`tracking.app.command_line`.
 
     @dataclass(frozen=True, kw_only=True)
     class FitOptions:
@@ -48,16 +48,11 @@ def check_ranges(options: Any) -> None:
         raise InputError(place=f"--{f.name}", got=value, expected=expected, remedy="correct it")
 
 
-def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
-    """Returns a decorator that gives a function the signature and, in its docstring, the options of a dataclass. In the
-    signature the first `positional` options may be given by position."""
+def documented(kind: type) -> Callable[[F], F]:
+    """Returns a decorator that lists the options of a dataclass in the docstring of a function."""
 
     def decorate(function: F) -> F:
-        kinds = [inspect.Parameter.POSITIONAL_OR_KEYWORD] * positional + [inspect.Parameter.KEYWORD_ONLY] * 99
-        options = [signature_parameter(f, k) for f, k in zip(fields(kind), kinds, strict=False)]
-        made: Any = function
-        made.__signature__ = inspect.Signature(options)
-        made.__doc__ = f"{inspect.getdoc(function)}\n\nOptions:\n\n{options_text(kind)}\n"
+        function.__doc__ = f"{inspect.getdoc(function)}\n\nOptions:\n\n{options_text(kind)}\n"
         return function
 
     return decorate
@@ -73,7 +68,7 @@ def required(f: Field[Any]) -> bool:
     return f.default is MISSING and f.default_factory is MISSING
 
 
-def signature_parameter(f: Field[Any], kind: Any, annotation: Any = None) -> inspect.Parameter:
-    """Returns an option as a parameter of a signature, of this kind; annotation: None takes the field's type."""
+def signature_parameter(f: Field[Any], kind: Any, annotation: Any) -> inspect.Parameter:
+    """Returns an option as a parameter of a signature, of this kind and with this annotation."""
     default = inspect.Parameter.empty if required(f) else [] if f.default is MISSING else f.default
-    return inspect.Parameter(f.name, kind, default=default, annotation=annotation or f.type)
+    return inspect.Parameter(f.name, kind, default=default, annotation=annotation)

@@ -35,7 +35,7 @@ JOURNAL = ".journal"  # Suffix of the journal beside `--out`.
 RESULT_MARKS: Marks = {"settings": dict, "counts": dict, "left_out": list}
 
 
-@documented(TuneOptions, positional=3)
+@documented(TuneOptions)
 def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.trials, **options: Any) -> TuningResult:
     """Searches parameters on simulated scenes, and measures their gain on other scenes.
 
