@@ -188,7 +188,7 @@ def parameters(config: str) -> str:
     module, _, name = config.partition(":")
     kind = getattr(import_module(module), name)
     names = import_module("tracking.config").presets(kind.tracker)
-    presets = {preset: kind.preset(preset).as_dict() for preset in names}
+    presets = {preset: kind.load(preset).as_dict() for preset in names}
     rows = []
     for p in kind.params().values():
         changed = [values[p.name] for values in presets.values()]

@@ -9,9 +9,7 @@ from types import ModuleType
 
 import pytest
 
-from scenarios.loading.toml_files import CATALOGUE, parse
 from tests.processes import ROOT
-from tracking.app.commands.scenarios import file_schema
 
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -69,12 +67,3 @@ def test_public_names_have_an_entry(site: ModuleType) -> None:
 
 def test_every_key_of_a_scenario_has_a_meaning(site: ModuleType) -> None:
     assert all(row["meaning"] for row in site.keys_of_scenarios())
-
-
-def test_the_schema_of_scenario_files_takes_those_that_extend_others() -> None:
-    schema = file_schema()
-    for path in CATALOGUE.glob("*.toml"):
-        found = parse(path)
-        assert found.keys() <= schema["properties"].keys()
-        assert found.keys() >= set(schema.get("required", ()))
-        assert all(row.keys() >= set(schema["$defs"]["GroupSpec"]["required"]) for row in found.get("group", ()))

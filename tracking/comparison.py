@@ -109,10 +109,6 @@ class ComparedRuns:
                 columns[each] = means
         return pa.table(columns)
 
-    def to_pandas(self, key: str = "objective") -> Any:
-        """Returns the table of `to_arrow` as a data frame of pandas, which must be installed."""
-        return self.to_arrow(key).to_pandas()
-
 
 def _values(scores: SequenceOf[Scores | None], key: str) -> Array:
     return np.array([float("nan") if one is None else one[key] for one in scores])

@@ -177,18 +177,11 @@ class Config:
         return cls.from_dict(read_params(path, cls.tracker), path)
 
     @classmethod
-    def preset(cls, name: str) -> Self:
-        """Returns the preset of this name; the preset "paper" turns off every departure from the tracker's paper.
-
-        Raises:
-            InputError: The tracker has no such preset.
-        """
-        return cls.from_toml(preset_file(cls.tracker, name))
-
-    @classmethod
     def load(cls, source: str | Path) -> Self:
-        """Returns the preset of the name `source` if the tracker has one, else the config in the TOML file `source`. To
-        load a file whose name is that of a preset, give it with a folder, such as ./paper."""
+        """Returns the preset of the name `source` if the tracker has one, else the config in the TOML file `source`.
+
+        The preset "paper" turns off every departure from the tracker's paper. To load a file whose name is that of a
+        preset, give it with a folder, such as ./paper."""
         return cls.from_toml(file_of(cls.tracker, source))
 
     def with_set(self, *assignments: str) -> Self:
@@ -243,21 +236,12 @@ def presets(tracker: str) -> tuple[str, ...]:
     return tuple(sorted(found.parent.name for found in PRESETS.glob("*/*.toml") if found.stem == tracker))
 
 
-def preset_file(tracker: str, name: str) -> Path:
-    """Returns the file of the preset `name` of a tracker. Raises InputError, with the known names, if there is none."""
-    known = presets(tracker)
-    if name not in known:
-        expected = "one of " + ", ".join(known) if known else f"nothing: {tracker} has no presets"
-        raise InputError(place="preset", got=name, expected=expected, remedy="check the name")
-    return PRESETS / name / f"{tracker}.toml"
-
-
 def file_of(tracker: str, source: str | Path) -> Path:
     """Returns the file of the tracker's preset if `source` is a preset's name (str), else the path `source`. Raises
     InputError if the tracker has presets and `source` is neither a preset nor an existing file."""
     known = presets(tracker)
     if isinstance(source, str) and source in known:
-        return preset_file(tracker, source)
+        return PRESETS / source / f"{tracker}.toml"
     if known and not os.path.exists(source):
         expected = f"a parameter file, or a preset of {tracker}: {', '.join(known)}"
         raise InputError(file=source, got="No such file or directory", expected=expected, remedy="check the path")

@@ -1,8 +1,8 @@
-"""Options of a public function, class or command, declared once as the fields of a frozen dataclass.
+"""Options of a public function or command, declared once as the fields of a frozen dataclass.
 
 The dataclass holds name, type, default, range and help text of every option. A function takes `**options`, builds the
-dataclass with `from_keywords`, and gets its signature and the list of options in its docstring from `documented`. A
-command is made of it by `tracking.app.command_line`.
+dataclass of them, and gets the list of options in its docstring from `documented`. A command is made of it by
+`tracking.app.command_line`.
 
     @dataclass(frozen=True, kw_only=True)
     class FitOptions:
@@ -12,15 +12,13 @@ command is made of it by `tracking.app.command_line`.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import MISSING, Field, field, fields
 from typing import Any, TypeVar
 
 from scenarios.errors import InputError
-from scenarios.loading.toml_files import did_you_mean
 
 F = TypeVar("F", bound=Callable[..., Any])
-T = TypeVar("T")
 
 
 def option(help: str, default: Any = MISSING, **more: Any) -> Any:
@@ -39,21 +37,6 @@ def option(help: str, default: Any = MISSING, **more: Any) -> Any:
     )
 
 
-def from_keywords(kind: type[T], function: str, given: Mapping[str, Any]) -> T:
-    """Returns an instance of the options dataclass `kind` with the given values by name, and defaults for the others.
-    Raises InputError if a name is unknown or a required option is missing; function: its name, for the message."""
-    known = fields(kind)  # type: ignore[arg-type]
-    names = [f.name for f in known]
-    for name in given:
-        if name not in names:
-            expected, remedy = f"one of {', '.join(names)}", did_you_mean(name, names, "choose one of them")
-            raise InputError(place=f"{function}(…)", got=f"{name}=…", expected=expected, remedy=remedy)
-    for f in known:
-        if required(f) and f.name not in given:
-            raise InputError(place=f"{function}(…)", got="nothing", expected=f"{f.name}=…", remedy=f"give {f.name}")
-    return kind(**given)
-
-
 def check_ranges(options: Any) -> None:
     """Raises InputError for the first option of an options dataclass that is less than `low`, or not less than `below`.
     Options without `low` are not checked, and `high` is not checked here."""
@@ -65,17 +48,11 @@ def check_ranges(options: Any) -> None:
         raise InputError(place=f"--{f.name}", got=value, expected=expected, remedy="correct it")
 
 
-def documented(kind: type, positional: int = 0) -> Callable[[F], F]:
-    """Returns a decorator that gives a function the signature and, in its docstring, the options of a dataclass. In the
-    signature the first `positional` options may be given by position. A first parameter `self` is kept."""
+def documented(kind: type) -> Callable[[F], F]:
+    """Returns a decorator that lists the options of a dataclass in the docstring of a function."""
 
     def decorate(function: F) -> F:
-        kinds = [inspect.Parameter.POSITIONAL_OR_KEYWORD] * positional + [inspect.Parameter.KEYWORD_ONLY] * 99
-        own = [p for p in inspect.signature(function).parameters.values() if p.name == "self"]
-        options = [signature_parameter(f, k) for f, k in zip(fields(kind), kinds, strict=False)]
-        made: Any = function
-        made.__signature__ = inspect.Signature([*own, *options])
-        made.__doc__ = f"{inspect.getdoc(function)}\n\nOptions:\n\n{options_text(kind)}\n"
+        function.__doc__ = f"{inspect.getdoc(function)}\n\nOptions:\n\n{options_text(kind)}\n"
         return function
 
     return decorate
@@ -91,7 +68,7 @@ def required(f: Field[Any]) -> bool:
     return f.default is MISSING and f.default_factory is MISSING
 
 
-def signature_parameter(f: Field[Any], kind: Any, annotation: Any = None) -> inspect.Parameter:
-    """Returns an option as a parameter of a signature, of this kind; annotation: None takes the field's type."""
+def signature_parameter(f: Field[Any], kind: Any, annotation: Any) -> inspect.Parameter:
+    """Returns an option as a parameter of a signature, of this kind and with this annotation."""
     default = inspect.Parameter.empty if required(f) else [] if f.default is MISSING else f.default
-    return inspect.Parameter(f.name, kind, default=default, annotation=annotation or f.type)
+    return inspect.Parameter(f.name, kind, default=default, annotation=annotation)

@@ -77,10 +77,7 @@ def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Calla
 
 
 def _point(action: ArrayLike, size: int) -> Array:
-    try:
-        point = np.asarray(action)
-    except ValueError:  # rows of different lengths
-        point = np.asarray(None)
+    point = np.asarray(action)
     if point.dtype.kind not in "biuf" or point.shape != (size,) or not np.isfinite(point).all():
         got, remedy = f"shape {point.shape}: {action!r}", "give one number in [-1, 1] for each parameter of the space"
         raise InputError(place="action", got=got[:80], expected=f"({size},) finite numbers", remedy=remedy)

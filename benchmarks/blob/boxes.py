@@ -42,7 +42,7 @@ CATALOGUE = ("merge", "split", "cross", "pass-by", "side-by-side", "pillar", "do
 RATED = ("cross", "crowd", "street", "party")
 RATES, DETECTED = (2.5, 5.0, 10.0, 25.0), (0.5, 0.7, 0.9)  # frames/s; probability of detection
 FIELDS = ((20, 1.0, 0.0), (100, 1.0, 0.0), (20, 0.9, 5.0), (100, 0.9, 5.0))  # squares, detection probability, clutter
-VARIANTS = {"`blob`": {}, "`blob`, paper": BlobConfig.preset("paper").as_dict()}
+VARIANTS = {"`blob`": {}, "`blob`, paper": BlobConfig.load("paper").as_dict()}
 SHOWN = ("HOTA", "DetA", "AssA", "MOTA", "IDF1", "IDSW")
 Table = dict[str, Array]
 """Columns frame, id and box of the rows of people."""

@@ -41,7 +41,7 @@ ABLATIONS: dict[str, dict[str, object]] = {
     "blob": {},
     "no splitting, no person size": {"split": False},
     "managed by rho": {"management": "rho"},
-    "preset `paper`": dict(BlobConfig.preset("paper").as_dict()),
+    "preset `paper`": dict(BlobConfig.load("paper").as_dict()),
 }
 NO_LOOKS = (person_look_kernels, "learn", lambda *_: None)
 SCENES = (("street", 15), ("street", 20), ("cross", 15), ("mixed", 15), ("pillar", 20), ("split", 15), ("crowd", 20))

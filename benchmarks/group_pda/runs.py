@@ -74,7 +74,7 @@ def trackers(name: str, mode: DetectionMode) -> tuple[Variant, ...]:
         for grouping in ("rule", "belief")
         for place, in_image in ([("", True), (ground, False)] if ground else [("", False)])
     ]
-    paper = GroupPdaConfig.preset("paper").as_dict()
+    paper = GroupPdaConfig.load("paper").as_dict()
     ours = (
         Variant(name, name),
         Variant("preset paper", name, paper),

@@ -32,7 +32,7 @@ WITHOUT: Mapping[str, Mapping[str, object]] = {
     "corrections": {"corrections": False},
     "missed and hidden members": {"carry_time": 0.0},
     "association and group constraint": {"association": "none"},
-    "all that is ours: preset paper": GroupPdaConfig.preset("paper").as_dict(),
+    "all that is ours: preset paper": GroupPdaConfig.load("paper").as_dict(),
 }
 DECIDED = ("lineage_accuracy", "ids", "group_F1_hull", "group_MOTA", "event_F1", "group_IDSW")
 

@@ -38,7 +38,7 @@ def _variants(name: str, params: Mapping[str, object]) -> list[Variant]:
     return [*found, Variant(f"{name} .2", params=known, detections="truth")]
 
 
-PRESET = _variants("preset", JointConfig.preset("paper").as_dict())
+PRESET = _variants("preset", JointConfig.load("paper").as_dict())
 DEFAULT = [Variant("default"), *_variants("default", {})]
 PAIRS = (("full", "VAR1"), ("VAR1", "VAR2"), ("VAR2", "VAR3"), (".2", "full"))
 

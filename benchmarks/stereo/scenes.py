@@ -163,7 +163,7 @@ def _levelled(errors: Array) -> Array:
 
 def scenes(args: argparse.Namespace) -> dict[str, dict[str, list[Row]]]:
     """Prints the table of scenes and that of decisions, and returns the rows by scene and variant."""
-    preset = StereoConfig.preset("paper")
+    preset = StereoConfig.load("paper")
     made: dict[str, dict[str, list[Row]]] = {}
     for scene in SCENES:
         paper = replace(preset, radius=SPHERES.get(scene, preset.radius))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from tracking.config import Config, param, preset_file, read_params
+from tracking.config import Config, file_of, param, read_params
 from tracking.papers.blob.config import BlobConfig
 from tracking.running.tracker_registry import find, names
 
@@ -87,25 +87,21 @@ WITH_PRESETS = [find(name).config_class for name in names()]
 @pytest.mark.parametrize("kind", WITH_PRESETS, ids=names())
 def test_the_paper_preset_names_every_parameter_that_is_ours(kind):
     """A parameter whose meaning says "ours" has its off value in the file, or a value without effect."""
-    given = read_params(preset_file(kind.tracker, "paper"), kind.tracker)
+    given = read_params(file_of(kind.tracker, "paper"), kind.tracker)
     ours = {name for name, p in kind.params().items() if re.search(r"\bours\b", p.meaning)}
     assert ours
     assert not ours - given.keys(), "give them their off values in tracking/presets/paper"
-    paper = kind.preset("paper")
+    paper = kind.load("paper")
     assert all(np.array_equal(getattr(paper, name), value) for name, value in given.items())
 
 
 def test_a_preset_is_found_by_name_beside_files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "paper").write_text("[params]\ngate = 0.5\n")
-    assert BlobConfig.load("paper") == BlobConfig.preset("paper") != BlobConfig()
+    assert BlobConfig.load("paper") != BlobConfig()
     assert BlobConfig.load("./paper") == BlobConfig.load(tmp_path / "paper") == BlobConfig(gate=0.5)
     with pytest.raises(InputError, match="preset of blob: paper"):
         BlobConfig.load("papers")
-    with pytest.raises(InputError, match="one of paper"):
-        BlobConfig.preset("first")
-    with pytest.raises(InputError, match="small has no presets"):
-        Small.preset("paper")
     with pytest.raises(InputError, match="No such file"):
         Small.load("paper2")
 

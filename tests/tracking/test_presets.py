@@ -28,7 +28,7 @@ SMALL = {"particles": 50, "partitions": 10}
 
 def run(tracker: str, preset: str, sequence: Sequence, length: int, mode: DetectionMode) -> int:
     """Runs the preset with few particles over the first frames, and returns how many tracks it reported."""
-    config = find(tracker).config_class.preset(preset)
+    config = find(tracker).config_class.load(preset)
     small = {key: value for key, value in SMALL.items() if key in config.params()}
     short = replace(sequence, frames=lambda: islice(sequence.frames(), length), bare=None, length=length)
     ready = prepare(tracker, short, params=replace(config, **small), detections=mode)

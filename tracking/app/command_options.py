@@ -128,7 +128,6 @@ class ScenariosOptions(Options, words="scenarios"):
     name: str | None = ARGUMENT("Scenario, *.toml file or suite to explain.", None)
     settings: list[str] = SET()
     out: Path | None = option("Write a drawing of the plan, with the orders.", None, metavar="FILE.svg")
-    schema: bool = option("Print the keys of scenario files as a JSON schema.", False)
 
 
 class GenerateOptions(PictureOptions, WorkerOptions, words="generate", run="datasets:generate"):
@@ -393,7 +392,6 @@ class FitJointOptions(Options, words="fit joint", run="fit:fit_joint"):
     names: list[str] = NAMES()
     out: Path = TOML("File to write: parameters of joint, for --params.")
     seeds: str = SEEDS("Seeds of the scenes to fit to.", "30000:30002")
-    check: str | None = option("Other seeds, to score the fit with.", None, metavar="A:B")
 
 
 class FitGroupingOptions(FitJointOptions, words="fit grouping", run="fit:fit_grouping"):
@@ -411,6 +409,4 @@ class FitRelationalOptions(Options, words="fit relational", run="fit:fit_relatio
     names: list[str] = NAMES()
     out: Path = TOML("File to write: parameters of relational, for --params.")
     seeds: str = SEEDS(SEEDS_HELP, "30000:30004")
-    observed: bool = option(
-        "Learn speed table and noise of positions from successive detections, as the paper does; no relations.", False)
 # fmt: on

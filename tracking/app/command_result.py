@@ -11,7 +11,7 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
-from scenarios.errors import FlockscopeError, InputError, WorkError, is_control, printable
+from scenarios.errors import FlockscopeError, InputError, WorkError, printable
 
 STATUS = {0: "ok", 1: "failed", 2: "refused", 130: "interrupted"}  # The "status" of the JSON object, by exit code.
 
@@ -75,8 +75,4 @@ def as_flockscope_error(error: BaseException) -> FlockscopeError:
 
 
 def _print_json(data: dict[str, Any]) -> None:
-    unicode = (sys.stdout.encoding or "utf-8").lower().replace("-", "") == "utf8"
-    text = json.dumps(data, ensure_ascii=not unicode, allow_nan=False)
-    if not text.isprintable():
-        text = "".join(json.dumps(c)[1:-1] if is_control(c) else c for c in text)
-    print(text, flush=True)
+    print(json.dumps(data, allow_nan=False), flush=True)

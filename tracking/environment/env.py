@@ -10,7 +10,6 @@ statistics of the run. A step's reward is S(frames so far) - S(frames before it)
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, cast, get_args
 
 import gymnasium
@@ -27,7 +26,6 @@ from tracking.config import Config
 from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, Source, SourceCache, SourceSpec, sources
 from tracking.environment.episodes import AnyTracker, Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
-from tracking.keyword_options import documented, from_keywords, option
 from tracking.parameter_space import Space, decode, decode_and_build, space_of
 from tracking.running.detection_mode import choose_mode
 from tracking.running.prepare import Params, config_of
@@ -36,30 +34,6 @@ from tracking.scoring.people_comparison import Similarity
 
 RESET_OPTIONS = ("scenario", "seed", "params")
 Floats = NDArray[np.float32]
-
-
-@dataclass(frozen=True, kw_only=True)
-class TuningEnvOptions:
-    """The keyword arguments of the environment; the metadata of each field hold its meaning."""
-
-    # fmt: off
-    tracker: AnyTracker = option('Registered name, "file.py:Class", "module:Class" or a class.')
-    suite: SourceSpec | Source = option(
-        "Suite, scenario, TOML file, stored sequences, recording, Sequence, or a list of these.", "quick")
-    seeds: Iterable[int] = option("Seeds that scenarios are simulated with.", range(100))
-    set: Iterable[str] = option('Settings "key=value" of the scenarios.', ())
-    detections: DetectionMode | None = option("Input of the tracker, the same in all episodes.", None)
-    similarity: Similarity | None = option(
-        'How people are compared: "ground", "image" or "boxes"; None: by the data.', None)
-    params: Params = option("Parameters that an episode begins with; the tracker's defaults if None.", None)
-    decision_every: int | None = option("Frames between two actions; None: one action per episode.", None)
-    cache: int = option("Bytes of sequences that are kept for later episodes.", DEFAULT_LIMIT, low=0)
-    tracker_seed: int = option("Seed of trackers that use random numbers.", 0)
-    # fmt: on
-
-    def __post_init__(self) -> None:
-        _check_choice("detections", self.detections, (None, *get_args(DetectionMode)))
-        _check_choice("similarity", self.similarity, (None, *get_args(Similarity)))
 
 
 class TuningEnv(gymnasium.Env[Floats, Floats]):
@@ -72,24 +46,40 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     score so far.
     """
 
-    @documented(TuningEnvOptions, positional=2)
-    def __init__(self, tracker: AnyTracker, suite: SourceSpec | Source = "quick", **options: Any) -> None:
+    def __init__(
+        self, tracker: AnyTracker, suite: SourceSpec | Source = "quick", *, seeds: Iterable[int] = range(100),
+        set: Iterable[str] = (), detections: DetectionMode | None = None, similarity: Similarity | None = None,
+        params: Params = None, decision_every: int | None = None, cache: int = DEFAULT_LIMIT, tracker_seed: int = 0,
+    ) -> None:  # fmt: skip
         """Makes the environment; the first episode begins with `reset`.
 
+        Args:
+            tracker: Registered name, "file.py:Class", "module:Class" or a class.
+            suite: Suite, scenario, TOML file, stored sequences, recording, Sequence, or a list of these.
+            seeds: Seeds that scenarios are simulated with.
+            set: Settings "key=value" of the scenarios.
+            detections: Input of the tracker, the same in all episodes.
+            similarity: How people are compared: "ground", "image" or "boxes"; None: by the data.
+            params: Parameters that an episode begins with; the tracker's defaults if None.
+            decision_every: Frames between two actions; None: one action per episode.
+            cache: Bytes of sequences that are kept for later episodes.
+            tracker_seed: Seed of trackers that use random numbers.
+
         Raises:
-            InputError: An argument is unknown or wrong, no parameter can be searched, a source is unreadable or lacks
-                the detections, or simulated sources have seeds of two splits.
+            InputError: An argument is wrong, no parameter can be searched, a source is unreadable or lacks the
+                detections, or simulated sources have seeds of two splits.
         """
-        given = from_keywords(TuningEnvOptions, "TuningEnv", {"tracker": tracker, "suite": suite, **options})
+        _check_choice("detections", detections, (None, *get_args(DetectionMode)))
+        _check_choice("similarity", similarity, (None, *get_args(Similarity)))
         self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
-        self.options, self.decision_every = given, given.decision_every
+        self.decision_every, self.tracker_seed, self.similarity = decision_every, tracker_seed, similarity
         self.config_class = config_class(self.tracker, self.tracker.__name__)
-        self.defaults = config_of(self.config_class, given.params)
-        self.sources = sources(given.suite, given.seeds, given.set)
+        self.defaults = config_of(self.config_class, params)
+        self.sources = sources(suite, seeds, set)
         _check_split(self.sources)
-        self.mode = _detection_mode(self.tracker, self.sources, given.detections)
-        self.space: Space = _action_parameters(self.config_class, self.mode, given.decision_every)
-        self.cache = SourceCache(given.cache)
+        self.mode = _detection_mode(self.tracker, self.sources, detections)
+        self.space: Space = _action_parameters(self.config_class, self.mode, decision_every)
+        self.cache = SourceCache(cache)
         self.observation_space = Box(0.0, 1.0, (len(NAMES),), np.float32)
         self.action_space = Box(-1.0, 1.0, (len(self.space),), np.float32)
         self.left_out: dict[Source, str] = {}  # and why: scenes whose script does not come true
@@ -170,10 +160,9 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return self._observe(), self.score - before, terminated, False, self._info()
 
     def _rollout(self, config: Config, source: Source | None = None) -> Rollout:
-        seed, similarity = self.options.tracker_seed, self.options.similarity
         return Rollout(
-            self.tracker, source or self.source, config, detections=self.mode, tracker_seed=seed, cache=self.cache,
-            similarity=similarity,
+            self.tracker, source or self.source, config, detections=self.mode, tracker_seed=self.tracker_seed,
+            cache=self.cache, similarity=self.similarity,
         )  # fmt: skip
 
     def _advance(self, rollout: Rollout, upto: int | None) -> bool:

@@ -89,9 +89,6 @@ def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: It
     """
     if isinstance(what, str | Path | Sequence | Source):
         what = (what,)
-    if not isinstance(seeds, Iterable):
-        remedy = f"write for example range({seeds})"
-        raise InputError(place="seeds", got=repr(seeds), expected="a range or a list of numbers", remedy=remedy)
     if isinstance(set, str):
         raise InputError(place="set", got=repr(set), expected='a list of "key=value"', remedy=f"write [{set!r}]")
     numbers, settings = tuple(seeds), tuple(set)
@@ -189,8 +186,6 @@ class SourceCache:
     """
 
     def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
-        if limit < 0:
-            raise InputError(place="cache", got=limit, expected="bytes, 0 or more", remedy="correct it")
         self.limit = limit
         self._opened: OrderedDict[tuple[object, ...], OpenedSource] = OrderedDict()
         self._bytes: dict[tuple[object, ...], int] = {}
@@ -212,7 +207,7 @@ class SourceCache:
         key = (*source.key, streams)
         if key not in self._opened:
             held = self.bytes
-            while held > self.limit:
+            while self._opened and held > self.limit:
                 dropped, _ = self._opened.popitem(last=False)
                 held -= self._bytes.pop(dropped)
             self._opened[key] = OpenedSource(source, streams)

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import itertools
 import signal
-from dataclasses import fields
-from typing import Any, Self, cast
+from typing import Any, Self
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
-from sim.arrays import Frozen
 from sim.types import Context, Detections, Frame, Tracker, Tracks
 from sim.workers.pool import RemoteTraceback, WorkerProcess
 from tracking.config import Config
@@ -134,13 +132,6 @@ def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
         raise RuntimeError("the process of this tracker was started again since its reset")
     signal.setitimer(signal.ITIMER_REAL, limit)  # without a handler this ends the process, also in compiled code
     try:
-        return getattr(_made[number], method)(*map(_frozen, given)), learned_by(_made[number])
+        return getattr(_made[number], method)(*given), learned_by(_made[number])
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-
-
-def _frozen(value: Any) -> Any:
-    # Arrays that were pickled can be written again.
-    if not isinstance(value, Frozen):
-        return value
-    return value.replace(**{f.name: _frozen(getattr(value, f.name)) for f in fields(cast(Any, value))})

@@ -34,7 +34,7 @@ Stage = Callable[[Scenario], list[Piece]]
 # The kinds of pieces, in the order in which they are taken out.
 STAGES: tuple[Stage, ...] = (
     reductions.script, reductions.seconds, reductions.beginning, reductions.obstacles, reductions.difficulties,
-    reductions.defaults, reductions.people, reductions.details,
+    reductions.people, reductions.details,
 )  # fmt: skip
 
 ALLOWED = 5  # one of so many confirming seeds may not fail

@@ -7,7 +7,6 @@ The kinds of pieces, in the order in which they are tried (`STAGES` of `tracking
     beginning     the first second of it: fixed groups start where they are a second later
     obstacles     a door, wall, pillar, flight of stairs or service point
     difficulties  a key of sensor, light, picture, crowd or camera: set to its easiest value, else to its default
-    defaults      a key that cannot have its easiest value: set to its default
     people        a person of a group (of a drawn size first those above the least), a copy of a group with `repeat`
     details       a stop or point on a group's way, a part of a split, a group of a merge or queue, a hidden time
 
@@ -230,30 +229,14 @@ def obstacles(scenario: Scenario) -> list[Piece]:
 def difficulties(scenario: Scenario) -> list[Piece]:
     """Returns a piece for each key that can be set to its easiest value (its default if no value is known to be
     easiest), and does not have it."""
-    layout = [key for key in LAYOUT if getattr(scenario, key) != Scenario.model_fields[key].default]
-    keys = [(easiest, name, key) for name, key, easiest, now, easy, _ in _eased(scenario) if now != easy]
-    return [*(_set(GONE, key) for key in layout), *(_set(*one) for one in keys)]
-
-
-def defaults(scenario: Scenario) -> list[Piece]:
-    """Returns a piece for each key with a known easiest value that has neither that value nor its default; the piece
-    sets the default."""
-    return [
-        _set(GONE, name, key)
-        for name, key, easiest, now, easy, usual in _eased(scenario)
-        if easiest is not GONE and now not in (easy, usual)
-    ]
-
-
-def _eased(scenario: Scenario) -> Iterator[tuple[str, str, Any, Any, Any, Any]]:
-    """Yields the keys that can be eased: part, key, easiest value (GONE: the default), and what part, easy part and
-    default part have."""
+    found = [_set(GONE, key) for key in LAYOUT if getattr(scenario, key) != Scenario.model_fields[key].default]
     for name in EASED:
         part, easiest = getattr(scenario, name), EASIEST.get(name, {})
-        easy, usual = type(part).model_validate(easiest), type(part)()
+        easy = type(part).model_validate(easiest)
         for key in type(part).model_fields:
-            if name != "camera" or key not in SIZES:
-                yield name, key, easiest.get(key, GONE), *(getattr(one, key) for one in (part, easy, usual))
+            if (name != "camera" or key not in SIZES) and getattr(part, key) != getattr(easy, key):
+                found.append(_set(easiest.get(key, GONE), name, key))
+    return found
 
 
 def people(scenario: Scenario) -> list[Piece]:

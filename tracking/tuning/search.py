@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from scenarios.errors import InputError, counted
 from sim.io.files.own_files import Marks, output_file, refuse_foreign_file
 from sim.types import Tracker
-from tracking.keyword_options import documented, from_keywords
+from tracking.keyword_options import documented
 from tracking.tuning.candidates import Candidate, Goal, HeldOutEvaluator, TrialRecord, pareto_front
 from tracking.tuning.options import Scenes, TuneOptions
 from tracking.tuning.parallel_episodes import episode_player
@@ -35,7 +35,7 @@ JOURNAL = ".journal"  # Suffix of the journal beside `--out`.
 RESULT_MARKS: Marks = {"settings": dict, "counts": dict, "left_out": list}
 
 
-@documented(TuneOptions, positional=3)
+@documented(TuneOptions)
 def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.trials, **options: Any) -> TuningResult:
     """Searches parameters on simulated scenes, and measures their gain on other scenes.
 
@@ -51,12 +51,11 @@ def tune(tracker: str | type[Tracker], suite: Scenes, trials: int = TuneOptions.
         is also written to files.
 
     Raises:
-        InputError: An option is unknown or wrong, options contradict each other, the study in the storage is about
+        InputError: An option is wrong, options contradict each other, the study in the storage is about
             another search, or Optuna is not installed.
         WorkError: Workers are lost, or the tracker fails with its defaults.
     """
-    given = {"tracker": tracker, "suite": suite, "trials": trials, **options}
-    return _search(from_keywords(TuneOptions, "tracking.tune", given))
+    return _search(TuneOptions(tracker=tracker, suite=suite, trials=trials, **options))
 
 
 def _search(options: TuneOptions) -> TuningResult:

@@ -90,7 +90,6 @@ COMMANDS = {
     "scenarios": ("scenarios", "scenarios --out {out}/plan.svg"),
     "scenarios NAME": ("scenarios {scene}", "scenarios no-such-scene"),
     "scenarios --out": ("scenarios {scene} --out {out}/plan.svg", "scenarios {scene} --set a=1 --out {out}/plan.svg"),
-    "scenarios --schema": ("scenarios --schema", "scenarios {scene} --schema --out {out}/plan.svg"),
     "generate": ("generate {scene} --seeds 5:7 --streams none --out {out}", "generate {scene} --seeds 5:5 --out {out}"),
     "generate pictures": (
         "generate {scene} --seeds 5 --set camera.image=[128,96] --out {out}",
@@ -99,7 +98,7 @@ COMMANDS = {
     "replay": ("replay {one} --set camera.image=[128,96] --out {out}", "replay {out}/nothing --out {out}/x"),
     "fit sensor": ("fit sensor {data} --out {out}/mine.toml", "fit sensor {out}/nothing --out {out}/mine.toml"),
     "fit grouping": (
-        "fit grouping side-by-side --seeds 0 --check 1 --out {out}/mine.toml",
+        "fit grouping side-by-side --seeds 0 --out {out}/mine.toml",
         "fit grouping no-such-scene --out {out}/mine.toml",
     ),
     "fit relational": (

@@ -361,7 +361,7 @@ OVERLAY = f"overlay {SEEN}/left.mp4 {{0}}/pair.txt --out {{1}}/o.mp4"
 # what is run: of each option what is appended, or the words of the line that become others.
 FLIPS = {
     "scenarios {0}/scene.toml": {"settings": "--set duration=9", "out": "--out {1}/plan.svg"},
-    "scenarios": {"schema": "--schema", "name": "{0}/scene.toml"},
+    "scenarios": {"name": "{0}/scene.toml"},
     "generate {0}/scene.toml --seeds 7 --streams none --out {1}": {
         "names": ("{0}/scene.toml", "cross --set camera.fps=5"), "seeds": ("--seeds 7", "--seeds 8"),
         "settings": "--set scenario.duration=3",

@@ -145,8 +145,7 @@ WRONG_ARGUMENTS = [
     ("blob", {"params": {"gaet": 0.5}}, "did you mean gate"),
     ("blob", {"suite": "nothing at all"}, "a scenario, a suite"),
     ("blob", {"detections": "boxes"}, "one of None, image, truth, file"),
-    ("blob", {"seeds": 5}, r"write for example range\(5\)"), ("blob", {"seeds": [0, 20_000]}, "seeds of one split"),
-    ("blob", {"cache": -1}, "bytes"),
+    ("blob", {"seeds": [0, 20_000]}, "seeds of one split"),
     ("blob", {"set": "camera.fps=5"}, r"write \['camera.fps=5'\]"),
     (StillToy, {"decision_every": 5}, "may change between frames"),
 ]  # fmt: skip

@@ -55,16 +55,15 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     from tracking.fitting.belief import belief_scores, fit_belief, sample_of
     from tracking.fitting.grouping_scenes import pair_scenes
 
-    out, seeds = output_file(options.out, ".toml"), _fit_and_check_seeds(options)
-    samples = {key: sample_of(list(pair_scenes(options.names, numbers))) for key, numbers in seeds.items()}
-    changes = sample_of(list(pair_scenes(options.events, seeds["fitted"]))) if options.events else None
-    belief = fit_belief(samples["fitted"], changes)
-    scores = {key: belief_scores(sample, belief.log_odds(sample.values)[:, 0]) for key, sample in samples.items()}
-    asked = [f"--events {name}" for name in options.events]
-    comments = _comments("grouping", options, asked, seeds, scores)
+    out, seeds = output_file(options.out, ".toml"), option_parsing.seeds(options.seeds)
+    sample = sample_of(list(pair_scenes(options.names, seeds)))
+    changes = sample_of(list(pair_scenes(options.events, seeds))) if options.events else None
+    belief = fit_belief(sample, changes)
+    scores = belief_scores(sample, belief.log_odds(sample.values)[:, 0])
+    comments = _comments("grouping", options, [f"--events {name}" for name in options.events], scores)
     write_file(out, belief.toml_text("\n".join(comments)).encode())
     text = "\n".join([*comments[1:], f"→ {out}: use it as --grouping {out}"])
-    return CommandResult({"file": out, **scores}, text)
+    return CommandResult({"file": out, "fitted": scores}, text)
 
 
 def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]]:
@@ -75,25 +74,11 @@ def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]
     return ((seed, simulated(entry, seed)) for entry in entries for seed in seeds)
 
 
-def _fit_and_check_seeds(options: FitJointOptions) -> dict[str, range]:
-    """Returns the seeds of --seeds under "fitted" and, if given, those of --check under "checked"."""
-    found = {"fitted": option_parsing.seeds(options.seeds)}
-    return found | ({} if options.check is None else {"checked": option_parsing.seeds(options.check, "--check")})
-
-
-def _comments(
-    kind: str,
-    options: FitJointOptions,
-    more: Iterable[str],
-    seeds: Mapping[str, range],
-    scores: Mapping[str, Mapping[str, float]],
-) -> list[str]:
-    """Returns the command that fits, and a line of scores for each range of seeds."""
-    lines = [" ".join(["flockscope fit", kind, *options.names, f"--seeds {options.seeds}", *more])]
-    for key, numbers in seeds.items():
-        values = ", ".join(f"{name} {value:.4g}" for name, value in scores[key].items())
-        lines.append(f"{key}, seeds {numbers.start}:{numbers.stop}: {values}")
-    return lines
+def _comments(kind: str, options: FitJointOptions, more: Iterable[str], scores: Mapping[str, float]) -> list[str]:
+    """Returns the command that fits, and a line of scores."""
+    values = ", ".join(f"{name} {value:.4g}" for name, value in scores.items())
+    command = " ".join(["flockscope fit", kind, *options.names, f"--seeds {options.seeds}", *more])
+    return [command, f"fitted, seeds {options.seeds}: {values}"]
 
 
 def fit_joint(options: FitJointOptions) -> CommandResult:
@@ -102,39 +87,28 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
     from tracking.fitting.joint_events import EventRows, event_rows, event_scores, fit_events
     from tracking.papers.joint.config import EVENT_TIME
 
-    out, seeds = output_file(options.out, ".toml"), _fit_and_check_seeds(options)
-    rows = {
-        key: EventRows.joined(event_rows(truth, EVENT_TIME, seed) for seed, truth in _simulated(options.names, numbers))
-        for key, numbers in seeds.items()
-    }
-    params = fit_events(rows["fitted"])
-    scores = {key: event_scores(part, params) for key, part in rows.items()}
-    comments = _comments("joint", options, (), seeds, scores)
+    out, seeds = output_file(options.out, ".toml"), option_parsing.seeds(options.seeds)
+    scenes = _simulated(options.names, seeds)
+    rows = EventRows.joined(event_rows(truth, EVENT_TIME, seed) for seed, truth in scenes)
+    params = fit_events(rows)
+    scores = event_scores(rows, params)
+    comments = _comments("joint", options, (), scores)
     body = [f"{name} = {value}" for name, value in params.items()]
     text = "\n".join([*(f"# {line}" for line in comments), 'tracker = "joint"', "", "[params]", *body, ""])
     write_file(out, text.encode())
     result = "\n".join([*comments[1:], "", *body, "", f"→ {out}: use it as --params {out}"])
-    return CommandResult({"file": out, "params": params, **scores}, result)
+    return CommandResult({"file": out, "params": params, "fitted": scores}, result)
 
 
 def fit_relational(options: FitRelationalOptions) -> CommandResult:
     """Writes the fitted parameters of `relational` as a TOML file."""
-    from scenarios.loading.resolve import resolve
     from sim.io.files.atomic import write_file
-    from sim.sequence import simulate
     from tracking.fitting import relational
     from tracking.papers.relational.config import RelationalConfig
 
     out, seeds = output_file(options.out, ".toml"), option_parsing.seeds(options.seeds)
-    params: dict[str, float | list[float]]
-    if options.observed:
-        entries = [entry for name in options.names for entry in resolve(name, relational.LABELS)]
-        scenes = (simulate(entry.scenario, seed, entry.repeat, ()) for entry in entries for seed in seeds)
-        ends = relational.PAPER_ENDS
-        params = {"speed_ends": list(ends), **relational.fit_observed(scenes, ends)}
-    else:
-        truths = (truth for _, truth in _simulated(options.names, seeds))
-        params = relational.fit_relational(truths, RelationalConfig().speed_ends)
+    truths = (truth for _, truth in _simulated(options.names, seeds))
+    params = relational.fit_relational(truths, RelationalConfig().speed_ends)
     config = RelationalConfig.from_dict(dict(params), out)
     write_file(out, f"# flockscope fit relational\n{config.to_toml()}".encode())
     width, body = max(map(len, params)), config.as_dict()

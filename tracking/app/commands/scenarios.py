@@ -1,47 +1,26 @@
-"""`flockscope scenarios`: lists scenarios and suites, explains one in words, or prints the schema of scenario files."""
+"""`flockscope scenarios`: lists scenarios and suites, or explains one in words."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import dump, load, names, read_suite, resolve, suite_file, suite_names
 from scenarios.loading.toml_files import SUITES
-from scenarios.schema.scenario import Scenario
 from tracking.app.command_options import ScenariosOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.option_parsing import scenario_settings
 
 
 def scenarios(options: ScenariosOptions) -> CommandResult:
-    """Explains the named scenario or suite; without a name lists all, or with --schema prints the JSON schema."""
-    if options.name is not None and not options.schema:
+    """Explains the named scenario or suite; without a name lists all."""
+    if options.name is not None:
         return explain(options.name, options.settings, options.out)
-    unused = {"NAME": options.name, "--out": options.out, "--set": options.settings}
-    for option, value in unused.items():
+    for option, value in {"--out": options.out, "--set": options.settings}.items():
         if value:
-            got, remedy = f"{option} without a scenario to explain", "name a scenario, and leave --schema out"
+            got, remedy = f"{option} without a scenario to explain", "name a scenario"
             raise InputError(place=option, got=got, expected="NAME", remedy=remedy)
-    if not options.schema:
-        return catalogue()
-    schema = file_schema()
-    return CommandResult({"schema": schema}, json.dumps(schema, indent=1, ensure_ascii=False))
-
-
-def file_schema() -> dict[str, Any]:
-    """Returns the JSON schema of scenario files; keys that `extends` may give a file are optional."""
-    schema = Scenario.model_json_schema(by_alias=True)
-    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
-    schema["properties"]["extends"] = {"type": "string", "description": "a file or scenario to which this one is added"}
-    del schema["required"]
-    for table in schema["$defs"].values():
-        if "id" in table["properties"]:
-            table["required"] = ["id"]
-    orders = schema["properties"]["event"]["items"]
-    schema["properties"]["event"]["items"] = {"anyOf": orders["oneOf"]}  # without `type` several kinds may fit
-    return schema
+    return catalogue()
 
 
 def catalogue() -> CommandResult:

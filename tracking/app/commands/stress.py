@@ -32,6 +32,10 @@ MOST_AXES = 2  # without a search
 
 def stress(options: StressOptions) -> CommandResult:
     """Plays a sweep, or with --search a search for the worst scenes, stores the episodes, and returns the findings."""
+    from tracking.app.report.of_sweep import report_of_sweep
+    from tracking.app.report.page import check_packages, write_report
+
+    check_packages()
     trackers = {name: contender(name, options.step_timeout) for name in dict.fromkeys(options.trackers)}
     detects = all({"boxes", "points"} & {*tracker.needs} for tracker in trackers.values())
     plan = _plan(options, options.detections or ("file" if detects else "image"))
@@ -50,21 +54,8 @@ def stress(options: StressOptions) -> CommandResult:
         data = _data(sweep, found)
         write_file(options.out / RESULT, json_document(data))
         write_file(options.out / TABLE, _parquet(sweep))
-        report = _report(sweep, data, options.out / REPORT)
-    return CommandResult(data, _text(sweep, data, options.out, report))
-
-
-def _report(sweep: Sweep, data: dict[str, Any], path: Path) -> str:
-    """Writes the report; returns its path, or why it was not written."""
-    from tracking.app.report.of_sweep import report_of_sweep
-    from tracking.app.report.page import check_packages, write_report
-
-    try:
-        check_packages()
-    except InputError as error:
-        return error.line()
-    write_report(report_of_sweep(sweep, data, [*_break_lines(sweep, data)]), path)
-    return str(path)
+        write_report(report_of_sweep(sweep, data, [*_break_lines(sweep, data)]), options.out / REPORT)
+    return CommandResult(data, _text(sweep, data, options.out))
 
 
 def _plan(options: StressOptions, detections: DetectionMode) -> Plan:
@@ -157,9 +148,9 @@ def _parquet(sweep: Sweep) -> bytes:
     return table_bytes(columns, {"axes": [axis.name for axis in sweep.plan.axes]})
 
 
-def _text(sweep: Sweep, data: dict[str, Any], out: Path, report: str) -> str:
+def _text(sweep: Sweep, data: dict[str, Any], out: Path) -> str:
     parts = _found(sweep, data) if data["found"] is not None else _curves(sweep, data)
-    end = f"{counted(data['episodes'], 'episode')} stored in {out}; report: {report}"
+    end = f"{counted(data['episodes'], 'episode')} stored in {out}; report: {out / REPORT}"
     return "\n".join([*parts, *_notes(data), end])
 
 

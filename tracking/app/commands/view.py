@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -47,23 +46,8 @@ def view(options: ViewOptions) -> CommandResult:
     if len(names) > 1 and unlabelled is not None:
         expected, remedy = "labels, by which several runs are compared", "give one run, or one sequence"
         raise InputError(file=unlabelled, got="no labels", expected=expected, remedy=remedy)
-    reported = bool(names) and unlabelled is None and _can_report(options.out / INDEX, alone=len(names) > 1)
-    return _report(options, sequences, names) if reported else _pages(options, sequences, names)
-
-
-def _can_report(index: Path, alone: bool) -> bool:
-    """Returns True if the report can be written; without its packages a warning, or InputError if it is `alone`."""
-    from tracking.app.report.page import check_packages
-
-    refuse_foreign_file(index)
-    try:
-        check_packages()
-    except InputError as error:
-        if alone:
-            raise
-        warnings.warn(error.line(), stacklevel=2)
-        return False
-    return True
+    write = _report if names and unlabelled is None else _pages
+    return write(options, sequences, names)
 
 
 def _pages(
@@ -95,8 +79,10 @@ def _pages(
 def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str]) -> CommandResult:
     """Writes index.html, the report on all runs; for one run it links to the pages of the sequences."""
     from tracking.app.report.of_runs import judged_runs, report_of_runs
-    from tracking.app.report.page import write_report
+    from tracking.app.report.page import check_packages, write_report
 
+    check_packages()
+    refuse_foreign_file(options.out / INDEX)
     index, pages = options.out / INDEX, CommandResult({"files": []})
     found = judged_runs(names, sequences, source_of(options, options.source), options.workers)
     if len(names) == 1:

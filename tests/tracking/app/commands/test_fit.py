@@ -40,7 +40,7 @@ def test_fit_generate_and_track_with_it(made: Path, tmp_path: Path, capsys: pyte
 
 def test_a_belief_is_fitted_and_used(made: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     files = [tmp_path / name for name in ("one.toml", "two.toml")]
-    words = ("fit", "grouping", "side-by-side", "pass-by", "--seeds", "30000:30002", "--check", "10000", "--out")
+    words = ("fit", "grouping", "side-by-side", "pass-by", "--seeds", "30000:30002", "--out")
     first, _ = (answer(capsys, *words, file) for file in files)
     assert files[0].read_text() == files[1].read_text(), "a fit gives the same file again"
     assert first["fitted"]["F1"] > 0.95

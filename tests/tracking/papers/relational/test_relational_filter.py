@@ -328,7 +328,7 @@ def test_all_members_of_a_particles_group_have_its_mean_velocity():
 def test_the_preset_keeps_groups_closed():
     """No member of a group is related to a part of it alone, after each frame."""
     scene = simulate(load("queue", ["camera.fps=5"]), 40_002, 0, ())
-    config = RelationalConfig.preset("paper").with_set("particles=100")
+    config = RelationalConfig.load("paper").with_set("particles=100")
     ready = prepare("relational", first(scene, 40), detections="file", params=config)
     ready.reset(0)
     largest = 0
