@@ -15,6 +15,7 @@ from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
+from tracking.fitting.relational import LABELS
 from tracking.papers.relational.config import ParticleConfig
 from tracking.running.prepare import prepare
 from tracking.running.tracker_registry import find
@@ -23,8 +24,6 @@ from tracking.stats import mean_interval, paired
 FILTERS = ("particle", "relational")
 DIFFERENCE = "relational − particle"
 PRESETS = {"paper": "paper", "default": None}
-LABELS = ("sensor.detect_prob=1", "sensor.occlusion_power=0", "sensor.clutter_rate=0")
-"""Settings of a sensor as the paper's observations are: every visible person, nobody else, and displaced feet."""
 HIDDEN = 0.2
 """People who are less visible are never detected: `sensor.min_visibility`."""
 CUT = 2.0

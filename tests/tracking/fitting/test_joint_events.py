@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
+from scenarios.loading.resolve import load
+from sim.sequence import simulate
 from tracking.fitting import joint_events
-from tracking.fitting.relational import fit_relational, logistic
+from tracking.fitting.relational import LABELS, fit_observed, fit_relational, logistic
 from tracking.papers.relational.config import RelationalConfig
 
 
@@ -73,6 +75,16 @@ def test_pairs_that_a_line_separates_have_finite_weights():
     assert weights[0] / weights[1] == pytest.approx(1.5, abs=0.05)
     assert weights[2] == 0
     assert 3 < weights[1] < 30
+
+
+def test_a_table_learned_from_observations_has_their_errors():
+    """Errors of variance r^2 add 6 (r / dt)^2 to the variance of the velocity's change in a frame."""
+    scene = load("party", ["camera.fps=10", *LABELS, "sensor.points=own", "sensor.noise_m=0.3"])
+    clean = load("party", ["camera.fps=10", *LABELS, "sensor.points=own", "sensor.noise_m=0.03"])
+    rough, exact = (fit_observed([simulate(s, 30_000, 0, ())], (1e6, 2e6, 3e6, 4e6)) for s in (scene, clean))
+    assert rough["point_noise"] == pytest.approx(0.3, rel=0.05)
+    assert exact["point_noise"] == pytest.approx(0.03, rel=0.05)
+    assert rough["diffusion"][0] * 0.1**0.5 == pytest.approx(6**0.5 * 0.3 / 0.1, rel=0.05)
 
 
 def test_without_scenes_nothing_is_fitted():
