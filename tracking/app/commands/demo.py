@@ -9,7 +9,8 @@ import math
 import os
 import re
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from html import escape
 from itertools import zip_longest
@@ -67,13 +68,15 @@ def demo(options: DemoOptions) -> CommandResult:
     refuse_foreign_file(page)
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     settings = QUICK_PIXEL_SETTINGS if quick else PIXEL_SETTINGS
-    with ProgressMeter("generate") as meter:
-        folders = generate(names, seeds, out / "data", progress=meter.update, streams=())
-        (rendered,) = generate(
-            [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
-        )  # fmt: skip
-    trackers = QUICK_TRACKERS if quick else tracker_registry.names()
-    runs = _runs(_jobs(out, trackers, folders, rendered, quick))
+    with _compiled_ahead() as compiled:
+        with ProgressMeter("generate") as meter:
+            folders = generate(names, seeds, out / "data", progress=meter.update, streams=())
+            (rendered,) = generate(
+                [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
+            )  # fmt: skip
+        trackers = QUICK_TRACKERS if quick else tracker_registry.names()
+        jobs = _jobs(out, trackers, folders, rendered, quick)
+        runs = _runs(compiled(jobs), len(jobs), 1 if quick else os.cpu_count() or 1)
     sequences, scenes = [open_source(folder)[0] for folder in folders], open_source(rendered)
     given: dict[str, dict[str, list[TrackingRun]]] = {"points": {}, "boxes": {}, "pixels": {}}
     for job in sorted(runs, key=lambda job: trackers.index(job.tracker)):
@@ -118,11 +121,11 @@ def _jobs(out: Path, trackers: Iterable[str], folders: list[Path], rendered: Pat
     return [job for two in zip_longest(image_jobs, file_jobs) for job in two if job is not None]
 
 
-def _runs(jobs: list[_TrackJob]) -> dict[_TrackJob, list[TrackingRun]]:
+def _runs(jobs: Iterable[_TrackJob], count: int, workers: int) -> dict[_TrackJob, list[TrackingRun]]:
     from sim.workers.pool import start_workers
 
     runs = {}
-    with ProgressMeter("track", len(jobs)) as meter, start_workers(os.cpu_count() or 1) as run:
+    with ProgressMeter("track", count) as meter, start_workers(workers) as run:
         for job, found in run(_tracked, jobs):
             runs[job] = found
             meter.step(f"{job.tracker}{' from pixels' if job.overlay else ''}")
@@ -141,6 +144,69 @@ def _tracked(job: _TrackJob) -> list[TrackingRun]:
     if job.overlay is not None:
         write_overlay(sequence, runs[-1], job.overlay, "over")
     return runs
+
+
+@contextmanager
+def _compiled_ahead() -> Iterator[Callable[[Iterable[_TrackJob]], Iterator[_TrackJob]]]:
+    """Compiles the kernels of QUICK_TRACKERS in another process; yields a function that yields jobs, each when those
+    that it needs are compiled."""
+    from sim.workers.pool import WorkerProcess
+
+    # With one processor it would only take longer, as the process imports everything again.
+    worker, compiling = WorkerProcess(), list(QUICK_TRACKERS) if (os.cpu_count() or 1) > 1 else []
+
+    def compiled(jobs: Iterable[_TrackJob]) -> Iterator[_TrackJob]:
+        for job in jobs:
+            while job.tracker in compiling:
+                del compiling[0]
+                worker.receive()
+            yield job
+
+    try:
+        for tracker in compiling:
+            worker.send(_compile, tracker)
+        yield compiled
+    finally:
+        worker.terminate()
+        worker.join()
+
+
+def _compile(tracker: str) -> None:
+    pixels = "pixels" in tracker_registry.find(tracker).needs
+    TrackerSetup(tracker, detections="image" if pixels else "file").run(_made_up_people())
+
+
+def _made_up_people() -> Sequence:
+    """Returns pictures of people, and points of two people side by side and one apart, all that a tracker needs to call
+    its kernels, with the types of simulated sequences."""
+    import numpy as np
+
+    from sim.scene.camera import camera_rotation, px_per_m_at_centre
+    from sim.types import Camera, Detections, Frame, Image
+
+    wide, high, fps, r = 320, 240, 5.0, np.random.default_rng(0)
+    pose = np.array([0.0, -10.0, 6.0]), camera_rotation(0.6, 0.0)
+    camera = Camera("pinhole", (wide, high), (250.0, 250.0), (wide / 2, high / 2), *pose)
+    ground = r.integers(90, 170, (high, wide, 1))
+
+    def picture(*lefts: int) -> Image:
+        image = ground + r.normal(0.0, 2.0, (high, wide, 3))
+        for left in lefts:
+            image[80:118, left : left + 10] = 20, 20, 150
+        made: Image = image.clip(0, 255).astype(np.uint8)
+        made.setflags(write=False)
+        return made
+
+    def frames() -> Iterator[Frame]:
+        for k in range(16):
+            pos = np.array([[k / 3 - 3.0, 0.0], [k / 3 - 2.75, 0.0], [3.0 - k / 3, 2.0]])
+            lefts = 90 + 7 * k, 230 - 7 * k, *(20, 30, 40) * (k > 7)  # the last three touch: new people in one blob
+            yield Frame(k + 1, k / fps, picture(*lefts), None, Detections(k + 1, k / fps, "ground", pos))
+
+    return Sequence(
+        "made-up", fps, 16, frames, image_size=camera.image, camera=camera, has_images=True, has_detections=True,
+        px_per_m=px_per_m_at_centre(camera), load_background=lambda: np.stack([picture() for _ in range(12)]),
+    )  # fmt: skip
 
 
 def _replays(sequences: list[Sequence], runs: Runs, folder: Path) -> dict[str, list[Path]]:
