@@ -90,7 +90,7 @@ class GroupMatches:
         true = group_rows(index, [groups[f - 1] for f in index.tolist()], people.rows)
         reported = [(t.index, t.groups) for t in tracks if frames[t.index] and t.groups is not None]
         est = group_rows(np.array([f for f, _ in reported], np.int64), [g for _, g in reported], people.rows)
-        est, _ = people_inside(est, people.rows, places, scale)
+        est = people_inside(est, people.rows, places, scale)
         est = est.keep(est.count != 1)
         pairs = matched_groups(true.pos, est.pos, hull_pairs(true, est))
         key = list(zip(true.rows.frame.tolist(), true.rows.id.tolist(), strict=True))

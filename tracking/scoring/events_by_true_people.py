@@ -58,8 +58,10 @@ def _parts_of(people: PersonRows) -> Callable[[GroupEvent, int, int, int], tuple
         def until(frame: int) -> list[list[int]]:
             return _by_group(event.members, lambda m: group[lookup.nearest(m, frame, back, 0)])
 
-        before = until(reported - 1)
-        after = _by_group(event.members, lambda m: group[lookup.nearest(m, reported, 0, ahead)])
+        before, after = (
+            until(reported - 1),
+            _by_group(event.members, lambda m: group[lookup.nearest(m, reported, 0, ahead)]),
+        )
         if sorted(before) == sorted(after):
             before = until(event.start - 1)
         if sorted(before) != sorted(after):
@@ -134,7 +136,8 @@ def events_of_hulls(
         children = _contained(groups, person, event.after, range(reported, reported + span))
         return ComparableEvent(event.kind, event.start, reported, None, event.pos, parents, children)
 
-    return [comparable(*report) for report in _reports(tracks, frames) if not (without_members and report[0].members)]
+    reports = _reports(tracks, frames)
+    return [comparable(*report) for report in reports if not (without_members and report[0].members)]
 
 
 def _last_appearance(rows: FrameRows, ids: Sequence[int]) -> int:
@@ -146,7 +149,7 @@ def _last_appearance(rows: FrameRows, ids: Sequence[int]) -> int:
 def _contained(groups: GroupRows, person: Ints, ids: Sequence[int], span: range) -> tuple[EventMembers, ...]:
     """Returns the people of each group id in `ids` in the frames `span`; person (K,): of each membership."""
     # One frame is not enough: the hulls of people behind each other overlap in the image. A person belongs to the group
-    # that had the person in most frames, of equals to the smaller one, then to the lowest id.
+    # that contained the person in most frames, of equals to the smaller one, then to the lowest id.
     rows, now = groups.rows, (groups.rows.frame >= span.start) & (groups.rows.frame < span.stop)
     reported = Counter(rows.id[now].tolist())
     inside = now[groups.of]

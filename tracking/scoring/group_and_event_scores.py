@@ -56,7 +56,7 @@ class TrackedGroups:
     """One tracker's groups in the labelled frames."""
 
     # all groups; memberships hold rows of the true people. Members mapped to nobody are left out. If the tracker names
-    # no members, they are the true people inside the hull or at most 0.3 m outside, and no nearer to another hull.
+    # no members, they are the true people inside the hull.
     every: GroupRows
     # the groups that are scored. Members are rows of the tracked people if the tracker names members, else rows of the
     # true people inside the hull.
@@ -79,11 +79,11 @@ def tracked_groups(sides: ComparedSides) -> TrackedGroups:
     wholes = any(t.unit == "group" for t in tracks)
     if wholes or not len(every.of):
         positions = sides.true.positions_on(sides.surface, "ground")
-        known, counted = positions is not None and bool(np.isfinite(sides.scale)), every
+        known = positions is not None and bool(np.isfinite(sides.scale))
         if positions is not None and known:
-            counted, every = people_inside(every, sides.true.rows, positions, sides.scale)
+            every = people_inside(every, sides.true.rows, positions, sides.scale)
         # a person alone is no group; a hull with nobody inside is a false one
-        counted = counted.keep(counted.count != 1)
+        counted = every.keep(every.count != 1)
         return TrackedGroups(every, counted, counted.member, not (wholes or len(every)), known or not len(every))
     counted = every.keep(every.count > 1)
     person = _true_rows(every, sides.mapping)

@@ -154,13 +154,9 @@ def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surfa
     return TrueGroups(found, wanted is not None)
 
 
-def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> tuple[GroupRows, GroupRows]:
+def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale: float) -> GroupRows:
     """Returns the groups with new members: the people inside the hull or at most 0.3 m outside, in the same frame.
-
-    In the second result a person is a member of the nearest of these hulls alone, or of all that are equally near:
-    those that contain the person. positions (R, 2): of the R people, in the unit of the hulls. scale: units per metre,
-    as px_per_m in the image.
-    """
+    positions (R, 2): of the R people, in the unit of the hulls. scale: units per metre, as px_per_m in the image."""
     hulls, points = pack(groups.hull), pack_padded(positions[:, None])
     low, high = hulls.box[:, :2] - INSIDE * scale, hulls.box[:, 2:] + INSIDE * scale
 
@@ -170,11 +166,8 @@ def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale:
         gap = gap_pairs(hulls, points, i, j)
         flat = hulls.area[i] <= 0  # a hull of one or two vertices contains no point: only distance counts
         gap[flat] = edge_distance_pairs(hulls, points, i[flat], j[flat])
-        kept = gap <= INSIDE * scale
-        return near[kept], gap[kept]
+        kept = near[gap <= INSIDE * scale]
+        return kept, np.ones(len(kept))
 
     members = compare(groups.rows, people, inside)
-    least = np.full(len(people), np.inf)
-    np.minimum.at(least, members.j, members.s)
-    nearest = members.keep(members.s <= least[members.j])
-    return replace(groups, of=members.i, member=members.j), replace(groups, of=nearest.i, member=nearest.j)
+    return replace(groups, of=members.i, member=members.j)
