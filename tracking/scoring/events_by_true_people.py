@@ -58,10 +58,8 @@ def _parts_of(people: PersonRows) -> Callable[[GroupEvent, int, int, int], tuple
         def until(frame: int) -> list[list[int]]:
             return _by_group(event.members, lambda m: group[lookup.nearest(m, frame, back, 0)])
 
-        before, after = (
-            until(reported - 1),
-            _by_group(event.members, lambda m: group[lookup.nearest(m, reported, 0, ahead)]),
-        )
+        before = until(reported - 1)
+        after = _by_group(event.members, lambda m: group[lookup.nearest(m, reported, 0, ahead)])
         if sorted(before) == sorted(after):
             before = until(event.start - 1)
         if sorted(before) != sorted(after):
@@ -136,8 +134,7 @@ def events_of_hulls(
         children = _contained(groups, person, event.after, range(reported, reported + span))
         return ComparableEvent(event.kind, event.start, reported, None, event.pos, parents, children)
 
-    reports = _reports(tracks, frames)
-    return [comparable(*report) for report in reports if not (without_members and report[0].members)]
+    return [comparable(*report) for report in _reports(tracks, frames) if not (without_members and report[0].members)]
 
 
 def _last_appearance(rows: FrameRows, ids: Sequence[int]) -> int:

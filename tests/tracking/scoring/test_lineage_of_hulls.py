@@ -8,28 +8,27 @@ from sim.types import GroupEvent
 from tests.hand_made import Scene, tracks, truth
 from tracking.scoring.evaluation import evaluate
 
-FRAMES = 60
 AB, CD, EF = (1, 2), (3, 4), (5, 6)
-PEOPLE = {i: (2.0 * i, 0.0) for i in range(1, 7)}
+Hull = tuple[float, float]  # m: from x0 to x1
 
 
-def scenes(merged_at: int) -> list[Scene]:
-    """Three pairs in a row, the first two are one from a frame on."""
-    made = []
-    for k in range(1, FRAMES + 1):
-        members = {1: AB, 2: CD, 3: EF} if k < merged_at else {1: AB + CD, 3: EF}
-        span = {g: (2.0 * min(m), 2.0 * max(m)) for g, m in members.items()}
-        made.append(Scene(PEOPLE, {g: (m, (span[g][0], -0.3, span[g][1], 0.3)) for g, m in members.items()}))
-    return made
+def row(hulls: dict[int, Hull], members: dict[int, tuple[int, ...]]) -> Scene:
+    """Six people in a row, at x = 2, 4, …, 12 m."""
+    people = {i: (2.0 * i, 0.0) for i in range(1, 7)}
+    return Scene(people, {g: (members[g], (x0, -0.3, x1, 0.3)) for g, (x0, x1) in hulls.items()})
 
 
-def merge(start: int, said: int, before: tuple[int, ...], after: tuple[int, ...], members=()) -> GroupEvent:
-    return GroupEvent("merge", start, said, said, before, after, members, (5.0, 0.0))
+def pairs(first: Hull, second: Hull) -> list[Scene]:
+    """Three pairs; from frame 30 on the first two are one."""
+    apart = row({1: first, 2: second, 3: (10, 12)}, {1: AB, 2: CD, 3: EF})
+    return [apart] * 29 + [row({1: (2, 8), 3: (10, 12)}, {1: AB + CD, 3: EF})] * 31
 
 
-def accuracy(seen: list[Scene], event: GroupEvent, start: int = 30) -> float:
-    true = truth(scenes(start), [merge(start, start, (1, 2), (1,), AB + CD)])
-    return evaluate(true, tracks(seen, [event], unit="group"))["lineage_accuracy"]
+def accuracy(seen: list[Scene], before: tuple[int, ...], after: tuple[int, ...]) -> float:
+    true, told = (
+        GroupEvent("merge", 30, 30, 30, *parts, (5.0, 0.0)) for parts in (((1, 2), (1,), AB + CD), (before, after, ()))
+    )
+    return evaluate(truth(pairs((2, 4), (6, 8)), [true]), tracks(seen, [told], unit="group"))["lineage_accuracy"]
 
 
 PARENTS = [
@@ -46,4 +45,8 @@ PARENTS = [
 
 @pytest.mark.parametrize(("before", "after", "right"), PARENTS)
 def test_parents_must_be_the_right_ones(before: tuple[int, ...], after: tuple[int, ...], right: float) -> None:
-    assert accuracy(scenes(30), merge(30, 30, before, after)) == right
+    assert accuracy(pairs((2, 4), (6, 8)), before, after) == right
+
+
+def test_a_person_inside_two_hulls_belongs_to_the_smaller() -> None:
+    assert accuracy(pairs((2, 8), (5.8, 8)), (1, 2), (1,)) == 1
