@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -135,7 +136,7 @@ def tracked(sequence: Recording, variants: Iterable[Variant], mode: DetectionMod
     return found
 
 
-likeness = merging_and_splitting.likeness
+likeness, moment = merging_and_splitting.likeness, merging_and_splitting.moment
 
 
 def unbroken(moments: list[merging_and_splitting.PairMoment], alike: float) -> Array:
@@ -147,6 +148,11 @@ def evenly(bank: GroupBank, points: Array, *others: object) -> Array:
     """Replaces `place_density`: nothing is known of members' places."""
     del others
     return np.ones((len(bank), len(points)))
+
+
+def by_centroids(bank: GroupBank, *pair: Any) -> merging_and_splitting.PairMoment:
+    """Replaces `moment`: groups walk as their centroids do."""
+    return moment(replace(bank, anchor=np.zeros_like(bank.anchor)), *pair)
 
 
 def without_hiding(
@@ -166,6 +172,7 @@ def as_given(points: Array, *others: object) -> Array:
 REPLACED: Mapping[str, Replacement] = {
     "evidence over time: an unbroken time in its place": (merging_and_splitting, "likeness", unbroken),
     "members' places in shared points": (group_pda, "place_density", evenly),
+    "walks of the members seen in two frames": (merging_and_splitting, "moment", by_centroids),
     "hidden groups": (group_pda, "associate", without_hiding),
     "hidden feet below heads": (group_pda, "below_heads", as_given),
 }

@@ -207,7 +207,7 @@ def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: 
 def remember(
     bank: GroupBank, claims: PointClaims, exclusive: Bools, predicted: Array, scaled: ScaledParameters, t: float
 ) -> None:
-    """Stores each group's points of this frame as its members in the bank, in place.
+    """Stores each group's points of this frame as its members, and how far these walked, in the bank, in place.
 
     predicted (G, 2): the groups' centroids before the update.
     """
@@ -217,9 +217,24 @@ def remember(
             bank.unshared[row] = Unshared(t, bank.x[row, 2:].copy(), mine)
         offset, places = mine - bank.x[row, :2], bank.members[row].offset + predicted[row]
         reach = scaled.scale * scaled.config.carry_reach
+        if not scaled.from_pixels:
+            bank.anchor[row] += predicted[row] - bank.x[row, :2] + displacement(places, mine, reach)
         known = any_within(mine, places, reach)
         parts = zip((offset, last_seen, known), _hidden_members(bank, row, claims.points, scaled, t), strict=True)
         bank.members[row] = MemberPlaces(*map(np.concatenate, parts))
+
+
+def displacement(before: Array, after: Array, reach: float) -> Array:
+    """Returns the mean displacement (2,) of the places before (K, 2) that are after (M, 2), too: 0 if none is.
+
+    A place is there, too, if it and one after are each other's nearest, at most `reach` apart; all in one unit.
+    """
+    if not len(before):
+        return np.zeros(2)
+    d2 = np.square(after[:, None] - before).sum(2)
+    nearest, here = d2.argmin(1), np.arange(len(after))
+    same = (d2.argmin(0)[nearest] == here) & (d2[here, nearest] <= reach**2)
+    return (after[same] - before[nearest[same]]).mean(0) if same.any() else np.zeros(2)
 
 
 def _hidden_members(bank: GroupBank, row: int, points: Array, scaled: ScaledParameters, t: float) -> MemberPlaces:

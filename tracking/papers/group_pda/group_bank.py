@@ -47,8 +47,10 @@ class GroupBank:
     group; a part has one of its own. first_seen (G,): time of the first points, of a part those of its group; last_seen
     (G,): of the last points. measured_time (G,): total time measured. null_time (G,): time without a feasible
     association, less measured frames in it. parent (G,): id of the group that the row is a part of, or NO_ID if it is
-    no part (see merging_and_splitting). colour_hist (G, C): people by colour; C = 0 without colours. members: a
-    MemberPlaces of each group; unshared: an Unshared of each.
+    no part (see merging_and_splitting). anchor (G, 2): from the centroid to a point that walks, from points, as the
+    members who are seen in both of two frames; who comes into view or is hidden moves the centroid alone. colour_hist
+    (G, C): people by colour; C = 0 without colours. members: a MemberPlaces of each group; unshared: an Unshared of
+    each.
     """
 
     x: Array
@@ -61,6 +63,7 @@ class GroupBank:
     measured_time: Array
     null_time: Array
     parent: Ints
+    anchor: Array
     colour_hist: Array
     members: list[MemberPlaces]
     unshared: list[Unshared]
@@ -72,7 +75,7 @@ class GroupBank:
         four = np.zeros((0, 4))
         return cls(
             four, np.zeros((0, 4, 4)), np.zeros((0, 2, 2)), none, ids, none, none, none, none,
-            ids, np.zeros((0, colour_bins)), [], [],
+            ids, np.zeros((0, 2)), np.zeros((0, colour_bins)), [], [],
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -148,5 +151,5 @@ def newborn(points: Array, weights: Array, group: Ints, scaled: ScaledParameters
     return GroupBank(
         np.hstack([mean, np.zeros((count, 2))]), P, extent, people, np.full(count, NO_ID),
         now, now.copy(), zero + scaled.dt, zero, np.full(count, NO_ID),
-        np.zeros((count, scaled.colour_bins)), members, unshared,
+        np.zeros((count, 2)), np.zeros((count, scaled.colour_bins)), members, unshared,
     )  # fmt: skip

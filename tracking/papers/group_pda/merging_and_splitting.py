@@ -5,9 +5,10 @@ groups after the update of a frame; output: the bank with merged groups, and the
 groups whose search regions (ellipses about the centroids) overlap and whose velocities are alike. G_x are the connected
 components of groups under R_x; each becomes one group. With `corrections` there is evidence over time (ours), as of a
 Markov chain of two states: a moment speaks for one group the more, the smaller the difference of velocities is beside
-`merge_velocity`, on the mean of two steps, and against it if people of both are more than 1.5 m apart. Since the onset,
-when the sum was least, it must have grown by `merge_time`. Without, velocities are alike if the regions SR_v overlap.
-Groups that are not measured, or infeasible, do not merge.
+`merge_velocity`, on the mean of two steps, and against it if people of both are more than 1.5 m apart. From points the
+velocities are those of the members who are seen in both of two frames (`anchor` of the bank). Since the onset, when the
+sum was least, it must have grown by `merge_time`. Without, velocities are alike if the regions SR_v overlap. Groups
+that are not measured, or infeasible, do not merge.
 
 Splitting (sec. 3.3, 4.2): a group without feasible associations for `split_time` falls apart. An association (a set of
 points that may be a group's) is feasible if its points form one group under the group constraint G_y
@@ -46,7 +47,7 @@ BEFORE = 16  # Places by which the way before the first moment is known.
 class PairMoment(NamedTuple):
     """Two groups a and b at one time; a has the smaller id.
 
-    t: s. way, velocity (2,): from a's centroid to b's, m on the ground, and b's velocity less a's, as filtered, m/s.
+    t: s. way, velocity (2,): from a's anchor to b's, m on the ground, and b's velocity less a's, as filtered, m/s.
     middle (2,): mean of the centroids, weighted by people, in the unit of the points. gap: distance of their nearest
     people, m.
     """
@@ -244,14 +245,15 @@ def merged(bank: GroupBank, rows: Ints) -> GroupBank:
     return GroupBank(
         x[None], P[None], extent[None], size[None].copy(), bank.id[one], bank.first_seen[rows].min(keepdims=True),
         bank.last_seen[rows].max(keepdims=True), bank.measured_time[rows].max(keepdims=True), np.zeros(1),
-        bank.parent[one], bank.colour_hist[rows].sum(0, keepdims=True),
+        bank.parent[one], bank.anchor[one] + bank.x[one, :2] - x[:2], bank.colour_hist[rows].sum(0, keepdims=True),
         [MemberPlaces(offset, last_seen, known)], [Unshared(float(bank.last_seen[rows].max()), x[2:], offset + x[:2])],
     )  # fmt: skip
 
 
 def moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float) -> PairMoment:
     """Returns the moment at time t, s, of the groups in the rows a and b of the bank; a has the smaller id."""
-    way, v = ((y[b] - y[a]) * scaled.metres_per_unit for y in (bank.x[:, :2], bank.x[:, 2:]))
+    walked = bank.x[:, :2] + bank.anchor
+    way, v = ((y[b] - y[a]) * scaled.metres_per_unit for y in (walked, bank.x[:, 2:]))
     w = bank.size[[a, b]] / bank.size[[a, b]].sum()
     gap = _nearest(*(bank.positions(row) * scaled.metres_per_unit for row in (a, b)))
     return PairMoment(t, way, v, w @ bank.x[[a, b], :2], gap)
@@ -285,6 +287,7 @@ def fall_apart(
     largest = int(np.lexsort((parts.x[:, 1], parts.x[:, 0], away, -parts.size))[0])
     parts.first_seen[:], parts.measured_time[:] = bank.first_seen[row], bank.measured_time[row]
     parts.colour_hist[:], parts.parent[:] = bank.colour_hist[row], bank.parent[row]
+    parts.anchor[:] = bank.anchor[row] + bank.x[row, :2] - parts.x[:, :2]
     parts.unshared = [part._replace(velocity=bank.x[row, 2:]) for part in parts.unshared]
     if bank.id[row] != NO_ID:
         parts.parent[:] = bank.group[row]

@@ -38,8 +38,7 @@ Departures. Those marked (c) are off with `corrections` off.
   foreground.
 - births: confirmed after `confirm_time`, merged from the next frame on, removed after as long without points; until
   confirmed no points of a confirmed group. Paper: at once. Why: false alarms.
-- P: Σ w² P of merged groups; new ones r² (1 + 1/N) and 1.3 m/s per axis. Paper: none. Why: the filter and SR_v need
-  one.
+- P: Σ w² P of merged groups; new ones r² (1 + 1/N) and 1.3 m/s per axis. Paper: none. Why: the filter and SR_v need one.
 - R, (c): members keep places, some are missed, stand-ins repeat their errors. Paper: a member's place and noise, read
   as Σ / m, of m people. Why: less noise.
 - m_d: covariance H P H' + R, with the R of each association's m. Paper: one P_yc. Why: fewer people measure a centroid
@@ -79,8 +78,9 @@ Departures. Those marked (c) are off with `corrections` off.
   groups the largest, then the oldest. Paper: none. Why: tracks need ids.
 - walking out: a new group within reach of a member (2 m/s and 3 r) is a part of its group and as old; without
   corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
-- like velocities, (c): evidence from the difference of the centroids' walks, on the mean of two steps, against
-  `merge_velocity`. Paper: SR_v overlap. Why: P does not measure likeness; people sway with each step.
+- like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`; from points
+  of the members seen in both of two frames, stand-ins as predicted; of a group in parts, those of the part with its id.
+  Paper: SR_v overlap. Why: P does not measure likeness; people sway with each step; hidden members move the centroid.
 - SR_v, without corrections: of the updated velocity, with the gate's γ. Paper: of the predicted one; its size is not
   stated. Why: Fig. 1 merges after the update.
 - near groups, (c): people more than 1.5 m apart are evidence against one group, too. Paper: regions overlap. Why: no

@@ -14,7 +14,7 @@ from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, shares
+from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, remember, shares
 from tracking.papers.group_pda.association_kernels import any_within
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
@@ -283,6 +283,17 @@ def test_a_shared_point_is_of_the_group_whose_members_walked_there() -> None:
     )
     assert tracemalloc.get_traced_memory()[1] < 2e7  # bytes; all pairs take more than 1e8
     tracemalloc.stop()
+
+
+def test_who_comes_into_view_or_is_hidden_does_not_displace_a_group() -> None:
+    before, walked = np.array([[0.0, 0.0], [0.6, 0.0], [3.0, 0.0]]), np.array([0.2, 0.1])
+    after = np.vstack([before[1::-1] + walked, [[1.4, 0.0], [-2.0, 1.0]]])  # one is hidden, two come
+    scaled = scale_parameters(GroupPdaConfig(), 10, 1.0)
+    claims = PointClaims(after, np.ones(4), np.full(4, 0.1), np.ones((1, 4)), np.full(4, -1), np.ones(4, int))
+    one = newborn(before, np.ones(3), np.zeros(3, int), scaled, 0.0)
+    predicted, one.x[0, :2] = one.x[:, :2].copy(), after.mean(0)
+    remember(one, claims, np.ones((1, 4), bool), predicted, scaled, 0.1)
+    assert one.x[0, :2] + one.anchor[0] - predicted[0] == pytest.approx(walked)
 
 
 @pytest.mark.parametrize("seed", range(30))
