@@ -25,7 +25,7 @@ import numpy as np
 from sim.scene.camera import to_ground
 from sim.types import Array, Bools, Camera, Ints
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.association_kernels import any_within
+from tracking.papers.group_pda.association_kernels import any_within, displacement
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
@@ -222,19 +222,6 @@ def remember(
         known = any_within(mine, places, reach)
         parts = zip((offset, last_seen, known), _hidden_members(bank, row, claims.points, scaled, t), strict=True)
         bank.members[row] = MemberPlaces(*map(np.concatenate, parts))
-
-
-def displacement(before: Array, after: Array, reach: float) -> Array:
-    """Returns the mean displacement (2,) of the places before (K, 2) that are after (M, 2), too: 0 if none is.
-
-    A place is there, too, if it and one after are each other's nearest, at most `reach` apart; all in one unit.
-    """
-    if not len(before):
-        return np.zeros(2)
-    d2 = np.square(after[:, None] - before).sum(2)
-    nearest, here = d2.argmin(1), np.arange(len(after))
-    same = (d2.argmin(0)[nearest] == here) & (d2[here, nearest] <= reach**2)
-    return (after[same] - before[nearest[same]]).mean(0) if same.any() else np.zeros(2)
 
 
 def _hidden_members(bank: GroupBank, row: int, points: Array, scaled: ScaledParameters, t: float) -> MemberPlaces:

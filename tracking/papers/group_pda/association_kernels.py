@@ -92,6 +92,32 @@ def any_within(place: Array, points: Array, reach: float) -> Bools:
 
 
 @njit(cache=True)
+def displacement(before: Array, after: Array, reach: float) -> Array:
+    """Returns the mean displacement (2,) of the places before (K, 2) that are after (M, 2), too: 0 if none is.
+
+    A place is there, too, if it and one after are each other's nearest, at most `reach` apart; all in one unit.
+    """
+    least, nearest = np.full(len(after), np.inf), np.zeros(len(after), np.int64)
+    least_back, back = np.full(len(before), np.inf), np.zeros(len(before), np.int64)
+    for j in range(len(after)):
+        for i in range(len(before)):
+            dx, dy = after[j, 0] - before[i, 0], after[j, 1] - before[i, 1]
+            d2 = dx * dx + dy * dy
+            if d2 < least[j]:
+                least[j], nearest[j] = d2, i
+            if d2 < least_back[i]:
+                least_back[i], back[i] = d2, j
+    total, count = np.zeros(2), 0
+    for j in range(len(after)):
+        i = nearest[j]
+        if least[j] <= reach * reach and back[i] == j:
+            total[0] += after[j, 0] - before[i, 0]
+            total[1] += after[j, 1] - before[i, 1]
+            count += 1
+    return total / max(count, 1)
+
+
+@njit(cache=True)
 def associate(
     points: Array, weights: Array, d2: Array, log_ratio: Array, owner: Ints, claimants: Ints,
     x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,

@@ -2,8 +2,8 @@
 
 Gennari & Hager, "Probabilistic data association methods in visual tracking of groups", CVPR 2004. The state of a group,
 or of each part of one, is (xi, v, Sigma, N): centroid xi and velocity v, together x with covariance P; extent Sigma of
-the members' positions; number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or section (sec.)
-and the module:
+the members' positions; number of people N. Members are at y_i = xi + s_i, s_i normal with Sigma (eq. 2.1). The steps of
+a frame (Fig. 1), with their equation (eq.) or section (sec.) and the module:
 
     (F, Q: transition and process noise of x; S: covariance of a point about xi, in the paper Sigma; y: a point; gamma:
     squared Mahalanobis radius `gate`; m_d, m_N, m_g: masses by the centroid's place, the number of people and the group
@@ -38,7 +38,7 @@ Departures. Those marked (c) are off with `corrections` off.
   foreground.
 - births: confirmed after `confirm_time`, merged from the next frame on, removed after as long without points; until
   confirmed no points of a confirmed group. Paper: at once. Why: false alarms.
-- P: Σ w² P of merged groups; new ones r² (1 + 1/N) and 1.3 m/s per axis. Paper: none. Why: the filter and SR_v need one.
+- P: Σ w² P of merged groups; new ones r² (1 + 1/N) and 1.3 m/s per axis. Paper: none. Why: filter and SR_v need one.
 - R, (c): members keep places, some are missed, stand-ins repeat their errors. Paper: a member's place and noise, read
   as Σ / m, of m people. Why: less noise.
 - m_d: covariance H P H' + R, with the R of each association's m. Paper: one P_yc. Why: fewer people measure a centroid
@@ -94,8 +94,9 @@ Departures. Those marked (c) are off with `corrections` off.
   groups share points. Why: hidden groups follow others.
 - reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
   search region. Why: lost groups are guesses.
-- onsets: dated back; a split to when the last two parts, as fast as they part when it is decided, came to be over 1.5 m
-  apart. Paper: none. Why: decisions lag.
+- onsets: a merge, (c), to when its evidence was least, else this frame; a split to when the last two parts would have
+  been 1.5 m apart, had they moved straight, as fast as when it is decided, at least 0.7 m/s; enter and leave to the
+  first and last points. Paper: none. Why: decisions lag.
 - depth of points in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px.
   Why: oblique views.
 """

@@ -15,7 +15,7 @@ from tracking.filters.components import Constraint
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, remember, shares
-from tracking.papers.group_pda.association_kernels import any_within
+from tracking.papers.group_pda.association_kernels import any_within, displacement
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
@@ -303,6 +303,15 @@ def test_near_is_that_of_all_pairs(seed: int) -> None:
     reach = float(r.choice([0.05, 0.5, 2.0]))
     squared = np.square(place[:, None] - points).sum(2) <= reach**2
     np.testing.assert_array_equal(any_within(place, points, reach), squared.any(1))
+
+
+@pytest.mark.parametrize("reach", [0.3, 3.0])
+def test_displacement_is_of_mutually_nearest_places(reach: float) -> None:
+    before = np.array([[0.0, 0], [4, 0], [4.3, 0]])
+    after = np.array([[0.2, 0], [0, 1], [4.5, 0.4]])  # the second is nobody's; the third is of (4.3, 0), not of (4, 0)
+    expected = np.array([[0.2, 0], [0.2, 0.4]])[: 1 + (reach > 1)].mean(0)
+    np.testing.assert_allclose(displacement(before, after, reach), expected, atol=1e-12)
+    assert not displacement(before[:0], after, reach).any()
 
 
 def test_gate_factor() -> None:
