@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import gammainc, logsumexp
+from scipy.special import gammainc, softmax
 from scipy.stats import multivariate_normal, norm
 
 from tests import reference_components
@@ -24,9 +24,6 @@ class Rules:
     constraint: Constraint
     noise: float  # standard deviation of one person's measured place
     count_noise: float
-    count_share: float
-    miss: float  # probability of the miss before any measurement
-    freeze: float  # share of N in others' points from which on extent and size rest
     keep: float
     correct: bool  # what the gate cuts off is put back
     redrawn: bool
@@ -40,8 +37,7 @@ class Rules:
         cut = truncation(c.gate) if self.correct else 1.0
         return np.array([
             c.gate, c.link, P[0, 0], P[0, 1], P[1, 1], c.strength, c.least, self.noise, self.count_noise,
-            self.count_share, self.miss, self.freeze, self.keep, cut, self.redrawn,
-            self.unconstrained, self.others,
+            self.keep, cut, self.redrawn, self.unconstrained, self.others,
         ], float)  # fmt: skip
 
 
@@ -50,9 +46,9 @@ def truncation(gate, dims=2):
     return gammainc(dims / 2 + 1, gate / 2) / gammainc(dims / 2, gate / 2)
 
 
-def search_region(P, extent, noise, wider):
-    """Sigma + H P H' + (noise + wider) I of one group."""
-    return extent + H @ P @ H.T + (noise + wider) * np.eye(2)
+def search_region(P, extent, noise):
+    """Sigma + H P H' + noise I of one group."""
+    return extent + H @ P @ H.T + noise * np.eye(2)
 
 
 def search(points, x, region, gate):
@@ -122,15 +118,13 @@ def associations(mine, shared, points, weights, rules):
     return [s for s in sets if reference_components.is_group(points[s], weights[s], rules.constraint)]
 
 
-def masses(sets, mine, shared, points, weights, own, region, x, P, extent, size, rules):
-    """Masses of the associations, m_d m_N (4.2), and of the miss, all normalised; each one's R.
+def masses(sets, mine, shared, points, weights, own, x, P, extent, size, rules):
+    """Masses of the associations, m_d m_N (4.2), normalised; each one's R.
 
-    m_N is a mass of numbers of people, which differ by those of a point: Gaussian, with tails. The miss has the same
-    unit: its centroid is anywhere in the region, and if there are points of no other group, their number is any up to
-    2 N.
+    m_N is a mass of numbers of people, which differ by those of a point: Gaussian, with tails.
     """
     step = weights[mine + shared].mean()
-    sigma = np.hypot(rules.count_noise, rules.count_share * size)
+    sigma = np.hypot(rules.count_noise, 0.01 * size)
     log, R = [], []
     for s in sets:
         n, mean, cov = moments(points[s], weights[s])
@@ -138,52 +132,40 @@ def masses(sets, mine, shared, points, weights, own, region, x, P, extent, size,
         close = multivariate_normal(x[:2], H @ P @ H.T + R[-1]).logpdf(mean)
         many = (1 - NEWCOMERS) * norm(size, sigma).pdf(n) + NEWCOMERS * (size + 1) / (size + 1 + n) ** 2
         log.append(close + np.log(step * many))
-    miss = -np.inf
-    if rules.miss > 0:
-        gate = rules.constraint.gate * (truncation(rules.constraint.gate) if rules.correct else 1.0)
-        area = np.pi * gate * np.sqrt(np.linalg.det(region))
-        number = step / (2 * size + 1) if mine else 1.0
-        miss = np.log(rules.miss / (1 - rules.miss) / area * number)
-    total = logsumexp([*log, miss])
-    return np.exp(np.array(log) - total), np.exp(miss - total), R
+    return softmax(log), R
 
 
-def update(g, points, weights, d2, own, hits, share, region, x, P, extent, size, hold, rules):
-    """One group after its points: state, rows chosen, mass of the miss, x, P, extent, size."""
+def update(g, points, weights, d2, own, hits, x, P, extent, size, hold, rules):
+    """One group after its points: state, rows chosen, x, P, extent, size."""
     mine, shared = claims(d2, own, hits, g)
     same = x, P, extent, size
     if not mine + shared:
-        return "nothing", [], 0.0, *same
+        return "nothing", [], *same
     sets = associations(mine, shared, points, weights, rules)
     if not sets:
         some = mine + shared
         if reference_components.partition(points[some], weights[some], rules.constraint).max() < 0:
-            return "nothing", [], 0.0, *same  # noise
-        return "null", some, 0.0, *same
-    beta, miss, R = masses(sets, mine, shared, points, weights, own, region, x, P, extent, size, rules)
-    states, covariances = [x], [P]
+            return "nothing", [], *same  # noise
+        return "null", some, *same
+    beta, R = masses(sets, mine, shared, points, weights, own, x, P, extent, size, rules)
+    states, covariances = [], []
     for s, r in zip(sets, R, strict=True):
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + r) * (own[s] < 0).any()
         states.append(x + K @ (moments(points[s], weights[s])[1] - x[:2]))
         covariances.append(P - K @ H @ P)
-    mass = np.array([miss, *beta])
-    new_x = mass @ np.array(states)
-    new_P = sum(b * (C + np.outer(y - new_x, y - new_x)) for b, y, C in zip(mass, states, covariances, strict=True))
-    best = int(np.argmax(beta))
+    new_x = beta @ np.array(states)
+    new_P = sum(b * (C + np.outer(y - new_x, y - new_x)) for b, y, C in zip(beta, states, covariances, strict=True))
     new_extent, new_size = extent, size
-    others = weights[mine + shared] @ (1 - share[g][mine + shared]) > rules.freeze * size
-    if not hold and not others:
-        new_extent, new_size = adapted(sets, mass, points, weights, extent, size, rules)
-    found = beta.sum() > miss
-    chosen = ("measured", sets[best]) if found else ("nothing", [])
-    return *chosen, miss, new_x, new_P, new_extent, new_size
+    if not hold:
+        new_extent, new_size = adapted(sets, beta, points, weights, extent, size, rules)
+    return "measured", sets[int(np.argmax(beta))], new_x, new_P, new_extent, new_size
 
 
 def adapted(sets, share, points, weights, extent, size, rules):
-    """(2.4) of each association, mixed; a miss leaves extent and size."""
+    """(2.4) of each association, mixed."""
     c, cut = rules.constraint, truncation(rules.constraint.gate) if rules.correct else 1.0
-    new_extent, new_size = share[0] * extent, share[0] * size
-    for b, s in zip(share[1:], sets, strict=True):
+    new_extent, new_size = 0.0, 0.0
+    for b, s in zip(share, sets, strict=True):
         n, _, S = moments(points[s], weights[s])
         shrunk = (n * S + c.strength * c.prior) / (n + c.strength) / cut
         new_extent = new_extent + b * (rules.keep * extent + (1 - rules.keep) * shrunk)

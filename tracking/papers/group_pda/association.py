@@ -25,9 +25,9 @@ import numpy as np
 from sim.scene.camera import to_ground
 from sim.types import Array, Bools, Camera, Ints
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.association_kernels import any_within
+from tracking.papers.group_pda.association_kernels import any_within, displacement
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared
-from tracking.papers.group_pda.scaled_parameters import SPLIT_SPEED, ScaledParameters
+from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
 LOWEST_HEAD = 1.5  # m above the ground: only few people, mostly children, are shorter.
 BELOW = 0.1  # Share of a box's height below its lower edge at which another box hides the feet.
@@ -70,11 +70,10 @@ def below_heads(points: Array, box: Array, camera: Camera) -> Array:
 
 
 def search_regions(bank: GroupBank, scaled: ScaledParameters) -> Array:
-    """Returns the covariances (G, 2, 2) of the groups' search regions: Sigma + H P H' + (r^2 + w^2) I (eq. 2.2: Sigma).
+    """Returns the covariances (G, 2, 2) of the groups' search regions: Sigma + H P H' + r^2 I (eq. 2.2: Sigma).
 
-    r: standard deviation of a person's position; w: what the region is wider by in infeasible time (ours)."""
-    wider = np.square(scaled.scale * (SPLIT_SPEED if scaled.config.corrections else 0.0) * bank.null_time)
-    return np.asarray(bank.extent + bank.P[:, :2, :2] + (scaled.point_sd**2 + wider)[:, None, None] * np.eye(2))
+    r: standard deviation of a person's position."""
+    return np.asarray(bank.extent + bank.P[:, :2, :2] + scaled.point_sd**2 * np.eye(2))
 
 
 def gated_distances(bank: GroupBank, points: Array, region: Array, scaled: ScaledParameters) -> Array:
@@ -110,7 +109,6 @@ def associate(
     x, P = bank.x.copy(), bank.P.copy()
     state, chosen = kernels.associate(
         claims.points, claims.weights, claims.d2, log_ratio, claims.owner, claims.claimants,
-        shares(log_density, np.isfinite(log_density)), region,
         bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,
     )  # fmt: skip
     mine = chosen & (np.arange(len(bank))[:, None] == shares(log_density, chosen).argmax(0)) if len(bank) else chosen
@@ -136,6 +134,7 @@ def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio
     return np.asarray(found)
 
 
+STRAY = 0.5  # m/s: by which members' places grow uncertain (ours).
 # Part of the density of a group's members that is even over its extent, of those who are not where they walked.
 LEAST_PLACES = 0.05
 MOST_PLACES = 64  # Places that are compared: bounds memory from pixels.
@@ -148,7 +147,7 @@ def place_density(bank: GroupBank, points: Array, scaled: ScaledParameters, t: f
     for row, (then, velocity, places) in enumerate(bank.unshared):
         some = places[:: len(places) // MOST_PLACES + 1]
         away = np.square(points[:, None] - some - (t - then) * velocity).sum(2)
-        var = 2 * scaled.point_sd**2 + np.square(scaled.scale * SPLIT_SPEED * (t - then))
+        var = 2 * scaled.point_sd**2 + np.square(scaled.scale * STRAY * (t - then))
         density[row] += (np.exp(-away / var / 2) / var).mean(1)
     return density
 
@@ -223,19 +222,6 @@ def remember(
         known = any_within(mine, places, reach)
         parts = zip((offset, last_seen, known), _hidden_members(bank, row, claims.points, scaled, t), strict=True)
         bank.members[row] = MemberPlaces(*map(np.concatenate, parts))
-
-
-def displacement(before: Array, after: Array, reach: float) -> Array:
-    """Returns the mean displacement (2,) of the places before (K, 2) that are after (M, 2), too: 0 if none is.
-
-    A place is there, too, if it and one after are each other's nearest, at most `reach` apart; all in one unit.
-    """
-    if not len(before):
-        return np.zeros(2)
-    d2 = np.square(after[:, None] - before).sum(2)
-    nearest, here = d2.argmin(1), np.arange(len(after))
-    same = (d2.argmin(0)[nearest] == here) & (d2[here, nearest] <= reach**2)
-    return (after[same] - before[nearest[same]]).mean(0) if same.any() else np.zeros(2)
 
 
 def _hidden_members(bank: GroupBank, row: int, points: Array, scaled: ScaledParameters, t: float) -> MemberPlaces:

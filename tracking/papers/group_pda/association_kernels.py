@@ -18,7 +18,6 @@ from tracking.filters.components_kernels import AROUND, WEIGHT, cells, component
 from tracking.papers.group_pda.association_mass_kernels import (
     COUNT_SD,
     COUNT_SHARE,
-    FREEZE_SHARE,
     GATE,
     GATE_FACTOR,
     KEEP,
@@ -31,7 +30,6 @@ from tracking.papers.group_pda.association_mass_kernels import (
     centroid_noise,
     log_count,
     log_density,
-    log_miss,
     running_moments,
 )  # fmt: skip
 
@@ -94,22 +92,46 @@ def any_within(place: Array, points: Array, reach: float) -> Bools:
 
 
 @njit(cache=True)
+def displacement(before: Array, after: Array, reach: float) -> Array:
+    """Returns the mean displacement (2,) of the places before (K, 2) that are after (M, 2), too: 0 if none is.
+
+    A place is there, too, if it and one after are each other's nearest, at most `reach` apart; all in one unit.
+    """
+    least, nearest = np.full(len(after), np.inf), np.zeros(len(after), np.int64)
+    least_back, back = np.full(len(before), np.inf), np.zeros(len(before), np.int64)
+    for j in range(len(after)):
+        for i in range(len(before)):
+            dx, dy = after[j, 0] - before[i, 0], after[j, 1] - before[i, 1]
+            d2 = dx * dx + dy * dy
+            if d2 < least[j]:
+                least[j], nearest[j] = d2, i
+            if d2 < least_back[i]:
+                least_back[i], back[i] = d2, j
+    total, count = np.zeros(2), 0
+    for j in range(len(after)):
+        i = nearest[j]
+        if least[j] <= reach * reach and back[i] == j:
+            total[0] += after[j, 0] - before[i, 0]
+            total[1] += after[j, 1] - before[i, 1]
+            count += 1
+    return total / max(count, 1)
+
+
+@njit(cache=True)
 def associate(
     points: Array, weights: Array, d2: Array, log_ratio: Array, owner: Ints, claimants: Ints,
-    share: Array, region: Array, x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
+    x: Array, P: Array, extent: Array, size: Array, rest: Bools, rules: Array,
 ) -> tuple[Ints, Bools]:  # fmt: skip
     """Update the groups x (G, 4), P (G, 4, 4), extent (G, 2, 2), size (G,) in place by the points (sec. 4.1 to 4.3).
 
-    x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M) and
-    region (G, 2, 2): of `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour
-    or place. owner (M,): the row of the only group that may have the point, a missed member that stands in, whose d2 is
-    inf; -1 for a point of this frame. claimants (M,): number of groups that may have the point. share (G, M):
-    probability that a point is the group's. rest (G,): True for groups whose extent and size must not change. rules:
-    see association_mass_kernels.
+    x: centroid and velocity; P: its covariance. points (M, 2); weights (M,): people each stands for. d2 (G, M): of
+    `search`. log_ratio (G, M): what a point adds to the log mass per person by its colour or place. owner (M,): the row
+    of the only group that may have the point, a missed member that stands in, whose d2 is inf; -1 for a point of this
+    frame. claimants (M,): number of groups that may have the point. rest (G,): True for groups whose extent and size
+    must not change. rules: see association_mass_kernels.
 
     Returns the state (G,) of each group and the points (G, M) bool of its likeliest association:
-    - NOTHING = 0: the group has no points, only noise, or the miss has at least the mass of all associations. No points
-      are chosen. The group is updated by the mixture if it has a feasible association.
+    - NOTHING = 0: the group has no points, or only noise. No points are chosen; it is not updated.
     - NULL = 1: it has points, more than noise, but no feasible association (points that form one group). All its points
       are chosen; it is not updated.
     - MEASURED = 2: else.
@@ -122,13 +144,11 @@ def associate(
         if n == 0:
             continue
         mine, people, fresh, colour = np.empty((n, 2)), np.empty(n), np.empty(n), np.empty(n)
-        others = 0.0  # people of other groups, expected
         for k in range(n):
             p = order[k]
             mine[k, 0], mine[k, 1] = points[p, 0], points[p, 1]
             people[k], fresh[k] = weights[p], weights[p] if owner[p] < 0 else 0.0
             colour[k] = log_ratio[g, p] * weights[p]
-            others += weights[p] * (1 - share[g, p])
         if rules[UNCONSTRAINED]:
             start = n
             feasible = np.ones(1, np.bool_)
@@ -141,11 +161,9 @@ def associate(
         taken = 0
         if feasible.any():
             best = _estimate(
-                mine, people, fresh, colour, start, feasible, region[g], x[g], P[g], extent[g], size[g : g + 1],
-                rest[g] or others > rules[FREEZE_SHARE] * size[g], rules,
-            )  # fmt: skip
-            if best >= 0:
-                state[g], taken = MEASURED, start + best
+                mine, people, fresh, colour, start, feasible, x[g], P[g], extent[g], size[g : g + 1], rest[g], rules
+            )
+            state[g], taken = MEASURED, start + best
         elif (components(mine, people, rules[LINK])[1][:, WEIGHT] >= rules[LEAST_WEIGHT]).any():
             # all m_g = 0: a split, if it lasts (sec. 4.2)
             state[g], taken = NULL, n
@@ -175,46 +193,29 @@ def _ordered_points(d2: Array, log_ratio: Array, owner: Ints, claimants: Ints, g
 
 @njit(cache=True)
 def _estimate(
-    points: Array, weights: Array, fresh: Array, colour: Array, start: int, feasible: Bools, region: Array,
+    points: Array, weights: Array, fresh: Array, colour: Array, start: int, feasible: Bools,
     x: Array, P: Array, extent: Array, size: Array, rest: bool, rules: Array,
 ) -> int:  # fmt: skip
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
     seen = np.cumsum(np.append(0.0, fresh))[start:]  # people measured in this frame
     S = np.empty((len(people), 3))
-    log_mass, beta = np.empty(len(people)), np.empty(len(people))
+    log_mass = np.full(len(people), -np.inf)
     unit = weights.sum() / len(weights)  # people that one point stands for: makes m_N a mass of numbers of points
     evidence = np.zeros(len(colour) - start + 1)
     evidence[1:] = np.cumsum(colour[start:])
-    log_m_miss = log_miss(unit, start, region, size[0], rules)
-    top = log_m_miss
-    width = rules[COUNT_SD] ** 2 + (rules[COUNT_SHARE] * size[0]) ** 2  # sigma_n^2
+    width = rules[COUNT_SD] ** 2 + (COUNT_SHARE * size[0]) ** 2  # sigma_n^2
     for j in range(len(people)):
-        log_mass[j] = -np.inf
         if feasible[j] and people[j] > 0:
             R = centroid_noise(people[j], seen[j] if seen[j] > 0 else people[j], cov[j], extent, size[0], rules)
             S[j, 0], S[j, 1], S[j, 2] = P[0, 0] + R[0], P[0, 1] + R[1], P[1, 1] + R[2]
             m_d = log_density(mean[j, 0], mean[j, 1], S[j])
             log_mass[j] = m_d + log_count(people[j], size[0], width) + np.log(unit) + evidence[j]  # eq. 4.2, m_g = 1
-            top = max(top, log_mass[j])
-    total = 0.0
-    for j in range(len(beta)):
-        beta[j] = np.exp(log_mass[j] - top)
-        total += beta[j]
-    total += np.exp(log_m_miss - top)
-    miss, best, matched = np.exp(log_m_miss - top) / total, 0, 0.0
-    for j in range(len(beta)):
-        beta[j] /= total
-        matched += beta[j]
-        if beta[j] > beta[best]:
-            best = j
-    measured = np.zeros(len(beta))
-    for j in range(len(beta)):
-        if seen[j] > 0:
-            measured[j] = beta[j]
-    _mix(measured, mean, S, x, P)
+    beta = np.exp(log_mass - log_mass.max())
+    beta /= beta.sum()
+    _mix(beta * (seen > 0), mean, S, x, P)
     if not rest:
-        _adapt(beta, matched, people, cov, extent, size, rules)
-    return best if matched > miss else -1
+        _adapt(beta, people, cov, extent, size, rules)
+    return int(beta.argmax())
 
 
 # Mean and covariance over each association's Kalman update, as in the PDAF (sec. 4.3).
@@ -245,9 +246,9 @@ def _mix(beta: Array, mean: Array, S: Array, x: Array, P: Array) -> None:
             P[a, b] = P[b, a] = (P[a, b] + P[b, a]) / 2
 
 
-# Eq. 2.4, of the mean over the associations; the mass of the miss keeps the old.
+# Eq. 2.4, of the mean over the associations.
 @njit(cache=True)
-def _adapt(beta: Array, total: float, people: Array, cov: Array, extent: Array, size: Array, rules: Array) -> None:
+def _adapt(beta: Array, people: Array, cov: Array, extent: Array, size: Array, rules: Array) -> None:
     target, count = np.zeros(3), 0.0
     for j in range(len(beta)):
         if beta[j] > 0:
@@ -257,7 +258,7 @@ def _adapt(beta: Array, total: float, people: Array, cov: Array, extent: Array, 
                 target[a] += share * total_cov / (n + rules[PRIOR_WEIGHT]) / rules[GATE_FACTOR]
             count += share * n
     new = 1 - rules[KEEP]
-    keep = rules[KEEP] + new * (1 - total)
+    keep = rules[KEEP] + new * (1 - beta.sum())  # masses sum to 1 but for rounding
     extent[0, 0] = keep * extent[0, 0] + new * target[0]
     extent[0, 1] = keep * extent[0, 1] + new * target[1]
     extent[1, 0] = extent[0, 1]

@@ -4,9 +4,8 @@ An association is a set of points that may be one group's; its mass, a relative 
 density of the points' centroid about the predicted one: `log_density`, with covariance S = H P H' + R. P is the
 covariance of the group's state, H picks its position, and R (`centroid_noise`) is the covariance of the measured
 centroid. m_N is the density of the number of people in the points, given that of the group: `log_count`. m_g is 1 for a
-feasible association (its points form one group), else 0. `log_miss` is the log mass of the miss hypothesis, that no
-point is the group's. The module association_kernels puts them together. Symmetric 2 x 2 matrices are stored as (3,) =
-xx, xy, yy. The slots of the array `rules` are named here.
+feasible association (its points form one group), else 0. The module association_kernels puts them together. Symmetric
+2 x 2 matrices are stored as (3,) = xx, xy, yy. The slots of the array `rules` are named here.
 """
 
 from __future__ import annotations
@@ -16,20 +15,21 @@ import numpy as np
 from sim.compiler import njit
 from sim.types import Array
 
-(GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, PRIOR_WEIGHT, LEAST_WEIGHT, POINT_SD, COUNT_SD, COUNT_SHARE,
- MISS_PROB, FREEZE_SHARE, KEEP, GATE_FACTOR, REDRAWN, UNCONSTRAINED, LEAST_OTHERS) = range(17)  # fmt: skip
+(GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, PRIOR_WEIGHT, LEAST_WEIGHT, POINT_SD, COUNT_SD,
+ KEEP, GATE_FACTOR, REDRAWN, UNCONSTRAINED, LEAST_OTHERS) = range(14)  # fmt: skip
 RULES = LEAST_OTHERS + 1
 """Slots of the array `rules`, RULES in all; tracking.papers.group_pda.scaled_parameters fills them.
 
 GATE: squared Mahalanobis radius in the group constraint, gamma / GATE_FACTOR. LINK: 2 r of R_0. PRIOR_XX, _XY, _YY:
 covariance that extents are shrunk to, with the weight PRIOR_WEIGHT in people. LEAST_WEIGHT: people below which a
-component is noise. POINT_SD: standard deviation of one person's measured position. COUNT_SD (people), COUNT_SHARE:
-sigma_n^2 = COUNT_SD^2 + (COUNT_SHARE N)^2. MISS_PROB: prior probability of the miss hypothesis, 0 without it.
-FREEZE_SHARE: share of N in points of other groups above which extent and size rest. KEEP: alpha_s = alpha_N of eq. 2.4
-per frame. GATE_FACTOR: share of its covariance that a Gaussian keeps inside the gate. REDRAWN: 1 if members are drawn
-anew in each frame. UNCONSTRAINED: 1 if a group takes all points in its region, without the group constraint (sec.
-5.2.1). LEAST_OTHERS: lower bound of n - 1 in the variance of a mean drawn without replacement.
+component is noise. POINT_SD: standard deviation of one person's measured position. COUNT_SD (people): sigma_n^2 =
+COUNT_SD^2 + (COUNT_SHARE N)^2. KEEP: alpha_s = alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that
+a Gaussian keeps inside the gate. REDRAWN: 1 if members are drawn anew in each frame. UNCONSTRAINED: 1 if a group takes
+all points in its region, without the group constraint (sec. 5.2.1). LEAST_OTHERS: lower bound of n - 1 in the variance
+of a mean drawn without replacement.
 """
+COUNT_SHARE = 0.01
+"""The part of sigma_n that grows with N, per N."""
 NEWCOMERS = 0.02
 """Probability that a group's number of people does not depend on its number before."""
 
@@ -113,21 +113,3 @@ def log_density(dx: float, dy: float, S: Array) -> float:
     area = S[0] * S[2] - S[1] * S[1]
     d2 = (S[2] * dx * dx - 2 * S[1] * dx * dy + S[0] * dy * dy) / area
     return float(-0.5 * (d2 + np.log(area)) - np.log(2 * np.pi))
-
-
-@njit(cache=True)
-def log_miss(unit: float, start: int, region: Array, size: float, rules: Array) -> float:
-    """Returns the log mass of the miss hypothesis (ours): no point is the group's; -inf if MISS_PROB is 0 (no
-    hypothesis).
-
-    The mass is the hypothesis' relative weight. unit: people that one point stands for, a mean; start: number of
-    unshared points; region (2, 2): covariance of the group's search region; size: its people. The points' centroid is
-    uniform over the search region. The number of the unshared points, if there are any, is uniform up to twice the
-    size.
-    """
-    if rules[MISS_PROB] <= 0:
-        return -np.inf
-    gate = rules[GATE] * rules[GATE_FACTOR]  # gamma; GATE is that of extents before their correction
-    area = np.pi * gate * np.sqrt(max(region[0, 0] * region[1, 1] - region[0, 1] ** 2, 1e-300))
-    strangers = np.log(unit / (2 * size + 1)) if start > 0 else 0.0
-    return float(np.log(rules[MISS_PROB] / (1 - rules[MISS_PROB])) - np.log(area) + strangers)

@@ -52,7 +52,6 @@ def add_newborns(
         if np.isfinite(d2.min()):
             row = int(np.flatnonzero(bank.id == of[d2.argmin()])[0])
             born.parent[k], born.first_seen[k] = bank.group[row], bank.first_seen[row]
-            born.move_with(k, bank, row, scaled)
     bank.add(born)
 
 

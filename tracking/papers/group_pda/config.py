@@ -35,7 +35,7 @@ class GroupPdaConfig(BackgroundSettings):
     association: str = param("pda", ("pda", "none"), "",
         "pda: by masses (sec. 4.2); none: all points in the region, without the constraint (sec. 5.2.1)", "categorical")
     corrections: bool = param(True, (True, False), "",
-        "R, misses, noise, extents, parts, places, hidden groups, velocities: departures (c) (ours)", "categorical")
+        "R, noise, extents, parts, places, hidden groups, evidence for merges: departures (c) (ours)", "categorical")
     appearance: float = param(0.5, (0.0, 5.0), "",
         "from pixels: weight of colours in the log masses (future work of sec. 6; ours)", sees="pixels")
     merge_velocity: float = param(0.5, (0.05, 3.0), "m/s",

@@ -14,7 +14,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_mass_kernels as kernels
-from tracking.papers.group_pda.scaled_parameters import SPEED_PRIOR, SPLIT_SPEED, ScaledParameters
+from tracking.papers.group_pda.scaled_parameters import SPEED_PRIOR, ScaledParameters
 
 
 class MemberPlaces(NamedTuple):
@@ -119,12 +119,6 @@ class GroupBank:
         for f in fields(self):
             a, b = getattr(self, f.name), getattr(other, f.name)
             setattr(self, f.name, a + b if isinstance(a, list) else np.concatenate([a, b]))
-
-    def move_with(self, rows: int | slice, bank: GroupBank, row: int, scaled: ScaledParameters) -> None:
-        """Gives these rows the velocity of the group in `row` of a bank, in place; nothing without `corrections`."""
-        if scaled.config.corrections:
-            self.x[rows, 2:] = bank.x[row, 2:]
-            self.P[rows, 2:, 2:] = bank.P[row, 2:, 2:] + (scaled.scale * SPLIT_SPEED) ** 2 * np.eye(2)
 
     def predict(self, scaled: ScaledParameters) -> None:
         """Predicts all groups to the next frame, in place: x = F x, P = F P F' + Q (eq. 2.3), F and Q from `scaled`."""

@@ -293,7 +293,6 @@ def fall_apart(
         parts.parent[:] = bank.group[row]
         parts.parent[largest] = bank.parent[row]
         parts.id[:] = [bank.id[row] if k == largest else ids.new() for k in range(len(parts))]
-    parts.move_with(slice(None), bank, row, scaled)
     bank.remove(row)
     bank.add(parts)
 

@@ -13,14 +13,6 @@ from tracking.papers.group_pda import association_mass_kernels as kernels
 from tracking.papers.group_pda.config import GroupPdaConfig
 
 SPEED_PRIOR = 1.3  # m/s: standard deviation of a newborn group's velocity, per axis, that of walking people.
-# m/s: standard deviation of a part's velocity about its group's, and speed at which a group's region widens while it
-# has no feasible association, and by which members' places grow uncertain (ours).
-SPLIT_SPEED = 0.5
-# sigma_n of m_N: the part that grows with N, per N; ours and, for next to none, with corrections off.
-COUNT_SHARE, PAPER_COUNT_SHARE = 0.15, 0.01
-MISS_PROB = 0.02  # Prior probability of the miss hypothesis (ours).
-# People among a group's points who are another group's, per group size, above which extent and size rest (ours).
-FREEZE_SHARE = 0.1
 LEAST_PEOPLE = 0.25  # From pixels: components with less foreground, in people, are noise (ours).
 COLOUR_BINS = 64  # Bins of a group's colour histogram (tracking.papers.group_pda.from_pixels).
 
@@ -31,7 +23,7 @@ class ScaledParameters:
 
     config: the GroupPdaConfig they come from. dt: s between frames. scale: units per metre (1 on the ground).
     constraint: the rule G_y by which points are one group (sec. 3.3). point_sd: standard deviation of one person's
-    measured position. kernel_rules (17,): the array `rules` of the kernels (gates, priors, noises). F, Q (4, 4):
+    measured position. kernel_rules (14,): the array `rules` of the kernels (gates, priors, noises). F, Q (4, 4):
     transition and process noise covariance of x, y, vx, vy, eq. 2.3. from_pixels: True if the points are foreground
     pixels, not people. metres_per_unit (2,): metres on the ground per unit along x and along y (depth in an image).
     colour_bins: bins of colour histograms (64), 0 if colours are not used.
@@ -87,12 +79,7 @@ def _kernel_rules(
     rules[kernels.PRIOR_XX : kernels.PRIOR_YY + 1] = constraint.prior_entries
     rules[kernels.PRIOR_WEIGHT], rules[kernels.LEAST_WEIGHT] = c.spread_weight, constraint.least
     rules[kernels.POINT_SD] = point_sd
-    rules[kernels.COUNT_SD], rules[kernels.COUNT_SHARE] = (
-        c.count_noise,
-        COUNT_SHARE if c.corrections else PAPER_COUNT_SHARE,
-    )
-    ours = c.corrections and c.association != "none"
-    rules[kernels.MISS_PROB], rules[kernels.FREEZE_SHARE] = (MISS_PROB, FREEZE_SHARE) if ours else (0.0, np.inf)
+    rules[kernels.COUNT_SD] = c.count_noise
     rules[kernels.KEEP] = np.exp(-1 / fps / c.extent_time)
     rules[kernels.GATE_FACTOR] = factor
     rules[kernels.REDRAWN] = not c.corrections

@@ -2,8 +2,8 @@
 
 Gennari & Hager, "Probabilistic data association methods in visual tracking of groups", CVPR 2004. The state of a group,
 or of each part of one, is (xi, v, Sigma, N): centroid xi and velocity v, together x with covariance P; extent Sigma of
-the members' positions; number of people N. The steps of a frame (Fig. 1), with their equation (eq.) or section (sec.)
-and the module:
+the members' positions; number of people N. Members are at y_i = xi + s_i, s_i normal with Sigma (eq. 2.1). The steps of
+a frame (Fig. 1), with their equation (eq.) or section (sec.) and the module:
 
     (F, Q: transition and process noise of x; S: covariance of a point about xi, in the paper Sigma; y: a point; gamma:
     squared Mahalanobis radius `gate`; m_d, m_N, m_g: masses by the centroid's place, the number of people and the group
@@ -29,8 +29,8 @@ Departures. Those marked (c) are off with `corrections` off.
 
 - units: m and s, in an image by one scale. Paper: px and frames. Why: any camera and frame rate.
 - F, Q: constant velocity, white acceleration that is constant in a frame. Paper: not stated. Why: any frame rate.
-- search region of the gate, and distances that order shared points: by Σ, P and a point's variance; (c) wider in
-  infeasible time. Paper: Σ, as in merges here. Why: few points give a small Σ.
+- search region of the gate, and distances that order shared points: by Σ, P and a point's variance. Paper: Σ, as in
+  merges here. Why: few points give a small Σ.
 - extents: with 1/N, shrunk by `spread_weight` to a prior, `person_spread`; (c) corrected for the gate. Paper: sample
   covariance. Why: few people; with 1/N eq. 3.1 is exact.
 - G_x in G_y: repeated until nothing changes. Paper: applied once. Why: joined regions overlap others.
@@ -38,25 +38,21 @@ Departures. Those marked (c) are off with `corrections` off.
   foreground.
 - births: confirmed after `confirm_time`, merged from the next frame on, removed after as long without points; until
   confirmed no points of a confirmed group. Paper: at once. Why: false alarms.
-- P: Σ w² P of merged groups; new ones r² (1 + 1/N) and 1.3 m/s per axis, (c) parts the group's and 0.5 m/s. Paper:
-  none. Why: the filter and SR_v need one.
+- P: Σ w² P of merged groups; new ones r² (1 + 1/N) and 1.3 m/s per axis. Paper: none. Why: filter and SR_v need one.
 - R, (c): members keep places, some are missed, stand-ins repeat their errors. Paper: a member's place and noise, read
   as Σ / m, of m people. Why: less noise.
 - m_d: covariance H P H' + R, with the R of each association's m. Paper: one P_yc. Why: fewer people measure a centroid
   worse.
-- m_N: σ_n grows with N, (c) by 15 %, else 1 %; heavy tails. Paper: normal, σ_n. Why: several join at once.
+- m_N: σ_n grows with N, by 1 %; heavy tails. Paper: normal, σ_n. Why: several join at once.
 - α_s and α_N: equal, from `extent_time`. Paper: two constants. Why: one parameter less.
-- missed detections: (c) a miss hypothesis, which shares in the means; if it outweighs all associations, the group
-  coasts; from points, missed members who were seen twice stand in for `carry_time` while the group has points, and
-  their places stay the group's for `coast_time`. Paper: not considered. Why: detectors miss people.
+- missed detections: from points, missed members who were seen twice stand in for `carry_time` while the group has
+  points, and their places stay the group's for `coast_time`. Paper: not considered. Why: detectors miss people.
 - stand-ins: associations of stand-ins alone leave x and P as they are, and are no infeasible time. Paper: none. Why:
   their places come from x.
-- Σ and N: rest until infeasible time is counted back, or (c) while many points are others'. Paper: always updated. Why:
-  they would swell.
+- Σ and N: rest until infeasible time is counted back. Paper: always updated. Why: they would swell.
 - no points: coasts, lost after `coast_time`; frames without detections are predicted only. Paper: null masses, as
   before a split. Why: occlusion.
-- an association without points: has no mass. Paper: j = 0 may be empty. Why: it has no centroid; the miss stands for
-  it.
+- an association without points: has no mass. Paper: j = 0 may be empty. Why: it has no centroid.
 - hidden feet: with boxes and a camera not overhead, points whose feet another box may hide are put no further than
   below heads at 1.5 m. Paper: points as they are. Why: hidden feet displace points.
 - pixels: foreground of tracking.detect on a grid of 0.1 m, each a share of a person, put where on the ground that
@@ -69,8 +65,8 @@ Departures. Those marked (c) are off with `corrections` off.
   over `extent_time`. Paper: future work. Why: similar groups cross.
 - places, (c): in the same, from points, too: where members have walked since none of the group's points could be
   another's. Paper: none. Why: groups that meet keep their people.
-- split: after `split_time`, until then predicted only; measured frames count back; colours and age go along; (c)
-  parent's velocity. Paper: after consecutive infeasible frames (Fig. 1: at once), at rest. Why: misses.
+- split: after `split_time`, until then predicted only; measured frames count back; colours and age go along. Paper:
+  after consecutive infeasible frames (Fig. 1: at once). Why: misses.
 - parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
   some have been more than 1.5 m from the rest for `confirm_time`; a part that is not measured, or infeasible, holds the
   others; R_x joins parts again. Paper: new groups at once. Why: misses and sway take people apart for a moment.
@@ -80,8 +76,8 @@ Departures. Those marked (c) are off with `corrections` off.
   Why: others' people stay out.
 - ids: the part that was largest when the group fell apart keeps the id, after its loss the largest left; of merged
   groups the largest, then the oldest. Paper: none. Why: tracks need ids.
-- walking out: a new group within reach of a member (2 m/s and 3 r) is a part of its group and as old, (c) with its
-  velocity; without corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
+- walking out: a new group within reach of a member (2 m/s and 3 r) is a part of its group and as old; without
+  corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
 - like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`; from points
   of the members seen in both of two frames, stand-ins as predicted; of a group in parts, those of the part with its id.
   Paper: SR_v overlap. Why: P does not measure likeness; people sway with each step; hidden members move the centroid.
@@ -98,8 +94,9 @@ Departures. Those marked (c) are off with `corrections` off.
   groups share points. Why: hidden groups follow others.
 - reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
   search region. Why: lost groups are guesses.
-- onsets: dated back; a split to when the last two parts, as fast as they part when it is decided, came to be over 1.5 m
-  apart. Paper: none. Why: decisions lag.
+- onsets: a merge, (c), to when its evidence was least, else this frame; a split to when the last two parts would have
+  been 1.5 m apart, had they moved straight, as fast as when it is decided, at least 0.7 m/s; enter and leave to the
+  first and last points. Paper: none. Why: decisions lag.
 - depth of points in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px.
   Why: oblique views.
 """

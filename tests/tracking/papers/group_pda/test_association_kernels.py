@@ -15,7 +15,7 @@ from tracking.filters.components import Constraint
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, remember, shares
-from tracking.papers.group_pda.association_kernels import any_within
+from tracking.papers.group_pda.association_kernels import any_within, displacement
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
@@ -23,7 +23,7 @@ from tracking.papers.group_pda.merging_and_splitting import merged
 from tracking.papers.group_pda.scaled_parameters import gate_factor, scale_parameters
 
 STATES = ["nothing", "null", "measured"]
-PLAIN = reference.Rules(Constraint(1.5, 9.21, 0.09 * np.eye(2), 3.0), 0.06, 0.5, 0.15, 0.0, np.inf, 0.9, True, False)
+PLAIN = reference.Rules(Constraint(1.5, 9.21, 0.09 * np.eye(2), 3.0), 0.06, 0.5, 0.9, True, False)
 
 
 def positive(r, n, scale=1.0):
@@ -33,14 +33,13 @@ def positive(r, n, scale=1.0):
 
 def random_rules(r, seed):
     """All options and kinds of association together, one combination after the other."""
-    miss, freeze, correct, redrawn, every = (bool(seed >> k & 1) for k in range(5))
+    correct, redrawn, every = (bool(seed >> k & 1) for k in range(3))
     constraint = Constraint(
         r.uniform(0.6, 2), r.uniform(6, 14), positive(r, 2, 0.4), r.uniform(0.5, 4), r.choice([0, 1.2])
     )
     return reference.Rules(
-        constraint, r.uniform(0.02, 0.3), r.uniform(0.2, 2), r.uniform(0.05, 0.4),
-        r.uniform(0.01, 0.5) if miss and not every else 0.0, r.uniform(0, 0.8) if freeze and not every else np.inf,
-        r.uniform(0.1, 0.99), correct, redrawn, every, float(r.choice([1e-9, 1.0])),
+        constraint, r.uniform(0.02, 0.3), r.uniform(0.2, 2), r.uniform(0.1, 0.99), correct, redrawn, every,
+        float(r.choice([1e-9, 1.0])),
     )  # fmt: skip
 
 
@@ -60,10 +59,7 @@ def random_case(seed):
     spread = np.array([np.linalg.cholesky(S) for S in extent])[of]
     points = x[of, :2] + np.einsum("kij,kj->ki", spread, r.normal(0, 1.2, (len(of), 2)))
     weights = r.uniform(0.2, 1.8, len(of)) if r.random() < 0.5 else np.ones(len(of))
-    wider = r.uniform(0, 0.3, count) * (r.random(count) < 0.3)
-    region = np.array(
-        [reference.search_region(*group) for group in zip(P, extent, [rules.noise**2] * count, wider, strict=True)]
-    )
+    region = np.array([reference.search_region(*group, rules.noise**2) for group in zip(P, extent, strict=True)])
     d2 = kernels.search(points, x, region, rules.constraint.gate)
     hits, own = np.isfinite(d2).sum(0), np.full(len(of), -1)
     free = np.flatnonzero((hits == 0) & (r.random(len(of)) < 0.7))
@@ -72,52 +68,33 @@ def random_case(seed):
     return rules, case, region
 
 
-def with_shares(case, region):
-    """The case in the order of the oracle's arguments."""
-    points, weights, d2, own, hits, x, P, extent, size, hold = case
-    may = np.isfinite(d2) | (own == np.arange(len(x))[:, None])
-    share = reference.shares(points, x, region, size, own, may)
-    return points, weights, d2, own, hits, share, region, x, P, extent, size, hold
-
-
-def kernel(case, rules, region=None):
-    """A copy of the case after the kernel: states, rows chosen, x, P, extent, size.
-
-    region: of the search, by default without anything wider.
-    """
-    if region is None:
-        groups = zip(case[6], case[7], strict=True)
-        region = np.array([reference.search_region(P, S, rules.noise**2, 0.0) for P, S in groups])
-    points, weights, d2, own, hits, share, region, *groups, hold = with_shares(case, region)
+def kernel(case, rules):
+    """A copy of the case after the kernel: states, rows chosen, x, P, extent, size."""
+    points, weights, d2, own, hits, *groups, hold = case
     after = [a.copy() for a in groups]
-    found = kernels.associate(
-        points, weights, d2, np.zeros(d2.shape), own, hits, share, region, *after, hold, rules.numbers
-    )
+    found = kernels.associate(points, weights, d2, np.zeros(d2.shape), own, hits, *after, hold, rules.numbers)
     return [STATES[s] for s in found[0].tolist()], found[1], *after
 
 
 def test_two_hundred_random_cases() -> None:
     seen = Counter()
     for seed in range(192):
-        rules, case, region = random_case(seed)
-        *points, share, _, x, P, extent, size, hold = with_shares(case, region)
-        d2, own, hits = case[2:5]
-        state, chosen, *after = kernel(case, rules, region)
-        for g in range(len(x)):
-            expected = reference.update(g, *points, share, region[g], x[g], P[g], extent[g], size[g], hold[g], rules)
+        rules, case, _ = random_case(seed)
+        d2, own, hits, *groups = case[2:]
+        state, chosen, *after = kernel(case, rules)
+        for g in range(len(state)):
+            expected = reference.update(g, *case[:5], *(a[g] for a in groups), rules)
             assert state[g] == expected[0], (seed, g)
             assert sorted(np.flatnonzero(chosen[g])) == sorted(expected[1]), (seed, g)
-            for found, right in zip(after, expected[3:], strict=True):
+            for found, right in zip(after, expected[2:], strict=True):
                 np.testing.assert_allclose(found[g], right, rtol=1e-8, atol=1e-10, err_msg=f"{seed} {g}")
             seen[state[g]] += 1
-            seen["missed"] += expected[2] > 0.5
-            seen["moved"] += not np.array_equal(after[2][g], extent[g])
+            seen["moved"] += not np.array_equal(after[2][g], groups[2][g])
             seen["carried"] += bool((own[expected[1]] >= 0).any())
             seen["shared"] += bool(((hits > 1) & np.isfinite(d2[g])).any())
-            seen[rules.unconstrained, rules.miss > 0, rules.freeze < np.inf, rules.correct, rules.redrawn] += 1
-    options = [n for key, n in seen.items() if isinstance(key, tuple)]
-    assert len(options) == 4 * (4 + 1)  # without group constraint there is neither miss nor freezing
-    assert min(seen[k] for k in ("nothing", "null", "measured", "missed", "moved", "shared", "carried")) > 5, seen
+            seen[rules.unconstrained, rules.correct, rules.redrawn] += 1
+    assert len([key for key in seen if isinstance(key, tuple)]) == 8
+    assert min(seen[k] for k in ("nothing", "null", "measured", "moved", "shared", "carried")) > 5, seen
 
 
 def kalman(x, P, F, Q):
@@ -172,29 +149,6 @@ def test_masses_sum_to_one(seed: int) -> None:
         np.testing.assert_allclose(b, a, rtol=1e-12, atol=1e-12)
 
 
-def occluded(miss):
-    """A group of 50 hidden behind another, of which three stray points are in its region; x, P and size after that."""
-    y = np.array([[1.2, 0.1], [1.3, -0.1], [1.25, 0.2]])
-    x, P, size = np.array([[0.0, 0, 1, 0]]), 0.02 * np.eye(4)[None], np.array([50.0])
-    case = y, np.ones(3), np.square(y).sum(1)[None] / 0.4, np.full(3, -1), np.full(3, 2)
-    case = *case, x, P, 0.36 * np.eye(2)[None]
-    state, chosen, x, P, _, size = kernel((*case, size, np.zeros(1, bool)), replace(PLAIN, miss=miss))
-    return state, chosen.any(), x[0], P[0], size[0]
-
-
-def test_strays_do_not_drag_a_hidden_group() -> None:
-    """Without the miss hypothesis three points have all the mass, as masses sum to 1."""
-    state, chosen, x, P, size = occluded(0.02)
-    assert (state, chosen) == (["nothing"], False)
-    np.testing.assert_allclose(x, [0, 0, 1, 0], atol=0.01)
-    np.testing.assert_allclose(P, 0.02 * np.eye(4), atol=0.001)
-    assert size == pytest.approx(50, abs=0.2)
-    state, chosen, x, _, size = occluded(0.0)
-    assert (state, chosen) == (["measured"], True)
-    assert x[0] > 0.05
-    assert size < 47
-
-
 def gaussian(count):
     """Points spread evenly as a Gaussian of covariance I is."""
     k = np.arange(count)
@@ -209,7 +163,7 @@ def settled(gate, correct, frames=120, start=1.0, count=400):
     rules = replace(PLAIN, constraint=constraint, noise=1e-3, correct=correct)
     x, P, extent, size = np.zeros((1, 4)), 1e-6 * np.eye(4)[None], start * np.eye(2)[None], np.array([float(count)])
     for _ in range(frames):
-        region = reference.search_region(P[0], extent[0], rules.noise**2, 0.0)
+        region = reference.search_region(P[0], extent[0], rules.noise**2)
         d2 = kernels.search(points, x, region[None], gate)
         case = points, weights, d2, np.full(count, -1), np.ones(count, np.int64)
         state, *_, x, P, extent, size = kernel((*case, x, P, extent, size, np.zeros(1, bool)), rules)
@@ -349,6 +303,15 @@ def test_near_is_that_of_all_pairs(seed: int) -> None:
     reach = float(r.choice([0.05, 0.5, 2.0]))
     squared = np.square(place[:, None] - points).sum(2) <= reach**2
     np.testing.assert_array_equal(any_within(place, points, reach), squared.any(1))
+
+
+@pytest.mark.parametrize("reach", [0.3, 3.0])
+def test_displacement_is_of_mutually_nearest_places(reach: float) -> None:
+    before = np.array([[0.0, 0], [4, 0], [4.3, 0]])
+    after = np.array([[0.2, 0], [0, 1], [4.5, 0.4]])  # the second is nobody's; the third is of (4.3, 0), not of (4, 0)
+    expected = np.array([[0.2, 0], [0.2, 0.4]])[: 1 + (reach > 1)].mean(0)
+    np.testing.assert_allclose(displacement(before, after, reach), expected, atol=1e-12)
+    assert not displacement(before[:0], after, reach).any()
 
 
 def test_gate_factor() -> None:
