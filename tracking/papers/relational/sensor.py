@@ -33,9 +33,9 @@ LEAST_MISS = 1e-6  # Least weight of a person without detection in the average o
 class Sight:
     """What is known of K people before a frame's detections.
 
-    detect (K,): probability that each person is measured if existing; missed (K,): True for people who were missed
-    since their last measurement; behind something, or without a frame, is no miss; cut (K,): probability that the feet
-    are hidden behind another person; eye (2,): place of the camera on the ground, m, nan if unknown.
+    detect (K,): probability that each person is measured if existing; missed (K,): True for people who were not
+    measured in the last frame with a measurement; cut (K,): probability that the feet are hidden behind another person;
+    eye (2,): place of the camera on the ground, m, nan if unknown.
     """
 
     detect: Array

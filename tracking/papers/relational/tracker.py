@@ -51,8 +51,8 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
   err.
 - displaced points: a share `outlier_share`, away from the camera, without one in all directions, more if feet are
   covered. Paper: normal. Why: hidden feet.
-- misses: after a miss, detected again with `hidden_time`; who is behind something is not missed. Paper: all alike. Why:
-  occlusions last.
+- misses: who was not measured is measured again with `hidden_time`; behind something nobody can be. Paper: all alike.
+  Why: occlusions last.
 - occluders: nobody is measured behind others, or behind known pillars and walls. Paper: none. Why: nobody is visible
   there.
 - sums*: exact up to a size, then belief propagation; in the preset each set of people and detections that are linked by
@@ -126,7 +126,8 @@ class Slots(PersonTable):
     """The people of a sequence, one row for each of K slots of the particles (all ours).
 
     id (K,): the track's id, -1 until the person is first reported. missed (K,): time without a measurement in which the
-    person could have been seen, s. seen (K,): True if measured in this frame. next_id: the next new id.
+    person could have been seen, s. seen (K,): True if measured in the last frame with a measurement. next_id: the next
+    new id.
     """
 
     missed: Array = field(default_factory=lambda: np.zeros(0))
@@ -185,11 +186,10 @@ class Particle(PointTracker):
         """
         detections = self.detected(frame, detections, None if self.shown is None else self.shown.box)
         self.streams.frame += 1
-        self.slots.seen[:] = False
         self._forecast()
         if detections is not None:
             self._measure(detections)
-        self.shown = tracks = self._report(frame)
+        self.shown = tracks = self._report(frame, detections is not None)
         if detections is not None:
             one = self.particles.one_weight
             few = self.particles.resample(1.0 if one else RESAMPLE_SHARE, self._uniforms)
@@ -224,8 +224,7 @@ class Particle(PointTracker):
 
     def _measure(self, detections: Detections) -> None:
         points, sizes = self.points(detections)
-        missed = self.slots.missed > 0
-        sight = sensor.Sight(self._detection_probability(), missed, self.cut, self.eye)
+        sight = sensor.Sight(self._detection_probability(), ~self.slots.seen, self.cut, self.eye)
         pairs, measured, nobody = sensor.weigh(self.particles, points, sight, self.noise, self.config)
         self.slots.measure(measured, pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
@@ -237,7 +236,7 @@ class Particle(PointTracker):
         c = self.config
         again = c.detect_prob if c.certain_sensor else min(c.detect_prob, -np.expm1(-self.dt / c.hidden_time))
         visible = 1.0 if c.certain_sensor else 1 - self.hidden
-        return np.asarray(np.where(self.slots.missed > 0, again, c.detect_prob) * visible)
+        return np.asarray(np.where(self.slots.seen, c.detect_prob, again) * visible)
 
     def _remove(self) -> None:
         keep = (self.particles.existence >= LEAST_EXISTENCE) & (self.slots.missed <= self.config.time_window + 1e-9)
@@ -266,7 +265,7 @@ class Particle(PointTracker):
 
     def _relate_newcomers(self, points: Array) -> None: ...
 
-    def _report(self, frame: Frame) -> Tracks:
+    def _report(self, frame: Frame, measured: bool) -> Tracks:
         mean, cov, exist = self.particles.estimates()
         exist = exist * self._stayed()
         rows = exist >= self.config.report_existence
@@ -277,17 +276,17 @@ class Particle(PointTracker):
         if self.plane == "image":
             pos, vel, cov = pos * self.unit, vel * self.unit, cov * self.unit**2
         box = boxes_at(pos, self.slots.size[rows]) if self.plane == "image" else None
-        alone, seen = np.full(len(id), -1), self.slots.seen[rows]
+        alone, seen = np.full(len(id), -1), self.slots.seen[rows] & measured
         return Tracks(frame.index, frame.t, self.plane, "person", id, alone, pos, vel, cov, box, score, seen=seen)
 
     def _stayed(self) -> Array:
         """Returns the probability (K,) that each person has not left: hidden since the last measurement against gone
         then, by the rates of `existence`; 1 if measured or with the paper's sensor."""
-        c, missed = self.config, self.slots.missed
+        c, seen = self.config, self.slots.seen
         # people leave with their partners: whose partner is measured is hidden
-        alone = 1 - (self.particles.together() * (missed == 0)).max(axis=1, initial=0.0)
-        gone = alone * existence.SHOWN_TIME / existence.LIFETIME * np.exp(missed / c.hidden_time)
-        return np.where((missed == 0) | c.certain_sensor, 1.0, 1 / (1 + gone))
+        alone = 1 - (self.particles.together() * seen).max(axis=1, initial=0.0)
+        gone = alone * existence.SHOWN_TIME / existence.LIFETIME * np.exp(self.slots.missed / c.hidden_time)
+        return np.where(seen | c.certain_sensor, 1.0, 1 / (1 + gone))
 
     def _follow(self, state: Array) -> None: ...
 
@@ -365,8 +364,8 @@ class Relational(Particle):
         pairs, related = particle_set.join(p.pos, p.exist, label, points, NEWCOMER_SHARE, uniforms, self._rules)
         p.pairs, p.related = np.concatenate([p.pairs, pairs]), np.concatenate([p.related, related])
 
-    def _report(self, frame: Frame) -> Tracks:
-        tracks, p = super()._report(frame), self.particles
+    def _report(self, frame: Frame, measured: bool) -> Tracks:
+        tracks, p = super()._report(frame, measured), self.particles
         if self.belief is None:
             self.together = p.together()
         else:

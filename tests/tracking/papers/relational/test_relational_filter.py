@@ -61,13 +61,9 @@ def placed(count, pos, vel=None, exist=1.0):
 def seat(tracker, particles):
     """Gives the tracker these people, who have not been measured in the last frame."""
     tracker.particles = particles
-    people = particles.people
-    tracker.slots.extend(
-        id=np.full(people, -1),
-        seen=np.zeros(people, bool),
-        size=np.full((people, 2), np.nan),
-        key=birth_keys(np.zeros((people, 2)), 1),
-    )
+    k = particles.people
+    unknown, key = np.full((k, 2), np.nan), birth_keys(np.zeros((k, 2)), 1)
+    tracker.slots.extend(id=np.full(k, -1), missed=np.zeros(k), seen=np.zeros(k, bool), size=unknown, key=key)
 
 
 # E1
@@ -194,9 +190,12 @@ def test_who_is_only_predicted_is_not_seen(kind):
 def test_a_missed_person_is_reported_while_probably_there_and_longer_beside_a_partner(apart, frames):
     """Alone for m s: exp(-m / 0.3), hidden once a second, above 1 / 15, gone once in 15 s, up to m = 0.81 s."""
     walk = [[(0.1 * k, 0.0), (0.1 * k, apart)] for k in range(51)]
-    tracks = stepped(Relational(), [*walk[:30], *[people[:1] for people in walk[30:50]], None, walk[50]])
+    tracker = Relational()
+    tracks = stepped(tracker, [*walk[:30], *[people[:1] for people in walk[30:50]], None, walk[50]])
     assert [len(t.id) for t in tracks[30:51]] == [2] * frames + [1] * (21 - frames)
     assert tracks[51].id.tolist() == tracks[29].id.tolist()
+    tracker.slots.missed[0], tracker.slots.seen[:] = 2.0, False  # the partner is behind something in all particles
+    assert tracker._stayed()[0] < 0.1
 
 
 @pytest.mark.parametrize("fps", [4, 10, 25])
