@@ -49,9 +49,11 @@ Departures. A star marks those that stay in the preset `paper`:
   Paper: restarted from the truth. Why: no truth.
 - frames without measurement*: X is predicted, nobody counts as missed, Z changes as ever. Paper: each frame is
   observed. Why: nobody could be seen.
-- existence in the filter*: unreported people count fully in partitions, votes and events; for events they stay in
-  their groups. Paper: all exist. Why: one state for all.
+- existence in the filter*: unreported people count fully in partitions and votes. Paper: all exist. Why: one state for
+  all.
 - p(y | x)*: normal about the place; 1 if missed. Paper: colour templates. Why: input is points.
+- displaced places: a share of the measured ones has a larger error, as by partial occlusion (`algorithm`). Paper: none.
+  Why: people are lost else.
 - pixels*: each blob one detection (`pixel_noise`). Paper: boxes. Why: no detector.
 - boxes*: reported in the image, with sizes that follow the measured ones. Paper: a template's box at the state. Why:
   they are shown and scored.
@@ -87,10 +89,8 @@ Departures. A star marks those that stay in the preset `paper`:
   own. Why: a group keeps its least member.
 - weights of votes*: before step 2, by the rest, in the preset by w (`algorithm`). Paper: summed over i after step 2.
   Why: no noise of resampling.
-- ids, onsets*: events of groups that change late, by the belief; ids as in the truth; onsets dated back, those of leave
-  to the last measurement. Paper: none. Why: as the truth.
-- events that correct groups*: not reported (`tracking.grouping.group_events`); nor are enters of the first
-  second. Paper: none. Why: who was in one group by mistake neither met nor parts.
+- ids, events*: derived by the grouping from the tracks, as for other trackers; the groups are the filter's. Paper:
+  none. Why: people meet and part less often than partitions change.
 """
 
 from __future__ import annotations
