@@ -149,6 +149,18 @@ def test_what_a_tracker_says_is_kept():
     assert [t.events for t in made] == [t.events for t in given]
 
 
+def test_groups_of_the_moment_come_and_go_without_events():
+    own = np.tile([5, 5, 5], (200, 1))
+    own[28::7] = -1
+    named = [
+        t.replace(momentary=True, groups=Groups.none() if (t.group < 0).all() else None)
+        for t in tracks(leaving(), group=own)
+    ]
+    made = derive(named, FPS, rule=RULE)
+    assert events(made) == events(derive(tracks(leaving()), FPS, rule=RULE))
+    assert [t.group.tolist() for t in made] == [[-1] * 3 if (own[k] < 0).all() else [1] * 3 for k, t in enumerate(made)]
+
+
 def test_crossings_and_queues_of_tracks():
     """The hulls come within 1 m in frame 44 and part after frame 58; 20 frames later it is known."""
     found = events(derive(tracks(passing()), FPS))
