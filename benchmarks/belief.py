@@ -52,8 +52,8 @@ from tracking.grouping.pair_evidence import NAMES, NEAR, QUANTITIES, TIMES
 from tracking.scoring.evaluation import evaluate
 from tracking.stats import block_intervals, mean_interval
 
+# Scenes to which the default is fitted: for *now*, and for *events*.
 TRAIN = (("streets", "streets", "standard"), ("standard", "friends-meet", "friends-meet-hard", "streets"))
-"""Scenes to which the default is fitted: for *now*, and for *events*."""
 KEYS = ("pairwise_F1", "group_F1_hull", "event_F1", "merge_latency")
 
 
@@ -242,11 +242,11 @@ def calibration(names: Sequence[str], seeds: range, belief: Belief, out: Path | 
         lines(panels, out)
 
 
+# Words of the names of tables that are left out together.
 FAMILIES: Mapping[str, tuple[str, ...]] = {
     **{name: (name,) for name in (*QUANTITIES, *NEAR)},
     **{f"means over {time:g} s": (f"{time:g} s",) for time in TIMES},
 }
-"""Words of the names of tables that are left out together."""
 CHANGED: Mapping[str, dict[str, float]] = {
     "`stay` = `come`": {"stay": 1.2},
     "`come` 0": {"come": 0.0},

@@ -122,8 +122,8 @@ def _rows(rows: Sequence[str]) -> str:
     return "".join(f"  {text},\n" for text in rows)
 
 
+# One recording: scene, seed, tracker, minutes, part, and by key (score, low, high).
 Row = dict[str, Any]
-"""One recording: scene, seed, tracker, minutes, part, and by key (score, low, high)."""
 
 
 def rows_of(name: str, seed: int) -> Iterator[Row]:

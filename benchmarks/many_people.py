@@ -21,10 +21,10 @@ from sim.types import Context, Detections, Frame
 from tracking.running.tracker_registry import find, names
 
 FPS, SCALE = 10.0, 40.0
+# People who come at once, and frames in which they are confirmed by every tracker.
 NEWCOMERS, SOON = (300, 1000), 6
-"""People who come at once, and frames in which they are confirmed by every tracker."""
+# People and frames of the long run.
 CROWD, LONG = 2000, 40
-"""People and frames of the long run."""
 
 
 def frames(name: str, people: int, count: int, area: float = 4.0) -> Iterator[Frame]:

@@ -9,8 +9,8 @@ from sim.types import Array, FrameTruth, GroupEvent, Groups, Sequence, Tracks
 from tests.reference_polygons import footprint_hull
 
 LATE = 4
+# px per metre, for velocities in the image.
 PX = 40.0
-"""px per metre, for velocities in the image."""
 
 
 def wholes(sequence: Sequence, plane: str) -> list[Tracks]:

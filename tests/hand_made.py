@@ -10,11 +10,11 @@ from sim.types import GroupEvent, Groups, Tracks, Truth
 
 FPS = 10.0
 
+# Id → place, m.
 People = Mapping[int, tuple[float, float]]
-"""Id → place, m."""
 
+# x0, y0, x1, y1.
 Rectangle = tuple[float, float, float, float]
-"""x0, y0, x1, y1."""
 
 
 class Scene:

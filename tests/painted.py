@@ -12,11 +12,11 @@ from sim.types import Context, Frame, Tracker, Tracks
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
 
+# px, frames per second, and how high a person is.
 HIGH, WIDE, FPS, TALL = 240, 320, 10.0, 68.0
-"""px, frames per second, and how high a person is."""
 
+# Middle and lower edge of the box, and height, px.
 Person = tuple[float, float, float]
-"""Middle and lower edge of the box, and height, px."""
 
 
 @functools.cache

@@ -13,12 +13,12 @@ from tests.processes import ROOT
 
 PACKAGES = ("scenarios", "sim", "tracking")
 LINES = 500
+# What scoring may import of ours: people use it alone, on their own arrays.
 SCORING = (
     "scenarios.limits", "tracking.scoring", "tracking.grouping.grouped_tracks", "tracking.grouping.foot_points",
     "scenarios.errors", "sim.arrays", "sim.types", "sim.truth.group_hulls", "sim.truth.crossing_events",
     "sim.truth.queue_detection", "sim.geometry.polygons", "sim.scene.camera", "sim.scene.terrain",
 )  # fmt: skip
-"""What scoring may import of ours: people use it alone, on their own arrays."""
 
 
 NUMBA = "sim.compiler sim.numba_shortcuts"
@@ -129,11 +129,12 @@ def test_no_global_state_of_chance_and_time():
         assert inside(name, "tracking.app") or read.isdisjoint(clocks), name
 
 
+# What decides motion, truth and detections: the same bits on every processor.
 DECIDING = (
     "sim.crowd", "sim.truth", "sim.scene", "sim.detector", "sim.geometry", "sim.rng", "sim.clock", "sim.elementary",
 )  # fmt: skip
-"""What decides motion, truth and detections: the same bits on every processor."""
 
+# Functions of numpy, BLAS and the C library whose code is chosen by processor; `sim.elementary` has their equals.
 BY_PROCESSOR = {
     "np": {
         *("exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh"),
@@ -146,19 +147,18 @@ BY_PROCESSOR = {
         *("sinh", "cosh", "tanh", "hypot", "dist", "pow", "cbrt", "erf", "erfc", "gamma", "lgamma", "sumprod", "fma"),
     },
 }
-"""Functions of numpy, BLAS and the C library whose code is chosen by processor; `sim.elementary` has their equals."""
 
+# Methods of numpy's generators that call the C library or may be contracted; `sim.rng` has their equals.
 DRAWS = {
     "normal", "standard_normal", "exponential", "poisson", "gamma", "beta", "lognormal", "uniform", "choice",
     "binomial",
 }  # fmt: skip
-"""Methods of numpy's generators that call the C library or may be contracted; `sim.rng` has their equals."""
 
+# Of scipy only what adds and compares, or proposes.
 WITHOUT_ARITHMETIC = {
     "scipy.optimize.linear_sum_assignment", "scipy.sparse.coo_array", "scipy.sparse.csgraph.connected_components",
     "scipy.sparse.csgraph.dijkstra", "scipy.spatial.cKDTree",
 }  # fmt: skip
-"""Of scipy only what adds and compares, or proposes."""
 
 
 def by_processor(node: ast.AST) -> str | None:

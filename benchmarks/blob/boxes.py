@@ -44,8 +44,8 @@ RATES, DETECTED = (2.5, 5.0, 10.0, 25.0), (0.5, 0.7, 0.9)  # frames/s; probabili
 FIELDS = ((20, 1.0, 0.0), (100, 1.0, 0.0), (20, 0.9, 5.0), (100, 0.9, 5.0))  # squares, detection probability, clutter
 VARIANTS = {"`blob`": {}, "`blob`, paper": BlobConfig.load("paper").as_dict()}
 SHOWN = ("HOTA", "DetA", "AssA", "MOTA", "IDF1", "IDSW")
+# Columns frame, id and box of the rows of people.
 Table = dict[str, Array]
-"""Columns frame, id and box of the rows of people."""
 
 
 @dataclass(frozen=True)

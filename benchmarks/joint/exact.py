@@ -43,6 +43,7 @@ class Condition:
     drawn: bool = False
 
 
+# Base: the default's Sigma and noise, 50 particles of 50 partitions, 5 % missed, a gap of 1 s every PERIOD.
 CONDITIONS = {
     "base": Condition(),
     "X, Z drawn from the model": Condition(drawn=True),
@@ -54,7 +55,6 @@ CONDITIONS = {
     "500 particles": Condition({"particles": 500}),
     "algorithm paper": Condition({"algorithm": "paper"}),
 }
-"""Base: the default's Sigma and noise, 50 particles of 50 partitions, 5 % missed, a gap of 1 s every PERIOD."""
 COLUMNS = (
     "VAR1 exact, cm", "Δ Z known", "Δ full exact", "VAR1 particles, cm", "Δ missed, Z known", "Δ full",
     "log loss of Z: prior / exact / particles",

@@ -19,8 +19,8 @@ from benchmarks.joint.runs import (
 )
 from benchmarks.support import tables
 
+# Settings of the mode ablation.
 DEPARTURES = ("variant=full", "variant=VAR1", "belief_rate=0 belief_memory=0", "belief_memory=0", "algorithm=paper")
-"""Settings of the mode ablation."""
 
 
 def ablation(given: argparse.Namespace) -> None:

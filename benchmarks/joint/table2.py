@@ -14,18 +14,18 @@ from benchmarks.support.options import HOTEL, SHARED_DATA, seeds_text
 from sim.io.source import open_source
 from tracking.papers.joint.config import JointConfig
 
+# Table 2 of the paper, on its own 28 sequences.
 PAPER = {
     "preset full": "2.18 (4.96) / 93.7 / 82.9 / 79.7 / 57.3",
     "preset VAR1": "2.19 (5.46) / 93.8 / 81.9 / 78.3 / 56.0",
     "preset VAR2": "3.72 (11.81) / 82.1 / 51.6 / 48.1 / 33.5",
     "preset VAR3": "2.52 (8.35) / 65.1 / 24.6 / 18.9 / 4.9",
 }
-"""Table 2 of the paper, on its own 28 sequences."""
+# Table 3b of the paper, on sequences of BIWI that it does not name.
 PAPER_BIWI = {
     "preset full": "– / 53.8 / 78.0 / 53.6 / 29.4",
     "preset VAR3": "– / 60.6 / 51.6 / 29.6 / 9.6",
 }
-"""Table 3b of the paper, on sequences of BIWI that it does not name."""
 COLUMNS = ("error, px (std)", "1-FP, %", "1-FN, %", "GDSR, %", "MOTA, %", "MOTP, px")
 PRINTED = "paper: error / 1-FP / 1-FN / GDSR / MOTA"
 COMPARED = ("GDSR", "MOTA", "1-FN", "1-FP")

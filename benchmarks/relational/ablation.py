@@ -20,15 +20,15 @@ from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import with_groups, without_groups
 from tracking.papers.relational import sensor, tracker, transition_kernels
 
+# Settings of the ablation beside the defaults. With relation_bias 40 partners count fully; detect_prob 1 and
+# clutter_density 0 are the paper's sensor and weights. Capitals: of SWITCHES.
 DEPARTURES = (
     "relation_evidence=state", "coupling_time=0", "common_noise=0", "relation_bias=40", "NO_SPREAD", "NO_FACTORS",
     "NO_OCCLUDERS", "detect_prob=1 clutter_density=0", "outlier_share=0", "hidden_time=2", "noise_scale=1",
     "clutter_density=0.02",
 )  # fmt: skip
-"""Settings of the ablation beside the defaults. With relation_bias 40 partners count fully; detect_prob 1 and
-clutter_density 0 are the paper's sensor and weights. Capitals: of SWITCHES."""
+# Walks of the table of a hidden partner.
 PARTNERS = 40
-"""Walks of the table of a hidden partner."""
 
 
 def _no_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
@@ -36,13 +36,13 @@ def _no_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
     return np.zeros(pairs.shape)
 
 
+# Departures without a parameter: a missed person has no factors of partners; nobody is behind other people; the
+# filter's scatter is not taken off distances of partners.
 SWITCHES: dict[str, Any] = {
     "NO_FACTORS": lambda: patch.object(sensor, "add_partner_factors", lambda *arguments: None),
     "NO_OCCLUDERS": lambda: patch.object(tracker, "BODY_RADIUS", 0.0),
     "NO_SPREAD": lambda: patch.object(transition_kernels, "pair_spread", _no_spread),
 }
-"""Departures without a parameter: a missed person has no factors of partners; nobody is behind other people; the
-filter's scatter is not taken off distances of partners."""
 
 
 def ablation(given: argparse.Namespace) -> None:

@@ -24,18 +24,18 @@ from tracking.stats import mean_interval, paired
 FILTERS = ("particle", "relational")
 DIFFERENCE = "relational − particle"
 PRESETS = {"paper": "paper", "default": None}
+# People who are less visible are never detected: `sensor.min_visibility`.
 HIDDEN = 0.2
-"""People who are less visible are never detected: `sensor.min_visibility`."""
+# Largest error of a person, and cost of a missing track, m.
 CUT = 2.0
-"""Largest error of a person, and cost of a missing track, m."""
+# Lengths of the occlusion in mode hidden, s.
 LENGTHS = (0.2, 0.5, 1.0, 2.0, 3.0)
-"""Lengths of the occlusion in mode hidden, s."""
+# Mode recordings: s from one occlusion to the next, its length, standard deviation of a detection per axis, m.
 PERIOD, AWAY, ROUGH = 6.0, 2.0, 0.1
-"""Mode recordings: s from one occlusion to the next, its length, standard deviation of a detection per axis, m."""
+# Mode hidden: frames per second, s before the occlusion, standard deviation of a detection, m.
 FPS, SEEN, NOISE = 10.0, 4.0, 0.05
-"""Mode hidden: frames per second, s before the occlusion, standard deviation of a detection, m."""
+# Modes hidden and recordings: where a filter places a hidden person, also if the person has probably left.
 EVERYBODY = "report_existence=0"
-"""Modes hidden and recordings: where a filter places a hidden person, also if the person has probably left."""
 
 
 def places(truth: Truth) -> tuple[Array, float]:

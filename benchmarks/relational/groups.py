@@ -22,8 +22,8 @@ from tracking.running.prepare import prepare
 from tracking.stats import paired
 
 COLUMNS = ("HOTA", "IDF1", "group_F1_hull", "pairwise_F1")
+# The seed of a filter is that of the scene, and so much more for each further filter seed.
 OFFSET = 1_000_000
-"""The seed of a filter is that of the scene, and so much more for each further filter seed."""
 
 
 def sequences(given: argparse.Namespace, suite: str) -> Iterator[tuple[str, int, Sequence]]:

@@ -33,13 +33,13 @@ from tracking.scoring import evaluate
 from tracking.stats import mean_interval
 
 SCENE = "scenarios/suites/subtraction-stereo/crowded.toml"
+# Groups from each side; two fifths as many come towards the camera, at least one.
 CROWDS = (2, 8)
-"""Groups from each side; two fifths as many come towards the camera, at least one."""
+# Wider spheres and trackers of one picture, and what they are compared with.
 RIVALS = {"stereo, radius 0.8": "stereo", "blob": "stereo", "group-pda": "stereo, in the image"}
-"""Wider spheres and trackers of one picture, and what they are compared with."""
 ROWS = ("stereo", "stereo, radius 0.8", "blob", "stereo, in the image", "group-pda")
+# m: people's feet and heads are so far from the height of their group, the middle of their bodies.
 HALF = 0.85
-"""m: people's feet and heads are so far from the height of their group, the middle of their bodies."""
 KEYS = {"group F1": "group_F1_hull", "1-FP": "group_1-FP", "1-FN": "group_1-FN", "MOTA": "group_MOTA",
         "ground, m": "ground", "found": "found"}  # fmt: skip
 

@@ -20,13 +20,13 @@ from tracking.papers.stereo import tracker
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.points import PicturePoints, moved_away, stereo_camera
 
+# Parameters that change no points, or move finished points.
 TRACKING = frozenset({
     "gate", "velocity_weight", "point_covariance",
     "person_spread", "spread_weight", "spread_time", "accel_noise", "centroid_noise",
     "density_width", "radius", "point_radius", "group_points", "point_noise", "merge_gate", "split_time",
     "confirm_time", "coast_time", "surface_offset", "top_offset",
 })  # fmt: skip
-"""Parameters that change no points, or move finished points."""
 
 
 @contextmanager

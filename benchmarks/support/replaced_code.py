@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from unittest import mock
 
+# Owner, name and value of an attribute.
 Replacement = tuple[object, str, object]
-"""Owner, name and value of an attribute."""
 
 
 @contextmanager

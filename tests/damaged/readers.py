@@ -24,10 +24,10 @@ from tracking.app.stored_tracks import find_tracks
 from tracking.papers.blob.config import BlobConfig
 from tracking.tuning.study import open_study
 
+# Frames of a recording that are read.
 SHOWN = 20
-"""Frames of a recording that are read."""
+# Most frames times people of a scenario that is simulated.
 SIMULATED = 500
-"""Most frames times people of a scenario that is simulated."""
 
 
 def _scenario(folder: Path) -> None:
@@ -83,6 +83,7 @@ def _study(folder: Path) -> None:
         study.finished()
 
 
+# What reads an input of each kind, given its folder.
 READERS: dict[str, Callable[[Path], object]] = {
     "scenario": _scenario,
     "extended-scenario": _scenario,
@@ -119,6 +120,5 @@ READERS: dict[str, Callable[[Path], object]] = {
     "run": lambda folder: [read_tracks(stored.path) for stored in find_tracks(folder)],
     "study": _study,
 }
-"""What reads an input of each kind, given its folder."""
+# Kinds whose files are those of `dataset`, damaged without its manifest: beginnings of their names.
 FILES = {"truth": ("gt/", "det/")}
-"""Kinds whose files are those of `dataset`, damaged without its manifest: beginnings of their names."""

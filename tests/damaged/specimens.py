@@ -19,8 +19,8 @@ duration = 1.0
 camera = { fps = 5, image = [64, 48], focal_px = 60.0 }
 group = [{ id = "a", size = 2, start = [4, 4], goal = [12, 4], repeat = 1 }]
 """
+# Kinds of input that are texts: the names of their folders below TEXTS.
 KINDS = sorted(folder.name for folder in TEXTS.iterdir())
-"""Kinds of input that are texts: the names of their folders below TEXTS."""
 
 
 def write_specimens(root: Path) -> dict[str, Path]:

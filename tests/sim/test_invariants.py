@@ -57,9 +57,9 @@ def test_numbers_of_people_do_not_matter(plots, random):
     assert rows(events) == rows(told, lambda p: order[p - 1] + 1)
 
 
+# Angle between the corners of a footprint, a 16-gon. Turned by another angle its hull is up to 5 mm smaller, so that
+# an encounter (hulls within 1.0 m) may begin or end one frame earlier or later.
 CORNER_DEG = 22.5
-"""Angle between the corners of a footprint, a 16-gon. Turned by another angle its hull is up to 5 mm smaller, so that
-an encounter (hulls within 1.0 m) may begin or end one frame earlier or later."""
 ANGLES = st.one_of(st.floats(0, 360), st.integers(0, 15).map(lambda corners: CORNER_DEG * corners))
 
 

@@ -17,13 +17,13 @@ from tracking.running.tracker_registry import find, names
 
 POINTS = ["camera.fps=5", "duration=4", "sensor.detect_prob=0.7", "sensor.clutter_rate=1"]
 PIXELS = ["camera.fps=5", "duration=2", "camera.image=[160,120]"]
+# People are so near that a stereo pair tells their distance.
 PAIRS = [
     "camera.fps=10", "duration=2", "camera.image=[240,180]", "camera.focal_px=200", "camera.height=6",
     "camera.crop=true", "camera.baseline=0.3",
 ]  # fmt: skip
-"""People are so near that a stereo pair tells their distance."""
+# By these the background sample was looked through already.
 TRAINED = ("detection_rate", "dark")
-"""By these the background sample was looked through already."""
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,8 @@ from tracking.running.prepare import prepare
 from tracking.running.tracker_registry import find, names
 
 PRESETS = [(tracker, preset) for tracker in names() for preset in presets(tracker)]
+# Numbers of particles that replace a preset's.
 SMALL = {"particles": 50, "partitions": 10}
-"""Numbers of particles that replace a preset's."""
 
 
 def run(tracker: str, preset: str, sequence: Sequence, length: int, mode: DetectionMode) -> int:
@@ -55,11 +55,11 @@ def test_presets_run_over_pictures(scenario: str) -> None:
         run(tracker, preset, sequence, 12, "image")
 
 
+# Recordings with labels, and their frame rates.
 RECORDINGS = {
     "biwi/seq_hotel": 2.5, "biwi/zara01": 2.5, "caviar/mwt1gt.xml": 25, "mot/PETS09-S2L1-first200": 7,
     "mot/TUD-Campus": 25, "mot/AVG-TownCentre-first225": 2.5,
 }  # fmt: skip
-"""Recordings with labels, and their frame rates."""
 
 
 @pytest.mark.filterwarnings("ignore:.*scores from:UserWarning")

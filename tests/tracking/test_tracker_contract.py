@@ -27,8 +27,8 @@ from tracking.running.run import track
 from tracking.running.tracker_registry import find, names
 
 FPS = 5
+# Frames tracked, by kind of detections.
 LENGTHS = {"file": 15, "image": 12}
-"""Frames tracked, by kind of detections."""
 
 
 def forbidden_truth() -> Truth:

@@ -18,17 +18,17 @@ from sim.types import Bools, Image
 
 Floats = NDArray[np.float32]
 
+# The classes of a pixel (uint8); DARK is dark foreground.
 BACKGROUND, FOREGROUND, DARK, SHADOW, HIGHLIGHT = range(5)
-"""The classes of a pixel (uint8); DARK is dark foreground."""
 
+# Slots of `limits`: thresholds of CD / b and of (alpha - 1) / a, lower and upper; limits of alpha itself.
 CHROMATICITY, LOWER, UPPER, DARK_BELOW, BRIGHT_ABOVE = range(5)
-"""Slots of `limits`: thresholds of CD / b and of (alpha - 1) / a, lower and upper; limits of alpha itself."""
 
+# Grey level at which the camera clips.
 CLIPPED = 255
-"""Grey level at which the camera clips."""
 
+# Sightings after which the mean of a colour forgets the older ones, so that it follows slow changes.
 MEMORY = np.float32(30)
-"""Sightings after which the mean of a colour forgets the older ones, so that it follows slow changes."""
 
 
 @njit(cache=True)

@@ -13,27 +13,27 @@ from sim.compiler import njit
 from sim.types import Array, Bools, Image, Ints
 from tracking.detect.background_kernels import Floats
 
+# First axis of `counts`: all inliers, or all frames of the pixels that nothing covered.
 INLIERS, CLEAN_PIXELS = range(2)
-"""First axis of `counts`: all inliers, or all frames of the pixels that nothing covered."""
+# Second axis of `counts`: the normalised distortions.
 BRIGHTNESS, CHROMATICITY = range(2)
-"""Second axis of `counts`: the normalised distortions."""
+# Grey levels: least sigma, and least noise from which the normalisers are computed. Compressed frames stay constant
+# and then jump by a level or two. With a lower floor these jumps would be foreground. OpenCV's MOG2 has 2, too.
 FLOOR = 2.0
-"""Grey levels: least sigma, and least noise from which the normalisers are computed. Compressed frames stay constant
-and then jump by a level or two. With a lower floor these jumps would be foreground. OpenCV's MOG2 has 2, too."""
+# A frame is an inlier of a pixel if all its channels lie within so many sigmas of E.
 INLIER = 3.5
-"""A frame is an inlier of a pixel if all its channels lie within so many sigmas of E."""
+# Standard deviation of a Gaussian over half the length of the central interval that holds SHARE of it.
 AS_SIGMA = 2.2
-"""Standard deviation of a Gaussian over half the length of the central interval that holds SHARE of it."""
+# Standard deviation of a Gaussian over half the length of the central interval that holds half of it.
 HALF_AS_SIGMA = 1.48
-"""Standard deviation of a Gaussian over half the length of the central interval that holds half of it."""
+# Most rounds of step 1; inliers settle after three or four.
 ROUNDS = 10
-"""Most rounds of step 1; inliers settle after three or four."""
+# Sigmas: a pixel with any frame beyond was covered by something; all its frames are left out of the thresholds.
 CLEAN = 6.0
-"""Sigmas: a pixel with any frame beyond was covered by something; all its frames are left out of the thresholds."""
+# Grey levels: a pixel whose first sigma is larger has no background (`valid` is False).
 WIDEST = 20.0
-"""Grey levels: a pixel whose first sigma is larger has no background (`valid` is False)."""
+# Number of bins of the histograms, which reach from -SPAN to SPAN; values beyond are counted in the end bins.
 BINS, SPAN = 4000, 20.0
-"""Number of bins of the histograms, which reach from -SPAN to SPAN; values beyond are counted in the end bins."""
 
 
 @njit(cache=True)

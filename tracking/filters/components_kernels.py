@@ -25,24 +25,24 @@ from sim.compiler import njit, shared_njit
 from sim.elementary_kernels import find_root, sort_by
 from sim.types import Array, Bools, Ints
 
+# Most bisections; two ellipses that are still undecided touch, and count as overlapping.
 STEPS = 60
-"""Most bisections; two ellipses that are still undecided touch, and count as overlapping."""
+# Columns of `sums`.
 WEIGHT, X, Y, XX, XY, YY = range(6)
-"""Columns of `sums`."""
+# Slots of `shape`: an ellipse (y - mean)' A^-1 (y - mean) <= 1.
 MEAN_X, MEAN_Y, A_XX, A_XY, A_YY = range(5)
-"""Slots of `shape`: an ellipse (y - mean)' A^-1 (y - mean) <= 1."""
+# Components of which all pairs are compared; more are sorted first.
 FEW = 16
-"""Components of which all pairs are compared; more are sorted first."""
+# A region's box is larger by this factor, and by this share of its place, so that rounding excludes no pair.
 SLACK, ROUNDING = 1 + 1e-6, 1e-15
-"""A region's box is larger by this factor, and by this share of its place, so that rounding excludes no pair."""
+# Cells round a cell from which points can be linked with its points.
 AROUND = 20
-"""Cells round a cell from which points can be linked with its points."""
+# Columns of `box`.
 LOW_X, LOW_Y, HIGH_X, HIGH_Y = range(4)
-"""Columns of `box`."""
+# Slots of `work`: cells and points compared so far; number of components.
 VISITS, COMPONENTS = range(2)
-"""Slots of `work`: cells and points compared so far; number of components."""
+# Cells from the first point beyond which a point is moved nearer, so that cell numbers fit in int64.
 FAR = 2.0**40
-"""Cells from the first point beyond which a point is moved nearer, so that cell numbers fit in int64."""
 
 
 @njit(cache=True)

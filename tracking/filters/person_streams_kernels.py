@@ -18,8 +18,8 @@ from sim.types import Array
 GOLDEN: Any = np.uint64(0x9E3779B97F4A7C15)
 FIRST, SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 SHIFTS = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(12)
+# Exponent of the floats in [1, 2), whose 52 other bits are random.
 ONE_TO_TWO = np.uint64(0x3FF0000000000000)
-"""Exponent of the floats in [1, 2), whose 52 other bits are random."""
 HALF_STEP = 2.0**-53
 
 

@@ -32,8 +32,8 @@ RATES = tuple(0.05 * 2.0**k for k in range(9))  # Rates of relations that are tr
 # Standard deviation of the prior of each logistic weight, about 0: pairs that a line separates have finite weights.
 PRIOR = 5.0
 FURTHEST = 2.0  # Largest distance of a detection from its person, m.
+# Settings of a sensor as the paper's observations are: every visible person, nobody else, and displaced feet.
 LABELS = ("sensor.detect_prob=1", "sensor.occlusion_power=0", "sensor.clutter_rate=0")
-"""Settings of a sensor as the paper's observations are: every visible person, nobody else, and displaced feet."""
 PAPER_ENDS = (0.0125, 2.5, 5.0, 7.5)  # Column A of the paper's Table 3, m/s.
 STEPS = 50  # Most steps of Newton's method.
 

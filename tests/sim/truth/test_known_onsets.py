@@ -96,15 +96,15 @@ def queueing():
     return scene(people, (1, (1, 2, 3, 4)))
 
 
+# The event of each scene, and the middle of all of its people at the onset; of a crossing when the pairs are nearest,
+# at 5.0 s. The rules of merge and split hold for 20 frames, 2 s. The older group, 1, keeps its id; of two equal parts
+# the one with the smaller person does.
 KNOWN = {
     merging: (("merge", 90, 109, (1, 2), (1,), (1, 2, 3, 4)), (8.9, 1.444)),
     splitting: (("split", 94, 113, (1,), (1, 2), (1, 2, 3, 4)), (9.3, 1.957)),
     crossing: (("cross", 44, 58, (1, 2), (1, 2), (1, 2, 3, 4)), (6.015, 5.1)),
     queueing: (("queue", 81, 150, (-1, -1, -1), (-1, -1, -1), (1, 2, 3)), (5.8, 3.0)),
 }
-"""The event of each scene, and the middle of all of its people at the onset; of a crossing when the pairs are nearest,
-at 5.0 s. The rules of merge and split hold for 20 frames, 2 s. The older group, 1, keeps its id; of two equal parts the
-one with the smaller person does."""
 
 
 @pytest.mark.parametrize("made", KNOWN)

@@ -26,8 +26,8 @@ from tracking.running import tracker_registry
 
 pytestmark = pytest.mark.slow
 
+# A scene in which every key of the table below has an effect.
 SCENE = Path(__file__).with_name("flips.toml").read_text()
-"""A scene in which every key of the table below has an effect."""
 TOP = "camera={ kind = 'top', px_per_m = 20, fps = 5 }"
 FAR = "group.s.goal=[22, 8]"
 LOW = "camera={ height = 3, position = [12, -3] }"
@@ -37,12 +37,12 @@ NEAR = "event.p.parts.c.goal=[8, 10]"
 STOP = "group.s.stops=[{ at = [13, 13], stay = 2 }]"
 SERVED = "event.l.goal=[21, 8]"
 
+# What stands for names and numbers of rows in the keys of settings.
 NAMES = {
     r"^group\.\w\.": "group[].", r"^event\.m\.": "event[](merge).", r"^event\.p\.": "event[](split).",
     r"^event\.l\.": "event[](queue).", r"parts\.\w\.": "parts[].", r"(stairs|doors|hide)\.\d\.": r"\1[].",
     r"walls\.\d$": "walls",
 }  # fmt: skip
-"""What stands for names and numbers of rows in the keys of settings."""
 
 
 def key_of(setting: str) -> str:
@@ -91,6 +91,7 @@ KEYS = {key_of(setting): ("", setting) for setting in (
     "event[](queue).at_goal": (SERVED, f"{SERVED};event.l.at_goal=stand"),
 }  # fmt: skip
 
+# For the merge; one model serves all three orders.
 WHEN = {
     "time": ("{ time = 1 }", "{ time = 2 }"),
     "after": ("{ time = 1 }", "{ after = 'p' }"),
@@ -100,9 +101,9 @@ WHEN = {
     "reach.radius": ("{ reach = { group = 'a' } }", "{ reach = { group = 'a', radius = 4 } }"),
     "delay": ("{ time = 1 }", "{ time = 1, delay = 1 }"),
 }
-"""For the merge; one model serves all three orders."""
 
 LAMP = "light.switch=[{ at = 0.2, gain = 0.5 }]"
+# What pictures alone are made of: looked for in frame 3, at 0.4 s, without the noise; `right_` in right pictures.
 PICTURES = {key_of(setting): ("", setting) for setting in (
     "light.shadow=0.6", "light.penumbra=0.4", "light.drift=0.1", "light.flicker=0.05", "light.cloud=0.2",
     "picture.texture=0.9", "picture.samples=3", "picture.noise=6", "picture.blur_px=1.5", "picture.jpeg=50",
@@ -120,14 +121,13 @@ PICTURES = {key_of(setting): ("", setting) for setting in (
     "picture.sway_px": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_px=4"),
     "picture.sway_time": ("picture.foliage=0.3", "picture.foliage=0.3;picture.sway_time=2"),
 }  # fmt: skip
-"""What pictures alone are made of: looked for in frame 3, at 0.4 s, without the noise; `right_` in right pictures."""
 
+# Keys that name things within the file, or say what it is.
 TEXT_ONLY = {"schema", "about", "group[].id", "event[](merge).into", "event[](split).parts[].id"}
-"""Keys that name things within the file, or say what it is."""
 
 
+# Of `sensor`: a detector's measured errors. What each does: tests/sim/detector.
 PROFILE = ("false_alarms.", "miss_memory[].", "by_visibility", "true_scores", "false_scores")
-"""Of `sensor`: a detector's measured errors. What each does: tests/sim/detector."""
 
 
 @cache
@@ -280,8 +280,8 @@ def scene_with_people_in_its_background():
     return dataclasses.replace(sequence, load_background=lambda: np.stack([first] * 20))
 
 
+# Trackers whose output shows the effect of a parameter with fewer particles just as well.
 QUICK = {"particle": {"particles": 200}, "relational": {"particles": 200}}
-"""Trackers whose output shows the effect of a parameter with fewer particles just as well."""
 
 
 @cache
@@ -441,10 +441,10 @@ ELSEWHERE = {
     *((command, "person_class") for command in ("coco", "score", "track")),  # tests/sim/io/formats/test_mot_people.py
     *((command, "box_scale") for command in ("score", "track")),  # tests/sim/io/formats/test_box_columns.py
 }
+# Commands whose options are tested one by one in commands/, ../stress, ../errors, and test_*.py here.
 OWN = (
     "compare", "errors", "group", "grouping", "joint", "minimize", "relational", "replay", "sensor", "stress", "tune",
 )  # fmt: skip
-"""Commands whose options are tested one by one in commands/, ../stress, ../errors, and test_*.py here."""
 
 
 def test_every_option_is_in_the_table():

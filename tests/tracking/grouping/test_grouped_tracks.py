@@ -11,8 +11,8 @@ from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.grouping.link_rule import LinkRule
 
 FPS = 10.0
+# Whose times follow from the paths by hand.
 RULE = LinkRule()
-"""Whose times follow from the paths by hand."""
 
 
 def tracks(people, *, scale=1.0, there=None, boxes=False, group=None, vel=True, ids=None):

@@ -62,8 +62,8 @@ def beside(scene):
     return scene.but(pos=scene.pos + np.random.default_rng(0).normal(0, 1e-5, scene.pos.shape))
 
 
+# Degrees from one corner of a footprint to the next: after such a turn hulls are the same, after others nearly.
 CORNER = 22.5
-"""Degrees from one corner of a footprint to the next: after such a turn hulls are the same, after others nearly."""
 
 
 @both

@@ -23,11 +23,11 @@ class Nothing: ...
 
 def function(): ...
 """
+# What is wrong in a class, and what is said of it.
 WRONG = {
     "needs = 'points'": "needs = 'points'", "needs = 5": "needs = 5", "needs = (['boxes'],)": "needs = ",
     "needs = ('boxes', 'sound')": "sound", "config_class = dict": "config_class = ",
 }  # fmt: skip
-"""What is wrong in a class, and what is said of it."""
 
 
 def test_registered_and_by_module():

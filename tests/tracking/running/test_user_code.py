@@ -54,11 +54,11 @@ class Tracker:
         none, ids = np.zeros((0, 2)), np.zeros(0, int)
         return Tracks(frame.index, frame.t, detections.plane, "person", ids, ids, none, none, np.zeros((0, 4, 4)))
 """
+# What a part of a tracker does, and what is said of it.
 STATEMENTS = {
     "sys.exit(0)": "SystemExit: 0", "raise KeyboardInterrupt": "KeyboardInterrupt",
     "raise GeneratorExit": "GeneratorExit", "raise ValueError('boo\\nand more')": "ValueError: boo;",
 }  # fmt: skip
-"""What a part of a tracker does, and what is said of it."""
 
 
 def command(tmp_path, part, statement):

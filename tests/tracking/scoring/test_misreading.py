@@ -61,11 +61,11 @@ WRITTEN = {
     "x1,x2,y1,y2": lambda box: corners(box)[:, [0, 2, 1, 3]],
     "top,left,height,width": lambda box: box[:, [1, 0, 3, 2]], "left,top,width,height": lambda box: box,
 }  # fmt: skip
+# Factors that make the boxes pixels again, and the value of --box-scale.
 SCALES = {
     (1.0, 1.0): "", (2.0, 2.0): "2", (1.5, 1.5): "1.5", (0.5, 0.5): "0.5", (3.0, 1.6875): "3,1.6875",
     (2.25, 2.25): "2.25", (1.92, 1.08): "1.92,1.08",
 }  # fmt: skip
-"""Factors that make the boxes pixels again, and the value of --box-scale."""
 
 
 @pytest.mark.parametrize("scale", SCALES)

@@ -20,8 +20,8 @@ from tracking.papers.blob.person_template_kernels import EXPLAINED, Cover, kerne
 
 ROWS, COLUMNS = 12, 3
 POINTS = ROWS * COLUMNS
+# Slots of a look's point, after the three colours.
 VAR, SEEN = 3, 4
-"""Slots of a look's point, after the three colours."""
 FIRST_VAR = 25.0**2  # variance of a colour before it is learned, which counts as FIRST_COUNT pictures
 FIRST_COUNT = 3.0
 LEAST_VAR = 15.0**2  # a learned variance is taken to be at least this: light and places vary

@@ -16,8 +16,8 @@ from sim.types import Array, Bools, Ints
 from tracking.detect.blobs import Labels
 
 Cover = NDArray[np.int16]
+# Slots of a template.
 X, FOOT, HEIGHT, WIDTH = range(4)
-"""Slots of a template."""
 HALVES, EMPTY = 2, -1  # halves that a covered foreground pixel and a covered background pixel count
 EXPLAINED = 1000  # added to the cover of an explained pixel; more than the number of templates in a frame
 ELLIPSE = np.pi / 4  # share of its box that an ellipse fills

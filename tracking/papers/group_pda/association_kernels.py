@@ -33,8 +33,8 @@ from tracking.papers.group_pda.association_mass_kernels import (
     running_moments,
 )  # fmt: skip
 
+# State of a group after `associate`: no point is the group's; no association is feasible; it was measured.
 NOTHING, NULL, MEASURED = range(3)
-"""State of a group after `associate`: no point is the group's; no association is feasible; it was measured."""
 
 
 @njit(cache=True)

@@ -15,23 +15,21 @@ import numpy as np
 from sim.compiler import njit
 from sim.types import Array
 
+# Slots of the array `rules`, RULES in all; tracking.papers.group_pda.scaled_parameters fills them. GATE: squared
+# Mahalanobis radius in the group constraint, gamma / GATE_FACTOR. LINK: 2 r of R_0. PRIOR_XX, _XY, _YY: covariance
+# that extents are shrunk to, with the weight PRIOR_WEIGHT in people. LEAST_WEIGHT: people below which a component is
+# noise. POINT_SD: standard deviation of one person's measured position. COUNT_SD (people): sigma_n^2 = COUNT_SD^2 +
+# (COUNT_SHARE N)^2. KEEP: alpha_s = alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that a Gaussian
+# keeps inside the gate. REDRAWN: 1 if members are drawn anew in each frame. UNCONSTRAINED: 1 if a group takes all
+# points in its region, without the group constraint (sec. 5.2.1). LEAST_OTHERS: lower bound of n - 1 in the variance
+# of a mean drawn without replacement.
 (GATE, LINK, PRIOR_XX, PRIOR_XY, PRIOR_YY, PRIOR_WEIGHT, LEAST_WEIGHT, POINT_SD, COUNT_SD,
  KEEP, GATE_FACTOR, REDRAWN, UNCONSTRAINED, LEAST_OTHERS) = range(14)  # fmt: skip
 RULES = LEAST_OTHERS + 1
-"""Slots of the array `rules`, RULES in all; tracking.papers.group_pda.scaled_parameters fills them.
-
-GATE: squared Mahalanobis radius in the group constraint, gamma / GATE_FACTOR. LINK: 2 r of R_0. PRIOR_XX, _XY, _YY:
-covariance that extents are shrunk to, with the weight PRIOR_WEIGHT in people. LEAST_WEIGHT: people below which a
-component is noise. POINT_SD: standard deviation of one person's measured position. COUNT_SD (people): sigma_n^2 =
-COUNT_SD^2 + (COUNT_SHARE N)^2. KEEP: alpha_s = alpha_N of eq. 2.4 per frame. GATE_FACTOR: share of its covariance that
-a Gaussian keeps inside the gate. REDRAWN: 1 if members are drawn anew in each frame. UNCONSTRAINED: 1 if a group takes
-all points in its region, without the group constraint (sec. 5.2.1). LEAST_OTHERS: lower bound of n - 1 in the variance
-of a mean drawn without replacement.
-"""
+# The part of sigma_n that grows with N, per N.
 COUNT_SHARE = 0.01
-"""The part of sigma_n that grows with N, per N."""
+# Probability that a group's number of people does not depend on its number before.
 NEWCOMERS = 0.02
-"""Probability that a group's number of people does not depend on its number before."""
 
 
 @njit(cache=True)

@@ -11,8 +11,8 @@ from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
 from tracking.papers.joint.partition_labels_kernels import validity_of
 
+# Largest group of which all divisions into two parts are tried.
 MOST_LISTED = 6
-"""Largest group of which all divisions into two parts are tried."""
 
 
 @njit(cache=True)

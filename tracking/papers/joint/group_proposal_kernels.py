@@ -19,24 +19,24 @@ from sim.types import Array, Ints
 from tracking.papers.joint.division_kernels import divide
 from tracking.papers.joint.partition_labels_kernels import clusters, same_row
 
+# Columns of moments (G, 9): mean place and velocity, covariance of the places shrunk to PRIOR, mean squared distance
+# to the mean place, number of people.
 X, Y, VX, VY, XX, XY, YY, SPREAD, SIZE = range(9)
-"""Columns of moments (G, 9): mean place and velocity, covariance of the places shrunk to PRIOR, mean squared distance
-to the mean place, number of people."""
+# Standard deviation per axis, m, to which covariances of places are shrunk.
 PRIOR = 0.35
-"""Standard deviation per axis, m, to which covariances of places are shrunk."""
+# Number of people that PRIOR counts for.
 PRIOR_WEIGHT = 1.0
-"""Number of people that PRIOR counts for."""
+# Largest log(1 + d_KL); also its value without another group.
 LOG_KL_MOST = 8.0
-"""Largest log(1 + d_KL); also its value without another group."""
+# d_KL, d_v, d_intra at the earlier time, then at the later one.
 FEATURES = 6
-"""d_KL, d_v, d_intra at the earlier time, then at the later one."""
+# Slots of `rules` (5,): time step over lag; weight of the validity in the choice of parts; 1 if the size prior acts on
+# all events, 0 if on Merge alone; its mean and standard deviation, people.
 RATIO, SHARPNESS, SIZE_OF_ALL, SIZE_MEAN, SIZE_STD = range(5)
-"""Slots of `rules` (5,): time step over lag; weight of the validity in the choice of parts; 1 if the size prior acts on
-all events, 0 if on Merge alone; its mean and standard deviation, people."""
+# Slots of a person's uniforms: place of its group in the order of visits; event; parts of a split.
 ORDER, EVENT, PARTS = range(3)
-"""Slots of a person's uniforms: place of its group in the order of visits; event; parts of a split."""
+# Slots of a covariance or precision (3,) of one axis of a state: of the place, place and velocity, the velocity.
 PLACE, CROSS, RATE = range(3)
-"""Slots of a covariance or precision (3,) of one axis of a state: of the place, place and velocity, the velocity."""
 
 
 @njit(cache=True)

@@ -14,8 +14,8 @@ import numpy as np
 from sim.compiler import njit
 from sim.types import Array, Ints
 
+# Slots of `scales` (2,): prior scatter s_0, virtual distance D_0; m.
 SCATTER, APART = range(2)
-"""Slots of `scales` (2,): prior scatter s_0, virtual distance D_0; m."""
 
 
 @njit(cache=True)

@@ -16,14 +16,14 @@ import numpy as np
 from sim.compiler import njit
 from sim.types import Array
 
+# Largest number of rows or columns, whichever is less, of an exact sum; above it sums are propagated.
 EXACT_BITS = 12
-"""Largest number of rows or columns, whichever is less, of an exact sum; above it sums are propagated."""
+# Most sweeps of belief propagation.
 SWEEPS = 200
-"""Most sweeps of belief propagation."""
+# Belief propagation ends when no message changes by more than this share.
 CONVERGED = 1e-10
-"""Belief propagation ends when no message changes by more than this share."""
+# Least weight of a row without column, and of a column without row, in belief propagation.
 TINY = 1e-150
-"""Least weight of a row without column, and of a column without row, in belief propagation."""
 
 
 @njit(cache=True)

@@ -10,8 +10,8 @@ from sim.compiler import njit
 from sim.types import Array, Bools, Ints
 from tracking.papers.relational.association_sums_kernels import cheapest, linked, sparse_sum
 
+# Pairs of complete mappings that are less probable than those of the best mapping by this factor are left out.
 NOTHING = 1e-20
-"""Pairs of complete mappings that are less probable than those of the best mapping by this factor are left out."""
 
 
 @njit(cache=True)

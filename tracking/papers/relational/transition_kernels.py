@@ -13,15 +13,15 @@ import numpy as np
 from sim.compiler import njit
 from sim.types import Array, Bools, Ints
 
+# Columns of a speed table (5, 3): upper end of a row's speeds, mean loss of speed in a step and standard deviation of
+# the velocity after it, per axis; all in m/s.
 SPEED, DRIFT, SPREAD = range(3)
-"""Columns of a speed table (5, 3): upper end of a row's speeds, mean loss of speed in a step and standard deviation of
-the velocity after it, per axis; all in m/s."""
+# Slots of `coupling` (2,): share of the difference to the mean velocity of a group that a member loses in a step, and
+# share of the variance of a member's noise that the group has in common; the paper: 1 and 0.
 FOLLOW, COMMON = range(2)
-"""Slots of `coupling` (2,): share of the difference to the mean velocity of a group that a member loses in a step, and
-share of the variance of a member's noise that the group has in common; the paper: 1 and 0."""
+# Slots of `rules` (4,): weight that the old relation loses in a step, 1 - exp(-rate dt); log odds of walking together
+# at the same place, their loss per m of distance and per m/s of velocity difference.
 RATE, BIAS, DISTANCE, VELOCITY = range(4)
-"""Slots of `rules` (4,): weight that the old relation loses in a step, 1 - exp(-rate dt); log odds of walking together
-at the same place, their loss per m of distance and per m/s of velocity difference."""
 
 
 def belonging(distance: Any, difference: Any, rules: Array) -> Any:

@@ -29,12 +29,12 @@ from tracking.app.commands.group import lasting
 FPS = 10.0
 Place = Callable[[float], tuple[float, float]]
 
+# Two people walk together, a third joins them, two others walk through them, one stays away.
 WALK: dict[int, Place] = {
     1: lambda t: (1 + 1.2 * t, 2.0), 2: lambda t: (1 + 1.2 * t, 2.8),
     3: lambda t: (1 + 1.2 * t, 3.6 + 0.8 * max(0.0, 4 - t)), 4: lambda t: (26 - 1.1 * t, 2.4),
     5: lambda t: (1 + 1.2 * t, 9.0), 6: lambda t: (26 - 1.1 * t, 3.2),
 }  # fmt: skip
-"""Two people walk together, a third joins them, two others walk through them, one stays away."""
 
 
 def text(frames: int = 200, box: str = "-1,-1,-1,-1") -> str:
@@ -264,8 +264,8 @@ def test_a_run_in_the_image_without_scale(tmp_path, capsys):
     assert row["px_per_m"] == 40
 
 
+# Settings of a camera among the people, with the horizon in the middle of the picture of 640 × 480.
 LOW_CAMERA = [f"camera.{setting}" for setting in ("tilt_deg=0", "height=2.5", "position=[12,12]", "crop=true")]
-"""Settings of a camera among the people, with the horizon in the middle of the picture of 640 × 480."""
 
 
 def test_boxes_above_the_horizon_of_a_camera(tmp_path, capsys):

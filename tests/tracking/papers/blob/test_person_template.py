@@ -14,8 +14,8 @@ from tracking.papers.blob.person_template import ExplainedForeground, template_m
 from tracking.papers.blob.person_template_kernels import EXPLAINED
 
 HIGH, WIDE = 90, 120
+# A picture and looks for who is placed by the foreground alone.
 NO_LOOKS = np.zeros((0, 0, 3), np.uint8), np.zeros((0, POINTS, 5))
-"""A picture and looks for who is placed by the foreground alone."""
 NO_LOOKS[0].setflags(write=False)
 
 

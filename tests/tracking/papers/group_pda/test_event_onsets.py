@@ -8,8 +8,8 @@ import pytest
 from sim.truth.merge_split_rules import MERGE_DISTANCE, MERGE_VELOCITY
 from tracking.papers.group_pda.merging_and_splitting import PairMoment, merge_onset, split_onset
 
+# Frames per second; when the difference of the velocities begins to fall from 2 m/s to nothing, and for how long.
 FPS, SLOWS, LASTS = 10.0, 2.0, 1.0
-"""Frames per second; when the difference of the velocities begins to fall from 2 m/s to nothing, and for how long."""
 
 
 def encounter(noise: float, seed: int, sway: float = 0.0) -> list[PairMoment]:

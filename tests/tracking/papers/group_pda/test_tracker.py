@@ -15,8 +15,8 @@ from tracking.papers.group_pda.tracker import GroupPda
 
 FPS = 10.0
 GROUND = Context(FPS, float("nan"))
+# (M, 2) of one frame; None is a lost one.
 Points = Array | None
-"""(M, 2) of one frame; None is a lost one."""
 
 
 def track(

@@ -11,8 +11,8 @@ from tracking.papers.joint.decentralised_filter import Nested, advance, log_sum,
 
 A = np.array([[0.9, 0.5], [0.0, 0.8]])
 Q = np.array([0.3, 0.4])
+# x' = A (x, z) + noise, z alike; y = H (x, z) + noise; standard deviations Q, R, and that of the proposal of x.
 H, R, WIDE = np.array([1.0, 0.6]), 0.5, 0.6
-"""x' = A (x, z) + noise, z alike; y = H (x, z) + noise; standard deviations Q, R, and that of the proposal of x."""
 
 
 def log_normal(x, mean, spread):

@@ -22,10 +22,10 @@ from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.tracker import Particle, Relational
 from tracking.running.prepare import prepare
 
+# The paper's rule: partners count fully.
 ALWAYS = np.array([0.0, np.inf, 0.0, 0.0])
-"""The paper's rule: partners count fully."""
+# The paper's coupling: members of a group have its mean velocity, and noise of their own.
 AT_ONCE = np.array([1.0, 0.0])
-"""The paper's coupling: members of a group have its mean velocity, and noise of their own."""
 CERTAIN = {"detect_prob": 1.0, "clutter_density": 0.0}
 
 

@@ -14,8 +14,8 @@ from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.space_group import POS, VEL, Measurement
 
 DT = 1 / 30
+# A rig that tells depths at 20 m: 25 px of disparity.
 FIT = {"tilt": 20.0, "focal": 1000.0, "baseline": 0.5, "height": 3.0}
-"""A rig that tells depths at 20 m: 25 px of disparity."""
 
 
 def at_places(pos: np.ndarray, cov: np.ndarray, vel: np.ndarray | None = None, vel_cov: float = 0.01) -> SpacePoints:
