@@ -250,6 +250,13 @@ def reject_foreign(folder: Path) -> None:
         raise InputError(file=found[0], got=got, expected=expected, remedy=remedy)
 
 
+def reject_sealed(folder: Path) -> None:
+    """Raises InputError if `folder` is that of a run or of a stored sequence, into which no export is written."""
+    if is_run(folder) or is_sequence(folder):
+        got, remedy = "a folder of tracks or of a sequence", "choose another --out"
+        raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=remedy)
+
+
 def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
     """Returns the content of run.json: `info`, size and hash of each of `files` (content by name), its own hash."""
     stated = {"format": tables.FORMAT, **info, "files": file_facts(files)}

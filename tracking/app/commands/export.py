@@ -10,7 +10,7 @@ from functools import partial
 from scenarios.errors import InputError, counted
 from sim.io.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
 from sim.io.source import open_source
-from sim.io.store.seal import is_run, is_sequence
+from sim.io.store.seal import reject_sealed
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.app import option_parsing
@@ -61,9 +61,7 @@ def export(form: Form, options: TrajnetOptions) -> CommandResult:
     jobs = _of_runs(options) if holds_tracks(options.source) else _of_sequences(options)
     folders = run_folders([sequence for sequence, _ in jobs], options.source, options.out)
     for folder in folders:
-        if is_run(folder) or is_sequence(folder):
-            got, remedy = "a folder of tracks or of a sequence", "choose another --out"
-            raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=remedy)
+        reject_sealed(folder)
     rows, lines = [], []
     with ProgressMeter("export", len(jobs)) as meter:
         for (sequence, stored), folder in zip(jobs, folders, strict=True):
