@@ -4,7 +4,9 @@ together, the events of `joint`, and the speed table and relations of `relationa
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 
 import numpy as np
 
@@ -44,7 +46,7 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     width = max(map(len, measured))
     lines += [f"{'':<{width}}  measured  simulated"]
     lines += [f"{name:<{width}}  {measured[name]:8.3f}  {simulated[name]:9.3f}" for name in measured]
-    lines += ["", f"→ {out}: use it as --sensor {out}"]
+    lines += ["", _use("--sensor", out)]
     data = {"file": out, "sensor": profile.model_dump(exclude_none=True), "measured": measured, "drawn": simulated}
     return CommandResult(data, "\n".join(lines))
 
@@ -60,11 +62,10 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     changes = sample_of(list(pair_scenes(options.events, seeds["fitted"]))) if options.events else None
     belief = fit_belief(samples["fitted"], changes)
     scores = {key: belief_scores(sample, belief.log_odds(sample.values)[:, 0]) for key, sample in samples.items()}
-    asked = [f"--events {name}" for name in options.events]
+    asked = [word for name in options.events for word in ("--events", name)]
     comments = _comments("grouping", options, asked, seeds, scores)
     write_file(out, belief.toml_text("\n".join(comments)).encode())
-    text = "\n".join([*comments[1:], f"→ {out}: use it as --grouping {out}"])
-    return CommandResult({"file": out, **scores}, text)
+    return CommandResult({"file": out, **scores}, "\n".join([*comments[1:], _use("--grouping", out)]))
 
 
 def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]]:
@@ -73,6 +74,10 @@ def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]
 
     entries = [entry for name in names for entry in resolve(name)]
     return ((seed, simulated(entry, seed)) for entry in entries for seed in seeds)
+
+
+def _use(option: str, out: Path) -> str:
+    return f"→ {out}: use it as {shlex.join([option, str(out)])}"
 
 
 def _fit_and_check_seeds(options: FitJointOptions) -> dict[str, range]:
@@ -89,7 +94,7 @@ def _comments(
     scores: Mapping[str, Mapping[str, float]],
 ) -> list[str]:
     """Returns the command that fits, and a line of scores for each range of seeds."""
-    lines = [" ".join(["flockscope fit", kind, *options.names, f"--seeds {options.seeds}", *more])]
+    lines = [shlex.join(["flockscope", "fit", kind, *options.names, "--seeds", options.seeds, *more])]
     for key, numbers in seeds.items():
         values = ", ".join(f"{name} {value:.4g}" for name, value in scores[key].items())
         lines.append(f"{key}, seeds {numbers.start}:{numbers.stop}: {values}")
@@ -113,7 +118,7 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
     body = [f"{name} = {value}" for name, value in params.items()]
     text = "\n".join([*(f"# {line}" for line in comments), 'tracker = "joint"', "", "[params]", *body, ""])
     write_file(out, text.encode())
-    result = "\n".join([*comments[1:], "", *body, "", f"→ {out}: use it as --params {out}"])
+    result = "\n".join([*comments[1:], "", *body, "", _use("--params", out)])
     return CommandResult({"file": out, "params": params, **scores}, result)
 
 
@@ -141,5 +146,5 @@ def fit_relational(options: FitRelationalOptions) -> CommandResult:
     lines = [
         f"{name:<{width}}  {np.round(np.array(body[name]), 4)}  {RelationalConfig.known(name).unit}" for name in params
     ]
-    lines += ["", f"→ {out}: use it as --params {out}"]
+    lines += ["", _use("--params", out)]
     return CommandResult({"file": out, "params": params}, "\n".join(lines))
