@@ -11,6 +11,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
+from sim.types import Array
+
 CORE = "groups, core"
 
 Better = Literal["higher", "lower", "neither"]
@@ -38,6 +40,10 @@ class Score:
         better, or if `high` is infinite."""
         value = {"higher": self.high, "lower": 0.0, "neither": inf}[self.better]
         return value if value < inf else float("nan")
+
+    def within(self, values: Array) -> Array:
+        """Returns the values, ends of an interval, as clipped to the range of possible values."""
+        return values.clip(self.low, self.high)
 
 
 def _core(score: Score) -> Score:

@@ -81,7 +81,9 @@ def test_two_configs_in_one_folder(made, tracks, tmp_path, capsys, option, words
     (one,) = (p for p in (made / "data").rglob("*s40001") if p.is_dir())
     options = [word.format(folder=tmp_path) for word in option]
     line = ["track", "blob", str(one), "--detections", "file", *options, "--out", str(tracks / "scene-s40001")]
-    assert run(line) == 0
+    assert "scene-s40001: got a run of blob with {'" in refused(capsys, *line)
+    shutil.rmtree(tracks / "scene-s40001")
+    assert run(line) == run(line) == 0
     text = refused(capsys, "score", made / "data", tracks)
     assert words in text
     assert "one folder per run" in text
@@ -168,10 +170,12 @@ def test_tracks_are_not_written_into_a_stored_sequence(made, tmp_path, capsys, b
     data = Path(shutil.copytree(made / "data", tmp_path / "data"))
     (folder,) = data.rglob("*-s40000")
     before = sorted(data.rglob("*"))
-    line = ["track", "blob", folder, "--detections", "file", "--out", folder / below]
-    assert "inside the stored sequence" in refused(capsys, *line)
-    line = ["track", "blob", data, "--detections", "file", "--out", folder.parent]
-    assert "inside the stored sequence" in refused(capsys, *line)
+    for line in (["track", "blob", folder], ["export", "csv", folder], ["group", made / "blob"]):
+        assert "inside the stored sequence" in refused(capsys, *line, "--out", folder / below)
+        dataset = folder.parent if below else data
+        assert "got a generated dataset" in refused(capsys, *line, "--out", dataset)
+    assert "a folder of tracks or" in refused(capsys, "export", "coco", data, "--out", folder / "manifest.json")
+    assert "a folder of tracks;" in refused(capsys, *generate(made / "scene.toml", made / "blob"))
     assert sorted(data.rglob("*")) == before
 
 

@@ -21,9 +21,9 @@ from tracking.app.command_result import CommandResult
 from tracking.app.commands.group import LASTING, groups_of, lasting
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import over_sequences, source_of
-from tracking.app.stored_tracks import run_folders
+from tracking.app.stored_tracks import check_place, run_folders
 from tracking.config import Config
-from tracking.grouping.grouping_choice import Grouping, grouping_of
+from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.running.detection_mode import choose_mode
 from tracking.running.run import TrackingRun, input_summary
 from tracking.running.time_limit import TimeLimited
@@ -48,6 +48,11 @@ class TrackerSetup:
     grouping: Grouping | None = None
     limited: TimeLimited | None = None  # the tracker with a limit of time for each step
 
+    def method(self) -> dict[str, Any]:
+        """Returns the tracker and its parameters, as run.json has them."""
+        config = None if self.config is None else self.config.as_dict()
+        return {"tracker": self.tracker, "config": config, "grouping": (self.grouping or default_grouping()).as_dict()}
+
     def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
         """Tracks the sequence and returns its tracks, with groups and events. Nothing is written."""
         from tracking.running.run import track
@@ -61,7 +66,6 @@ class TrackerSetup:
 def track(options: TrackOptions) -> CommandResult:
     """Tracks every sequence of the source and stores the tracks; returns a line for each run."""
     from sim.io.files.atomic import lock_folder
-    from sim.io.store.seal import reject_foreign
 
     setup = _setup(options)
     option_parsing.output_folder(options.out)
@@ -72,7 +76,7 @@ def track(options: TrackOptions) -> CommandResult:
     folders = run_folders(sequences, options.source, options.out)
     with lock_folder(options.out):
         for folder in folders:
-            reject_foreign(folder)
+            check_place(folder, setup.method())
         _check_modes(setup, needs, sequences, options.background)
         if min(options.workers, len(sequences)) > 1:
             given = pickle.dumps(options)  # a tracker class and its config cannot be pickled, their names can
