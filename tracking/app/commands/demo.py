@@ -23,7 +23,7 @@ from tracking.app import option_parsing
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_ranking import COLUMNS, interval, rank_words, shown_columns, usual_key, verdict
-from tracking.app.commands.score_tables import SIMILARITY, arrow, number, table
+from tracking.app.commands.score_tables import SIMILARITY, number, table
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.comparison import ComparedRuns, compare
@@ -102,7 +102,9 @@ def demo(options: DemoOptions) -> CommandResult:
         ) for name, (page,) in pages.items()
     )  # fmt: skip
     text = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
+    meanings = "".join(f"<dt>{k}</dt><dd>{escape(CATALOGUE[k].meaning)}</dd>" for k in ("objective", *COLUMNS))
     words = {"GENERATOR": GENERATOR, "STYLE": theme(), "FRAMES": str(frames), "PARTS": "\n".join(parts), "FILMS": films}
+    words["MEANINGS"] = meanings
     write_file(page, re.sub("@@([A-Z]+)@@", lambda found: words[found[1]], text).encode())
     lines = [table("", ["tracker"], COLUMNS, cells)]
     lines += [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]
@@ -236,7 +238,7 @@ def _ranking(compared: ComparedRuns, key: str) -> str:
     sure = f"<p><strong>Result:</strong> {escape(words)}.</p>" if words else ""
     by = f"people compared by {SIMILARITY[compared.similarity]}; small: 95 % interval"
     note = f"<p>{counted(len(compared.sequences), 'scene')}, {by}.</p>"
-    return note + sure + _table(["<th>tracker</th>", "<th>rank</th>", *map(_heading, [key, *keys])], rows)
+    return note + sure + _table(["<th>tracker</th>", "<th>rank</th>", *(f"<th>{k}</th>" for k in (key, *keys))], rows)
 
 
 def _scenes(compared: ComparedRuns, key: str, pages: Mapping[str, list[Path]], root: Path) -> str:
@@ -252,9 +254,3 @@ def _scenes(compared: ComparedRuns, key: str, pages: Mapping[str, list[Path]], r
 def _table(head: list[str], rows: list[list[str]]) -> str:
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     return f'<div class="wide"><table><thead><tr>{"".join(head)}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
-def _heading(key: str) -> str:
-    score = CATALOGUE[key]
-    unit = f" [{score.unit}]" if score.unit not in ("1", "count") else ""
-    return f'<th title="{escape(score.meaning)}">{escape(arrow(key))}{unit}</th>'
