@@ -19,7 +19,6 @@ from pathlib import Path
 from scenarios.errors import counted
 from sim.io.files.own_files import GENERATOR, output_path
 from sim.types import DetectionMode, Sequence
-from tracking.app import option_parsing
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_ranking import COLUMNS, interval, rank_words, shown_columns, usual_key, verdict
@@ -64,7 +63,7 @@ def demo(options: DemoOptions) -> CommandResult:
     from tracking.app.replay_page.page import theme
 
     start, out, quick = time.monotonic(), options.out, options.quick
-    page = option_parsing.output_folder(out) / "index.html"
+    page = out / "index.html"
     refuse_foreign_file(page)
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     settings = QUICK_PIXEL_SETTINGS if quick else PIXEL_SETTINGS

@@ -18,7 +18,6 @@ import numpy as np
 from scenarios.errors import InputError, counted, shortened
 from sim.io.formats.options import refuse_options
 from sim.types import EVENT_KINDS, Sequence
-from tracking.app import option_parsing
 from tracking.app.command_options import GroupOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import table
@@ -135,7 +134,6 @@ TEXT = "mot text"
 
 def group(options: GroupOptions) -> CommandResult:
     """Groups the people of every sequence or stored run, stores each as a run, and returns tables of groups."""
-    option_parsing.output_folder(options.out)
     grouping = None if options.grouping is None else grouping_of(options.grouping)
     belief = _belief(grouping or default_grouping()) if options.probabilities else None
     sequences, stored = _opened(options)

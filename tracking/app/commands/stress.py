@@ -35,7 +35,6 @@ def stress(options: StressOptions) -> CommandResult:
     trackers = {name: contender(name, options.step_timeout) for name in dict.fromkeys(options.trackers)}
     detects = all({"boxes", "points"} & {*tracker.needs} for tracker in trackers.values())
     plan = _plan(options, options.detections or ("file" if detects else "image"))
-    option_parsing.output_folder(options.out)
     refuse_foreign_file(options.out / REPORT)
     with (
         lock_folder(options.out),

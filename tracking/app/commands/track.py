@@ -68,7 +68,6 @@ def track(options: TrackOptions) -> CommandResult:
     from sim.io.files.atomic import lock_folder
 
     setup = _setup(options)
-    option_parsing.output_folder(options.out)
     needs = find(setup.tracker).needs
     pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
     source = source_of(options, options.source, pictures)
