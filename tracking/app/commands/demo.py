@@ -5,7 +5,6 @@ The first page has videos of one scene, and tables of scores that link to replay
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import time
@@ -89,10 +88,7 @@ def demo(options: DemoOptions) -> CommandResult:
         pages = _replays(of, found, out / "pages" / word)
         parts += [f"<h2>Trackers from {word}</h2>", _ranking(compared, key), _scenes(compared, key, pages, out)]
         rows = (row for row in compared.to_arrow(key).to_pylist() if row["first"] is not None)
-        cells += [
-            [f"{row['run']}, from {word}", *(number(k, math.nan if row[k] is None else row[k]) for k in COLUMNS)]
-            for row in rows
-        ]
+        cells += [[f"{row['run']}, from {word}", *(number(k, row[k]) for k in COLUMNS)] for row in rows]
     frames = scenes[0].length or 0
     films = "".join(
         VIDEO.format(

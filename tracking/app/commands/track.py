@@ -48,11 +48,6 @@ class TrackerSetup:
     grouping: Grouping | None = None
     limited: TimeLimited | None = None  # the tracker with a limit of time for each step
 
-    def method(self) -> dict[str, Any]:
-        """Returns the tracker and its parameters, as run.json has them."""
-        config = None if self.config is None else self.config.as_dict()
-        return {"tracker": self.tracker, "config": config, "grouping": (self.grouping or default_grouping()).as_dict()}
-
     def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
         """Tracks the sequence and returns its tracks, with groups and events. Nothing is written."""
         from tracking.running.run import track
@@ -73,9 +68,11 @@ def track(options: TrackOptions) -> CommandResult:
     source = source_of(options, options.source, pictures)
     sequences = source.open()
     folders = run_folders(sequences, options.source, options.out)
+    config, rule = setup.config and setup.config.as_dict(), (setup.grouping or default_grouping()).as_dict()
+    method = {"tracker": setup.tracker, "config": config, "grouping": rule}
     with lock_folder(options.out):
         for folder in folders:
-            check_place(folder, setup.method())
+            check_place(folder, method)
         _check_modes(setup, needs, sequences, options.background)
         if min(options.workers, len(sequences)) > 1:
             given = pickle.dumps(options)  # a tracker class and its config cannot be pickled, their names can
