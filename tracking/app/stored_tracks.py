@@ -188,10 +188,8 @@ def check_place(folder: Path, info: dict[str, Any]) -> None:
         return
     if other := {key: value for key, value in before.items() if now.get(key) != value}:
         got = f"a run of {before['tracker']}" + ("" if "tracker" in other else f" with {shortened(str(other), 80)}")
-        remedy = "choose another --out, or delete that folder"
-        raise InputError(
-            file=folder, got=got, expected="none, or one of the same tracker and parameters", remedy=remedy
-        )
+        expected, remedy = "none, or one of the same tracker and parameters", "choose another --out, or delete it"
+        raise InputError(file=folder, got=got, expected=expected, remedy=remedy)
 
 
 def run_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:

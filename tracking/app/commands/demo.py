@@ -97,9 +97,8 @@ def demo(options: DemoOptions) -> CommandResult:
         ) for name, (page,) in pages.items()
     )  # fmt: skip
     text = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
-    meanings = "".join(f"<dt>{k}</dt><dd>{escape(CATALOGUE[k].meaning)}</dd>" for k in ("objective", *COLUMNS))
     words = {"GENERATOR": GENERATOR, "STYLE": theme(), "FRAMES": str(frames), "PARTS": "\n".join(parts), "FILMS": films}
-    words["MEANINGS"] = meanings
+    words["MEANINGS"] = "".join(f"<dt>{k}</dt><dd>{escape(CATALOGUE[k].meaning)}</dd>" for k in ("objective", *COLUMNS))
     write_file(page, re.sub("@@([A-Z]+)@@", lambda found: words[found[1]], text).encode())
     lines = [table("", ["tracker"], COLUMNS, cells)]
     lines += [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]

@@ -136,12 +136,11 @@ def group(options: GroupOptions) -> CommandResult:
     """Groups the people of every sequence or stored run, stores each as a run, and returns tables of groups."""
     grouping = None if options.grouping is None else grouping_of(options.grouping)
     belief = _belief(grouping or default_grouping()) if options.probabilities else None
-    sequences, stored = _opened(options)
+    (sequences, stored), rule = _opened(options), (grouping or default_grouping()).as_dict()
     folders = run_folders(sequences, options.source, options.out)
     for folder, tracks in zip(folders, stored, strict=True):
         _refuse_own(folder, tracks)
-        known = {"tracker": "group"} if tracks is None else tracks.info
-        check_place(folder, {**known, "grouping": (grouping or default_grouping()).as_dict()})
+        check_place(folder, {"tracker": "group", **({} if tracks is None else tracks.info), "grouping": rule})
     rows = []
     with ProgressMeter("group", len(sequences)) as meter:
         for sequence, tracks, folder in zip(sequences, stored, folders, strict=True):
