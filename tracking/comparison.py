@@ -102,7 +102,7 @@ class ComparedRuns:
         }
         for part in ("mean", "low", "high"):
             ends = np.concatenate([*(getattr(one, part) for one in of_oracles), getattr(ranking, part)])
-            columns[part] = np.clip(ends, CATALOGUE[key].low, CATALOGUE[key].high).tolist()
+            columns[part] = CATALOGUE[key].within(ends).tolist()
         for each in CATALOGUE:
             means = [mean_of_finite(_values(rows[name], each)) for name in columns["run"]]
             if np.isfinite(means).any():

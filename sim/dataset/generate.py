@@ -26,7 +26,7 @@ from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
 from sim.io.files.atomic import PARTIAL, lock_folder, remove_partials, write_file
 from sim.io.files.own_files import is_side_file, output_path, output_paths
 from sim.io.store import sequence_folder
-from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest
+from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
 from sim.streams import check_streams
 from sim.types import Camera, Sequence
 from sim.workers.pool import WorkerOptions, start_workers
@@ -238,7 +238,8 @@ def generate(
 
 @contextmanager
 def _dataset(root: Path, folder: Path) -> Iterator[None]:
-    """Locks the folder of a dataset for the block, and removes what interrupted writers left there."""
+    """Locks the folder of a dataset for the block, and removes what interrupted writers left there; refuses runs."""
+    reject_runs(root)
     with lock_folder(root):
         remove_partials(root, folder, root / "seqmaps")
         try:

@@ -25,6 +25,7 @@ from typer.core import TyperCommand
 from scenarios.errors import FlockscopeError, InputError, WorkError, printable, shortened
 from tracking.app import command_result
 from tracking.app.command_result import INTERRUPTED, CommandResult, print_error, print_interrupted
+from tracking.app.option_parsing import check_output_folder
 from tracking.keyword_options import signature_parameter
 from tracking.running.user_code import recorded_interrupts
 
@@ -66,7 +67,8 @@ def _declared(f: Any) -> Any:
 
 
 class StrictCommand(TyperCommand):
-    """A command that raises InputError if an option has an empty value, or is given twice and takes one value only."""
+    """A command that raises InputError if an option has an empty value, or is given twice and takes one value only, or
+    if --out DIR is no folder."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parses the words of the command line after the command's name, as Typer does."""
@@ -83,6 +85,8 @@ class StrictCommand(TyperCommand):
             if "" in (text if isinstance(text, list | tuple) else [text]):
                 name = param.opts[0] if param.param_type_name == "option" else param.name.upper()
                 raise InputError(place=name, got="''", expected="a value", remedy="give one, or leave it out")
+            if param.name == "out" and param.metavar == "DIR":
+                check_output_folder(ctx.params["out"])
         return rest
 
 

@@ -49,8 +49,8 @@ def print_error(error: FlockscopeError, as_json: bool) -> int:
 
 
 def print_interrupted(as_json: bool) -> int:
-    """Prints that Ctrl-C ended the command and that running it again continues the work; returns the exit code 130."""
-    remedy = "run the same command again: completed parts are kept"
+    """Prints that Ctrl-C ended the command and which commands continue when run again; returns the exit code 130."""
+    remedy = "run the same command again; generate, replay, stress and tune continue, others begin anew"
     error = WorkError(got="an interruption", expected="to finish", remedy=remedy)
     if as_json:
         _print_json({"status": STATUS[INTERRUPTED], "error": error.as_dict()})

@@ -88,10 +88,9 @@ def toml_values(texts: Iterable[str]) -> dict[str, Any]:
     return {".".join(steps): value for steps, value in map(parse_setting, texts)}
 
 
-def output_folder(out: Path) -> Path:
-    """Returns `out` if it is, or can become, a folder; else raises InputError."""
+def check_output_folder(out: Path) -> None:
+    """Raises InputError unless `out` is, or can become, a folder."""
     existing = next(p for p in (out, *out.parents) if p.exists())
     if not existing.is_dir():
         expected, remedy = "a folder, existing or new", "choose another --out"
         raise InputError(file=existing, place="--out", got="a file", expected=expected, remedy=remedy)
-    return out

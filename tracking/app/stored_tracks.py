@@ -13,7 +13,19 @@ from sim.io.files.own_files import is_hidden, output_paths
 from sim.io.formats.mot_text import frame_rate
 from sim.io.formats.options import BoxScale, refuse_options
 from sim.io.source import holds_sequences
-from sim.io.store.seal import AGAIN, RUN, WHOLE, check_run, is_run, is_sequence, read_run, run_folder, tracked_hash
+from sim.io.store.seal import (
+    AGAIN,
+    RUN,
+    WHOLE,
+    check_run,
+    is_dataset,
+    is_run,
+    read_run,
+    reject_dataset,
+    reject_foreign,
+    run_folder,
+    tracked_hash,
+)  # fmt: skip
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.running.run import TrackingRun
@@ -25,8 +37,6 @@ STATED = "run.json states it"
 
 # Endings of files that hold no tracks.
 OTHER_FILES = (".toml", ".py", ".json", ".ini", ".html", ".svg", ".jpg", ".png", ".mp4", ".xml", ".ndjson")
-
-DATASET = ("", "*", "*/*")  # Where a stored sequence lies below a sequence folder, a split of a dataset, or a dataset.
 
 
 @dataclass(frozen=True)
@@ -99,7 +109,7 @@ def find_tracks(path: Path) -> list[StoredTracks]:
     elif path.is_file():
         folder = run_folder(path)
         found = [StoredTracks(None, path, read_run(folder) if folder is not None and path.name in WHOLE else {})]
-    elif any(is_sequence(folder) for pattern in DATASET for folder in ([path] if not pattern else path.glob(pattern))):
+    elif is_dataset(path):
         got, remedy = "a generated dataset, no tracks", "give the --out of `flockscope track`"
     elif path.is_dir():
         got, found = "no tracks", list(_below(path, DEPTH))
@@ -155,20 +165,34 @@ def _refuse_unmatched(sequence: Sequence, by_name: dict[str, StoredTracks]) -> N
 def _refuse_mixture(runs: list[StoredTracks]) -> None:
     """Raises InputError if stored tracks that are scored together are of different trackers or parameters."""
     for first, each in pairwise(runs):
-        if (before := _method(first)) != (now := _method(each)):
+        if (before := _method(first.info)) != (now := _method(each.info)):
             other = {key: value for key, value in now.items() if before.get(key) != value}
             got = f"{shortened(str(other or now), 80)} in {each.path.name}, other than in {first.path.name}"
             remedy = "keep one folder per run: track again with another --out, and score them apart"
             raise InputError(file=each.path.parent, got=got, expected="one tracker with one config", remedy=remedy)
 
 
-def _method(stored: StoredTracks) -> dict[str, Any]:
-    info = stored.info
+def _method(info: dict[str, Any]) -> dict[str, Any]:
     return {"tracker": info.get("tracker"), **(info.get("config") or {}), **(info.get("grouping") or {})}
 
 
+def check_place(folder: Path, tracker: str) -> None:
+    """Raises InputError if a run of this tracker cannot be written into the folder, or would replace one of another
+    tracker. An unfinished or damaged run may be replaced."""
+    reject_foreign(folder)
+    try:
+        before = read_run(folder).get("tracker", tracker)
+    except InputError:
+        return
+    if before != tracker:
+        expected, remedy = f"none, or one of {tracker}", "choose another --out, or delete it"
+        raise InputError(file=folder, got=f"a run of {before}", expected=expected, remedy=remedy)
+
+
 def run_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:
-    """Returns the folder for each sequence's run: `out` itself if the source is one sequence, else one below it."""
+    """Returns the folder for each sequence's run: `out` itself if the source is one sequence, else one below it.
+    Raises InputError if `out` is a dataset."""
+    reject_dataset(out)
     own = Path(sequences[0].source.get("path", source))
     if len(sequences) == 1 and (own == source or source.is_file() or own.is_file()):
         return [out]

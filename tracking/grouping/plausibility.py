@@ -25,7 +25,7 @@ def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float
     step = math.gcd(*np.diff([t.index for t in present]).astype(int).tolist())
     if step > 1:
         yield (
-            f"{name}: people only in every {step}th frame, so that no group lasts. Number these frames 1, 2, 3, … and "
+            f"{name}: people only in every {step}th frame, so groups may not last. Number these frames 1, 2, 3, … and "
             f"give their own rate: --fps {fps:g} if the labels have this rate, --fps {fps / step:g} if the video has it"
         )
     if not present:

@@ -6,10 +6,11 @@ docs/reference/metrics.md has the table.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import inf
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
+
+from sim.types import Array
 
 CORE = "groups, core"
 
@@ -32,12 +33,9 @@ class Score:
     meaning: str  # definition in words
     source: str = ""  # the paper that defines it, "" if flockscope does
 
-    @property
-    def best(self) -> float:
-        """The value of a perfect tracker: `high` if higher is better, 0 if lower is better. It is nan if neither is
-        better, or if `high` is infinite."""
-        value = {"higher": self.high, "lower": 0.0, "neither": inf}[self.better]
-        return value if value < inf else float("nan")
+    def within(self, values: Array) -> Array:
+        """Returns the values, ends of an interval, as clipped to the range of possible values."""
+        return values.clip(self.low, self.high)
 
 
 def _core(score: Score) -> Score:

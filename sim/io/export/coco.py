@@ -23,7 +23,7 @@ from sim.io.files.own_files import GENERATOR, output_paths
 from sim.io.files.tables import json_text
 from sim.io.formats.mot_folder import left_pictures
 from sim.io.source import open_source, split_and_name
-from sim.io.store.seal import read_whole_manifest
+from sim.io.store.seal import read_whole_manifest, reject_sealed
 from sim.scene.visibility import image_size_of_boxes
 from sim.streams import file_name
 from sim.types import Array, Bools, Sequence, Truth
@@ -47,10 +47,11 @@ def coco(source: str | Path, out: str | Path, *, person_class: int | str | None 
         The path of the file. The same dataset gives the same bytes.
 
     Raises:
-        InputError: No sequence has labelled boxes, two have one name, there are several splits, or an argument is
-            wrong.
+        InputError: No sequence has labelled boxes, two have one name, there are several splits, `out` lies in
+            the folder of a stored sequence or a run, or an argument is wrong.
     """
     source, out = Path(source), Path(out)
+    reject_sealed(out.parent)
     every = open_source(source, person_class=person_class)
     sequences = [s for s in every if s.truth is not None and s.truth.box is not None]
     if not sequences:

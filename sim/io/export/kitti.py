@@ -22,7 +22,7 @@ from sim.io.files.atomic import write_file
 from sim.io.pictures.stored_pictures import StoredPictures
 from sim.io.source import generated_folders, split_and_name
 from sim.io.store.camera_files import read_camera
-from sim.io.store.seal import read_whole_manifest
+from sim.io.store.seal import read_whole_manifest, reject_sealed
 from sim.types import Camera
 
 FOLDERS = {"left": "image_2", "right": "image_3", "disparity": "disp_noc_0"}
@@ -39,13 +39,14 @@ def kitti(source: str | Path, out: str | Path) -> list[Path]:
         The folders of the sequences.
 
     Raises:
-        InputError: Two sequences share a folder.
+        InputError: Two sequences share a folder, or it is that of a stored sequence or a run.
     """
     folders = generated_folders(Path(source))
     targets = [Path(out) / split_and_name(folder) for folder in folders]
     if len(set(targets)) < len(targets):
         raise InputError(file=source, got="two sequences of one name", expected="unique names", remedy="rename one")
     for folder, target in zip(folders, targets, strict=True):
+        reject_sealed(target)
         _export(folder, target)
     return targets
 

@@ -401,7 +401,7 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
         values = list(map(number_or_nan, cells.split(",")))
         count = len(values) == 4 if option == "--line" else len(values) >= 6 and len(values) % 2 == 0
         if not name.isidentifier() or name in found or not count or not np.max(np.abs(values)) <= COORDINATE:
-            got, expected = repr(text), f"{forms[option]}, each name once"
+            got, expected = repr(text), f"{forms[option]}, each name once, of letters, digits and _"
             remedy = "write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image"
             raise InputError(place=option, got=got, expected=expected, remedy=remedy)
         found[name] = np.reshape(values, (-1, 2))

@@ -30,6 +30,7 @@ RUN_MARKS: Marks = {"boxes": str}
 
 REDO = "run the same `flockscope generate` again"
 AGAIN = "track again"
+ANOTHER, FOR_RUNS = "choose another --out", "a new folder, or one with a run"
 OLD = "delete run.json, then track again; tracks of another program are read without it"
 
 EXACT = "tracks.parquet"
@@ -172,6 +173,12 @@ def is_sequence(folder: Path) -> bool:
     return (folder / MANIFEST).is_file() or (folder / "scenario.toml").is_file()
 
 
+def is_dataset(path: Path) -> bool:
+    """Returns True if the folder is a stored sequence, a split of a dataset, or a dataset."""
+    names = (f"{below}{name}" for below in ("", "*/", "*/*/") for name in (MANIFEST, "scenario.toml"))
+    return any(found.is_file() for name in names for found in path.glob(name))
+
+
 def is_own_sequence(folder: Path) -> bool:
     """Returns True if flockscope wrote the manifest in the folder, or any Parquet table in or below it."""
     return any(is_ours(path, MARKS) for path in (folder / MANIFEST, *folder.rglob("*.parquet")))
@@ -237,15 +244,32 @@ def run_folder(path: Path) -> Path | None:
 
 def reject_foreign(folder: Path) -> None:
     """Raises InputError if writing a run into `folder` would change a foreign file or a stored sequence."""
-    expected, remedy = "a new folder, or one with a run", "choose another --out"
-    for place in (folder.absolute(), *folder.absolute().parents):
-        if is_ours(place / MANIFEST, MARKS):
-            got = f"a place inside the stored sequence {place.name}"
-            raise InputError(file=folder, got=got, expected=expected, remedy=remedy)
+    reject_dataset(folder)
     found = [folder / name for name in (RUN, EXACT, *NAMES) if (folder / name).exists()]
     if found and not is_ours(found[0], RUN_MARKS):
-        got, remedy = "a file of another program, or a damaged one", f"{remedy}, or move it; delete a damaged run"
-        raise InputError(file=found[0], got=got, expected=expected, remedy=remedy)
+        got, remedy = "a file of another program, or a damaged one", f"{ANOTHER}, or move it; delete a damaged run"
+        raise InputError(file=found[0], got=got, expected=FOR_RUNS, remedy=remedy)
+
+
+def reject_dataset(folder: Path) -> None:
+    """Raises InputError if `folder` is a dataset or lies in a stored sequence, where no tracks or tables belong."""
+    place = next((p for p in (folder.absolute(), *folder.absolute().parents) if is_ours(p / MANIFEST, MARKS)), None)
+    if place is not None or is_dataset(folder):
+        got = "a generated dataset" if place is None else f"a place inside the stored sequence {place.name}"
+        raise InputError(file=folder, got=got, expected=FOR_RUNS, remedy=ANOTHER)
+
+
+def reject_runs(folder: Path) -> None:
+    """Raises InputError if `folder` is that of runs and no dataset yet: no sequences are written beside them."""
+    if any(map(is_run, (folder, *folder.glob("*")))) and not is_dataset(folder):
+        raise InputError(file=folder, got="a folder of tracks", expected="a new folder, or a dataset", remedy=ANOTHER)
+
+
+def reject_sealed(folder: Path) -> None:
+    """Raises InputError if `folder` is that of a run or of a stored sequence, into which no export is written."""
+    if is_run(folder) or is_sequence(folder):
+        got = "a folder of tracks or of a sequence"
+        raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=ANOTHER)
 
 
 def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:

@@ -49,11 +49,6 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
     return found + [problem for problems in checks for problem in problems]
 
 
-def holds_sequences(folder: str | Path) -> bool:
-    """Returns True if the folder is or holds a generated sequence, at any depth."""
-    return bool(_inside(Path(folder), seal.is_sequence))
-
-
 def _inside(root: Path, kind: Callable[[Path], bool]) -> list[Path]:
     return sorted(p for p in (root, *root.glob("**/*/")) if PARTIAL not in str(p.relative_to(root)) and kind(p))
 

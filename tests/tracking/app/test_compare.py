@@ -71,7 +71,7 @@ NOT_COMPARED = [
     (lambda p: stored(p, BASE, similarity="image", truth="a"), "s0: similarity: got 'image'"),
     (lambda p: stored(p, BASE, truth="b"), "s0: truth"),
     (lambda p: stored(p, BASE, truth=None), "s0: truth: got None"),
-    (lambda p: (p.write_text("{}"), str(p))[1], "got no scores of sequences"),
+    (lambda p: str(p.parent), "no scores of sequences; expected a file of `flockscope score --json`"),
     (lambda p: (p.write_text('{"sequences": [{"name": "a"}, {"name": "a"}]}'), str(p))[1], "a sequence twice"),
 ]
 
@@ -84,7 +84,7 @@ def test_what_is_not_compared_ends_with_2(write, words, tmp_path, capsys):
 
 OPTIONS = [
     (1, [], "too few"),
-    (2, ["--by", "HOTA"], "HOTA: got known in 0 sequences"),
+    (2, ["--by", "HOTA"], "choose other scores, that both have: --by objective --by IDSW"),
     (6, ["--save", "mine.txt"], "ends in .json"),
 ]
 

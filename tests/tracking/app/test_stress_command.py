@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from pathlib import Path
 
@@ -56,6 +57,8 @@ def test_two_axes_make_a_matrix(scene: str, capsys) -> None:
     assert [len(row) for row in means] == [2] * 5
     assert [value for row in means for value in row] == data["curves"]["oracle"]["mean"]
     assert means[0][0] > means[4][0]
+    ends = re.findall(r"<td>[\d.]+ to ([\d.]+)</td>", Path("o/report.html").read_text())
+    assert max(map(float, ends)) == 1.0, "intervals of two seeds end with the range of the score"
     assert pq.read_table("o/episodes.parquet")["group.a.size"].to_pylist().count(2.0) == 2 * 2 * 5
 
 

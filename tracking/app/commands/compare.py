@@ -50,13 +50,14 @@ def compare(options: CompareOptions) -> CommandResult:
 
 
 def _read(path: Path) -> Stored:
-    document = read_json(path)
+    document = {} if path.is_dir() else read_json(path)
     rows = document.get("sequences") if isinstance(document, dict) else None
     rows = rows if isinstance(rows, list) else []
     named = [row for row in rows if isinstance(row, dict) and "name" in row]
     found = {str(row["name"]): row for row in named}
     if not named or len(named) < len(rows):
-        raise InputError(file=path, got="no scores of sequences", expected=EXPECTED, remedy="give another file")
+        remedy = "score the tracks: flockscope score TRUTH TRACKS --json > FILE"
+        raise InputError(file=path, got="no scores of sequences", expected=EXPECTED, remedy=remedy)
     if len(found) < len(named):
         raise InputError(file=path, got="a sequence twice", expected="one entry for each", remedy="score splits alone")
     return found
@@ -87,7 +88,9 @@ def _row(key: str, before: Stored, now: Stored, tolerance: float) -> dict[str, A
     first, second = pairs[np.isfinite(pairs).all(axis=1)].T
     if len(first) < FEWEST:
         got = f"known in {counted(len(first), 'sequence')} on both sides"
-        raise InputError(place=key, got=got, expected=f"at least {FEWEST}", remedy="choose another score with --by")
+        both = [k for k in CATALOGUE if all(any(k in row for row in side.values()) for side in (before, now))]
+        remedy = f"choose other scores, that both have: {shortened(' '.join(f'--by {k}' for k in both), 80)}"
+        raise InputError(place=key, got=got, expected=f"at least {FEWEST}", remedy=remedy)
     mean, low, high = (float(end[0]) for end in paired(first[:, None], second[:, None]))
     upwards = CATALOGUE[key].better != "lower"
     verdict = _verdict(*((mean, low, high) if upwards else (-mean, -high, -low)), tolerance)

@@ -14,7 +14,6 @@ def generate(options: GenerateOptions) -> CommandResult:
     from sim.dataset.generate import generate as make
     from sim.workers.pool import WorkerOptions
 
-    option_parsing.output_folder(options.out)
     seeds = option_parsing.seeds(options.seeds)
     sensor = option_parsing.sensor_settings(options.sensor)
     settings = [*sensor, *option_parsing.scenario_settings(options.settings)]
@@ -32,7 +31,8 @@ def generate(options: GenerateOptions) -> CommandResult:
 
 def validate(options: ValidateOptions) -> CommandResult:
     """Checks a generated sequence or dataset, or stored tracks; changes nothing."""
-    from sim.io.store.validate import content_hash, holds_sequences
+    from sim.io.source import holds_sequences
+    from sim.io.store.validate import content_hash
     from sim.io.store.validate import validate as check
 
     folder = options.folder
@@ -53,7 +53,6 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
     from sim.dataset.replay import Cut
     from sim.io.source import open_source
 
-    option_parsing.output_folder(options.out)
     seeds = option_parsing.seeds(options.seeds)
     streams, images = option_parsing.pictures(options.streams, options.images)
     if options.duration is not None and not options.duration > 0:

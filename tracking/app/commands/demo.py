@@ -5,7 +5,6 @@ The first page has videos of one scene, and tables of scores that link to replay
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import time
@@ -19,11 +18,10 @@ from pathlib import Path
 from scenarios.errors import counted
 from sim.io.files.own_files import GENERATOR, output_path
 from sim.types import DetectionMode, Sequence
-from tracking.app import option_parsing
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_ranking import COLUMNS, interval, rank_words, shown_columns, usual_key, verdict
-from tracking.app.commands.score_tables import SIMILARITY, arrow, number, table
+from tracking.app.commands.score_tables import SIMILARITY, number, table
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.comparison import ComparedRuns, compare
@@ -64,7 +62,7 @@ def demo(options: DemoOptions) -> CommandResult:
     from tracking.app.replay_page.page import theme
 
     start, out, quick = time.monotonic(), options.out, options.quick
-    page = option_parsing.output_folder(out) / "index.html"
+    page = out / "index.html"
     refuse_foreign_file(page)
     names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     settings = QUICK_PIXEL_SETTINGS if quick else PIXEL_SETTINGS
@@ -90,10 +88,7 @@ def demo(options: DemoOptions) -> CommandResult:
         pages = _replays(of, found, out / "pages" / word)
         parts += [f"<h2>Trackers from {word}</h2>", _ranking(compared, key), _scenes(compared, key, pages, out)]
         rows = (row for row in compared.to_arrow(key).to_pylist() if row["first"] is not None)
-        cells += [
-            [f"{row['run']}, from {word}", *(number(k, math.nan if row[k] is None else row[k]) for k in COLUMNS)]
-            for row in rows
-        ]
+        cells += [[f"{row['run']}, from {word}", *(number(k, row[k]) for k in COLUMNS)] for row in rows]
     frames = scenes[0].length or 0
     films = "".join(
         VIDEO.format(
@@ -103,6 +98,7 @@ def demo(options: DemoOptions) -> CommandResult:
     )  # fmt: skip
     text = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
     words = {"GENERATOR": GENERATOR, "STYLE": theme(), "FRAMES": str(frames), "PARTS": "\n".join(parts), "FILMS": films}
+    words["MEANINGS"] = "".join(f"<dt>{k}</dt><dd>{escape(CATALOGUE[k].meaning)}</dd>" for k in ("objective", *COLUMNS))
     write_file(page, re.sub("@@([A-Z]+)@@", lambda found: words[found[1]], text).encode())
     lines = [table("", ["tracker"], COLUMNS, cells)]
     lines += [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]
@@ -236,7 +232,7 @@ def _ranking(compared: ComparedRuns, key: str) -> str:
     sure = f"<p><strong>Result:</strong> {escape(words)}.</p>" if words else ""
     by = f"people compared by {SIMILARITY[compared.similarity]}; small: 95 % interval"
     note = f"<p>{counted(len(compared.sequences), 'scene')}, {by}.</p>"
-    return note + sure + _table(["<th>tracker</th>", "<th>rank</th>", *map(_heading, [key, *keys])], rows)
+    return note + sure + _table(["<th>tracker</th>", "<th>rank</th>", *(f"<th>{k}</th>" for k in (key, *keys))], rows)
 
 
 def _scenes(compared: ComparedRuns, key: str, pages: Mapping[str, list[Path]], root: Path) -> str:
@@ -252,9 +248,3 @@ def _scenes(compared: ComparedRuns, key: str, pages: Mapping[str, list[Path]], r
 def _table(head: list[str], rows: list[list[str]]) -> str:
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     return f'<div class="wide"><table><thead><tr>{"".join(head)}</tr></thead><tbody>{body}</tbody></table></div>'
-
-
-def _heading(key: str) -> str:
-    score = CATALOGUE[key]
-    unit = f" [{score.unit}]" if score.unit not in ("1", "count") else ""
-    return f'<th title="{escape(score.meaning)}">{escape(arrow(key))}{unit}</th>'

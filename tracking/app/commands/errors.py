@@ -8,7 +8,7 @@ from sim.io.formats.options import BoxScale
 from sim.types import Sequence
 from tracking.app.command_options import ErrorsOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import table
+from tracking.app.commands.score_tables import figure, table
 from tracking.app.commands.scored_sequence import box_scale_of
 from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
@@ -52,21 +52,17 @@ def _tables(found: list[RunErrors], sequences: list[dict[str, Any]], causes: lis
     left = {key: mean_of_known(run.left[key] for run in found) for key in SHOWN}
     every = [*causes, {"kind": "position", "cause": "", "errors": "", "seconds": None, **left}]
     lost = [
-        [row["kind"], row["cause"], str(row["errors"]), _number(row["seconds"], ".1f", ""),
-         *(_number(row[key], "+.3f") for key in SHOWN)]
+        [row["kind"], row["cause"], str(row["errors"]), figure(row["seconds"], ".1f", ""),
+         *(figure(row[key], "+.3f") for key in SHOWN)]
         for row in every
     ]  # fmt: skip
-    now = "  ".join(f"{key} {_number(mean_of_known(run.scores[key] for run in found), '.3f')}" for key in SHOWN)
+    now = "  ".join(f"{key} {figure(mean_of_known(run.scores[key] for run in found), '.3f')}" for key in SHOWN)
     errors = [(sequence["name"], error) for sequence in sequences for error in sequence["errors"]]
     dearest = sorted(errors, key=lambda item: -(item[1]["cost"] or 0.0))[:limit]
     listed = [
-        [name, f"{e['start']}–{e['end']}", e["kind"], e["who"], e["detail"] or e["cause"], _number(e["cost"], ".4f")]
+        [name, f"{e['start']}–{e['end']}", e["kind"], e["who"], e["detail"] or e["cause"], figure(e["cost"], ".4f")]
         for name, e in dearest
     ]
     title = f"the {len(dearest)} dearest of {len(errors)} errors; cost: HOTA, of groups group_F1"
     costs = table(f"where the score is lost; now {now}", ["kind", "cause"], ["errors", "seconds", *SHOWN], lost)
     return costs + "\n" + table(title, ["sequence", "frames", "kind", "who", "cause"], ["cost"], listed)
-
-
-def _number(value: float | None, form: str, unknown: str = "–") -> str:
-    return unknown if value is None or value != value else format(value, form)

@@ -10,10 +10,9 @@ from functools import partial
 from scenarios.errors import InputError, counted
 from sim.io.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
 from sim.io.source import open_source
-from sim.io.store.seal import is_run, is_sequence
+from sim.io.store.seal import reject_sealed
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
-from tracking.app import option_parsing
 from tracking.app.command_options import CocoOptions, CsvOptions, KittiOptions, TrajnetOptions, WebdatasetOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
@@ -34,7 +33,7 @@ def export_kitti(options: KittiOptions) -> CommandResult:
     """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder --out."""
     from sim.io.export.kitti import kitti
 
-    folders = kitti(options.folder, option_parsing.output_folder(options.out))
+    folders = kitti(options.folder, options.out)
     return CommandResult({"folders": folders}, "\n".join(map(str, folders)))
 
 
@@ -42,8 +41,7 @@ def export_webdataset(options: WebdatasetOptions) -> CommandResult:
     """Writes tar shards of all sequences of a generated dataset into the folder of --out, and an index.json."""
     from sim.io.export.webdataset import size_of, webdataset
 
-    out = option_parsing.output_folder(options.out)
-    size = size_of(options.shard_size)
+    out, size = options.out, size_of(options.shard_size)
     with ProgressMeter("export") as meter:
         index = webdataset(options.folder, out, shard_size=size, progress=meter.update)
     shards = index["shards"]
@@ -57,13 +55,10 @@ def export_webdataset(options: WebdatasetOptions) -> CommandResult:
 def export(form: Form, options: TrajnetOptions) -> CommandResult:
     """Writes the tables of every run or sequence, or their people, in this form."""
     places = parse_places(options.line, options.zone) if isinstance(options, CsvOptions) else {}
-    option_parsing.output_folder(options.out)
     jobs = _of_runs(options) if holds_tracks(options.source) else _of_sequences(options)
     folders = run_folders([sequence for sequence, _ in jobs], options.source, options.out)
     for folder in folders:
-        if is_run(folder) or is_sequence(folder):
-            got, remedy = "a folder of tracks or of a sequence", "choose another --out"
-            raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=remedy)
+        reject_sealed(folder)
     rows, lines = [], []
     with ProgressMeter("export", len(jobs)) as meter:
         for (sequence, stored), folder in zip(jobs, folders, strict=True):

@@ -4,7 +4,9 @@ together, the events of `joint`, and the speed table and relations of `relationa
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 
 import numpy as np
 
@@ -44,7 +46,7 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     width = max(map(len, measured))
     lines += [f"{'':<{width}}  measured  simulated"]
     lines += [f"{name:<{width}}  {measured[name]:8.3f}  {simulated[name]:9.3f}" for name in measured]
-    lines += ["", f"→ {out}: use it as --sensor {out}"]
+    lines += ["", _use("--sensor", out)]
     data = {"file": out, "sensor": profile.model_dump(exclude_none=True), "measured": measured, "drawn": simulated}
     return CommandResult(data, "\n".join(lines))
 
@@ -60,10 +62,10 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     changes = sample_of(list(pair_scenes(options.events, seeds))) if options.events else None
     belief = fit_belief(sample, changes)
     scores = belief_scores(sample, belief.log_odds(sample.values)[:, 0])
-    comments = _comments("grouping", options, [f"--events {name}" for name in options.events], scores)
+    asked = [word for name in options.events for word in ("--events", name)]
+    comments = _comments("grouping", options, asked, scores)
     write_file(out, belief.toml_text("\n".join(comments)).encode())
-    text = "\n".join([*comments[1:], f"→ {out}: use it as --grouping {out}"])
-    return CommandResult({"file": out, "fitted": scores}, text)
+    return CommandResult({"file": out, "fitted": scores}, "\n".join([*comments[1:], _use("--grouping", out)]))
 
 
 def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]]:
@@ -74,10 +76,14 @@ def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]
     return ((seed, simulated(entry, seed)) for entry in entries for seed in seeds)
 
 
+def _use(option: str, out: Path) -> str:
+    return f"→ {out}: use it as {shlex.join([option, str(out)])}"
+
+
 def _comments(kind: str, options: FitJointOptions, more: Iterable[str], scores: Mapping[str, float]) -> list[str]:
     """Returns the command that fits, and a line of scores."""
     values = ", ".join(f"{name} {value:.4g}" for name, value in scores.items())
-    command = " ".join(["flockscope fit", kind, *options.names, f"--seeds {options.seeds}", *more])
+    command = shlex.join(["flockscope", "fit", kind, *options.names, "--seeds", options.seeds, *more])
     return [command, f"fitted, seeds {options.seeds}: {values}"]
 
 
@@ -96,7 +102,7 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
     body = [f"{name} = {value}" for name, value in params.items()]
     text = "\n".join([*(f"# {line}" for line in comments), 'tracker = "joint"', "", "[params]", *body, ""])
     write_file(out, text.encode())
-    result = "\n".join([*comments[1:], "", *body, "", f"→ {out}: use it as --params {out}"])
+    result = "\n".join([*comments[1:], "", *body, "", _use("--params", out)])
     return CommandResult({"file": out, "params": params, "fitted": scores}, result)
 
 
@@ -124,5 +130,5 @@ def fit_relational(options: FitRelationalOptions) -> CommandResult:
     lines = [
         f"{name:<{width}}  {np.round(np.array(body[name]), 4)}  {RelationalConfig.known(name).unit}" for name in params
     ]
-    lines += ["", f"→ {out}: use it as --params {out}"]
+    lines += ["", _use("--params", out)]
     return CommandResult({"file": out, "params": params}, "\n".join(lines))

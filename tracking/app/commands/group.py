@@ -17,15 +17,13 @@ import numpy as np
 
 from scenarios.errors import InputError, counted, shortened
 from sim.io.formats.options import refuse_options
-from sim.io.store.seal import reject_foreign
 from sim.types import EVENT_KINDS, Sequence
-from tracking.app import option_parsing
 from tracking.app.command_options import GroupOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import table
 from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import source_of
-from tracking.app.stored_tracks import STATED, StoredTracks, find_tracks, holds_tracks, run_folders
+from tracking.app.stored_tracks import STATED, StoredTracks, check_place, find_tracks, holds_tracks, run_folders
 from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.grouping.plausibility import median_speed
@@ -136,13 +134,13 @@ TEXT = "mot text"
 
 def group(options: GroupOptions) -> CommandResult:
     """Groups the people of every sequence or stored run, stores each as a run, and returns tables of groups."""
-    option_parsing.output_folder(options.out)
     grouping = None if options.grouping is None else grouping_of(options.grouping)
     belief = _belief(grouping or default_grouping()) if options.probabilities else None
     sequences, stored = _opened(options)
     folders = run_folders(sequences, options.source, options.out)
     for folder, tracks in zip(folders, stored, strict=True):
-        _refuse(folder, tracks)
+        _refuse_own(folder, tracks)
+        check_place(folder, "group" if tracks is None else tracks.info.get("tracker", "group"))
     rows = []
     with ProgressMeter("group", len(sequences)) as meter:
         for sequence, tracks, folder in zip(sequences, stored, folders, strict=True):
@@ -196,8 +194,7 @@ def _belief(grouping: Grouping) -> Belief:
     raise InputError(place="--probabilities", got="the baseline rule", expected=expected, remedy=remedy)
 
 
-def _refuse(folder: Path, tracks: StoredTracks | None) -> None:
+def _refuse_own(folder: Path, tracks: StoredTracks | None) -> None:
     if tracks is not None and folder.resolve() in (tracks.path.resolve(), tracks.path.resolve().parent):
         got, remedy = "the folder of the tracks themselves", "choose another --out"
         raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=remedy)
-    reject_foreign(folder)

@@ -81,7 +81,6 @@ def _row_data(row: SequenceScores) -> dict[str, Any]:
 
 def summary(scores: SequenceOf[Scores]) -> Means:
     """Returns the mean over sequences of each score by key, with its 95 % interval, within the score's range."""
-    mean, low, high = mean_interval(np.array([[one[key] for key in CATALOGUE] for one in scores]))
-    least, most = (np.array([getattr(score, end) for score in ALL]) for end in ("low", "high"))
-    ends = (end.tolist() for end in (mean, np.maximum(low, least), np.minimum(high, most)))
-    return {key: {"mean": m, "low": a, "high": b} for key, m, a, b in zip(CATALOGUE, *ends, strict=True)}
+    ends = np.array(mean_interval(np.array([[one[key] for key in CATALOGUE] for one in scores])))
+    shown = (score.within(end).tolist() for score, end in zip(ALL, ends.T, strict=True))
+    return {key: {"mean": m, "low": a, "high": b} for key, (m, a, b) in zip(CATALOGUE, shown, strict=True)}

@@ -139,8 +139,11 @@ def chance(rows: int) -> str:
     return f"of {counted(rows, 'row')} about {(1 - LEVEL) * rows:.2g} would be called sure by chance"
 
 
-def number(key: str, value: float, *, mean: bool = False) -> str:
+def number(key: str, value: float | None, *, mean: bool = False) -> str:
     """Returns a score as text: three decimals, for a count none, or one if it is a mean; "–" if it is not finite."""
-    if not math.isfinite(value):
-        return "–"
-    return f"{value:.3f}" if CATALOGUE[key].unit != "count" else f"{value:.{int(mean)}f}"
+    return figure(value, ".3f" if CATALOGUE[key].unit != "count" else f".{int(mean)}f")
+
+
+def figure(value: float | None, form: str = ".3f", unknown: str = "–") -> str:
+    """Returns a number as text in this form; `unknown` if it is None or not finite."""
+    return unknown if value is None or not math.isfinite(value) else format(value, form)

@@ -16,7 +16,7 @@ from sim.types import Array, DetectionMode
 from tracking.app import option_parsing
 from tracking.app.command_options import StressOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import checked_key, table
+from tracking.app.commands.score_tables import checked_key, figure, table
 from tracking.app.progress import ProgressMeter
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval
@@ -39,7 +39,6 @@ def stress(options: StressOptions) -> CommandResult:
     trackers = {name: contender(name, options.step_timeout) for name in dict.fromkeys(options.trackers)}
     detects = all({"boxes", "points"} & {*tracker.needs} for tracker in trackers.values())
     plan = _plan(options, options.detections or ("file" if detects else "image"))
-    option_parsing.output_folder(options.out)
     refuse_foreign_file(options.out / REPORT)
     with (
         lock_folder(options.out),
@@ -162,7 +161,7 @@ def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
         first, second = data["matrix"]["values"]
         columns = [f"{axes[1]} {second[0]:g}", *(f"{value:g}" for value in second[1:])]
         for name, means in data["matrix"]["mean"].items():
-            rows = [[f"{value:g}", *map(_number, row)] for value, row in zip(first, means, strict=True)]
+            rows = [[f"{value:g}", *map(figure, row)] for value, row in zip(first, means, strict=True)]
             yield table(f"{name}: {title}", (), [axes[0], *columns], rows)
         return
     rows = []
@@ -188,7 +187,7 @@ def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
     columns = ["scenario", "seed", *(axis.name for axis in plan.axes), tracker, ORACLE, "shortfall"]
     rows = [
         [f["scenario"], str(f["seed"]), *(f"{value:g}" for value in f["values"]),
-         *(_number(f[key]) for key in ("score", "oracle", "shortfall"))]
+         *(figure(f[key]) for key in ("score", "oracle", "shortfall"))]
         for f in data["found"]
     ]  # fmt: skip
     scenes = f"{', '.join(plan.scenarios)}, {counted(len(sweep.scenes), 'scene')}"
@@ -211,13 +210,9 @@ def _note(words: str, first: Mapping[str, Any], key: str) -> str:
     return printable(f"{words}, the first {first['scenario']}, seed {first['seed']}: {first[key]}")
 
 
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3f}"
-
-
 def _interval(row: Mapping[str, float | None]) -> str:
     low, high = row["low"], row["high"]
-    return _number(row["mean"]) + ("" if low is None or high is None else f" ± {(high - low) / 2:.3f}")
+    return figure(row["mean"]) + ("" if low is None or high is None else f" ± {(high - low) / 2:.3f}")
 
 
 def _break_words(point: Mapping[str, float | None], share: float) -> str:

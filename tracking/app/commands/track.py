@@ -21,7 +21,7 @@ from tracking.app.command_result import CommandResult
 from tracking.app.commands.group import LASTING, groups_of, lasting
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import over_sequences, source_of
-from tracking.app.stored_tracks import run_folders
+from tracking.app.stored_tracks import check_place, run_folders
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping, grouping_of
 from tracking.running.detection_mode import choose_mode
@@ -61,10 +61,8 @@ class TrackerSetup:
 def track(options: TrackOptions) -> CommandResult:
     """Tracks every sequence of the source and stores the tracks; returns a line for each run."""
     from sim.io.files.atomic import lock_folder
-    from sim.io.store.seal import reject_foreign
 
     setup = _setup(options)
-    option_parsing.output_folder(options.out)
     needs = find(setup.tracker).needs
     pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
     source = source_of(options, options.source, pictures)
@@ -72,7 +70,7 @@ def track(options: TrackOptions) -> CommandResult:
     folders = run_folders(sequences, options.source, options.out)
     with lock_folder(options.out):
         for folder in folders:
-            reject_foreign(folder)
+            check_place(folder, setup.tracker)
         _check_modes(setup, needs, sequences, options.background)
         if min(options.workers, len(sequences)) > 1:
             given = pickle.dumps(options)  # a tracker class and its config cannot be pickled, their names can

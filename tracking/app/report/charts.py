@@ -15,6 +15,7 @@ from bokeh.resources import Resources
 
 from tracking.app.report.content import Curves, Json, Report
 from tracking.errors.found import CauseRow
+from tracking.scoring.catalogue import CATALOGUE
 
 # Their contrast to both backgrounds is 3 : 1 or more.
 COLOURS = ("#2f81d8", "#d9730d", "#1a9e6c", "#c2478f", "#8a63d2", "#a08000", "#d6453d", "#3d8ea3", "#6b7a2f", "#8b6f5c")
@@ -58,7 +59,7 @@ def _curves(curves: Curves, by: str) -> Any:
     plot.x_range.flipped = first > last
     items, order = [], np.argsort(curves.values)
     for k, (name, one) in enumerate(curves.curves.items()):
-        data = {key: np.array(one[key], float) for key in ("mean", "low", "high")}
+        data = {key: CATALOGUE[by].within(np.array(one[key], float)) for key in ("mean", "low", "high")}
         source, look = ColumnDataSource({"x": curves.values, **data}), {"color": colour(k)}
         band = plot.varea("x", "low", "high", source=source, fill_alpha=0.14, **look)
         line = plot.line("x", "mean", source=source, line_width=2.4, line_dash=DASHES[k % len(DASHES)], **look)

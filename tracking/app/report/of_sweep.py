@@ -68,7 +68,7 @@ def _ranking(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[Json]:
     ranks = [{"first": a, "last": b} for a, b in zip(found.first.tolist(), found.last.tolist(), strict=True)]
     words = ["", *map(rank_words, ranks)]
     ends = zip(mean_interval(best[:, None]), (found.mean, found.low, found.high), strict=True)
-    mean, low, high = (np.concatenate(pair).tolist() for pair in ends)
+    mean, low, high = (CATALOGUE[sweep.plan.by].within(np.concatenate(pair)).tolist() for pair in ends)
     for k, name in enumerate([ORACLE, *(names[k] for k in found.order.tolist())]):
         means = {key: mean_of_finite(_values(sweep, name, scenes, key)) for key in CATALOGUE}
         yield {"run": name, "rank": words[k], "mean": mean[k], "low": low[k], "high": high[k], **means}

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+
 import cv2
 import numpy as np
 import pytest
 
+from scenarios.errors import InputError
 from sim.io.export.kitti import calibration, kitti
 from sim.io.store import sequence_folder
 from sim.scene.camera import project_pair
@@ -37,8 +40,9 @@ def test_pairs_and_disparities_are_those_of_the_dataset(tmp_path) -> None:
     )
     (target,) = kitti(folder, tmp_path / "out")
     assert target == tmp_path / "out/flockscope-train/a"
-    names = [path.name for path in sorted((target / "disp_noc_0").iterdir())]
-    assert names == [f"{k:06d}.png" for k in range(1, live.length + 1)]
+    with pytest.raises(InputError, match="a folder of tracks or of a sequence"):
+        kitti(tmp_path, tmp_path)
+    assert sorted(os.listdir(target / "disp_noc_0")) == [f"{k:06d}.png" for k in range(1, live.length + 1)]
     codes = cv2.imread(str(target / "disp_noc_0/000005.png"), cv2.IMREAD_UNCHANGED)
     assert codes.dtype == np.uint16
     assert decode_disparity(codes) == pytest.approx(live.load_pixels(5).disparity, abs=1 / 256, nan_ok=True)
@@ -46,5 +50,4 @@ def test_pairs_and_disparities_are_those_of_the_dataset(tmp_path) -> None:
     assert np.array_equal(cv2.imread(str(target / "image_2/000005.png")), frame.image)
     assert np.array_equal(cv2.imread(str(target / "image_3/000005.png")), frame.right)
     assert (target / "calib.txt").read_text() == calibration(live.camera)
-    times = [float(line) for line in (target / "times.txt").read_text().splitlines()]
-    assert times == pytest.approx([k / live.fps for k in range(live.length)])
+    assert np.loadtxt(target / "times.txt") == pytest.approx([k / live.fps for k in range(live.length)])
