@@ -75,6 +75,11 @@ def names_groups(tracks: Sequence[Tracks]) -> bool:
     return first is not None and _has_groups(first)
 
 
+def keeps_groups(tracks: Sequence[Tracks]) -> bool:
+    """Returns True if the tracker's groups are kept with their ids: it names groups, and not those of the moment."""
+    return names_groups(tracks) and not tracks[0].momentary
+
+
 def late_groups(tracks: Sequence[Tracks]) -> int | None:
     """Returns the first frame with groups if the tracker reported none at first (`names_groups` is False), else None.
     Such late groups are replaced by derived ones."""
@@ -104,12 +109,15 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
     if not given or any(t.unit == "group" for t in given):
         return given
     rule, named, own = rule or default_grouping(), names_groups(given), _own_events(given)
-    if not named:
+    momentary = named and given[0].momentary
+    if momentary:
+        given = [t.replace(groups=None) for t in given]  # their ids and hulls follow from the derived ids
+    elif not named:
         # groups that appear later would change frames that are reported already
         given = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in given]
     table, events = tabulate(given, fps, px_per_m), list[GroupEvent]()
     if not named or own.get("merge", math.inf) > 1:
-        table, events = _grouped(table, named, given[0].momentary, fps, rule)
+        table, events = _grouped(table, named, momentary, fps, rule)
     events += _crossings_and_queues(table, fps)
     return _filled(given, table, [e for e in events if (e.emitted or e.start) < own.get(e.kind, math.inf)])
 

@@ -220,7 +220,7 @@ def track(
     """
     from sim.compiler import clock
     from tracking.grouping.foot_points import completed
-    from tracking.grouping.grouped_tracks import late_groups, names_groups
+    from tracking.grouping.grouped_tracks import keeps_groups, late_groups
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
@@ -239,8 +239,8 @@ def track(
         reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene,
         source=prepared.input, image_size=known.image_size,
     )  # fmt: skip
-    named, late, odd = names_groups(reported), late_groups(reported), list[str]()
-    if named and chosen is not None:
+    kept, late, odd = keeps_groups(reported), late_groups(reported), list[str]()
+    if kept and chosen is not None:
         odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
     if late is not None:
         odd.append(
@@ -251,7 +251,7 @@ def track(
         warnings.warn(text, UserWarning, stacklevel=2)
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
     info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
-    return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
+    return TrackingRun(tracks, info if kept else {**info, "grouping": rule.as_dict()})
 
 
 def group(
