@@ -17,7 +17,7 @@ import numpy as np
 from sim.scene.camera import seen_ground, standing_share
 from sim.types import Array, Bools, Camera, GroupEvent, Ints, Scene, Tracks
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
-from tracking.grouping.grouped_tracks import groups_in_frames, keeps_groups, names_groups, with_groups, with_velocities
+from tracking.grouping.grouped_tracks import groups_in_frames, names_groups, with_groups, with_velocities
 from tracking.grouping.grouping_choice import Grouping
 
 FLATTENED = 0.4  # k of `as_measured`: of 0 to 1, about the greatest F1 of groups and pairs from 5 to 60 degrees above.
@@ -109,10 +109,10 @@ def completed(
         return with_groups(tracks, fps, px_per_m, rule), ground
     stairs = None if camera is None else scene  # the boxes tell no place in the scene
     feet = standing(tracks, ground.camera, stairs) if plane_of_run(tracks) == "image" else tracks
-    grouped, kept = with_groups(depth_as_measured(feet, ground.camera), fps, 1.0, rule), keeps_groups(tracks)
+    grouped, named = with_groups(depth_as_measured(feet, ground.camera), fps, 1.0, rule), names_groups(tracks)
     out = [_grouped_as(t, g) for t, g in zip(with_velocities(tracks, fps), grouped, strict=True)]
     pairs = zip(out, groups_in_frames(out), strict=True)
-    return tuple(t if kept and t.groups is not None else t.replace(groups=g) for t, g in pairs), ground
+    return tuple(t if named and t.groups is not None else t.replace(groups=g) for t, g in pairs), ground
 
 
 def depth_as_measured(tracks: Sequence[Tracks], camera: Camera) -> list[Tracks]:
@@ -122,7 +122,8 @@ def depth_as_measured(tracks: Sequence[Tracks], camera: Camera) -> list[Tracks]:
 
 def _grouped_as(t: Tracks, grouped: Tracks) -> Tracks:
     new = moved_events(grouped.events[len(t.events) :], t.id, t.pos)
-    return t.replace(group=grouped.group, events=(*t.events, *new), derived=True)
+    groups = None if t.momentary else t.groups  # those of the moment have new ids
+    return t.replace(group=grouped.group, groups=groups, events=(*t.events, *new), derived=True)
 
 
 def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> list[Tracks]:

@@ -75,11 +75,6 @@ def names_groups(tracks: Sequence[Tracks]) -> bool:
     return first is not None and _has_groups(first)
 
 
-def keeps_groups(tracks: Sequence[Tracks]) -> bool:
-    """Returns True if the tracker's groups are kept with their ids: it names groups, and not those of the moment."""
-    return names_groups(tracks) and not tracks[0].momentary
-
-
 def late_groups(tracks: Sequence[Tracks]) -> int | None:
     """Returns the first frame with groups if the tracker reported none at first (`names_groups` is False), else None.
     Such late groups are replaced by derived ones."""
@@ -109,15 +104,12 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
     if not given or any(t.unit == "group" for t in given):
         return given
     rule, named, own = rule or default_grouping(), names_groups(given), _own_events(given)
-    momentary = named and given[0].momentary
-    if momentary:
-        given = [t.replace(groups=None) for t in given]  # their ids and hulls follow from the derived ids
-    elif not named:
+    if not named:
         # groups that appear later would change frames that are reported already
         given = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in given]
     table, events = tabulate(given, fps, px_per_m), list[GroupEvent]()
     if not named or own.get("merge", math.inf) > 1:
-        table, events = _grouped(table, named, momentary, fps, rule)
+        table, events = _grouped(table, named, named and given[0].momentary, fps, rule)
     events += _crossings_and_queues(table, fps)
     return _filled(given, table, [e for e in events if (e.emitted or e.start) < own.get(e.kind, math.inf)])
 
@@ -177,7 +169,8 @@ def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupE
         new = tuple(sorted(by_frame.pop(t.index, ()), key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
         out.append(t.replace(group=label, events=(*t.events, *new), derived=True))
     groups = groups_in_frames(out, table.scale)
-    return [t.replace(groups=g) if t.groups is None else t for t, g in zip(out, groups, strict=True)]
+    # groups of the moment have new ids
+    return [t.replace(groups=g) if t.groups is None or t.momentary else t for t, g in zip(out, groups, strict=True)]
 
 
 def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:

@@ -192,8 +192,9 @@ def track(
 ) -> TrackingRun:
     """Tracks every frame of a sequence, and derives groups and events if the tracker reports none.
 
-    Warns with a UserWarning if `grouping` has no effect because the tracker reports groups itself. Warns, too, if the
-    tracker reports groups only after its first frame with people; such groups are replaced by derived ones.
+    Warns with a UserWarning if `grouping` has no effect because the tracker reports groups itself, other than of the
+    moment. Warns, too, if the tracker reports groups only after its first frame with people; such groups are replaced
+    by derived ones.
 
     Args:
         tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
@@ -220,7 +221,7 @@ def track(
     """
     from sim.compiler import clock
     from tracking.grouping.foot_points import completed
-    from tracking.grouping.grouped_tracks import keeps_groups, late_groups
+    from tracking.grouping.grouped_tracks import late_groups, names_groups
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
@@ -239,7 +240,8 @@ def track(
         reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene,
         source=prepared.input, image_size=known.image_size,
     )  # fmt: skip
-    kept, late, odd = keeps_groups(reported), late_groups(reported), list[str]()
+    kept = names_groups(reported) and not reported[0].momentary
+    late, odd = late_groups(reported), list[str]()
     if kept and chosen is not None:
         odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
     if late is not None:
