@@ -40,12 +40,11 @@ class Loopback:
             process.wait()
 
     def _start(self, what: str, words: list[str], **env: str) -> subprocess.Popen[bytes]:
-        # dask's profiler may stop workers before Python 3.11.9
-        own = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "0"}
+        threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         with (self.folder / f"{what}-{len(self.workers)}.log").open("wb") as log:
             return subprocess.Popen(
                 [sys.executable, "-m", f"distributed.cli.dask_{what}", *words],
-                env={**os.environ, **own, **env}, stdout=log, stderr=log, cwd=self.folder,
+                env={**os.environ, **threads, **env}, stdout=log, stderr=log, cwd=self.folder,
             )  # fmt: skip
 
     def _told(self, file: Path) -> str:
