@@ -118,7 +118,7 @@ def test_the_kernel_keeps_the_moments_and_draws_equal_particles_apart():
     before = [np.cov(particles.pos[:, 0].T), particles.pos[:, 0].mean(axis=0)]
     rng = np.random.default_rng(6)
     few = particles.resample(1.0, drawn(particles, rng))
-    particles.spread(few, 1.0, rng.standard_normal((len(few), 4, particles.count)))
+    particles.spread(few, rng.standard_normal((len(few), 4, particles.count)))
     assert len(np.unique(particles.pos[:, 0, 0])) == 20_000
     np.testing.assert_allclose(particles.pos[:, 0].mean(axis=0), before[1], atol=0.003)
     np.testing.assert_allclose(np.cov(particles.pos[:, 0].T), before[0], rtol=0.05, atol=3e-4)

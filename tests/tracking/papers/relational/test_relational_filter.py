@@ -213,7 +213,7 @@ def test_people_who_are_equal_in_all_particles_change_no_weight(detect):
 
 def joined_by(particles, label, points, uniforms, rules):
     """Relates the new people, the last slots, to the groups that they join."""
-    pairs, related = particle_set.join(particles.pos, particles.exist, label, points, 0.5, uniforms, rules)
+    pairs, related = particle_set.join(particles.pos, particles.exist, label, points, uniforms, rules)
     particles.hold(pairs)
     particles.related[len(particles.pairs) - len(pairs) :] = related
     assert np.array_equal(particles.pairs[len(particles.pairs) - len(pairs) :], pairs)
