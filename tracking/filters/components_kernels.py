@@ -152,12 +152,8 @@ def unset(count: int) -> Ints:
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
     """Returns the first component that each of K is joined with, (K,) (G_x, sec. 3.1)."""
     k = len(sums)
-    label, alive, order, tree = (
-        np.empty(k, np.int64),
-        np.empty(k, np.int64),
-        np.empty(k, np.int64),
-        np.empty(k, np.int64),
-    )
+    label, alive = np.empty(k, np.int64), np.empty(k, np.int64)
+    order, tree = np.empty(k, np.int64), np.empty(k, np.int64)
     pooled, shape = np.empty((k, 6)), np.empty((k, 5))
     left, wide = np.empty(k), np.empty(k)  # of a region: least x, half of its width
     fresh = np.empty(k, np.bool_)  # only pairs with a changed component are compared again

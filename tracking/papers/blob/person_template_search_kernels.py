@@ -25,18 +25,6 @@ SWEEPS = 3  # most sweeps over all templates: the first on the coarse grid, the 
 
 
 @kernel
-def column_range_within(x: float, half: float, low: np.int32, high: np.int32) -> tuple[np.int32, np.int32]:
-    """Returns first column and last column + 1, counted from `low`, of the pixels whose centre is at most `half` px
-    from x.
-
-    Only columns low to high - 1 count; both results are equal if there is no such column.
-    """
-    left, right = np.int32(np.ceil(x - half - 0.5)), np.int32(np.floor(x + half - 0.5)) + np.int32(1)
-    left = min(max(left, low), high)
-    return left - low, min(max(right, left), high) - low
-
-
-@kernel
 def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: int, step: float) -> Whole:
     """Returns the sum over a template's uncovered pixels at each place of a grid round its own, in halves of a pixel,
     int32.
@@ -62,7 +50,7 @@ def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: in
             half = kernels.half_width(row, down, h, w)
             if half > 0:
                 for j in range(n):
-                    begin[j], end[j] = column_range_within(middle[j], half, np.int32(left), np.int32(right))
+                    begin[j], end[j] = kernels.column_range(middle[j], half, np.int32(left), np.int32(right))
                 for j in range(n):
                     found[i, j] += sums[row - low, end[j]] - sums[row - low, begin[j]]
     return found

@@ -157,12 +157,8 @@ class ParticleSet:
         no relations; their weights are equal, or the particles' one weight."""
         count, k, new = self.count, self.people, pos.shape[1]
         weights = self.weights[:, :1] if self.one_weight and k else np.full((count, 1), 1 / count)
-        added = {
-            "weights": np.repeat(weights, new, axis=1),
-            "pos": pos,
-            "vel": vel,
-            "exist": np.full((count, new), exist),
-        }
+        exists = np.full((count, new), exist)
+        added = {"weights": np.repeat(weights, new, axis=1), "pos": pos, "vel": vel, "exist": exists}
         for name, values in added.items():
             setattr(self, name, np.concatenate([getattr(self, name), np.ascontiguousarray(values)], axis=1))
 

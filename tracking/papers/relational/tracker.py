@@ -222,8 +222,8 @@ class Particle(PointTracker):
 
     def _measure(self, detections: Detections) -> None:
         points, sizes = self.points(detections)
-        sight = sensor.Sight(self._detection_probability(), ~self.slots.seen, self.cut, self.eye)
-        pairs, measured, nobody = sensor.weigh(self.particles, points, sight, self.noise, self.config)
+        sight = self._detection_probability(), ~self.slots.seen, self.cut, self.eye
+        pairs, measured, nobody = sensor.weigh(self.particles, points, *sight, self.noise, self.config)
         self.slots.measure(measured, pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
         new = nobody >= BIRTH_DOUBT
