@@ -24,7 +24,7 @@ import numpy as np
 from sim.types import Array
 from tracking.filters import kalman
 
-MOST_FRAMES = 999  # Frames after which a track counts as confirmed, whatever rho is.
+MOST_FRAMES = 998  # Frames after which a track counts as confirmed, whatever rho is.
 
 
 @dataclass(frozen=True)
@@ -89,9 +89,10 @@ def _rho_after(dynamics: Dynamics, state: Array, steps: int) -> float:
 def time_to_confirm(dynamics: Dynamics, confirm_ratio: float) -> float:
     """Returns the age, s, that a track measured in every frame must reach; the next frame confirms it."""
     state, q = dynamics.newborn(), dynamics.q
-    for frames in range(MOST_FRAMES):
-        kalman.predict(state, dynamics.dt, q)
-        if rho(state, dynamics.noise, dynamics.asymptote)[0] <= confirm_ratio:
-            break
+    kalman.predict(state, dynamics.dt, q)
+    frames = 0
+    while frames < MOST_FRAMES and rho(state, dynamics.noise, dynamics.asymptote)[0] > confirm_ratio:
         kalman.update(state, np.zeros(1, np.int64), np.zeros((1, len(dynamics.noise))), dynamics.noise)
+        kalman.predict(state, dynamics.dt, q)
+        frames += 1
     return frames * dynamics.dt
