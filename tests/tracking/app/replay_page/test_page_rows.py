@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.geometry.polygons import convex_hull
+from sim.geometry.hull_kernels import convex_hull
 from sim.types import GroupEvent, Sequence
 from tests.groups_as_wholes import wholes
 from tests.reference_polygons import area, footprint_hull
