@@ -61,9 +61,8 @@ def member_rows(frame: Ints, id: Ints, group: Ints) -> tuple[Ints, Ints]:
     rows = rows[group[rows] >= 0]
     new = (np.diff(frame[rows], prepend=-1) != 0) | (np.diff(group[rows], prepend=-1) != 0)
     number = np.cumsum(new) - 1
-    rows = rows[np.bincount(number)[number] > 1] if len(rows) else rows
-    new = (np.diff(frame[rows], prepend=-1) != 0) | (np.diff(group[rows], prepend=-1) != 0)
-    return rows, np.flatnonzero(new)
+    several = np.bincount(number)[number] > 1
+    return rows[several], np.flatnonzero(new[several])
 
 
 def _assemble(
