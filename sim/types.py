@@ -305,11 +305,6 @@ class Near(Frozen):
     a: Ints
     b: Ints
 
-    @classmethod
-    def none(cls) -> Near:
-        """Returns a Near of zero rows."""
-        return cls(no_ids(), no_ids(), no_ids(), no_ids())
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameTruth(Frozen):

@@ -58,6 +58,15 @@ def complain(_: object) -> None:
     raise Awkward("a", "b")
 
 
+def profiled(_: object) -> bool:
+    """Whether dask looks at what the threads of its worker are at."""
+    from distributed import get_worker
+
+    return any(
+        name == "profile" and callback.is_running() for name, callback in get_worker().periodic_callbacks.items()
+    )
+
+
 def told(item: tuple[Path, float]) -> str:
     """Says that it has begun, takes its time, says that it is done."""
     marker, seconds = item

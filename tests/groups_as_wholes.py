@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.geometry.polygons import convex_hull
+from sim.geometry.hull_kernels import convex_hull
 from sim.types import Array, FrameTruth, GroupEvent, Groups, Sequence, Tracks
 from tests.reference_polygons import footprint_hull
 

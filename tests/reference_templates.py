@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracking.papers.blob import new_people_kernels, person_template
 from tracking.papers.blob import person_look_kernels as looks
-from tracking.papers.blob import person_template
 from tracking.papers.blob.person_template_kernels import BARE, ELLIPSE, EXPLAINED, LEAST_INSIDE
 from tracking.papers.blob.person_template_search_kernels import FINE_STEPS, MOST_STEPS, STEPS_PER_HEIGHT, SWEEPS
 
@@ -117,7 +117,7 @@ def enter(foreground, cover, guesses, person, support):
     best, most = np.zeros((0, 4)), 0.0
     for guess in guesses:
         spread = np.maximum(person_template.ROAM * guess[:, 2:3], 1.0) * np.ones(2)
-        at = settle(foreground, cover, guess, spread, person_template.EVIDENCE)
+        at = settle(foreground, cover, guess, spread, new_people_kernels.EVIDENCE)
         union = (painted(cover.shape, at) > 0) & (cover == 0)
         value = np.where(foreground, 1.0, -0.5)[union].sum() / person - len(guess) * support
         if value > most and alone(foreground, cover, at).min() >= support:

@@ -24,7 +24,7 @@ import numpy as np
 from benchmarks.stereo.scenes import Row, entries, position_errors, recordings
 from benchmarks.support.tables import head, interval, row, signed
 from scenarios.loading.resolve import Entry, load
-from sim.geometry.polygons import convex_hull
+from sim.geometry.hull_kernels import convex_hull
 from sim.scene.camera import project
 from sim.types import Camera, Tracks
 from sim.types import Sequence as Recording

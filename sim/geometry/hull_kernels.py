@@ -1,6 +1,6 @@
 """Compiled convex hulls of many sets of points (x, y in any unit) at once, by Andrew's monotone chain.
 
-The result is one array of vertices for each set. `sim.geometry.polygons.convex_hull` computes a single hull.
+The result is one array of vertices for each set.
 """
 
 from __future__ import annotations
@@ -25,6 +25,14 @@ def convex_hulls(sets: Sequence[Array]) -> tuple[Array, ...]:
     order = np.lexsort((points[:, 1], points[:, 0], owner))
     vertices, ends = monotone_chains(points[order], np.concatenate([[0], np.cumsum(count)]))
     return tuple(np.split(vertices, ends[:-1]))
+
+
+def convex_hull(points: Array) -> Array:
+    """Returns the convex hull (V, 2) of points (N, 2), counter-clockwise from the leftmost, without points on edges.
+
+    V is 2 if all points lie on a line, 1 if all are equal, 0 without points.
+    """
+    return convex_hulls([np.unique(points, axis=0)])[0]
 
 
 @njit(cache=True)

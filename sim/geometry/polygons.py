@@ -70,31 +70,6 @@ def cross(a: Array, b: Array) -> Array:
     return product
 
 
-def convex_hull(points: Array) -> Array:
-    """Returns the convex hull (V, 2) of points (N, 2), counter-clockwise from the leftmost, without points on edges.
-
-    V is 2 if all points lie on a line, 1 if all are equal, 0 without points.
-    """
-    rows = sorted(set(map(tuple, np.asarray(points, float).tolist())))
-    if len(rows) < 3:
-        return np.array(rows, float).reshape(-1, 2)
-    lower, upper = _chain(rows), _chain(rows[::-1])
-    return np.array(lower[:-1] + upper[:-1], float)
-
-
-def _chain(rows: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-    """Returns the lower half of the convex hull of points sorted by x, then y."""
-    kept: list[tuple[float, ...]] = []
-    for x, y in rows:
-        while len(kept) > 1:
-            (ax, ay), (bx, by) = kept[-2], kept[-1]
-            if (bx - ax) * (y - ay) > (by - ay) * (x - ax):
-                break
-            kept.pop()
-        kept.append((x, y))
-    return kept
-
-
 def intersection_pairs(a: PackedPolygons, b: PackedPolygons, i: Ints, j: Ints) -> Array:
     """Returns the area (K,) that convex polygons a[i[k]] and b[j[k]] have in common; 0 if either has no area."""
     common = np.zeros(len(i))

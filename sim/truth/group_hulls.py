@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.geometry.polygons import convex_hull, footprint_hulls
+from sim.geometry.polygons import footprint_hulls
 from sim.types import Array, Groups, Ints
 
 __all__ = ["box_groups", "groups_over_time", "member_rows"]
@@ -40,11 +40,13 @@ def box_groups(
     Like `groups_over_time`, but each hull encloses the members' boxes. pos, vel (R, 2): px, px/s. box (R, 4): left,
     top, width, height, px.
     """
+    from sim.geometry.hull_kernels import convex_hulls
+
     order, starts = member_rows(frame, id, group)
     low, high = box[:, :2], box[:, :2] + box[:, 2:]
     corners = np.stack([low, np.stack([high[:, 0], low[:, 1]], 1), high, np.stack([low[:, 0], high[:, 1]], 1)], 1)
     ends = np.append(starts, len(order))
-    hulls = [convex_hull(corners[order[a:b]].reshape(-1, 2)) for a, b in pairwise(ends)]
+    hulls = convex_hulls([corners[order[a:b]].reshape(-1, 2) for a, b in pairwise(ends)])
     rows = frame[order], id[order], group[order], pos[order], vel[order]
     return _assemble(*rows, starts, hulls, first, length)
 
@@ -59,9 +61,8 @@ def member_rows(frame: Ints, id: Ints, group: Ints) -> tuple[Ints, Ints]:
     rows = rows[group[rows] >= 0]
     new = (np.diff(frame[rows], prepend=-1) != 0) | (np.diff(group[rows], prepend=-1) != 0)
     number = np.cumsum(new) - 1
-    rows = rows[np.bincount(number)[number] > 1] if len(rows) else rows
-    new = (np.diff(frame[rows], prepend=-1) != 0) | (np.diff(group[rows], prepend=-1) != 0)
-    return rows, np.flatnonzero(new)
+    several = np.bincount(number)[number] > 1
+    return rows[several], np.flatnonzero(new[several])
 
 
 def _assemble(

@@ -11,6 +11,8 @@ import logging
 import os
 import pickle
 import re
+import sys
+import threading
 import time
 import uuid
 import warnings
@@ -30,6 +32,8 @@ CONNECT_TIMEOUT = 10.0  # s to reach a scheduler
 NO_WORKERS_WARNING = 20.0  # s without any worker before a warning
 COUNT_INTERVAL = 1.0  # s between two counts of the cluster's workers
 REMEDY = "run the same command again: what is complete is kept"
+# earlier Pythons may deadlock in sys._current_frames, which dask's profiler calls (gh-106883)
+PROFILE_SAFE = (3, 11, 9)
 
 
 @contextmanager
@@ -141,6 +145,8 @@ def run_on_worker(call: bytes, required: tuple[tuple[str, str], ...]) -> bytes:
     for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")
     worker = get_worker()
+    if sys.version_info < PROFILE_SAFE:
+        _stop_profiler(worker)
     if worker.state.nthreads != 1:
         raise WorkError(
             file=worker.address, got=f"a worker of {worker.state.nthreads} threads", expected="one thread per worker",
@@ -155,6 +161,16 @@ def run_on_worker(call: bytes, required: tuple[tuple[str, str], ...]) -> bytes:
             expected=", ".join(f"{k} {wanted[k]}" for k in different) + " as here", remedy=SAME,
         )  # fmt: skip
     return run_pickled(call)
+
+
+def _stop_profiler(worker: Any) -> None:
+    profile = worker.periodic_callbacks.get("profile")
+    if profile is not None and profile.is_running():
+        # The profiler inspects the stack of each thread a hundred times a second.
+        worker.loop.add_callback(profile.stop)
+        stopped = threading.Event()
+        worker.loop.add_callback(stopped.set)
+        stopped.wait(CONNECT_TIMEOUT)
 
 
 def _result(answer: Any, item: T, address: str, on_loss: OnLoss[T, R]) -> R:

@@ -131,20 +131,3 @@ def test_a_change_half_way_is_seen_from_there_on_and_not_before(name, points):
     plain, late = answers(name, points, "file", {}), answers(name, points, "file", {12: config})
     same(plain[:11], late[:11])
     assert differ(plain[11:], late[11:])
-
-
-def test_a_refused_change_leaves_blob_as_it_was(points):
-    """Newborn tracks that would be confirmed at once."""
-    paper = find("blob").config_class(management="rho")
-    wrong = dataclasses.replace(paper, confirm_ratio=2.0, speed_prior=0.1, accel_noise=10.0)
-    ready, plain = prepare("blob", points, params=paper), answers("blob", points, "file", {0: paper})
-    ready.reset(0)
-    good, made = ready.tracker.config, []
-    for frame in ready.frames():
-        ready.tracker.config = wrong
-        with pytest.raises(InputError, match="confirm_ratio"):
-            ready.step(frame)
-        ready.tracker.config = good
-        made.append(ready.step(frame))
-    assert len(made) == 20
-    same(plain, made)

@@ -404,11 +404,11 @@ class FitGroupingOptions(FitJointOptions, words="fit grouping", run="fit:fit_gro
 
 
 class FitRelationalOptions(Options, words="fit relational", run="fit:fit_relational"):
-    """Learn the speed table and the relations of the tracker relational from simulated truth."""
+    """Learn the speed table of the tracker relational from simulated truth."""
 
     names: list[str] = NAMES()
     out: Path = TOML("File to write: parameters of relational, for --params.")
     seeds: str = SEEDS(SEEDS_HELP, "30000:30004")
     observed: bool = option(
-        "Learn speed table and noise of positions from successive detections, as the paper does; no relations.", False)
+        "Learn speed table and noise of positions from successive detections, as the paper does.", False)
 # fmt: on

@@ -70,18 +70,9 @@ def classify(
 
 @njit(cache=True)
 def adapt(
-    image: Image,
-    classes: Image,
-    protected: Bools,
-    E: Floats,
-    V: Floats,
-    g: Floats,
-    first: int,
-    step: int,
-    fast: float,
-    slow: float,
-    least: float,
-) -> None:
+    image: Image, classes: Image, protected: Bools, E: Floats, V: Floats, g: Floats, first: int, step: int,
+    fast: float, slow: float, least: float,
+) -> None:  # fmt: skip
     """Change mean E and variance V, (3, H, W) float32, in place towards a frame (H, W, 3) uint8. Returns nothing.
 
     Only the rows first, first + step, first + 2 step, … change. classes (H, W): the frame's pixel classes. g (3,): the

@@ -126,12 +126,10 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
     fewest = max(int(np.ceil(SECOND_SHARE * len(sample))), 3)
     kernels.learn(sample, gains, held, fewest, mean, sigma, s, b, valid, second, counts)
     if valid.mean() < 0.5:
-        raise InputError(
-            place="background",
-            got=f"{1 - valid.mean():.0%} of the pixels never keep one colour in {len(sample)} frames",
-            expected="a still camera; from this sample no background can be learned",
-            remedy="give a sample of the empty scene, or detections instead of pixels",
-        )
+        got = f"{1 - valid.mean():.0%} of the pixels never keep one colour in {len(sample)} frames"
+        expected = "a still camera; from this sample no background can be learned"
+        remedy = "give a sample of the empty scene, or detections instead of pixels"
+        raise InputError(place="background", got=got, expected=expected, remedy=remedy)
     clean, inliers = (counts[which, kernels.CHROMATICITY].sum() for which in (kernels.CLEAN_PIXELS, kernels.INLIERS))
     counts = counts[kernels.CLEAN_PIXELS if clean >= FEWEST_CLEAN * inliers else kernels.INLIERS].copy()
     return Trained(mean, sigma, s, b, valid, second, thresholds(counts, rate), counts)
@@ -141,24 +139,17 @@ def check(sample: Image) -> None:
     """Raises InputError unless the sample is (K, H, W, 3) uint8 with H, W above 0 and K at least LEAST_FRAMES = 10
     frames."""
     shape, kind = np.shape(sample), getattr(sample, "dtype", None)
-    expected, remedy = "", ""
-    if kind != np.uint8 or len(shape) != 4 or shape[-1] != 3 or 0 in shape[1:3]:
-        expected, remedy = "(K, H, W, 3) of uint8, BGR", "convert the frames to 8-bit colour"
-    elif shape[0] < LEAST_FRAMES:
-        expected, remedy = f"at least {LEAST_FRAMES} frames", "give a longer sample"
-    if expected:
+    if kind != np.uint8 or len(shape) != 4 or shape[-1] != 3 or 0 in shape[1:3] or shape[0] < LEAST_FRAMES:
+        expected = f"(K, H, W, 3) of uint8, BGR, at least {LEAST_FRAMES} frames"
+        remedy = "give a longer sample, of 8-bit colour"
         raise InputError(place="background", got=f"{shape} of {kind}", expected=expected, remedy=remedy)
 
 
 def check_frame(image: Image, size: tuple[int, ...]) -> None:
     """Raises InputError unless a frame is a uint8 array of shape (H, W, 3)."""
     if image.dtype != np.uint8 or image.shape != (*size, 3):
-        raise InputError(
-            place="frame",
-            got=f"{image.shape} of {image.dtype}",
-            expected=f"{(*size, 3)} of uint8, as the background sample",
-            remedy="give 8-bit colour frames of one size",
-        )
+        got, expected = f"{image.shape} of {image.dtype}", f"{(*size, 3)} of uint8, as the background sample"
+        raise InputError(place="frame", got=got, expected=expected, remedy="give 8-bit colour frames of one size")
 
 
 def thresholds(counts: Ints, rate: float) -> tuple[float, float, float]:

@@ -164,18 +164,9 @@ def distortions(value: Floats, m: Array, sd: Array, inlier: Bools, alpha: Array,
 
 @njit(cache=True)
 def learn(
-    sample: Image,
-    gains: Floats,
-    held: int,
-    fewest: int,
-    mean: Floats,
-    sigma: Floats,
-    s: Floats,
-    b: Floats,
-    valid: Bools,
-    second: Floats,
-    counts: Ints,
-) -> None:
+    sample: Image, gains: Floats, held: int, fewest: int, mean: Floats, sigma: Floats, s: Floats, b: Floats,
+    valid: Bools, second: Floats, counts: Ints,
+) -> None:  # fmt: skip
     """Train on a sample (K, H, W, 3) uint8 and write the model into the last seven arguments. Returns nothing.
 
     gains (K, 3): gain (brightness factor) of each frame and channel, by which grey levels are divided. held: number of

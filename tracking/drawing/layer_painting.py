@@ -142,12 +142,3 @@ def draw_captions(image: Image, layer: Layer, index: int, fps: float, size: floa
     y = float(image.shape[0] - 6)
     for event in layer.recent_events(index, CAPTION_SECONDS * fps)[:CAPTIONS]:
         y -= draw_label(image, event_words(event, layer.prefix), (6, y), size * 1.25, kind_colour(event.kind)) + 3
-
-
-def draw_banner(image: Image, words: str, warning: str, size: float) -> None:
-    """Fills the whole image and writes a line of text on it, and a warning on red at its right if there is one."""
-    image[:] = FLOOR
-    y = image.shape[0] * 0.5 + 9 * size
-    text(image, words, (6, y), size)
-    if warning:
-        draw_label(image, warning, (image.shape[1], y + 6), size, colour(ALARM))

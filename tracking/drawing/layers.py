@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from sim.geometry.polygons import convex_hull
+from sim.geometry.hull_kernels import convex_hull
 from sim.io.store.track_files import upright_boxes
 from sim.io.store.truth_files import with_ground_height
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth

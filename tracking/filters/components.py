@@ -54,16 +54,9 @@ def partition(points: Array, weights: Array, rule: Constraint) -> Ints:
     group = np.full(len(sums), -1)
     if len(parts):
         # noise must not bridge two groups, so that only the heavy components are joined
-        joined = kernels.closure(sums[parts], rule.gate, rule.prior_entries, rule.strength)[0]
+        joined = kernels.closure(sums[parts], rule.gate, rule.prior_entries, rule.strength)
         group[parts] = np.unique(joined, return_inverse=True)[1]
     return np.asarray(group[label])
-
-
-def prefixes(points: Array, weights: Array, start: int, rule: Constraint) -> Bools:
-    """Returns for n = start, start + 1, … M if the first n points form exactly one group, bool (M - start + 1,)."""
-    return kernels.prefixes(
-        points, weights, start, rule.link, rule.gate, rule.prior_entries, rule.strength, rule.least
-    )[0]
 
 
 def regions_overlap(mean: Array, covariance: Array, gate: float) -> Bools:

@@ -39,8 +39,6 @@ SLACK, ROUNDING = 1 + 1e-6, 1e-15
 AROUND = 20
 # Columns of `box`.
 LOW_X, LOW_Y, HIGH_X, HIGH_Y = range(4)
-# Slots of `work`: cells and points compared so far; number of components.
-VISITS, COMPONENTS = range(2)
 # Cells from the first point beyond which a point is moved nearer, so that cell numbers fit in int64.
 FAR = 2.0**40
 
@@ -151,15 +149,11 @@ def unset(count: int) -> Ints:
 
 
 @shared_njit(cache=True)
-def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[Ints, int]:
-    """Returns the first component that each of K is joined with (K,) (G_x, sec. 3.1), and the pairs compared."""
-    k, compared = len(sums), 0
-    label, alive, order, tree = (
-        np.empty(k, np.int64),
-        np.empty(k, np.int64),
-        np.empty(k, np.int64),
-        np.empty(k, np.int64),
-    )
+def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
+    """Returns the first component that each of K is joined with, (K,) (G_x, sec. 3.1)."""
+    k = len(sums)
+    label, alive = np.empty(k, np.int64), np.empty(k, np.int64)
+    order, tree = np.empty(k, np.int64), np.empty(k, np.int64)
     pooled, shape = np.empty((k, 6)), np.empty((k, 5))
     left, wide = np.empty(k), np.empty(k)  # of a region: least x, half of its width
     fresh = np.empty(k, np.bool_)  # only pairs with a changed component are compared again
@@ -187,7 +181,6 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[In
                 p, q = order[n], order[later]
                 if many and left[q] > left[p] + 2 * wide[p]:
                     break
-                compared += 1
                 if (
                     (fresh[p] or fresh[q])
                     # pairs that are joined already need no test
@@ -214,7 +207,7 @@ def closure(sums: Array, gate: float, prior: Array, strength: float) -> tuple[In
         count = kept
     for i in range(k):
         label[i] = find_root(tree, i)
-    return label, compared
+    return label
 
 
 @njit(cache=True)
@@ -266,22 +259,22 @@ def _slot(table: Ints, place: Ints, first: Ints, x: int, y: int) -> int:
 @njit(cache=True)
 def add_point(
     k: int, points: Array, weight: float, link: float, cell: Ints, around: Ints,
-    parent: Ints, head: Ints, after: Ints, box: Array, sums: Array, work: Ints,
+    parent: Ints, head: Ints, after: Ints, box: Array, sums: Array, left: Ints,
 ) -> None:  # fmt: skip
     """Adds point k to the components of the points before it, in place (sec. 4.2.1).
 
     head (C,), after (M,): the last added point of each cell, and the one before each point. box (C, 4): bounds of each
-    cell's points. parent (M,), sums (M, 6): forest of the points, and moments at the roots.
+    cell's points. parent (M,), sums (M, 6): forest of the points, and moments at the roots. left (1,): number of
+    components.
     """
     c = cell[k]
     x, y = points[k, 0], points[k, 1]
     parent[k] = k
     sums[k, WEIGHT], sums[k, X], sums[k, Y] = weight, x, y
     sums[k, XX], sums[k, XY], sums[k, YY] = 0.0, 0.0, 0.0
-    work[VISITS] += 1
-    work[COMPONENTS] += 1
+    left[0] += 1
     if head[c] >= 0:
-        _join(parent, sums, k, head[c], work)
+        _join(parent, sums, k, head[c], left)
         box[c, LOW_X], box[c, LOW_Y] = min(box[c, LOW_X], x), min(box[c, LOW_Y], y)
         box[c, HIGH_X], box[c, HIGH_Y] = max(box[c, HIGH_X], x), max(box[c, HIGH_Y], y)
     else:
@@ -291,11 +284,10 @@ def add_point(
     for n in range(AROUND):
         other = around[c, n]
         # everything is one component: nothing more can be joined
-        if work[COMPONENTS] == 1:
+        if left[0] == 1:
             break
         if other < 0 or head[other] < 0:
             continue
-        work[VISITS] += 1
         if find_root(parent, head[other]) == top:
             continue
         # the bounding box of the cell's points rules most cells out without a look at its points
@@ -305,16 +297,15 @@ def add_point(
             continue
         p = head[other]
         while p >= 0:
-            work[VISITS] += 1
             if (points[p, 0] - x) ** 2 + (points[p, 1] - y) ** 2 <= link * link:
-                _join(parent, sums, k, p, work)
+                _join(parent, sums, k, p, left)
                 top = find_root(parent, k)
                 break
             p = after[p]
 
 
 @njit(cache=True)
-def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
+def _join(parent: Ints, sums: Array, a: int, b: int, left: Ints) -> None:
     """Joins the components of points a and b under the older root, so that roots depend only on the order of points."""
     a, b = find_root(parent, a), find_root(parent, b)
     if a == b:
@@ -323,7 +314,7 @@ def _join(parent: Ints, sums: Array, a: int, b: int, work: Ints) -> None:
     low, high = min(a, b), max(a, b)
     parent[high] = low
     pool(sums[low], sums[high])
-    work[COMPONENTS] -= 1
+    left[0] -= 1
 
 
 @shared_njit(cache=True)
@@ -336,9 +327,9 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
         return label, sums
     cell, around = cells(points, link)
     head, after, box = unset(len(around)), unset(m), np.empty((len(around), 4))
-    work = np.zeros(2, np.int64)
+    left = np.zeros(1, np.int64)
     for k in range(m):
-        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
+        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums, left)
     for k in range(m):
         top = find_root(parent, k)
         if top == k:
@@ -354,8 +345,8 @@ def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]
 @njit(cache=True)
 def prefixes(
     points: Array, weights: Array, start: int, link: float, gate: float, prior: Array, strength: float, least: float
-) -> tuple[Bools, int]:
-    """Returns whether the first start, … M points are one group, (M - start + 1,), and the comparisons made."""
+) -> Bools:
+    """Returns whether the first start, … M points are one group, (M - start + 1,)."""
     # All associations of a group at once: the points of the group alone, then one shared point more each time (4.2.1).
     # While a single component is heavy, n points cost O(n). Of more, only the region of the last point's is new; it is
     # compared with the M others if no two of those overlap. Else all are sorted along x and joined in rounds, O(M^1.5)
@@ -363,16 +354,16 @@ def prefixes(
     m = len(points)
     one = np.zeros(m - start + 1, np.bool_)
     if m == 0:
-        return one, 0
+        return one
     cell, around = cells(points, link)
     parent, sums = np.empty(m, np.int64), np.empty((m, 6))
     head, after, box = unset(len(around)), unset(m), np.empty((len(around), 4))
-    work = np.zeros(2, np.int64)
+    left = np.zeros(1, np.int64)
     # Roots of the components that are not left out, ascending, from the first prefix on; their moments and regions.
     heavy, count, moments, shape = np.empty(m, np.int64), 0, np.empty((m, 6)), np.empty((m, 5))
     apart = False  # True if no two of the regions overlap
     for k in range(m):
-        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums, work)
+        add_point(k, points, weights[k], link, cell, around, parent, head, after, box, sums, left)
         if k + 1 < start:
             continue
         top, now = find_root(parent, k), k + 1 - start
@@ -396,7 +387,6 @@ def prefixes(
             apart = True
             for n in range(count):
                 other = heavy[n]
-                work[VISITS] += 1
                 if other != top and meet(shape[max(top, other)], shape[min(top, other)]):
                     apart = False
                     break
@@ -405,13 +395,12 @@ def prefixes(
             for n in range(count):
                 for c in range(6):
                     moments[n, c] = sums[heavy[n], c]
-            label, compared = closure(moments[:count], gate, prior, strength)
+            label = closure(moments[:count], gate, prior, strength)
             one[now] = apart = True
             for n in range(count):
                 one[now] = one[now] and label[n] == 0
                 apart = apart and label[n] == n
-            work[VISITS] += count + compared
-    return one, work[VISITS]
+    return one
 
 
 @njit(cache=True)

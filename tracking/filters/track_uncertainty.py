@@ -9,7 +9,6 @@ The paper prints no numbers. It confirms "below a certain percentage" of the asy
 above, the percentage is above 100. It deletes at the value that "a certain number" of misses gives. The value at birth
 depends on the first covariance, too. Rules, ours where the paper has none:
 - A track is confirmed if rho <= confirm_ratio (above 1) and the measurement of that frame is near.
-- A new track must start above confirm_ratio, so that one measurement never confirms it (`check_birth`).
 - A confirmed track is deleted if rho reaches the value after k misses from the steady state. A track that is not yet in
   the steady state gets there after fewer misses.
 - A tentative (not confirmed) track is deleted if rho, while the track is missed, reaches its value at birth, or after a
@@ -22,9 +21,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenarios.errors import InputError
 from sim.types import Array
 from tracking.filters import kalman
+
+MOST_FRAMES = 998  # Frames after which a track counts as confirmed, whatever rho is.
 
 
 @dataclass(frozen=True)
@@ -79,17 +79,6 @@ def at_birth(dynamics: Dynamics) -> float:
     return _rho_after(dynamics, dynamics.newborn(), 1)
 
 
-def hits_to_confirm(dynamics: Dynamics, confirm_ratio: float, limit: int = 1000) -> int:
-    """Returns how many frames with a measurement in a row bring a new track's rho to confirm_ratio, `limit` at most."""
-    state, q = dynamics.newborn(), dynamics.q
-    for hits in range(1, limit):
-        kalman.predict(state, dynamics.dt, q)
-        if rho(state, dynamics.noise, dynamics.asymptote)[0] <= confirm_ratio:
-            return hits + 1
-        kalman.update(state, np.zeros(1, np.int64), np.zeros((1, len(dynamics.noise))), dynamics.noise)
-    return limit
-
-
 def _rho_after(dynamics: Dynamics, state: Array, steps: int) -> float:
     q = dynamics.q
     for _ in range(steps):
@@ -97,15 +86,13 @@ def _rho_after(dynamics: Dynamics, state: Array, steps: int) -> float:
     return float(rho(state, dynamics.noise, dynamics.asymptote)[0])
 
 
-def check_birth(dynamics: Dynamics, confirm_ratio: float) -> None:
-    """Raises InputError if the first measurement after its birth would confirm a track."""
-    start = at_birth(dynamics)
-    if start <= confirm_ratio:
-        got = f"{confirm_ratio:g}, while new tracks start at {start:.3g} times the asymptote"
-        remedy = "raise speed_prior, or lower confirm_ratio or the acceleration noises"
-        raise InputError(place="confirm_ratio", got=got, expected="new tracks that start above it", remedy=remedy)
-
-
 def time_to_confirm(dynamics: Dynamics, confirm_ratio: float) -> float:
     """Returns the age, s, that a track measured in every frame must reach; the next frame confirms it."""
-    return (hits_to_confirm(dynamics, confirm_ratio) - 2) * dynamics.dt
+    state, q = dynamics.newborn(), dynamics.q
+    kalman.predict(state, dynamics.dt, q)
+    frames = 0
+    while frames < MOST_FRAMES and rho(state, dynamics.noise, dynamics.asymptote)[0] > confirm_ratio:
+        kalman.update(state, np.zeros(1, np.int64), np.zeros((1, len(dynamics.noise))), dynamics.noise)
+        kalman.predict(state, dynamics.dt, q)
+        frames += 1
+    return frames * dynamics.dt

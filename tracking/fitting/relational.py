@@ -1,73 +1,42 @@
-"""`fit_relational`: the speed table and the relation dynamics of `relational`, learned from clean simulated truth;
-`fit_observed`: the speed table and the sensor's noise, learned from observations, as the paper does.
+"""`fit_relational`: the speed table of `relational`, learned from clean simulated truth; `fit_observed`: the table and
+the sensor's noise, learned from observations, as the paper does.
 
 Speed table (Table 3 of Cattelani et al. 2012): for each row of speeds the mean of the velocity's change over LAG,
 against the direction of motion, and its standard deviation per axis; as drift per second and diffusion per root second.
 The paper learns from differences of measured boxes in consecutive frames, which mixes the sensor's errors with the
 motion.
-
-Relations (ours; the paper gives none): a logistic regression of "in one true group" on distance and velocity
-difference, and the rate at which the relation follows it: the one whose moving average of probabilities has the least
-log loss.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.types import Array, Bools, Ints, Truth
+from sim.types import Array, Truth
 from sim.types import Sequence as Recording
 from tracking.filters.assignment import optimal
 
 Changes = tuple[Array, Array, Array, Array]
 
 LAG = 0.4  # Time over which changes of velocity are measured, s: steering is correlated over shorter times.
-NEAR = 6.0  # Pairs farther apart teach nothing, m.
-LEAST = 500  # Fewest rows from which anything is fitted.
-RATES = tuple(0.05 * 2.0**k for k in range(9))  # Rates of relations that are tried, 1/s.
-# Standard deviation of the prior of each logistic weight, about 0: pairs that a line separates have finite weights.
-PRIOR = 5.0
+LEAST = 500  # Fewest changes from which a table is fitted.
 FURTHEST = 2.0  # Largest distance of a detection from its person, m.
 # Settings of a sensor as the paper's observations are: every visible person, nobody else, and displaced feet.
 LABELS = ("sensor.detect_prob=1", "sensor.occlusion_power=0", "sensor.clutter_rate=0")
 PAPER_ENDS = (0.0125, 2.5, 5.0, 7.5)  # Column A of the paper's Table 3, m/s.
-STEPS = 50  # Most steps of Newton's method.
-
-
-@dataclass(frozen=True)
-class TruePairs:
-    """Pairs of people of a sequence, one row per pair and frame, sorted by pair, then frame. pair, frame (R,)."""
-
-    pair: Ints
-    frame: Ints
-    design: Array  # (R, 3): 1, minus distance in m, minus velocity difference in m/s
-    same: Bools  # (R,): True if both are in one true group
-    dt: float  # s between frames
 
 
 def fit_relational(truths: Iterable[Truth], ends: Sequence[float]) -> dict[str, float | list[float]]:
-    """Returns fitted parameters of `relational` by name: drift, diffusion, relation_rate, _bias, _distance, _velocity.
-    ends: upper ends of the rows of the speed table, m/s; the last row has none. Raises InputError for too few data."""
-    changes, pairs = [], []
-    for truth in truths:
-        changes.append(velocity_changes(truth, max(1, round(LAG * truth.fps))))
-        pairs.append(pair_rows(truth))
-    speed = np.concatenate([c[0] for c in changes]) if changes else np.zeros(0)
-    same = np.concatenate([p.same for p in pairs]) if pairs else np.zeros(0, bool)
-    if len(speed) < LEAST or same.all() or not same.any():
-        raise InputError(
-            place="scenes", got=f"{len(speed)} changes of velocity, {int(same.sum())} pairs in groups of {len(same)}",
-            expected=f"{LEAST} changes, and pairs in and out of groups", remedy="give more seeds or scenarios",
-        )  # fmt: skip
-    weights = logistic(np.concatenate([p.design for p in pairs]), same)
-    losses = [_log_loss(pairs, weights, rate) for rate in RATES]
-    rate = RATES[int(np.argmin(losses))]
-    names = ("relation_bias", "relation_distance", "relation_velocity")
-    return speed_table(changes, ends) | {"relation_rate": rate, **dict(zip(names, weights.tolist(), strict=True))}
+    """Returns fitted parameters of `relational` by name: drift and diffusion. ends: upper ends of the rows of the speed
+    table, m/s; the last row has none. Raises InputError for too few data."""
+    changes = [velocity_changes(truth, max(1, round(LAG * truth.fps))) for truth in truths]
+    count = sum(len(speed) for speed, *_ in changes)
+    if count < LEAST:
+        remedy = "give more seeds or scenarios"
+        raise InputError(place="scenes", got=f"{count} changes of velocity", expected=f"{LEAST}", remedy=remedy)
+    return speed_table(changes, ends)
 
 
 def fit_observed(sequences: Iterable[Recording], ends: Sequence[float]) -> dict[str, float | list[float]]:
@@ -143,53 +112,3 @@ def velocity_changes(truth: Truth, frames: int) -> Changes:
     along = (change * ahead).sum(axis=1)
     across = change[:, 1] * ahead[:, 0] - change[:, 0] * ahead[:, 1]
     return speed, along, across, np.full(len(now), frames / truth.fps)
-
-
-def pair_rows(truth: Truth) -> TruePairs:
-    """Returns the rows of all pairs of people of a sequence, in the frames in which they are at most 6 m apart."""
-    assert truth.pos is not None
-    assert truth.vel is not None
-    people, found = int(truth.id.max(initial=0)) + 1, []
-    for index in range(1, truth.length + 1):
-        r = truth.rows(index)
-        pos, vel, id, group = truth.pos[r], truth.vel[r], truth.id[r], truth.group[r]
-        a, b = np.triu_indices(len(id), 1)
-        distance, differ = (np.hypot(*(x[a] - x[b]).T) for x in (pos, vel))
-        near = distance <= NEAR
-        a, b, distance, differ = a[near], b[near], distance[near], differ[near]
-        design = np.stack([np.ones(len(a)), -distance, -differ], axis=1)
-        found.append((id[a] * people + id[b], np.full(len(a), index), design, (group[a] >= 0) & (group[a] == group[b])))
-    pair, frame, design, same = (np.concatenate(x) for x in zip(*found, strict=True))
-    order = np.lexsort((frame, pair))
-    return TruePairs(pair[order], frame[order], design[order], same[order], 1 / truth.fps)
-
-
-def logistic(design: Array, same: Bools) -> Array:
-    """Returns the weights (3,) of a logistic regression of `same` (R,) on `design` (R, 3), with a normal prior."""
-    weights = np.zeros(design.shape[1])
-    for _ in range(STEPS):
-        p = 1 / (1 + np.exp(-np.clip(design @ weights, -40, 40)))
-        gradient = design.T @ (same - p) - weights / PRIOR**2
-        hessian = (design * (p * (1 - p))[:, None]).T @ design + np.eye(len(weights)) / PRIOR**2
-        step = np.linalg.solve(hessian, gradient)
-        weights = weights + step
-        if np.abs(step).max() < 1e-8:
-            break
-    return weights
-
-
-def _log_loss(sequences: list[TruePairs], weights: Array, rate: float) -> float:
-    from scipy.signal import lfilter
-
-    total, count = 0.0, 0
-    for rows in sequences:
-        g = 1 / (1 + np.exp(-np.clip(rows.design @ weights, -40, 40)))
-        new = -np.expm1(-rate * rows.dt)
-        cuts = np.flatnonzero((np.diff(rows.pair) != 0) | (np.diff(rows.frame) != 1)) + 1
-        for part in np.split(np.arange(len(g)), cuts):
-            if len(part):
-                smooth = lfilter([new], [1, new - 1], g[part], zi=[(1 - new) * g[part[0]]])[0]
-                p = np.clip(smooth, 1e-6, 1 - 1e-6)
-                total -= float(np.log(np.where(rows.same[part], p, 1 - p)).sum())
-                count += len(part)
-    return total / max(count, 1)

@@ -86,16 +86,9 @@ def as_measured(pos: Array, camera: Camera) -> Array:
 
 
 def completed(
-    tracks: Sequence[Tracks],
-    fps: float,
-    px_per_m: float,
-    rule: Grouping | None = None,
-    *,
-    camera: Camera | None,
-    scene: Scene | None,
-    source: str | None = None,
-    image_size: tuple[int, int] | None = None,
-) -> tuple[tuple[Tracks, ...], Ground]:
+    tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None, *, camera: Camera | None,
+    scene: Scene | None, source: str | None = None, image_size: tuple[int, int] | None = None,
+) -> tuple[tuple[Tracks, ...], Ground]:  # fmt: skip
     """Returns the tracks with groups and events filled in, and the ground that was used for them.
 
     If the ground under the boxes is known (`ground_below`), groups are derived from positions there, else as
@@ -122,7 +115,8 @@ def depth_as_measured(tracks: Sequence[Tracks], camera: Camera) -> list[Tracks]:
 
 def _grouped_as(t: Tracks, grouped: Tracks) -> Tracks:
     new = moved_events(grouped.events[len(t.events) :], t.id, t.pos)
-    return t.replace(group=grouped.group, events=(*t.events, *new), derived=True)
+    groups = None if t.momentary else t.groups  # those of the moment have new ids
+    return t.replace(group=grouped.group, groups=groups, events=(*t.events, *new), derived=True)
 
 
 def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> list[Tracks]:

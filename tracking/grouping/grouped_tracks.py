@@ -109,7 +109,7 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
         given = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in given]
     table, events = tabulate(given, fps, px_per_m), list[GroupEvent]()
     if not named or own.get("merge", math.inf) > 1:
-        table, events = _grouped(table, named, given[0].momentary, fps, rule)
+        table, events = _grouped(table, named, named and given[0].momentary, fps, rule)
     events += _crossings_and_queues(table, fps)
     return _filled(given, table, [e for e in events if (e.emitted or e.start) < own.get(e.kind, math.inf)])
 
@@ -169,7 +169,8 @@ def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupE
         new = tuple(sorted(by_frame.pop(t.index, ()), key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
         out.append(t.replace(group=label, events=(*t.events, *new), derived=True))
     groups = groups_in_frames(out, table.scale)
-    return [t.replace(groups=g) if t.groups is None else t for t, g in zip(out, groups, strict=True)]
+    # groups of the moment have new ids
+    return [t.replace(groups=g) if t.groups is None or t.momentary else t for t, g in zip(out, groups, strict=True)]
 
 
 def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:

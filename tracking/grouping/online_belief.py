@@ -13,13 +13,7 @@ import numpy as np
 from sim.truth.merge_split_rules import close_pairs
 from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import DECISIONS, NOW, UNSEEN, default_belief
-from tracking.grouping.pair_evidence import (
-    CHORD,
-    REACH,
-    ExponentialMeans,
-    frames_per_step,
-    instant_evidence,
-)
+from tracking.grouping.pair_evidence import CHORD, REACH, ExponentialMeans, frames_per_step, instant_evidence
 
 PAIR = 2**31  # Numbers of people are below this.
 

@@ -112,7 +112,8 @@ def _picture_files(sequence: Sequence) -> dict[int, Path]:
 def _annotations(
     sequence: Sequence, truth: Truth, boxes: Array, size: tuple[int, int], index: int
 ) -> Iterator[dict[str, Any]]:
-    ids = None if sequence.load_pixels is None else sequence.load_pixels(index).ids
+    # masks are read down the columns
+    ids = None if sequence.load_pixels is None else np.asfortranarray(sequence.load_pixels(index).ids)
     for row in range(*truth.rows(index).indices(len(boxes))):
         box = [round(v, 2) for v in boxes[row].tolist()]
         left, top, right, bottom = _inside(boxes[row], size)

@@ -174,9 +174,9 @@ def is_sequence(folder: Path) -> bool:
 
 
 def is_dataset(path: Path) -> bool:
-    """Returns True if the folder is a stored sequence, a split of a dataset, or a dataset."""
-    names = (f"{below}{name}" for below in ("", "*/", "*/*/") for name in (MANIFEST, "scenario.toml"))
-    return any(found.is_file() for name in names for found in path.glob(name))
+    """Returns True if the folder is a stored sequence, a split of a dataset, or a dataset, perhaps a damaged one."""
+    found = (manifest for below in ("", "*/", "*/*/") for manifest in path.glob(below + MANIFEST))
+    return any(is_ours(manifest, MARKS) is not False for manifest in found)
 
 
 def is_own_sequence(folder: Path) -> bool:
@@ -267,7 +267,7 @@ def reject_runs(folder: Path) -> None:
 
 def reject_sealed(folder: Path) -> None:
     """Raises InputError if `folder` is that of a run or of a stored sequence, into which no export is written."""
-    if is_run(folder) or is_sequence(folder):
+    if is_run(folder) or is_ours(folder / MANIFEST, MARKS):
         got = "a folder of tracks or of a sequence"
         raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=ANOTHER)
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from sim.geometry import polygons
-from sim.geometry.hull_kernels import convex_hulls
+from sim.geometry.hull_kernels import convex_hull, convex_hulls
 from tests.reference_polygons import area, contains, footprint_hull, iou_matrix, polygon_gap
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
@@ -15,7 +15,7 @@ SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
 
 def random_hulls(seed, n, spread=3.0):
     r = np.random.default_rng(seed)
-    return [polygons.convex_hull(r.uniform(0, spread, (r.integers(3, 20), 2)) + r.uniform(-1, 1, 2)) for _ in range(n)]
+    return [convex_hull(r.uniform(0, spread, (r.integers(3, 20), 2)) + r.uniform(-1, 1, 2)) for _ in range(n)]
 
 
 def raster_iou(a, b, step=0.01):
@@ -60,12 +60,12 @@ def test_no_area_no_overlap():
 def test_hull_of_points():
     for seed in range(50):
         points = np.random.default_rng(seed).normal(size=(12, 2))
-        hull = polygons.convex_hull(points)
+        hull = convex_hull(points)
         assert area(hull) == pytest.approx(ConvexHull(points).volume)
         assert len(hull) == len(ConvexHull(points).vertices)
-    assert polygons.convex_hull(np.array([[0, 0], [1, 1], [2, 2], [1, 1.0]])).tolist() == [[0, 0], [2, 2]]
-    assert polygons.convex_hull(np.zeros((3, 2))).tolist() == [[0, 0]]
-    assert polygons.convex_hull(np.zeros((0, 2))).shape == (0, 2)
+    assert convex_hull(np.array([[0, 0], [1, 1], [2, 2], [1, 1.0]])).tolist() == [[0, 0], [2, 2]]
+    assert convex_hull(np.zeros((3, 2))).tolist() == [[0, 0]]
+    assert convex_hull(np.zeros((0, 2))).shape == (0, 2)
 
 
 def places_of(kind, r):
@@ -88,7 +88,7 @@ def test_footprint_hull_is_the_hull_of_all_footprints(kind):
         places = places_of(kind, r)
         hull, slow = (
             footprint_hull(places),
-            polygons.convex_hull((places[:, None] + polygons.FOOTPRINT).reshape(-1, 2)),
+            convex_hull((places[:, None] + polygons.FOOTPRINT).reshape(-1, 2)),
         )
         assert area(hull) == pytest.approx(area(slow), abs=1e-9)
         edge = np.roll(hull, -1, axis=0) - hull
@@ -130,7 +130,7 @@ def test_hulls_are_those_of_each_set_by_itself(seed: int) -> None:
     sets = [r.integers(0, 6, (int(r.integers(0, 12)), 2)).astype(float) for _ in range(30)]
     for points, found in zip(sets, convex_hulls(sets), strict=True):
         if len(np.unique(points, axis=0)) == len(points):
-            np.testing.assert_array_equal(found, polygons.convex_hull(points))
+            np.testing.assert_array_equal(found, convex_hull(points))
 
 
 def test_points_lines_and_nothing() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim.geometry.polygons import convex_hull
+from sim.geometry.hull_kernels import convex_hull
 from sim.scene.body import Ellipsoids, contour, ellipsoids, outlines, person_boxes
 from sim.scene.camera import project
 from sim.truth.group_hulls import box_groups, groups_over_time

@@ -12,7 +12,7 @@ import pytest
 from scenarios.errors import InputError, WorkError
 from sim.workers import cluster
 from sim.workers.pool import start_workers
-from tests.errands import complain, fall, process, refuse, root_of
+from tests.errands import complain, fall, process, profiled, refuse, root_of
 from tests.loopback import Loopback, loopback
 
 pytestmark = pytest.mark.slow
@@ -90,6 +90,12 @@ def test_a_worker_that_is_not_as_we_are(name: str, two: Loopback, monkeypatch: p
     )
     with pytest.raises(WorkError, match=message), start_workers(1, two.address) as run:
         list(run(root_of, [4.0]))
+
+
+@pytest.mark.skipif(sys.version_info >= cluster.PROFILE_SAFE, reason="this Python does not stand still")
+def test_workers_do_without_the_profile_that_may_stop_them(two: Loopback) -> None:
+    with start_workers(1, two.address) as run:
+        assert set(dict(run(profiled, range(8), ahead=8)).values()) == {False}
 
 
 def test_a_scheduler_that_goes_away(tmp_path: Path) -> None:

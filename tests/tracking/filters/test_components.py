@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tests import reference_components as reference
-from tracking.filters.components import Constraint, linked, partition, prefixes
+from tracking.filters.components import Constraint, linked, partition
+from tracking.filters.components_kernels import prefixes
 
 LINK = 1.5
 RULE = Constraint(LINK, 9.21, 0.09 * np.eye(2), 3.0)
@@ -20,11 +21,12 @@ def random_set(r):
     A = r.normal(0, 0.2, (2, 2))
     prior = A @ A.T + 0.01 * np.eye(2)
     least = float(r.choice([0.0, 1.0, 2.0]))
-    return (
-        points,
-        weights,
-        Constraint(float(r.uniform(0.8, 2)), float(r.uniform(2, 9.21)), prior, r.uniform(0.1, 3), least),
-    )
+    rule = Constraint(float(r.uniform(0.8, 2)), float(r.uniform(2, 9.21)), prior, r.uniform(0.1, 3), least)
+    return points, weights, rule
+
+
+def numbers(rule):
+    return rule.link, rule.gate, rule.prior_entries, rule.strength, rule.least
 
 
 def test_every_prefix_of_random_sets() -> None:
@@ -33,7 +35,7 @@ def test_every_prefix_of_random_sets() -> None:
         r = np.random.default_rng(seed)
         points, weights, rule = random_set(r)
         start = int(r.integers(0, len(points) + 1))
-        found = prefixes(points, weights, start, rule)
+        found = prefixes(points, weights, start, *numbers(rule))
         assert np.array_equal(found, reference.prefixes(points, weights, start, rule)), seed
         verdicts += found.tolist()
     assert 0.2 < np.mean(verdicts) < 0.8
@@ -54,8 +56,8 @@ def test_partitions_of_random_sets() -> None:
 def test_nobody_one_and_all_at_the_same_place() -> None:
     none = np.zeros((0, 2))
     assert linked(none, LINK).shape == partition(none, np.zeros(0), RULE).shape == (0,)
-    assert prefixes(none, np.zeros(0), 0, RULE).tolist() == [False]
+    assert prefixes(none, np.zeros(0), 0, *numbers(RULE)).tolist() == [False]
     assert partition(np.ones((1, 2)), np.ones(1), RULE).tolist() == [0]
-    assert prefixes(np.ones((1, 2)), np.ones(1), 1, RULE).tolist() == [True]
+    assert prefixes(np.ones((1, 2)), np.ones(1), 1, *numbers(RULE)).tolist() == [True]
     assert not partition(np.ones((50, 2)), np.ones(50), RULE).any()
-    assert prefixes(np.ones((50, 2)), np.ones(50), 0, RULE).tolist() == [False] + 50 * [True]
+    assert prefixes(np.ones((50, 2)), np.ones(50), 0, *numbers(RULE)).tolist() == [False] + 50 * [True]

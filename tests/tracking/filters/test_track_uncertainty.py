@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.errors import InputError
 from tracking.filters import kalman, track_uncertainty
 from tracking.filters.track_uncertainty import Dynamics
-from tracking.papers.blob.config import BlobConfig
 
 MADE = Dynamics(0.04, np.array([2.0, 2.0, 1.0, 1.0]), np.full(4, 0.01), np.full(4, 1.5**2))
 
@@ -47,9 +45,3 @@ def test_rho_does_not_see_the_measured_values(seed):
     pattern = np.random.default_rng(seed).random(80) < 0.5
     first, second = (follow(MADE, pattern, np.random.default_rng(k)) for k in (1, 2))
     assert np.array_equal(first, second)
-
-
-def test_a_newborn_that_would_be_confirmed_at_once_is_refused():
-    with pytest.raises(InputError, match="confirm_ratio"):
-        BlobConfig(management="rho", accel_noise=10.0, speed_prior=0.1).dynamics(2.5)
-    assert BlobConfig().dynamics(2.5).dt == 0.4

@@ -11,7 +11,7 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tracking.fitting import joint_events
-from tracking.fitting.relational import LABELS, fit_observed, fit_relational, logistic
+from tracking.fitting.relational import LABELS, fit_observed, fit_relational
 from tracking.papers.relational.config import RelationalConfig
 
 
@@ -59,22 +59,6 @@ def test_without_events_nothing_is_fitted():
 
 
 ENDS = RelationalConfig().speed_ends
-
-
-def test_logistic_regression_finds_its_weights():
-    rng = np.random.default_rng(0)
-    design = np.stack([np.ones(40_000), -rng.exponential(2, 40_000), -rng.exponential(0.5, 40_000)], axis=1)
-    true = np.array([3.0, 1.5, 4.0])
-    same = rng.random(40_000) < 1 / (1 + np.exp(-design @ true))
-    np.testing.assert_allclose(logistic(design, same), true, rtol=0.05)
-
-
-def test_pairs_that_a_line_separates_have_finite_weights():
-    distance = np.linspace(0, 4, 400)
-    weights = logistic(np.stack([np.ones(400), -distance, np.zeros(400)], axis=1), distance < 1.5)
-    assert weights[0] / weights[1] == pytest.approx(1.5, abs=0.05)
-    assert weights[2] == 0
-    assert 3 < weights[1] < 30
 
 
 def test_a_table_learned_from_observations_has_their_errors():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from scenarios.errors import InputError, counted
 from tracking.app import option_parsing
 from tracking.app.command_options import GenerateOptions, ReplayCommandOptions, ValidateOptions
@@ -31,14 +33,15 @@ def generate(options: GenerateOptions) -> CommandResult:
 
 def validate(options: ValidateOptions) -> CommandResult:
     """Checks a generated sequence or dataset, or stored tracks; changes nothing."""
-    from sim.io.source import holds_sequences
     from sim.io.store.validate import content_hash
     from sim.io.store.validate import validate as check
 
     folder = options.folder
     problems = check(folder)
     if not problems:
-        content = content_hash(folder) if holds_sequences(folder) else None
+        content = None
+        with suppress(InputError):  # of runs, and of what lies beside recordings, there is none
+            content = content_hash(folder)
         text = f"{folder}: no problems" + ("" if content is None else f"; content {content[:16]}")
         return CommandResult({"problems": [], "content_hash": content}, text)
     lines = [problem.line() for problem in problems]

@@ -1,5 +1,5 @@
 """`flockscope fit`: the errors of a detector, from recordings; and from simulated truth the belief of who belongs
-together, the events of `joint`, and the speed table and relations of `relational`.
+together, the events of `joint`, and the speed table of `relational`.
 """
 
 from __future__ import annotations

@@ -18,14 +18,14 @@ from sim.io.files.own_files import GENERATOR
 from sim.io.pictures.video_files import write_video
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app.replay_page.video import even_size, refuse_source, shown_pictures
-from tracking.drawing.canvas import Canvas
-from tracking.drawing.layer_painting import draw_banner, draw_captions, letter_size, paint_layer
+from tracking.drawing.canvas import FLOOR, Canvas, colour, text
+from tracking.drawing.layer_painting import ALARM, draw_captions, draw_label, letter_size, paint_layer
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.running.run import grouped
 
 LOW = 400  # px: pictures less high than this are shown at twice their size.
 
-BANNER_HEIGHT = 32
+BANNER_HEIGHT, LETTERS = 32, 0.55  # px, and size of the letters: of the line above each picture
 
 
 def write_overlay(
@@ -78,8 +78,10 @@ def overlay_pictures(sequence: Sequence, layers: SequenceOf[Layer]) -> Iterator[
     """Yields the video's pictures, BGR uint8, one per frame, of even width and height."""
     for frame, picture in shown_pictures(sequence):
         body = _drawn(picture, sequence.fps, frame.index, layers)
-        banner = np.zeros((BANNER_HEIGHT, body.shape[1], 3), np.uint8)
-        draw_banner(banner, banner_words(sequence, frame, layers), "lost frame" if frame.image is None else "", 0.55)
+        banner = np.full((BANNER_HEIGHT, body.shape[1], 3), FLOOR, np.uint8)
+        text(banner, banner_words(sequence, frame, layers), (6, BANNER_HEIGHT / 2 + 5), LETTERS)
+        if frame.image is None:
+            draw_label(banner, "lost frame", (body.shape[1], BANNER_HEIGHT / 2 + 10), LETTERS, colour(ALARM))
         yield even_size(np.concatenate([banner, body]))
 
 

@@ -33,14 +33,6 @@ class Bar(NamedTuple):
     size: int  # most people in one of its frames, rounded
 
 
-class Link(NamedTuple):
-    """Group `a` becomes or joins group `b`, a link between their bars; both are ids."""
-
-    frame: int  # when a tracker reported it; of truth the event's first frame
-    a: int
-    b: int
-
-
 def bars(frame: Ints, group: Ints, people: Array | None = None) -> list[Bar]:
     """Returns the bars of the timeline, one per unbroken life of a group, sorted by first frame.
 
@@ -74,10 +66,10 @@ def _in_lanes(lives: list[tuple[int, int, int, int]]) -> list[Bar]:
     return made
 
 
-def links(events: Iterable[GroupEvent]) -> list[Link]:
+def links(events: Iterable[GroupEvent]) -> list[tuple[int, int, int]]:
     """Returns a link for each merge or split and each pair of a group before and another group after it."""
     return [
-        Link(event.start if event.emitted is None else event.emitted, a, b)
+        (event.start if event.emitted is None else event.emitted, a, b)
         for event in events
         if event.kind in ("merge", "split")
         for a in sorted(set(event.before) - {-1})

@@ -9,7 +9,7 @@ import numpy as np
 
 from tracking.config import param
 from tracking.detect.background_settings import BackgroundSettings
-from tracking.filters.track_uncertainty import Dynamics, check_birth
+from tracking.filters.track_uncertainty import Dynamics
 
 SIZE_RATE_PRIOR = 0.2  # m/s: standard deviation of the rate of a new track's height and width.
 CONFIRM_GATE = 0.99  # Share of a track's own measurements that the gate of the confirming measurement holds.
@@ -56,14 +56,9 @@ class BlobConfig(BackgroundSettings):
         # Acceleration noises are roots of spectral densities, so that a step has sigma = noise / sqrt(dt) (ours).
         root = np.sqrt(fps)
         accel, size = self.accel_noise * root, self.size_accel_noise * root
-        made = Dynamics(
+        return Dynamics(
             1.0 / fps,
             np.array([accel, accel, size, size]),
             np.square([self.position_noise, self.position_noise, self.size_noise, self.size_noise]),
             np.square([self.speed_prior, self.speed_prior, SIZE_RATE_PRIOR, SIZE_RATE_PRIOR]),
         )
-        if (
-            self.management == "rho" and made.dt <= self.tentative_time
-        ):  # else a new track has its first measurement only to be confirmed by
-            check_birth(made, self.confirm_ratio)
-        return made

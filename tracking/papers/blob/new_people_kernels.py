@@ -16,27 +16,21 @@ from tracking.papers.blob import person_template_search_kernels as search
 from tracking.papers.blob.person_look_kernels import POINTS
 from tracking.papers.blob.person_template_kernels import Cover, kernel
 
+EVIDENCE = 1000.0  # log-likelihood of full support: so large that the first guess hardly restrains a template
+
 
 @kernel
 def fit_new_people(
-    foreground: Bools,
-    cover: Cover,
-    guesses: Array,
-    most: int,
-    person: float,
-    support: float,
-    spread: Array,
-    nats: float,
+    foreground: Bools, cover: Cover, guesses: Array, most: int, person: float, support: float, spread: Array
 ) -> Array:
     """Returns the templates (K, 4) x, foot, h, w, px, of the best number of people in a region, 0 to `most`; paints
     them.
 
     foreground (H, W) bool; cover (H, W): painted templates per pixel, changed in place. guesses (1 + 2 + … + most, 4):
     first places for 1, 2, … people, one number after the other; from there fit_places moves them, with `spread` (one
-    row per guess: standard deviation of x and foot, px) and `nats`, the log-likelihood of full support. person: area of
-    a person, px^2. The best number has the largest joint support in units of `person`, less `support` for each person.
-    Joint support: covered pixels, 1 for foreground, -1/2 for background. Each template must have the share `support` of
-    its own.
+    row per guess: standard deviation of x and foot, px). person: area of a person, px^2. The best number has the
+    largest joint support in units of `person`, less `support` for each person. Joint support: covered pixels, 1 for
+    foreground, -1/2 for background. Each template must have the share `support` of its own.
     """
     best, worth = np.zeros((0, 4)), 0.0
     no_image, no_looks = np.zeros((0, 0, 3), np.uint8), np.zeros((0, POINTS, 5))
@@ -44,7 +38,7 @@ def fit_new_people(
     for count in range(1, most + 1):
         one, far = guesses[first : first + count], spread[first : first + count]
         first += count
-        at = search.fit_places(foreground, cover, one, far, nats, no_image, no_looks)
+        at = search.fit_places(foreground, cover, one, far, EVIDENCE, no_image, no_looks)
         alone = kernels.supports(foreground, cover, at, 1)
         kernels.paint_all(cover, at, -1)
         value = joint_support(foreground, cover, at) / person - count * support

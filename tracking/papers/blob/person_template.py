@@ -34,7 +34,6 @@ LEAST = 0.3  # a region smaller than this share of a person's area is ignored
 MOST = 6  # most people found in one region in a frame
 LOWEST = 0.98  # quantile of the rows of a part's pixels at which its foot is guessed
 ROAM = 0.25  # standard deviation of a first guess, of a person's height
-EVIDENCE = 1000.0  # log-likelihood of full support: so large that the first guess hardly restrains a template
 
 
 class ExplainedForeground:
@@ -112,7 +111,7 @@ def _in_region(scene: ExplainedForeground, guesses: Array, person: float, suppor
     most = int((np.sqrt(8 * sure + 1) - 1) / 2)  # 1 + 2 + ... + most <= sure
     guesses = guesses[: most * (most + 1) // 2]
     spread = np.maximum(ROAM * guesses[:, 2:3], 1.0) * np.ones(2)
-    return new.fit_new_people(scene.foreground, scene.cover, guesses, most, person, support, spread, EVIDENCE)
+    return new.fit_new_people(scene.foreground, scene.cover, guesses, most, person, support, spread)
 
 
 def _guesses(found: blobs.Blobs, row: int, most: int, size: PersonSize) -> Array:

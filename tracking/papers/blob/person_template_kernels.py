@@ -28,14 +28,15 @@ kernel = njit(cache=True)
 
 
 @kernel
-def column_range(x: float, half: float, width: int) -> tuple[int, int]:
-    """Returns first column and last column + 1 of the pixels whose centre is at most `half` px from x, in an image's
-    row.
+def column_range(x: float, half: float, low: np.int32, high: np.int32) -> tuple[np.int32, np.int32]:
+    """Returns first column and last column + 1, counted from `low`, of the pixels whose centre is at most `half` px
+    from x.
 
-    width: columns of the image, to which the range is cut. Without such a pixel the second is not above the first.
+    Only columns low to high - 1 count; both results are equal if there is no such column.
     """
-    left, right = int(np.ceil(x - half - 0.5)), int(np.floor(x + half - 0.5)) + 1
-    return min(max(left, 0), width), min(max(right, 0), width)
+    left, right = np.int32(np.ceil(x - half - 0.5)), np.int32(np.floor(x + half - 0.5)) + np.int32(1)
+    left = min(max(left, low), high)
+    return left - low, min(max(right, left), high) - low
 
 
 @kernel
@@ -93,7 +94,7 @@ def paint(cover: Cover, template: Array, more: int) -> None:
     for row in range(low, high):
         half = half_width(row, foot, h, w)
         if half > 0:
-            left, right = column_range(x, half, cover.shape[1])
+            left, right = column_range(x, half, np.int32(0), np.int32(cover.shape[1]))
             for column in range(left, right):
                 cover[row, column] += more
 
@@ -136,7 +137,7 @@ def count_pixels(foreground: Bools, cover: Cover, template: Array, covered: int)
     for row in range(low, high):
         half = half_width(row, foot, h, w)
         if half > 0:
-            left, right = column_range(x, half, cover.shape[1])
+            left, right = column_range(x, half, np.int32(0), np.int32(cover.shape[1]))
             for column in range(left, right):
                 own = cover[row, column] == covered
                 bare += own
@@ -202,7 +203,7 @@ def visible_share(cover: Cover, templates: Array) -> Array:
         for row in range(low, high):
             half = half_width(row, foot, h, w)
             if half > 0:
-                left, right = column_range(x, half, cover.shape[1])
+                left, right = column_range(x, half, np.int32(0), np.int32(cover.shape[1]))
                 for column in range(left, right):
                     bare += not (hidden[row, column] or cover[row, column] >= EXPLAINED)
                     hidden[row, column] = True

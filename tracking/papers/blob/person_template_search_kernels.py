@@ -12,24 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.types import Array, Bools, Image
+from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob.person_look_kernels import look_fits
-from tracking.papers.blob.person_template_kernels import (
-    EMPTY,
-    FOOT,
-    HALVES,
-    HEIGHT,
-    Cover,
-    X,
-    area,
-    boxes_touch,
-    half_width,
-    kernel,
-    near_first,
-    paint,
-    paint_all,
-    row_range,
-    window,
-)
+from tracking.papers.blob.person_template_kernels import FOOT, HEIGHT, Cover, X, kernel
 
 Whole = NDArray[np.int32]
 STEPS_PER_HEIGHT = 24  # a coarse step is the template's height over this, but at least 1 px; a fine step is half of it
@@ -37,18 +22,6 @@ MOST_STEPS = 8  # most steps in each direction of the coarse grid, which reaches
 FINE_STEPS = 2  # steps in each direction of the fine grid, and fewest of the coarse grid
 LOOK_EVIDENCE = 3.0  # nats: weight of the mean log-likelihood ratio of a look's points, which are not independent
 SWEEPS = 3  # most sweeps over all templates: the first on the coarse grid, the others on the fine grid
-
-
-@kernel
-def column_range_within(x: float, half: float, low: np.int32, high: np.int32) -> tuple[np.int32, np.int32]:
-    """Returns first column and last column + 1, counted from `low`, of the pixels whose centre is at most `half` px
-    from x.
-
-    Only columns low to high - 1 count; both results are equal if there is no such column.
-    """
-    left, right = np.int32(np.ceil(x - half - 0.5)), np.int32(np.floor(x + half - 0.5)) + np.int32(1)
-    left = min(max(left, low), high)
-    return left - low, min(max(right, left), high) - low
 
 
 @kernel
@@ -61,7 +34,7 @@ def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: in
     (4,): x, foot, h, w, px, not painted. Pixels outside the image count 0.
     """
     x, foot, h, w = template
-    low, high, left, right = window(template, steps * step, cover.shape)
+    low, high, left, right = kernels.window(template, steps * step, cover.shape)
     n = 2 * steps + 1
     found = np.zeros((n, n), np.int32)
     if high <= low or right <= left:
@@ -72,12 +45,12 @@ def worth_when_moved(foreground: Bools, cover: Cover, template: Array, steps: in
     sums = row_sums(foreground[low:high, left:right], cover[low:high, left:right])
     for i in range(n):
         down = foot + (i - steps) * step
-        first, last = row_range(down, h, cover.shape[0])
+        first, last = kernels.row_range(down, h, cover.shape[0])
         for row in range(first, last):
-            half = half_width(row, down, h, w)
+            half = kernels.half_width(row, down, h, w)
             if half > 0:
                 for j in range(n):
-                    begin[j], end[j] = column_range_within(middle[j], half, np.int32(left), np.int32(right))
+                    begin[j], end[j] = kernels.column_range(middle[j], half, np.int32(left), np.int32(right))
                 for j in range(n):
                     found[i, j] += sums[row - low, end[j]] - sums[row - low, begin[j]]
     return found
@@ -95,7 +68,7 @@ def row_sums(foreground: Bools, cover: Cover) -> Whole:
         total = 0
         sums[row, 0] = 0
         for column in range(cover.shape[1]):
-            worth = HALVES if foreground[row, column] else EMPTY
+            worth = kernels.HALVES if foreground[row, column] else kernels.EMPTY
             total += worth if cover[row, column] == 0 else 0
             sums[row, column + 1] = total
     return sums
@@ -139,7 +112,7 @@ def best_place(worth: Array, step: float, at: Array, expected: Array, spread: Ar
 def touches_another(templates: Array, k: int) -> bool:
     """Returns True if the box of template k touches that of another of the templates (K, 4)."""
     for other in range(len(templates)):  # noqa: SIM110  (numba has no `any` of a generator)
-        if other != k and boxes_touch(templates[k], templates[other]):
+        if other != k and kernels.boxes_touch(templates[k], templates[other]):
             return True
     return False
 
@@ -158,21 +131,21 @@ def fit_places(
     `best_place`. foreground, cover (H, W). spread (K, 2): standard deviation, px, of the expected x and foot. evidence:
     log-likelihood of full support. image (H, W, 3) BGR; looks (K, POINTS, 5), or (0, POINTS, 5) to ignore looks.
     """
-    found, order = templates.copy(), near_first(templates)
-    paint_all(cover, found, 1)
+    found, order = templates.copy(), kernels.near_first(templates)
+    kernels.paint_all(cover, found, 1)
     for sweep in range(SWEEPS):
         any_moved = False
         for k in order:
-            paint(cover, found[k], -1)
+            kernels.paint(cover, found[k], -1)
             steps, step = grid(found[k, HEIGHT], spread[k], sweep > 0)
             halves = worth_when_moved(foreground, cover, found[k], steps, step)
-            worth = evidence * (halves / HALVES) / area(found[k], cover.shape[0], cover.shape[1])
+            worth = evidence * (halves / kernels.HALVES) / kernels.area(found[k], cover.shape[0], cover.shape[1])
             if len(looks) and touches_another(found, k):
                 worth += LOOK_EVIDENCE * look_fits(image, cover, found, k, looks[k], steps, step)
             x, foot = best_place(worth, step, found[k], templates[k], spread[k])
             any_moved |= x != found[k, X] or foot != found[k, FOOT]
             found[k, X], found[k, FOOT] = x, foot
-            paint(cover, found[k], 1)
+            kernels.paint(cover, found[k], 1)
         if not any_moved:
             break
     return found

@@ -38,9 +38,7 @@ without a parameter that switches it off holds in the preset `paper`, too.
 - scale of a track: its longer side is 1.7 m, but at most a factor of 2 from the image's scale; from straight above the
   image's. An unknown scale of the image follows from the first boxes, or from lone blobs. Paper: none. Why: near people
   are larger.
-- first P: R, `speed_prior` and 0.2 m/s for sizes, at rest. With "rho", values by which the first measurement after
-  birth would confirm raise InputError, unless a frame is longer than `tentative_time`. Paper: not stated. Why: a filter
-  needs it.
+- first P: R, `speed_prior` and 0.2 m/s for sizes, at rest. Paper: not stated. Why: a filter needs it.
 - deletion: also missed tracks outside the image. Paper: ρ. Why: they do not come back.
 - deletion, with "rho": missed tracks by ρ: confirmed ones 2 % below its value after `coast_time` of misses from the
   steady state, tentative ones at its value at birth; tentative ones, missed or not, also after `tentative_time`. Paper:
@@ -140,9 +138,8 @@ class Blob:
         """Deletes all tracks and starts a sequence, from pixels if the context has a background sample, else boxes.
 
         Ids begin at 1 again. `seed` is not used. If the image's size is unknown, it is taken from the background
-        sample. Raises InputError if the config's noises confirm new tracks at once. From pixels it is also raised if
-        the sample has a wrong shape or dtype, too few frames or shows no background, or if the scale px_per_m is zero
-        or negative (nan: it is learned).
+        sample. From pixels, raises InputError if the sample has a wrong shape or dtype, too few frames or shows no
+        background, or if the scale px_per_m is zero or negative (nan: it is learned).
         """
         c = self.config
         if context.image_size is None and context.background is not None:
@@ -166,13 +163,11 @@ class Blob:
         measurement. From pixels a frame without image, or with too much foreground, is one. If `config` was replaced
         since the last frame, all tracks go on with the new one.
 
-        Raises InputError if the new config is invalid at this frame rate (nothing is changed then), if the picture's
-        size or dtype is not the background sample's, or if there are boxes and the scale px_per_m is unknown, zero or
-        negative.
+        Raises InputError if the picture's size or dtype is not the background sample's, or if there are boxes and the
+        scale px_per_m is unknown, zero or negative.
         """
         if self.config is not self.people.config:
-            dynamics = self.config.dynamics(self.context.fps)
-            self.people.follow(self.config, dynamics)
+            self.people.follow(self.config, self.config.dynamics(self.context.fps))
             self.updater.follow(self.config)
         self.updater.step(frame, detections)
         camera, every = self.context.camera, np.arange(len(self.people.id))

@@ -121,10 +121,7 @@ class PixelUpdater:
         foreground.adapt(seen, self._protected())
         if len(found) and (frame.t >= self.learn_at or len(self.size.lone) < KEPT):
             self.learn_at = frame.t + SIZE_TIME
-            alone = ~self._several_expected(found.box, people.upright_boxes())
-            if self.size.reliable:
-                alone &= self.size.one_person(found.box, found.ellipse)
-            self.size.learn(found.box, found.ellipse, alone & ~found.cut())
+            self.size.learn(found.box, found.ellipse, self._lone_people(found, people.upright_boxes()))
             foreground.take_scale(self.size)
 
     def _protected(self) -> Bools:
@@ -181,19 +178,16 @@ class PixelUpdater:
         person_look_kernels.learn(image, at, people.look, rows[shares[rows] >= LEARN_SHOWN], gain)
 
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
-        one = self.size.one_person(found.box, found.ellipse)
-        return np.asarray(one & ~found.cut() & ~self._several_expected(found.box, expected))
+        one = not self.size.reliable or self.size.one_person(found.box, found.ellipse)
+        sure, blobs = expected[self.people.confirmed], box_geometry.centred_from_ltwh(found.box)
+        several = (box_geometry.covered_share(sure, blobs) >= SHARED).sum(0) > 1
+        return np.asarray(one & ~found.cut() & ~several)
 
     def _person_boxes(self, upright: Array) -> Array:
         return np.concatenate([upright[:, :2], upright[:, 2:] * self.size.box_over_ellipse], 1)
 
     def _person_ellipses(self, box: Array) -> Array:
         return box_geometry.inscribed_ellipses(np.concatenate([box[:, :2], box[:, 2:] / self.size.box_over_ellipse], 1))
-
-    def _several_expected(self, box: Array, expected: Array) -> Bools:
-        sure = expected[self.people.confirmed]
-        blobs = box_geometry.centred_from_ltwh(box)
-        return np.asarray((box_geometry.covered_share(sure, blobs) >= SHARED).sum(0) > 1)
 
     def _associate(self, z: Array, angle_var: Array) -> tuple[Measured, Ints, Array]:
         d2, log_det = self.people.directed_innovations(z, self._gated_direction(angle_var))

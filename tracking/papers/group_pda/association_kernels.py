@@ -157,7 +157,7 @@ def associate(
             # m_g (eq. 4.1)
             feasible = prefixes(
                 mine, people, start, rules[LINK], rules[GATE], prior, rules[PRIOR_WEIGHT], rules[LEAST_WEIGHT]
-            )[0]
+            )
         taken = 0
         if feasible.any():
             best = _estimate(

@@ -62,10 +62,8 @@ class People(Candidates):
 
     def add(self, new: Newcomers, rows: Bools) -> None:
         """Adds the newcomers `rows` (M,)."""
-        ids = self.next_id + np.arange(rows.sum())
-        self.extend(
-            id=ids, group=np.full(len(ids), NEW), states=new.states[rows], size=new.size[rows], key=new.key[rows]
-        )
+        ids, group = self.next_id + np.arange(rows.sum()), np.full(rows.sum(), NEW)
+        self.extend(id=ids, group=group, states=new.states[rows], size=new.size[rows], key=new.key[rows])
         self.next_id += len(ids)
 
 

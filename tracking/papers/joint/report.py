@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Groups, Ints
+from sim.types import Array, Ints
 from tracking.papers.joint import partition_labels_kernels
 
 
@@ -22,8 +22,3 @@ def histogram_partition(label: Ints, weights: Array) -> Ints:
     partition_labels_kernels.head_votes(label, weights, votes)
     head = votes.argmax(axis=1)
     return np.where(np.bincount(head, minlength=len(head))[head] > 1, head, -1)
-
-
-def no_groups(group: Ints) -> Groups | None:
-    """Returns empty `Groups` if nobody is in a group; else None, so that groups are derived from the group ids."""
-    return Groups.none() if (group < 0).all() else None

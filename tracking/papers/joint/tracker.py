@@ -99,7 +99,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
+from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Tracks
 from tracking.detect.point_detections import PointTracker, boxes_at, followed_sizes
 from tracking.filters import existence
 from tracking.filters.person_streams import NOBODY, PersonStreams
@@ -233,7 +233,7 @@ class Joint(PointTracker):
         self.shown = boxes_at(pos, self.people.size[shown]) if self.plane == "image" else None
         return Tracks(
             frame.index, frame.t, self.plane, "person", id, group, pos, vel, cov, self.shown, np.ones(len(id)),
-            report.no_groups(group), momentary=True, seen=seen[shown],
+            Groups.none() if (group < 0).all() else None, momentary=True, seen=seen[shown],
         )  # fmt: skip
 
     def _groups(self) -> Ints:

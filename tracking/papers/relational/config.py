@@ -16,18 +16,6 @@ from sim.types import Array
 from tracking.config import param
 from tracking.detect.background_settings import BackgroundSettings
 
-# Resampled particles are drawn apart by a kernel of so many optimal widths, if people have own weights (ours).
-KERNEL_WIDTH = 1.0
-# People with own weights are resampled if their effective number is at most this share of the particles (ours).
-RESAMPLE_SHARE = 0.5
-# Least probability that a detection is nobody's for it to start a person; the paper does not say which starts one.
-BIRTH_DOUBT = 0.5
-LEAST_EXISTENCE = 0.02  # A person whose existence is less probable is removed (ours).
-NEWCOMER_SHARE = 0.5  # Probability that a new person near a group belongs to it (sec. 3.2).
-# m: half the width of a body that hides others from a known camera (ours); not with the paper's sensor.
-BODY_RADIUS = 0.25
-SPEED_PRIOR = 1.3  # m/s: standard deviation of a new person's velocity, per axis, that of walking people.
-
 
 @dataclass(frozen=True)
 class ParticleConfig(BackgroundSettings):

@@ -63,26 +63,23 @@ def covered_by_people(particles: ParticleSet, camera: Camera | None, radius: flo
     if camera is not None and camera.kind == "pinhole" and radius > 0:
         axes = np.ascontiguousarray(np.moveaxis(p.pos, 2, 0))
         mean = np.stack([particle_set_kernels.column_sums(p.weights, places) for places in axes], axis=1)
-        body = np.array([HEIGHT, radius, LEAST_VISIBLE])
-        cover(p.pos, p.weights, mean, p.existence, camera.position, body, hidden, cut)
+        cover(p.pos, p.weights, mean, p.existence, camera.position, radius, hidden, cut)
     return hidden, cut
 
 
 @njit(cache=True)
 def cover(
-    pos: Array, weights: Array, mean: Array, exist: Array, eye: Array, body: Array, hidden: Array, cut: Array
+    pos: Array, weights: Array, mean: Array, exist: Array, eye: Array, radius: float, hidden: Array, cut: Array
 ) -> None:
     """Writes the probabilities (K,) that each person is hidden behind another one, and that the feet are.
 
     pos (P, K, 2), m; weights (P, K): of the particles, sum 1 for each person; mean (K, 2): of the places, m; exist
-    (K,): probability that each person exists; eye (3,): the camera, m. body (3,): height and half the width, m; a
-    person is hidden if a smaller share of the body than the third number is visible.
+    (K,): probability that each person exists; eye (3,): the camera, m. radius: half the width of a body, m.
 
     Another person at the mean place covers the share 1 - d / (2 radius) of the body's width, d being the distance to
     the line of sight, and the body's height up to where the line of sight over the other's head meets it.
     """
     particles, n, _ = pos.shape
-    height, radius, least = body[0], body[1], body[2]
     for k in range(n):
         for other in range(n):
             to_x, to_y = mean[other, 0] - eye[0], mean[other, 1] - eye[1]
@@ -100,12 +97,12 @@ def cover(
                 if along <= 0.0 or along >= 1.0:
                     continue
                 side = abs(x * to_y - y * to_x) / math.sqrt(square)
-                top = eye[2] - (eye[2] - height) / along
+                top = eye[2] - (eye[2] - HEIGHT) / along
                 if side >= 2.0 * radius or top <= 0.0:
                     continue
                 share = 1.0 - side / (2.0 * radius)
                 low += weights[p, k] * share
-                if 1.0 - share * min(top / height, 1.0) < least:
+                if 1.0 - share * min(top / HEIGHT, 1.0) < LEAST_VISIBLE:
                     behind += weights[p, k]
             cut[k] = max(cut[k], exist[other] * low)
             hidden[k] = max(hidden[k], exist[other] * behind)

@@ -131,10 +131,10 @@ class ParticleSet:
         self.weights[:, few] = 1 / self.count
         return few
 
-    def spread(self, members: Ints, width: float, normals: Array) -> None:
-        """Draws the particles of members (R,) apart by a kernel of so many optimal widths, which keeps their moments;
+    def spread(self, members: Ints, normals: Array) -> None:
+        """Draws the particles of members (R,) apart by a kernel of the optimal width, which keeps their moments (ours);
         normals (R, 4, P): standard normals."""
-        h = min(width * (4 / (self.count * 6)) ** (1 / 8), 1.0)
+        h = (4 / (self.count * 6)) ** (1 / 8)
         state = np.concatenate([self.pos[:, members], self.vel[:, members]], axis=2)
         state = np.ascontiguousarray(state.transpose(1, 2, 0))
         mean = state.mean(axis=2, keepdims=True)
@@ -157,12 +157,8 @@ class ParticleSet:
         no relations; their weights are equal, or the particles' one weight."""
         count, k, new = self.count, self.people, pos.shape[1]
         weights = self.weights[:, :1] if self.one_weight and k else np.full((count, 1), 1 / count)
-        added = {
-            "weights": np.repeat(weights, new, axis=1),
-            "pos": pos,
-            "vel": vel,
-            "exist": np.full((count, new), exist),
-        }
+        exists = np.full((count, new), exist)
+        added = {"weights": np.repeat(weights, new, axis=1), "pos": pos, "vel": vel, "exist": exists}
         for name, values in added.items():
             setattr(self, name, np.concatenate([getattr(self, name), np.ascontiguousarray(values)], axis=1))
 
@@ -207,14 +203,12 @@ def near_pairs(pos: Array, rules: Array) -> Ints:
 
 
 @np.errstate(over="ignore")
-def join(
-    pos: Array, exist: Array, label: Ints, points: Array, share: float, uniforms: Array, rules: Array
-) -> tuple[Ints, Bools]:
+def join(pos: Array, exist: Array, label: Ints, points: Array, uniforms: Array, rules: Array) -> tuple[Ints, Bools]:
     """Relates M new people, the last slots, to the groups that they join in each particle, one after the other (sec.
     3.2). Returns their pairs (N, 2) and relations (N, P); the groups label (P, K) of the new people are changed.
 
     pos (P, K, 2), m; exist (P, K): with the new people; points (M, 2), m: where they were detected; uniforms (M, P) in
-    [0, 1); rules (4,). With the probability `share` (the paper: 1/2) a person joins a group, people alone being groups
+    [0, 1); rules (4,). With the probability NEWCOMER_SHARE a person joins a group, people alone being groups
     of one; which one is drawn in proportion to the belonging at the distance of the group's nearest member, at equal
     velocities (ours). Where these sum to less than 1, the person is alone with what is missing. People whose belonging
     is below FAR in all particles are left out, so that the cost of a person is that of the neighbours.
@@ -227,7 +221,7 @@ def join(
     for m, point in enumerate(points):
         new, related = old + m, np.zeros((old + m, len(pos)), bool)
         near = np.flatnonzero(close[m, :new])
-        transition_kernels.join(pos, exist, label, point, near, new, share, uniforms[m], rules, related)
+        transition_kernels.join(pos, exist, label, point, near, new, uniforms[m], rules, related)
         others = np.flatnonzero(related.any(axis=1))
         pairs.append(np.column_stack([others, np.full(len(others), new)]))
         relations.append(related[others])

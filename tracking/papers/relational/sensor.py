@@ -8,8 +8,6 @@ person, all others averaged; factors of the partners of missed people.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from sim.types import Array, Bools, Ints
@@ -29,25 +27,15 @@ ALMOST = 1 - 1e-9  # Largest probability of a detection (ours).
 LEAST_MISS = 1e-6  # Least weight of a person without detection in the average over others, which divides by it.
 
 
-@dataclass(frozen=True)
-class Sight:
-    """What is known of K people before a frame's detections.
+def weigh(
+    particles: ParticleSet, points: Array, detect: Array, missed: Bools, cut: Array, eye: Array, noise: float,
+    config: ParticleConfig,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Multiplies the weights of the particles by p(z_t | s^a_t), updates existence, and returns three probabilities.
 
     detect (K,): probability that each person is measured if existing; missed (K,): True for people who were not
     measured in the last frame with a measurement; cut (K,): probability that the feet are hidden behind another person;
     eye (2,): place of the camera on the ground, m, nan if unknown.
-    """
-
-    detect: Array
-    missed: Bools
-    cut: Array
-    eye: Array
-
-
-def weigh(
-    particles: ParticleSet, points: Array, sight: Sight, noise: float, config: ParticleConfig
-) -> tuple[Array, Array, Array]:
-    """Multiplies the weights of the particles by p(z_t | s^a_t), updates existence, and returns three probabilities.
 
     Returned are the probabilities that person and detection belong together, (K, M), weighted over particles; that each
     person, if existing, is measured, (K,); and that each detection is no known person's, (M,).
@@ -59,15 +47,15 @@ def weigh(
     if certain:
         pairs, logs, marginals = _complete(particles, points, noise)
     else:
-        detect = np.minimum(sight.detect, ALMOST)
-        pairs, density, mean = _pairs(particles, points, sight, detect, noise, config)
+        detect = np.minimum(detect, ALMOST)
+        pairs, density, mean = _pairs(particles, points, detect, cut, eye, noise, config)
         free = free_detections(mean, np.maximum(1 - particles.existence * detect, LEAST_MISS))
         logs, measured = np.empty((2, *particles.exist.shape))
         marginals = np.empty(density.shape)
         sensor_kernels.person_sums(
             density, pairs, particles.exist, detect, config.clutter_density, free, logs, marginals, measured
         )
-        add_partner_factors(particles, sight.missed, logs)
+        add_partner_factors(particles, missed, logs)
         unseen = particles.exist * (1 - detect) / np.maximum(1 - particles.exist * detect, np.finfo(float).tiny)
         particles.exist = np.minimum(measured + (1 - measured) * unseen, 1.0)
     particles.weigh(logs)
@@ -91,15 +79,15 @@ def _complete(particles: ParticleSet, points: Array, noise: float) -> tuple[Ints
 
 
 def _pairs(
-    particles: ParticleSet, points: Array, sight: Sight, detect: Array, noise: float, config: ParticleConfig
+    particles: ParticleSet, points: Array, detect: Array, cut: Array, eye: Array, noise: float, config: ParticleConfig
 ) -> tuple[Ints, Array, Array]:
     wide = max(config.outlier_noise, noise)
     normal = config.outlier_share == 0
-    share = np.zeros(particles.people) if normal else config.outlier_share + (1 - config.outlier_share) * sight.cut
+    share = np.zeros(particles.people) if normal else config.outlier_share + (1 - config.outlier_share) * cut
     displaced = WIDE_REACH * wide if config.outlier_share > 0 else 0.0
     reach = max(REACH * noise, displaced) ** 2
     pairs = np.ascontiguousarray(np.argwhere(may_reach(particles.pos, points, reach)))
-    density = sensor_kernels.densities(particles.pos, points, pairs, noise, wide, share, sight.eye, reach)
+    density = sensor_kernels.densities(particles.pos, points, pairs, noise, wide, share, eye, reach)
     person, weights = pairs[:, 0], particles.weights * particles.exist
     odds = column_sums(weights.take(person, 1), density) * detect[person] / config.clutter_density
     total = 1 - particles.existence * detect + np.bincount(person, odds, particles.people)

@@ -102,21 +102,19 @@ from tracking.filters.person_streams import PersonStreams, birth_keys
 from tracking.grouping.belief import UNSEEN
 from tracking.grouping.online_belief import PairBelief
 from tracking.papers.relational import particle_set, particle_set_kernels, sensor, transition_kernels
-from tracking.papers.relational.config import (
-    BIRTH_DOUBT,
-    BODY_RADIUS,
-    KERNEL_WIDTH,
-    LEAST_EXISTENCE,
-    NEWCOMER_SHARE,
-    RESAMPLE_SHARE,
-    SPEED_PRIOR,
-    ParticleConfig,
-    RelationalConfig,
-)
+from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.occluders import covered_by_people, hidden_share
 from tracking.papers.relational.particle_set import ParticleSet
 from tracking.papers.relational.transition_kernels import DISTANCE, VELOCITY
 
+# People with own weights are resampled if their effective number is at most this share of the particles (ours).
+RESAMPLE_SHARE = 0.5
+# Least probability that a detection is nobody's for it to start a person; the paper does not say which starts one.
+BIRTH_DOUBT = 0.5
+LEAST_EXISTENCE = 0.02  # A person whose existence is less probable is removed (ours).
+# m: half the width of a body that hides others from a known camera (ours); not with the paper's sensor.
+BODY_RADIUS = 0.25
+SPEED_PRIOR = 1.3  # m/s: standard deviation of a new person's velocity, per axis, that of walking people.
 # What random numbers are drawn for. Relations have streams of their own, so that they change no other draw.
 MOTION, BIRTHS, RESAMPLING, SPREAD, RELATIONS, JOINING, COUPLING = range(7)
 
@@ -194,7 +192,7 @@ class Particle(PointTracker):
             one = self.particles.one_weight
             few = self.particles.resample(1.0 if one else RESAMPLE_SHARE, self._uniforms)
             if not one and len(few):
-                self.particles.spread(few, KERNEL_WIDTH, self._normals(few))
+                self.particles.spread(few, self._normals(few))
         return tracks
 
     def _forecast(self) -> None:
@@ -224,8 +222,8 @@ class Particle(PointTracker):
 
     def _measure(self, detections: Detections) -> None:
         points, sizes = self.points(detections)
-        sight = sensor.Sight(self._detection_probability(), ~self.slots.seen, self.cut, self.eye)
-        pairs, measured, nobody = sensor.weigh(self.particles, points, sight, self.noise, self.config)
+        sight = self._detection_probability(), ~self.slots.seen, self.cut, self.eye
+        pairs, measured, nobody = sensor.weigh(self.particles, points, *sight, self.noise, self.config)
         self.slots.measure(measured, pairs, sizes, self.dt * (1 - self.hidden))
         self._remove()
         new = nobody >= BIRTH_DOUBT
@@ -361,7 +359,7 @@ class Relational(Particle):
         label = np.empty(p.exist.shape, np.int64)
         particle_set_kernels.group_labels(p.pairs, p.related, label)
         uniforms = self.streams.uniforms(JOINING, self.slots.key[-new:], 1, p.count)[0]
-        pairs, related = particle_set.join(p.pos, p.exist, label, points, NEWCOMER_SHARE, uniforms, self._rules)
+        pairs, related = particle_set.join(p.pos, p.exist, label, points, uniforms, self._rules)
         p.pairs, p.related = np.concatenate([p.pairs, pairs]), np.concatenate([p.related, related])
 
     def _report(self, frame: Frame, measured: bool) -> Tracks:

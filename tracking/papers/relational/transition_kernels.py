@@ -22,6 +22,7 @@ FOLLOW, COMMON = range(2)
 # Slots of `rules` (4,): weight that the old relation loses in a step, 1 - exp(-rate dt); log odds of walking together
 # at the same place, their loss per m of distance and per m/s of velocity difference.
 RATE, BIAS, DISTANCE, VELOCITY = range(4)
+NEWCOMER_SHARE = 0.5  # Probability that a new person near a group belongs to it (sec. 3.2).
 
 
 def belonging(distance: Any, difference: Any, rules: Array) -> Any:
@@ -150,8 +151,8 @@ def relate(
 
 @njit(cache=True)
 def join(
-    pos: Array, exist: Array, label: Ints, point: Array, near: Ints, new: int, share: float, uniforms: Array,
-    rules: Array, related: Bools,
+    pos: Array, exist: Array, label: Ints, point: Array, near: Ints, new: int, uniforms: Array, rules: Array,
+    related: Bools,
 ) -> None:  # fmt: skip
     """Writes the group label[:, new] of a new person in each particle, and the relations (K, P) to all others.
 
@@ -160,7 +161,7 @@ def join(
     belongs = np.zeros(new)  # by groups
     for p in range(len(pos)):
         joined = label[p, new] = new
-        if uniforms[p] >= share:  # alone, whoever is near
+        if uniforms[p] >= NEWCOMER_SHARE:  # alone, whoever is near
             continue
         for i in near:
             dx, dy = pos[p, i, 0] - point[0], pos[p, i, 1] - point[1]
@@ -171,7 +172,7 @@ def join(
             total += belongs[g]
         left = uniforms[p] * max(total, 1.0)
         for g in range(new):
-            left -= share * belongs[g]
+            left -= NEWCOMER_SHARE * belongs[g]
             belongs[g] = 0.0
             if left < 0 and joined == new:
                 joined = g

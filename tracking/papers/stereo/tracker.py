@@ -102,19 +102,11 @@ from sim.geometry.polygons import FOOTPRINT
 from sim.types import Context, Detections, Frame, Groups, Plane, Tracks
 from tracking.detect.features import SpacePoints
 from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, whole_group_tracks
+from tracking.papers.stereo import space_group
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.group_life import born, confirm, merge, remove_lost, sphere_groups, split
 from tracking.papers.stereo.points import PicturePoints, PointLinks
-from tracking.papers.stereo.space_group import (
-    POS,
-    VEL,
-    Measurement,
-    SpaceGroup,
-    associated,
-    measure,
-    motion_model,
-    predict,
-)
+from tracking.papers.stereo.space_group import POS, VEL, Measurement, SpaceGroup
 from tracking.running.image_scale import required
 
 LEAST_FEATURES = 3  # From pixels: least number of features that update a group (sec. 3.3).
@@ -147,7 +139,7 @@ class Stereo:
         self.groups: list[SpaceGroup] = []
         self.ids = GroupIds()
         self.pictures = None if context.background is None else PicturePoints(self.config, context)
-        self.links, self.motion = PointLinks(context.fps), motion_model(self.config, 1 / context.fps)
+        self.links, self.motion = PointLinks(context.fps), space_group.motion_model(self.config, 1 / context.fps)
         self.measurement = Measurement(None if self.pictures is None else self.pictures.camera)
         flat = context.camera is None and context.px_per_m > 0
         self.plane: Plane = "space" if self.pictures is not None else "image" if flat else "ground"
@@ -167,10 +159,10 @@ class Stereo:
         if self.pictures is not None and self.pictures.config is not self.config:
             self.pictures.follow(self.config)
         if self.motion.config is not self.config:
-            self.motion = motion_model(self.config, 1 / self.context.fps)
+            self.motion = space_group.motion_model(self.config, 1 / self.context.fps)
         points, t = self._points(frame, detections), frame.t
         for group in self.groups:
-            predict(group, self.motion)
+            space_group.predict(group, self.motion)
         self._measure(points, t)
         events = merge(self.groups, self.config, t)
         events += confirm(self.groups, self.config, t, self.ids)
@@ -215,14 +207,14 @@ class Stereo:
         radius, least, update = (
             (c.point_radius, 1, 1) if self.pictures is None else (c.radius, c.group_points, LEAST_FEATURES)
         )
-        owner = associated(self.groups, points, c)
+        owner = space_group.associated(self.groups, points, c)
         children: list[SpaceGroup] = []
         for k, group in enumerate(self.groups):
             mine = points.at(owner == k)
             if len(mine) < update:
                 group.apart_since = float("nan")
                 continue
-            measure(group, mine, self.measurement, motion, t)
+            space_group.measure(group, mine, self.measurement, motion, t)
             children += split(group, mine, sphere_groups(mine.pos, radius, least), self.measurement, motion, t)
         loose = points.at(owner < 0)
         alone = sphere_groups(loose.pos, radius, least)

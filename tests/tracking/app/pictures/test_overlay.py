@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.geometry.polygons import convex_hull
+from sim.geometry.hull_kernels import convex_hull
 from sim.scene.camera import project
 from sim.types import Frame, GroupEvent, Groups, Sequence, Tracks, Truth
 from tests.coded_pictures import SIZE, coded, number, sequence

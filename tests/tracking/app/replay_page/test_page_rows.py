@@ -8,13 +8,13 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.geometry.polygons import convex_hull
+from sim.geometry.hull_kernels import convex_hull
 from sim.types import GroupEvent, Sequence
 from tests.groups_as_wholes import wholes
 from tests.reference_polygons import area, footprint_hull
 from tracking.app.replay_page import page_rows
 from tracking.app.replay_page.page import Run, page_data
-from tracking.app.replay_page.page_rows import Bar, Link, bars, links
+from tracking.app.replay_page.page_rows import Bar, bars, links
 
 
 def test_bars_and_links_of_groups(sequence: Sequence) -> None:
@@ -74,4 +74,4 @@ def test_links_join_and_fork() -> None:
             event("form", (-1, -1), (4,)),
         ]
     )
-    assert made == [Link(10, 2, 1), Link(14, 1, 3)]
+    assert made == [(10, 2, 1), (14, 1, 3)]

@@ -20,9 +20,8 @@ from tracking.papers.relational.tracker import Particle, Relational
 def sight(detect, missed=None, cut=None, eye=(np.nan, np.nan)):
     detect = np.asarray(detect, float)
     none = np.zeros(len(detect))
-    return sensor.Sight(
-        detect, none > 0 if missed is None else np.array(missed), none if cut is None else np.array(cut), np.array(eye)
-    )
+    seen, uncut = none > 0, none
+    return detect, seen if missed is None else np.array(missed), uncut if cut is None else np.array(cut), np.array(eye)
 
 
 def three(count=400, seed=0):
@@ -91,7 +90,7 @@ def test_weights_of_a_person_are_those_of_the_joint_filter_with_the_others_avera
     alone, config = ParticleSet.empty(count), ParticleConfig()
     for places in (x, y):
         alone.add(places[:, None], np.zeros((count, 1, 2)), 0.9)
-    sensor.weigh(alone, points, sight([0.9] * 2), 0.08, config)
+    sensor.weigh(alone, points, *sight([0.9] * 2), 0.08, config)
     near, wide, share = np.square(pos[:, :, None] - points).sum(axis=3), config.outlier_noise, config.outlier_share
     density = (1 - share) * np.exp(-near / 2 / 0.08**2) / 0.08**2 + share * np.exp(-near / 2 / wide**2) / wide**2
     W = 0.9 * 0.9 * density / (2 * np.pi) / config.clutter_density
@@ -106,7 +105,7 @@ def test_a_missed_person_has_the_weights_of_the_partners():
     particles = three()
     relate(particles, 0, 2, np.arange(particles.count) < 200)
     points, missed = particles.pos[:1, 0], np.array([False, False, True])
-    sensor.weigh(particles, points, sight([0.9, 0.9, 0.0], missed), 0.08, RelationalConfig())
+    sensor.weigh(particles, points, *sight([0.9, 0.9, 0.0], missed), 0.08, RelationalConfig())
     own, other = particles.weights[:200, 0], particles.weights[:200, 2]
     np.testing.assert_allclose(other / other.sum(), own / own.sum(), rtol=1e-9)
     np.testing.assert_allclose(particles.weights[200:, 2], particles.weights[200, 2], rtol=1e-9)
@@ -118,7 +117,7 @@ def test_the_kernel_keeps_the_moments_and_draws_equal_particles_apart():
     before = [np.cov(particles.pos[:, 0].T), particles.pos[:, 0].mean(axis=0)]
     rng = np.random.default_rng(6)
     few = particles.resample(1.0, drawn(particles, rng))
-    particles.spread(few, 1.0, rng.standard_normal((len(few), 4, particles.count)))
+    particles.spread(few, rng.standard_normal((len(few), 4, particles.count)))
     assert len(np.unique(particles.pos[:, 0, 0])) == 20_000
     np.testing.assert_allclose(particles.pos[:, 0].mean(axis=0), before[1], atol=0.003)
     np.testing.assert_allclose(np.cov(particles.pos[:, 0].T), before[0], rtol=0.05, atol=3e-4)
@@ -143,7 +142,7 @@ def test_existence_by_bayes():
     particles = three()
     far = np.array([[0.0, 0.0]])
     particles.pos[:, 0], particles.pos[:, 1] = far[0], [5.0, 0.0]
-    sensor.weigh(particles, far, sight([0.8] * 3), 0.08, ParticleConfig(clutter_density=1e-9))
+    sensor.weigh(particles, far, *sight([0.8] * 3), 0.08, ParticleConfig(clutter_density=1e-9))
     np.testing.assert_allclose(particles.exist[:, 2], 0.9 * 0.2 / (1 - 0.9 * 0.8), rtol=1e-12)
     np.testing.assert_allclose(particles.exist[:, 0], 1.0, atol=1e-6)
 
@@ -220,7 +219,7 @@ def test_a_miss_leaves_weights_if_everybody_who_exists_is_detected():
     particles.exist[:] = 1.0
     config = ParticleConfig(detect_prob=1.0)
     for _ in range(2):
-        sensor.weigh(particles, particles.pos[0, :2], sight([1.0] * 3), 0.08, config)
+        sensor.weigh(particles, particles.pos[0, :2], *sight([1.0] * 3), 0.08, config)
         np.testing.assert_allclose(particles.weights.sum(axis=0), 1.0, rtol=1e-9)
     np.testing.assert_allclose(particles.existence, 1.0, rtol=1e-6)  # who certainly exists is hidden
 

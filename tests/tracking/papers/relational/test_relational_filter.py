@@ -151,7 +151,7 @@ def hidden_variance(related, seen, steps, count=20_000, r=0.4):
         points = (truth + r * rng.standard_normal(2))[None] if seen else np.zeros((0, 2))
         particles.pos[:, 1] = 1e6  # never near the detection
         if seen:
-            sensor.weigh(particles, points, sight([0.9, 0.0], [False, True]), r, config)
+            sensor.weigh(particles, points, *sight([0.9, 0.0], [False, True]), r, config)
             particles.resample(1.0, drawn(particles, rng))
         out.append(particles.vel[:, 1].var(axis=0).mean())
     return np.array(out)
@@ -207,13 +207,13 @@ def test_missed_people_are_reported_for_one_time_at_all_frame_rates(fps):
 @pytest.mark.parametrize("detect", [np.zeros(2), np.full(2, 0.9)])
 def test_people_who_are_equal_in_all_particles_change_no_weight(detect):
     particles = placed(50, [[0, 0], [3, 0]])
-    sensor.weigh(particles, np.zeros((0, 2)), sight(detect), 0.08, ParticleConfig())
+    sensor.weigh(particles, np.zeros((0, 2)), *sight(detect), 0.08, ParticleConfig())
     np.testing.assert_allclose(particles.weights, 1 / 50, rtol=1e-12)
 
 
 def joined_by(particles, label, points, uniforms, rules):
     """Relates the new people, the last slots, to the groups that they join."""
-    pairs, related = particle_set.join(particles.pos, particles.exist, label, points, 0.5, uniforms, rules)
+    pairs, related = particle_set.join(particles.pos, particles.exist, label, points, uniforms, rules)
     particles.hold(pairs)
     particles.related[len(particles.pairs) - len(pairs) :] = related
     assert np.array_equal(particles.pairs[len(particles.pairs) - len(pairs) :], pairs)
