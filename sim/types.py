@@ -110,8 +110,7 @@ class Tracks(Frozen):
     (z), vx, vy, (vz). box (N, 4): left, top, width, height in px, or None. score (N,): in [0, 1], or empty. A tracker
     of people may return groups None and events (): the grouping then fills both in and sets `derived` True. own_events:
     kinds of events that the tracker reports itself, which the grouping does not add. seen (N,): False for a person who
-    was only predicted in this frame, not measured; empty: all were measured. momentary: True if the tracker names
-    groups of the moment, which may come and go: their events and ids follow from the grouping."""
+    was only predicted in this frame, not measured; empty: all were measured."""
 
     index: int
     t: float
@@ -129,7 +128,6 @@ class Tracks(Frozen):
     derived: bool = False
     own_events: tuple[str, ...] = ()
     seen: Bools = field(default_factory=lambda: np.zeros(0, bool))
-    momentary: bool = False
 
     @property
     def measured(self) -> Bools:

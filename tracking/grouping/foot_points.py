@@ -115,8 +115,7 @@ def depth_as_measured(tracks: Sequence[Tracks], camera: Camera) -> list[Tracks]:
 
 def _grouped_as(t: Tracks, grouped: Tracks) -> Tracks:
     new = moved_events(grouped.events[len(t.events) :], t.id, t.pos)
-    groups = None if t.momentary else t.groups  # those of the moment have new ids
-    return t.replace(group=grouped.group, groups=groups, events=(*t.events, *new), derived=True)
+    return t.replace(group=grouped.group, events=(*t.events, *new), derived=True)
 
 
 def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> list[Tracks]:

@@ -79,11 +79,14 @@ class Parts:
     gone: PersonSet = frozenset()  # people of a divided group who are present no more
 
 
-def event_of_change(change: GroupChange, t: int, parts: Parts, motion: TrackedMotion) -> GroupEvent | None:
+def event_of_change(
+    change: GroupChange, t: int, parts: Parts, motion: TrackedMotion, *, late: bool = False
+) -> GroupEvent | None:
     """Returns the event of a change that became known in frame t.
 
     It is None for a merge or split that was not seen (`TrackedMotion.onset`), and for an enter in the first second.
-    People alone who form a group and were never apart enter, as groups are known later than their people.
+    late: True if groups are known later than their people, so that people alone who form one and were never apart
+    enter.
     """
     # a group leaves when its last two people were measured, or its last one: it may be predicted for longer
     if change.kind == "leave":
@@ -97,7 +100,7 @@ def event_of_change(change: GroupChange, t: int, parts: Parts, motion: TrackedMo
         unchanged = [pair for pair, onset in zip(pairs, onsets, strict=True) if onset is None]
         if len(set(connected(parts.sets, unchanged))) > 1:
             start = min(onset for onset in onsets if onset is not None)
-        elif change.kind == "form" and parts.since > t - frames_of(SEARCHED, motion.fps):
+        elif late and change.kind == "form" and parts.since > t - frames_of(SEARCHED, motion.fps):
             change = replace(change, kind="enter", before=())
         else:
             return None

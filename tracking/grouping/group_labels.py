@@ -9,7 +9,7 @@ and leave; crossings and queues are not found here. Ids follow the rule of the t
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -97,7 +97,7 @@ def label_people(
             group_of[list(people)] = -1
         parted = {frozenset((a, b)): sure for a, b, on, sure in switched if not on}
         real = [c for c in changes if not corrects(c, parted)]
-        told = (event_of_change(c, t, _parts_of_change(c, old, state), motion) for c in real)
+        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, late=True) for c in real)
         events += [e for e in told if e is not None]
     return _without_singles(frame, group), events
 
@@ -121,15 +121,25 @@ def _together_now(found: FoundGroups, t: int, state: LinkedPeople) -> Iterable[P
     return [frozenset(people) for people in parts.values() if len(people) > 1]
 
 
-def _parts_of_change(change: GroupChange, old: Members, state: LinkedPeople) -> Parts:
-    """Returns the parts, groups and then people alone, that a change joined, or into which it divided a group. old: the
-    groups by id before the change."""
-    divided, people = change.kind in ("split", "dissolve"), frozenset(state.present.keys() & set(change.members))
-    groups, names = (state.identities.groups, change.after) if divided else (old, change.before)
-    parts = [part for g in names if g >= 0 and (part := groups[g] & people)]
-    parts += [frozenset([p]) for p in sorted(people.difference(*parts))]
+def parts_of_change(change: GroupChange, old: Members, state: LinkedPeople) -> Parts:
+    """Returns the parts that a change joined, or into which it divided a group, and since when all are present. old:
+    the groups by id before the change."""
+    parts = part_sets(change, old, state.identities.groups, frozenset(state.present.keys() & set(change.members)))
     since = max((min(state.present[p] for p in part) for part in parts), default=0)
-    return Parts(parts, since, old[change.before[0]] - state.present.keys() if divided else frozenset())
+    return Parts(parts, since, gone_people(change, old, state.present.keys()))
+
+
+def gone_people(change: GroupChange, old: Members, present: Set[int]) -> PersonSet:
+    """Returns the people of a group that a change divided who are present no more; nobody for other changes."""
+    return old[change.before[0]] - present if change.kind in ("split", "dissolve") else frozenset()
+
+
+def part_sets(change: GroupChange, old: Members, new: Members, people: PersonSet) -> list[PersonSet]:
+    """Returns the parts that a change joined, or divided a group into: groups, cut to `people`, then people alone. old,
+    new: the groups by id before and after the change."""
+    groups, names = (new, change.after) if change.kind in ("split", "dissolve") else (old, change.before)
+    parts = [part for g in names if g >= 0 and (part := groups[g] & people)]
+    return parts + [frozenset([p]) for p in sorted(people.difference(*parts))]
 
 
 def _spells(frame: Ints, column: Ints, memory: int, length: int) -> dict[int, list[tuple[int, int | None]]]:

@@ -6,8 +6,7 @@
 - Crossings and queues are measured by `sim.truth.crossing_events` and `sim.truth.queue_detection`.
 
 What the tracker reports itself is decided once, so that no later frame changes an earlier one:
-- Groups: by the first frame in which there are people (`names_groups`). If it says that they are of the moment
-  (`Tracks.momentary`), events follow from the grouping, and ids from both.
+- Groups: by the first frame in which there are people (`names_groups`).
 - Events: by the kinds that the tracker declares (`Tracks.own_events`); of kinds that are not declared, from the frame
   on in which it first reports one.
 
@@ -33,7 +32,7 @@ from sim.truth.queue_detection import ADVANCE_TIME, BRIDGE_TIME, queues
 from sim.types import EVENT_KINDS, GroupEvent, Groups, Tracks
 from tracking.grouping.group_events import TrackedMotion, events_of_labels
 from tracking.grouping.group_labels import label_people
-from tracking.grouping.grouping_choice import Grouping, default_grouping, find_groups, named_groups
+from tracking.grouping.grouping_choice import Grouping, default_grouping, find_groups
 from tracking.grouping.tracks_table import TracksTable, tabulate
 
 # Kinds of events in which the membership of groups changes.
@@ -109,7 +108,7 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
         given = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in given]
     table, events = tabulate(given, fps, px_per_m), list[GroupEvent]()
     if not named or own.get("merge", math.inf) > 1:
-        table, events = _grouped(table, named, named and given[0].momentary, fps, rule)
+        table, events = _grouped(table, named, fps, rule)
     events += _crossings_and_queues(table, fps)
     return _filled(given, table, [e for e in events if (e.emitted or e.start) < own.get(e.kind, math.inf)])
 
@@ -124,18 +123,14 @@ def _own_events(tracks: Sequence[Tracks]) -> dict[str, int]:
     return {**found, **(dict.fromkeys(MEMBERSHIP_KINDS, min(membership)) if membership else {})}
 
 
-def _grouped(
-    table: TracksTable, named: bool, momentary: bool, fps: float, rule: Grouping
-) -> tuple[TracksTable, list[GroupEvent]]:
+def _grouped(table: TracksTable, named: bool, fps: float, rule: Grouping) -> tuple[TracksTable, list[GroupEvent]]:
     """Returns the table with group ids filled in, and the membership events."""
     if named and (table.group < 0).all():
         return table, []
     found = find_groups(table, fps, rule)
-    if momentary:
-        found = replace(found, now=named_groups(table), size=1)
     motion = TrackedMotion(table.motion(), fps, table.measured_motion())
     group, events = label_people(table.frame, table.column, motion, found, rule)
-    if momentary or not named:
+    if not named:
         return replace(table, group=group), events
     # As long as a tracker's groups equal those of the grouping, the grouping's events are used: their onsets are dated
     # back.
@@ -169,8 +164,7 @@ def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupE
         new = tuple(sorted(by_frame.pop(t.index, ()), key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
         out.append(t.replace(group=label, events=(*t.events, *new), derived=True))
     groups = groups_in_frames(out, table.scale)
-    # groups of the moment have new ids
-    return [t.replace(groups=g) if t.groups is None or t.momentary else t for t, g in zip(out, groups, strict=True)]
+    return [t.replace(groups=g) if t.groups is None else t for t, g in zip(out, groups, strict=True)]
 
 
 def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:

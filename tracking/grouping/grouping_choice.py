@@ -114,12 +114,6 @@ def belief_groups(
     return FoundGroups(_links(lasting, size, found), now, size)
 
 
-def named_groups(table: TracksTable) -> StepGroups:
-    """Returns the groups that a tracker names, in steps of one frame; the numbers of groups are its own."""
-    rows = table.group >= 0
-    return StepGroups((table.length, len(table.ids)), table.frame[rows], table.column[rows], table.group[rows])
-
-
 def groups_now(table: TracksTable, fps: float, belief: Belief) -> Ints:
     """Returns for each row of a table a number that people of one frame share if they are together now, -1 alone, (R,).
     The numbers are person numbers, not group ids that last."""

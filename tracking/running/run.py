@@ -192,9 +192,8 @@ def track(
 ) -> TrackingRun:
     """Tracks every frame of a sequence, and derives groups and events if the tracker reports none.
 
-    Warns with a UserWarning if `grouping` has no effect because the tracker reports groups itself, other than of the
-    moment. Warns, too, if the tracker reports groups only after its first frame with people; such groups are replaced
-    by derived ones.
+    Warns with a UserWarning if `grouping` has no effect because the tracker reports groups itself. Warns, too, if the
+    tracker reports groups only after its first frame with people; such groups are replaced by derived ones.
 
     Args:
         tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
@@ -240,9 +239,8 @@ def track(
         reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene,
         source=prepared.input, image_size=known.image_size,
     )  # fmt: skip
-    kept = names_groups(reported) and not reported[0].momentary
-    late, odd = late_groups(reported), list[str]()
-    if kept and chosen is not None:
+    named, late, odd = names_groups(reported), late_groups(reported), list[str]()
+    if named and chosen is not None:
         odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
     if late is not None:
         odd.append(
@@ -253,7 +251,7 @@ def track(
         warnings.warn(text, UserWarning, stacklevel=2)
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
     info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
-    return TrackingRun(tracks, info if kept else {**info, "grouping": rule.as_dict()})
+    return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
 
 
 def group(

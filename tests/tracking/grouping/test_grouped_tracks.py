@@ -7,7 +7,7 @@ import pytest
 from sim.io.formats.labelled_truth import labelled_truth_fields
 from sim.types import GroupEvent, Groups, Tracks
 from tests.reference_sense import paced
-from tracking.grouping.grouped_tracks import derive, groups_in_frames, with_groups
+from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.grouping.link_rule import LinkRule
 
 FPS = 10.0
@@ -147,18 +147,6 @@ def test_what_a_tracker_says_is_kept():
     made = derive(given, FPS)
     assert all(t.groups is g.groups for t, g in zip(made, given, strict=True))
     assert [t.events for t in made] == [t.events for t in given]
-
-
-def test_groups_of_the_moment_come_and_go_without_events():
-    own = np.tile([5, 5, 5], (200, 1))
-    own[28::7] = -1
-    named = [t.replace(momentary=True, groups=groups_in_frames([t])[0]) for t in tracks(leaving(), group=own)]
-    unnamed = [t.replace(momentary=True) for t in tracks(leaving())]
-    made, derived, other = (derive(given, FPS, rule=RULE) for given in (named, tracks(leaving()), unnamed))
-    assert events(made) == events(derived) == events(other)
-    assert all(a.group.tolist() == b.group.tolist() for a, b in zip(derived, other, strict=True))
-    assert all({*t.groups.id} == {*t.group[t.group >= 0]} for t in made)
-    assert [t.group.tolist() for t in made] == [[-1] * 3 if (own[k] < 0).all() else [1] * 3 for k, t in enumerate(made)]
 
 
 def test_crossings_and_queues_of_tracks():

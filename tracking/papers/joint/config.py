@@ -25,9 +25,6 @@ BIRTH_DENSITY = 0.003  # 1/(m^2 s): new people (ours).
 # Existence probabilities from which a new person is tracked, and a tracked one reported (ours).
 CONFIRMED, REPORTED = 0.9, 0.5
 LEAST_PRESENCE = 0.02  # Who is less probably still there, as a person or a false alarm, is removed (ours).
-# Share of the measured places that are displaced, as by partial occlusion, and their standard deviation, m (ours).
-OUTLIER_SHARE, OUTLIER_NOISE = 0.05, 0.4
-Errors = list[tuple[float, float]]  # Kinds of errors: the share of each, and its standard deviation, m.
 SPEED_PRIOR = 1.3  # m/s: standard deviation of a new person's velocity, per axis, that of walking people (ours).
 # m: s_0, prior scatter of a cluster, as of one person more, and D_0, distance of a virtual other cluster (ours).
 SCATTER, APART = 0.5, 2.0
@@ -86,11 +83,6 @@ class JointConfig(BackgroundSettings):
     def own_weights(self) -> bool:
         """True (algorithm "ours") if people have weights of their own and are resampled one by one."""
         return self.algorithm == "ours"
-
-    def errors(self, noise: float) -> Errors:
-        """Returns the kinds of errors of measured places; noise: standard deviation of most, m."""
-        displaced = [(1 - OUTLIER_SHARE, noise), (OUTLIER_SHARE, max(OUTLIER_NOISE, noise))]
-        return displaced if self.own_weights else [(1.0, noise)]
 
     @property
     def classifier(self) -> Array:

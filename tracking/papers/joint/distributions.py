@@ -17,7 +17,7 @@ import numpy as np
 from sim.types import Array, Ints
 from tracking.filters.person_streams import NOBODY, Keys, PersonStreams
 from tracking.papers.joint import group_proposal_kernels, partition_labels_kernels
-from tracking.papers.joint.config import ALPHA, SCALES, VALIDITY_RATE, Errors, JointConfig
+from tracking.papers.joint.config import ALPHA, SCALES, VALIDITY_RATE, JointConfig
 from tracking.papers.joint.decentralised_filter import log_sum
 from tracking.papers.joint.group_proposal_kernels import CROSS, PLACE, RATE, group_dynamics, own_dynamics
 
@@ -54,13 +54,13 @@ def moved(state: Array, dt: float) -> Array:
 class Proposal:
     """The proposal of each person, a mixture: alpha N(A x, Sigma) + (1 - alpha) pi_det, of each person alone (ours).
 
-    sigma (3,): Sigma of one axis. errors: of measured places, as `JointConfig.errors`. dt: s. alpha: share of the
+    sigma (3,): Sigma of one axis. noise: standard deviation of a measured place, m. dt: s. alpha: share of the
     dynamics. informed: True: pi_det is p(x' | x, y), the product of dynamics and likelihood (ours); False: the
     paper's, Sigma about the detection and the predicted velocity.
     """
 
     sigma: Array
-    errors: Errors
+    noise: float
     dt: float
     alpha: float
     informed: bool
@@ -86,7 +86,7 @@ class Proposal:
         if not self.informed:
             target[..., :2] = z
             return target, self.sigma
-        gain = self.sigma[:RATE] / (self.sigma[PLACE] + self.errors[0][1] ** 2)
+        gain = self.sigma[:RATE] / (self.sigma[PLACE] + self.noise**2)
         error = z - mean[..., :2]
         target[..., :2] += gain[PLACE] * error
         target[..., 2:] += gain[CROSS] * error
@@ -94,11 +94,9 @@ class Proposal:
         return target, np.array([a - gain[PLACE] * a, b - gain[PLACE] * b, c - gain[CROSS] * b])
 
     def log_likelihood(self, state: Array, z: Array) -> Array:
-        """Returns log p(y | x) (N, K), normal about the place: exp(-lambda d) with the squared distance as d (ours);
-        a mixture over the kinds of errors."""
+        """Returns log p(y | x) (N, K), normal about the place: exp(-lambda d) with the squared distance as d (ours)."""
         square = ((z - state[..., :2]) ** 2).sum(axis=-1)
-        kinds = [np.log(share) - square / (2 * s**2) - np.log(2 * np.pi * s**2) for share, s in self.errors]
-        return log_sum(np.stack(kinds, axis=-1))
+        return np.asarray(-square / (2 * self.noise**2) - np.log(2 * np.pi * self.noise**2))
 
 
 def _coloured(normals: Array, cov: Array) -> Array:
@@ -144,7 +142,7 @@ class FrameModel:
         c, shape = self.config, x.shape[:2]
         normals = self.streams.normals(MOTION, self.key, shape[0], STATE)
         uniforms = self.streams.uniforms(CHOICES, self.key, shape[0], 1)[..., 0]
-        proposal = Proposal(self.sigma, c.errors(self.noise), self.dt, ALPHA, c.own_weights)
+        proposal = Proposal(self.sigma, self.noise, self.dt, ALPHA, c.own_weights)
         if c.individuals == "measured":
             place = np.where(np.isfinite(self.z), self.z, moved(x, self.dt)[..., :2])
             return np.concatenate([place, (place - x[..., :2]) / self.dt], axis=-1), np.zeros(shape)

@@ -16,10 +16,8 @@ from tracking.detect.point_detections import PersonTable
 from tracking.filters import existence, kalman
 from tracking.filters.assignment import optimal
 from tracking.filters.person_streams import birth_keys
-from tracking.papers.joint.config import BIRTH_DENSITY, CLUTTER_DENSITY, SPEED_PRIOR, Errors
-from tracking.papers.joint.decentralised_filter import log_sum
+from tracking.papers.joint.config import BIRTH_DENSITY, CLUTTER_DENSITY, SPEED_PRIOR
 
-NEW = -2  # Group of a person who is in no estimate yet.
 NEWCOMER_NOISE = 1.0  # Standard deviation of the acceleration of a person who is not confirmed, m/s^2.
 
 
@@ -53,17 +51,15 @@ class Candidates(PersonTable):
 
 @dataclass
 class People(Candidates):
-    """The K tracked people. id (K,): of the track. group (K,): the estimated group, by the id of its head, -1 alone,
-    NEW before the first estimate. next_id: the next new id."""
+    """The K tracked people. id (K,): of the track. next_id: the next new id."""
 
     id: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
-    group: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
     next_id: int = 1
 
     def add(self, new: Newcomers, rows: Bools) -> None:
         """Adds the newcomers `rows` (M,)."""
-        ids, group = self.next_id + np.arange(rows.sum()), np.full(rows.sum(), NEW)
-        self.extend(id=ids, group=group, states=new.states[rows], size=new.size[rows], key=new.key[rows])
+        ids = self.next_id + np.arange(rows.sum())
+        self.extend(id=ids, states=new.states[rows], size=new.size[rows], key=new.key[rows])
         self.next_id += len(ids)
 
 
@@ -77,12 +73,12 @@ class Newcomers(Candidates):
         """Predicts all filters dt s ahead, in place."""
         kalman.predict(self.bank, dt, kalman.white_acceleration(dt, np.full(2, NEWCOMER_NOISE)))
 
-    def measure(self, points: Array, sizes: Array, errors: Errors, detect_prob: float, dt: float) -> Ints:
+    def measure(self, points: Array, sizes: Array, noise: float, detect_prob: float, dt: float) -> Ints:
         """Updates the newcomers by the points (M, 2), m, associated with them, in place; returns the rows of
-        the points left over. sizes (M, 2), px: of boxes; errors: as `JointConfig.errors`; dt: s since the last."""
+        the points left over. sizes (M, 2), px: of boxes; noise: standard deviation, m; dt: s since the last frame."""
         cov = self.bank[kalman.VAR][:, None] * np.eye(2)
-        rows, columns, density = associate(self.bank[kalman.PLACE], cov, points, errors, self.odds(detect_prob, dt))
-        kalman.update(self.bank, rows, points[columns], errors[0][1] ** 2)
+        rows, columns, density = associate(self.bank[kalman.PLACE], cov, points, noise, self.odds(detect_prob, dt))
+        kalman.update(self.bank, rows, points[columns], noise**2)
         self.weigh(rows, density, detect_prob)
         self.size[rows] = np.where(np.isnan(sizes[columns]), self.size[rows], sizes[columns])
         return np.setdiff1d(np.arange(len(points)), columns)
@@ -103,15 +99,13 @@ class Newcomers(Candidates):
         return np.concatenate([place + a * u, rate + b * u + c * v], axis=-1)
 
 
-def associate(mean: Array, cov: Array, points: Array, errors: Errors, odds: Array) -> tuple[Ints, Ints, Array]:
-    """Returns rows and columns (R,) of the associated people and points, one to one, and the densities (R,) of
-    the points, 1/m^2: N(z; mean, S) for each kind of errors. A pair is more probable than none, and the product of all
-    is the largest. odds (K,): as `Candidates.odds`."""
-    error, kinds = points - mean[:, None], []
-    for share, noise in errors:
-        S = cov + noise**2 * np.eye(2)
-        d2 = np.einsum("kmi,kij,kmj->km", error, np.linalg.inv(S), error)
-        kinds.append(np.log(share) - (d2 + np.linalg.slogdet(2 * np.pi * S)[1][:, None]) / 2)
-    log_density = log_sum(np.stack(kinds, axis=-1))
+def associate(mean: Array, cov: Array, points: Array, noise: float, odds: Array) -> tuple[Ints, Ints, Array]:
+    """Returns rows and columns (R,) of the associated people and points, one to one, and the densities N(z; mean, S)
+    (R,) of the points, 1/m^2. A pair is more probable than none, and the product of all is the largest. odds (K,): as
+    `Candidates.odds`."""
+    S = cov + noise**2 * np.eye(2)
+    error = points - mean[:, None]
+    d2 = np.einsum("kmi,kij,kmj->km", error, np.linalg.inv(S), error)
+    log_density = -(d2 + np.linalg.slogdet(2 * np.pi * S)[1][:, None]) / 2
     rows, columns = optimal(-log_density - np.log(odds)[:, None], 0.0)
     return rows, columns, np.exp(log_density[rows, columns])

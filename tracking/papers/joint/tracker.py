@@ -49,11 +49,9 @@ Departures. A star marks those that stay in the preset `paper`:
   Paper: restarted from the truth. Why: no truth.
 - frames without measurement*: X is predicted, nobody counts as missed, Z changes as ever. Paper: each frame is
   observed. Why: nobody could be seen.
-- existence in the filter*: unreported people count fully in partitions and votes. Paper: all exist. Why: one state for
-  all.
+- existence in the filter*: unreported people count fully in partitions, votes and events; for events they stay in
+  their groups. Paper: all exist. Why: one state for all.
 - p(y | x)*: normal about the place; 1 if missed. Paper: colour templates. Why: input is points.
-- displaced places: a share of the measured ones has a larger error, as by partial occlusion (`algorithm`). Paper: none.
-  Why: people are lost else.
 - pixels*: each blob one detection (`pixel_noise`). Paper: boxes. Why: no detector.
 - boxes*: reported in the image, with sizes that follow the measured ones. Paper: a template's box at the state. Why:
   they are shown and scored.
@@ -89,8 +87,10 @@ Departures. A star marks those that stay in the preset `paper`:
   own. Why: a group keeps its least member.
 - weights of votes*: before step 2, by the rest, in the preset by w (`algorithm`). Paper: summed over i after step 2.
   Why: no noise of resampling.
-- ids, events*: derived by the grouping from the tracks, as for other trackers; the groups are the filter's. Paper:
-  none. Why: people meet and part less often than partitions change.
+- ids, onsets*: events of groups that change late, by the belief; ids as in the truth; onsets dated back, those of leave
+  to the last measurement. Paper: none. Why: as the truth.
+- events that correct groups*: not reported (`tracking.grouping.group_events`); nor are enters of the first
+  second. Paper: none. Why: who was in one group by mistake neither met nor parts.
 """
 
 from __future__ import annotations
@@ -99,7 +99,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Tracks
+from sim.truth.group_ids_and_changes import Members
+from sim.types import Array, Bools, Context, Detections, Frame, Ints, Tracks
 from tracking.detect.point_detections import PointTracker, boxes_at, followed_sizes
 from tracking.filters import existence
 from tracking.filters.person_streams import NOBODY, PersonStreams
@@ -119,15 +120,17 @@ from tracking.papers.joint.distributions import (
     process_noise,
 )
 from tracking.papers.joint.division_kernels import place_newcomers
-from tracking.papers.joint.people import NEW, Newcomers, People, associate
+from tracking.papers.joint.people import Newcomers, People, associate
+from tracking.papers.joint.report import OWN_EVENTS, ReportedEvents
 
 
 class Joint(PointTracker):
     """The tracker `joint`: people and the groups they form, from points or from pixels.
 
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
-    particles after step 2; people, the tracked people; newcomers, people who are not confirmed yet; belief, of pairs;
-    streams, the random numbers; shown (K, 4), boxes of the people reported last, px, or None.
+    particles after step 2; people, the tracked people; newcomers, people who are not confirmed yet; groups, the people
+    of each reported group, by id; events, which makes the events; belief, of pairs; streams, the random numbers; shown
+    (K, 4), boxes of the people reported last, px, or None.
     """
 
     config_class: ClassVar[type[JointConfig]] = JointConfig
@@ -143,6 +146,8 @@ class Joint(PointTracker):
         self.shown: Array | None = None
         self.nested = Nested.empty((c.particles, c.partitions), STATE)
         self.people, self.newcomers = People(), Newcomers()
+        self.groups: Members = {}
+        self.events = ReportedEvents(context.fps)
         self.belief = PairBelief(context.fps, EVENTS)
         self.streams = PersonStreams(seed)
 
@@ -180,15 +185,20 @@ class Joint(PointTracker):
         mean, cov = report.moments(ahead, np.full(ahead.shape[:2], 1 / len(ahead)))
         spread = process_noise(c.place_noise, c.velocity_noise, self.dt)[0] * np.eye(2)
         odds = self.people.odds(c.detect_prob, self.dt)
-        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, c.errors(self.noise), odds)
+        return associate(mean[:, :2], cov[:, :2, :2] + spread, points, self.noise, odds)
 
     def _filter(self, z: Array) -> None:
         if not len(z):
             return
-        beliefs = remembered(self.belief.log_odds, self.people.group, self.config.belief_memory)
+        beliefs = remembered(self.belief.log_odds, *self._before(), self.config.belief_memory)
         model = FrameModel(self.config, self.dt, self.noise, z, beliefs, self.streams, self.people.key)
         uniforms = self.streams.uniforms(PARTITIONS, NOBODY, 1, self.config.particles)[0, 0]
         self.nested = decentralised_filter.advance(self.nested, model, uniforms)
+
+    def _before(self) -> tuple[Ints, Array]:
+        id = self.people.id
+        known = np.isin(id, np.array(sorted(self.events.people.identities.people), np.int64)).astype(float)
+        return report.known_groups(self.groups, id), known
 
     def _resample(self) -> None:
         if len(self.people.id):
@@ -201,10 +211,11 @@ class Joint(PointTracker):
         self.nested = self.nested.kept(rows)
         self.people.keep(rows)
         self.belief.keep(rows)
+        self.events.belief.keep(rows)
 
     def _newcomers(self, points: Array, sizes: Array) -> None:
-        c, new = self.config, self.newcomers
-        free = new.measure(points, sizes, c.errors(self.noise), c.detect_prob, self.dt)
+        new = self.newcomers
+        free = new.measure(points, sizes, self.noise, self.config.detect_prob, self.dt)
         new.start(points[free], sizes[free], self.noise, self.streams.frame, self.dt)
         sure = new.existence >= CONFIRMED
         if sure.any():
@@ -219,6 +230,7 @@ class Joint(PointTracker):
         self.nested = n = self.nested.joined(self.newcomers.draw(rows, normals))
         self.people.add(self.newcomers, rows)
         self.belief.add(n.x.mean(axis=0))
+        self.events.belief.add(n.x.mean(axis=0))
         uniforms = self.streams.uniforms(PLACING, key, n.log_q.size, 1).reshape(*n.log_q.shape, len(key))
         place_newcomers(n.x, n.z, uniforms, SHARPNESS, SCALES)
 
@@ -226,28 +238,28 @@ class Joint(PointTracker):
         n, c, id = self.nested, self.config, self.people.id
         mean, cov = report.moments(n.x, n.component_weights(c.own_weights))
         self.belief.see(mean[:, :2])
-        self.people.group = self._groups()
+        self.events.add(id, mean[:, :2], seen)
+        events = self.events.events(self.groups, self.unit)
+        parts = [frozenset(id[rows].tolist()) for rows in self._groups()]
+        self.groups = self.events.people.identities.name(frame.index, parts, self.groups)
         shown = self.people.existence >= REPORTED
-        id, group, mean, cov = id[shown], self.people.group[shown], mean[shown], cov[shown]
+        id, group, mean, cov = id[shown], report.known_groups(self.groups, id[shown]), mean[shown], cov[shown]
         pos, vel, cov = mean[:, :2] * self.unit, mean[:, 2:] * self.unit, cov * self.unit**2
         self.shown = boxes_at(pos, self.people.size[shown]) if self.plane == "image" else None
         return Tracks(
             frame.index, frame.t, self.plane, "person", id, group, pos, vel, cov, self.shown, np.ones(len(id)),
-            Groups.none() if (group < 0).all() else None, momentary=True, seen=seen[shown],
+            report.no_groups(group), events, own_events=OWN_EVENTS, seen=seen[shown],
         )  # fmt: skip
 
-    def _groups(self) -> Ints:
-        n, id = self.nested, self.people.id
-        if not len(id):
-            return id
+    def _groups(self) -> list[Ints]:
+        n = self.nested
         particle = n.weights(self.config.own_weights)
-        head = report.histogram_partition(n.z, particle[:, None] * np.exp(n.log_q))
-        return np.where(head < 0, -1, id[head])
+        return report.histogram_partition(n.z, particle[:, None] * np.exp(n.log_q)) if n.z.shape[2] else []
 
 
-def remembered(log_odds: Array, group: Ints, share: float) -> Array:
+def remembered(log_odds: Array, group: Ints, known: Array, share: float) -> Array:
     """Returns the log-odds (K, K) of pairs, raised for people who were in one group and lowered for others. group (K,):
-    as `People.group`; new people change nothing. share: factor of the change."""
-    belief, known = default_belief(), (group != NEW).astype(float)
+    estimated group, -1 alone; known (K,): 1 for people tracked before, else 0. share: factor of the change."""
+    belief = default_belief()
     same = (group[:, None] >= 0) & (group[:, None] == group)
     return np.asarray(log_odds + share * np.outer(known, known) * np.where(same, belief.stay, -belief.come))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from tests.reference_joint import all_partitions, label_of, validity
 from tracking.papers.joint import division_kernels
 from tracking.papers.joint import group_proposal_kernels as events
 from tracking.papers.joint.config import JointConfig
+from tracking.papers.joint.report import ReportedEvents
 
 SCALES = np.array([0.5, 2.0])
 BIAS = -1
@@ -188,3 +191,80 @@ def test_many_newcomers_join_as_with_a_look_at_all_clusters():
     assert np.array_equal(labels, expected)
     assert (labels[..., 15:] > 15).any()
     assert ((labels[..., 15:] > 0) & (labels[..., 15:] <= 15)).any()
+
+
+FPS = 10.0
+
+
+def reported(pos, partitions, log_odds=1.0, measured=1000):
+    """The events of a sequence; pos (T, P, 2), nan where absent; partitions: frame (from 0) to groups, from then on;
+    log_odds: of all pairs; measured: frames in which people are measured."""
+    report, parts, out = ReportedEvents(FPS), [], []
+    for t, place in enumerate(pos):
+        there = np.flatnonzero(np.isfinite(place[:, 0]))
+        parts, every = partitions.get(t, parts), np.ones(len(there), bool)
+        report._lasting = Mock(return_value=[frozenset(p) for p in parts])
+        report.belief = Mock(log_odds=np.full((len(there),) * 2, log_odds), seen=every.copy)
+        report.add(there + 11, place[there], every & (t < measured))
+        out += report.events({}, 2.0)
+    return out
+
+
+def two(gap):
+    """Two people (11, 12) side by side, `gap` (T,) apart."""
+    pos = np.zeros((len(gap), 2, 2))
+    pos[:, 1, 1] = gap
+    return pos
+
+
+def test_merges_and_splits_begin_when_the_rules_of_the_truth_come_true():
+    gap = np.concatenate([np.linspace(6, 1, 50), np.ones(40), np.linspace(1, 6, 50)])
+    form, dissolve = reported(two(gap), {70: [(11, 12)], 130: []})
+    assert (form.kind, form.emitted, form.members, form.before, form.after) == ("form", 71, (11, 12), (-1, -1), (1,))
+    assert 50 <= form.start <= 54, "near since frame 46, and alike in velocity since frame 51"
+    assert (dissolve.kind, dissolve.emitted) == ("dissolve", 131)
+    assert 90 < dissolve.start < 110
+    doubted = reported(two(gap), {70: [(11, 12)], 130: []}, log_odds=-1.0)
+    assert [e.kind for e in doubted] == ["form"], "who parts was never together"
+    assert form.pos[0] == 0
+    assert 1.0 <= form.pos[1] <= 2 * 1.5
+
+
+def test_people_who_arrive_together_have_no_merge():
+    assert not reported(two(np.ones(60)), {20: [(11, 12)]})
+    late = two(np.ones(60))
+    late[:30] = np.nan
+    assert not reported(late, {45: [(11, 12)]})
+
+
+def test_members_of_an_event_are_those_of_its_parts():
+    pos = np.zeros((120, 4, 2))
+    pos[:, :, 1] = [0, 0.8, 10, 10.8]
+    pos[:, 2:, 1] -= np.clip(np.arange(120) - 20, 0, 80)[:, None] * 0.1
+    found = reported(pos, {0: [(11, 12), (13, 14)], 115: [(11, 12, 13, 14)]})
+    (merge,) = [e for e in found if e.kind == "merge"]
+    assert (merge.before, merge.after, merge.members) == ((1, 2), (1,), (11, 12, 13, 14))
+    assert 85 < merge.start < 105
+
+
+def test_what_is_more_than_the_searched_time_ago_is_forgotten():
+    gap = np.concatenate([np.ones(50), np.linspace(1, 6, 50), np.full(400, 6)])
+    assert not reported(two(gap), {0: [(11, 12)], 440: []})
+
+
+def test_a_leave_is_dated_by_the_last_measurement():
+    pos = two(np.ones(80))
+    pos[70:] = np.nan
+    (leave,) = reported(pos, {0: [(11, 12)], 70: []}, measured=50)
+    assert (leave.kind, leave.start, leave.emitted) == ("leave", 50, 71)
+
+
+@pytest.mark.parametrize(("measured", "kinds"), [(60, []), (1000, ["dissolve"])])
+def test_who_is_missed_stays_in_the_group(measured, kinds):
+    pos, report, out = two(np.concatenate([np.ones(60), np.linspace(1, 8, 40)])), ReportedEvents(FPS), []
+    pos[:, :, 0] = np.arange(100)[:, None] / FPS
+    report.belief.add(np.concatenate([pos[0], [[1.0, 0.0]] * 2], axis=1))
+    for t in range(100):
+        report.add(np.array([1, 2]), pos[t], np.array([True, t < measured]))
+        out += report.events({}, 1.0)
+    assert [e.kind for e in out] == kinds

@@ -11,7 +11,6 @@ from tracking.papers.joint import partition_labels_kernels
 from tracking.papers.joint.config import SCALES as OWN_SCALES
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.distributions import FrameModel, stam_cumulated
-from tracking.papers.joint.people import NEW
 from tracking.papers.joint.report import histogram_partition
 from tracking.papers.joint.tracker import remembered
 
@@ -92,12 +91,12 @@ def test_partitions_are_drawn_uniformly():
 
 def test_the_histogram_takes_each_persons_label_of_most_weight():
     label = np.array([[[1, 1, 0], [1, 1, 1], [0, 0, 0]]])
-    assert histogram_partition(label, np.array([[0.5, 0.2, 0.3]])).tolist() == [0, 0, -1]
-    assert histogram_partition(label, np.array([[0.1, 0.8, 0.1]])).tolist() == [0, 0, 0]
+    assert [r.tolist() for r in histogram_partition(label, np.array([[0.5, 0.2, 0.3]]))] == [[0, 1]]
+    assert [r.tolist() for r in histogram_partition(label, np.array([[0.1, 0.8, 0.1]]))] == [[0, 1, 2]]
 
 
 def test_pairs_of_a_group_gain_and_others_lose():
-    found = remembered(np.zeros((4, 4)), np.array([3, 3, -1, NEW]), 0.5)
+    found = remembered(np.zeros((4, 4)), np.array([3, 3, -1, -1]), np.array([1.0, 1.0, 1.0, 0.0]), 0.5)
     stay, come = default_belief().stay / 2, -default_belief().come / 2
     apart = found[np.triu_indices(4, 1)]
     np.testing.assert_allclose(apart, [stay, come, 0, come, 0, 0])

@@ -34,7 +34,7 @@ def kalman(tracker, points, config):
     new = tracker.newcomers
     new.predict(1 / FPS)
     z = np.array([points[frames - 1]])
-    new.measure(z, np.full(z.shape, np.nan), config.errors(config.point_noise), config.detect_prob, 1 / FPS)
+    new.measure(z, np.full(z.shape, np.nan), config.point_noise, config.detect_prob, 1 / FPS)
     place, rate, var, cross, rate_var = new.bank[:, 0]
     x, P = np.concatenate([place, rate]), np.kron([[var[0], cross[0]], [cross[0], rate_var[0]]], np.eye(2))
     A, H = np.eye(4) + np.eye(4, k=2) / FPS, np.eye(4)[:2]
@@ -53,7 +53,6 @@ def test_people_alone_have_the_kalman_filter(algorithm, error, monkeypatch):
     """Z all alone, exact association; ours: locally optimal proposal (E2); paper: all three people are
     drawn from the transition and weighted together, so that few of 1000 particles count."""
     monkeypatch.setattr("tracking.papers.joint.distributions.ALPHA", 0.0)
-    monkeypatch.setattr("tracking.papers.joint.config.OUTLIER_SHARE", 1e-9)
     config = JointConfig(particles=1000, partitions=1, place_noise=0.15, algorithm=algorithm, **QUIET)
     points = walk([[0, 0], [20, 0], [40, 5]], [1.2, 0.3], 25, noise=0.08)
     runs = [stepped(Joint(config), points, seed) for seed in range(6)]
