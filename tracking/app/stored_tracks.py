@@ -178,13 +178,13 @@ def _method(info: dict[str, Any]) -> dict[str, Any]:
 
 def check_place(folder: Path, tracker: str) -> None:
     """Raises InputError if a run of this tracker cannot be written into the folder, or would replace one of another
-    tracker. An unfinished or damaged run may be replaced."""
+    tracker. Trackers of files are told apart by file name and class. An unfinished or damaged run may be replaced."""
     reject_foreign(folder)
     try:
         before = read_run(folder).get("tracker", tracker)
     except InputError:
         return
-    if before != tracker:
+    if Path(before).name != Path(tracker).name:
         expected, remedy = f"none, or one of {tracker}", "choose another --out, or delete it"
         raise InputError(file=folder, got=f"a run of {before}", expected=expected, remedy=remedy)
 

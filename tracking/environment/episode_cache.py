@@ -89,6 +89,11 @@ def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: It
     """
     if isinstance(what, str | Path | Sequence | Source):
         what = (what,)
+    if not isinstance(seeds, Iterable):
+        remedy = f"write for example range({seeds})"
+        raise InputError(place="seeds", got=repr(seeds), expected="a range or a list of numbers", remedy=remedy)
+    if isinstance(set, str):
+        raise InputError(place="set", got=repr(set), expected='a list of "key=value"', remedy=f"write [{set!r}]")
     numbers, settings = tuple(seeds), tuple(set)
     found = tuple(source for item in what for source in _sources_of(item, numbers, settings))
     if not found:
