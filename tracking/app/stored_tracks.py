@@ -181,7 +181,7 @@ def check_place(folder: Path, tracker: str) -> None:
     tracker. Trackers of files are told apart by file name and class. An unfinished or damaged run may be replaced."""
     reject_foreign(folder)
     try:
-        before = read_run(folder).get("tracker", tracker)
+        before = str(read_run(folder).get("tracker") or tracker)
     except InputError:
         return
     if Path(before).name != Path(tracker).name:
