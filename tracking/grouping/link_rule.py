@@ -14,8 +14,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim.truth import merge_split_rules as truth
-from sim.truth.merge_split_rules import close_pairs, frames_of, runs
+from sim.truth.merge_split_rules import (
+    HOLD_TIME,
+    MERGE_DISTANCE,
+    MERGE_VELOCITY,
+    SPLIT_DISTANCE,
+    close_pairs,
+    frames_of,
+    runs,
+)
 from sim.types import Array, Bools, Ints
 from tracking.config import Config, param
 
@@ -32,15 +39,15 @@ class LinkRule(Config):
     tracker: ClassVar[str] = "grouping"
 
     # fmt: off
-    near: float = param(truth.MERGE_DISTANCE, (0.5, 3.0), "m", "a pair nearer than this is near")
-    alike: float = param(truth.MERGE_VELOCITY, (0.1, 2.0), "m/s", "a pair whose velocities differ by less moves alike")
+    near: float = param(MERGE_DISTANCE, (0.5, 3.0), "m", "a pair nearer than this is near")
+    alike: float = param(MERGE_VELOCITY, (0.1, 2.0), "m/s", "a pair whose velocities differ by less moves alike")
     share: float = param(0.8, (0.3, 1.0), "share",
         "a pair is linked if it was near and moved alike in this share of the frames of `window` with both seen")
-    window: float = param(truth.HOLD_TIME, (0.2, 6.0), "s", "time over which the share is counted")
+    window: float = param(HOLD_TIME, (0.2, 6.0), "s", "time over which the share is counted")
     acquaintance: float = param(1.0, (0.0, 6.0), "s",
         "least time within the window in which both must have been seen before they can be linked")
-    apart: float = param(truth.SPLIT_DISTANCE, (0.5, 5.0), "m", "a pair farther than this is apart")
-    patience: float = param(truth.HOLD_TIME, (0.1, 6.0), "s", "time apart after which a link breaks")
+    apart: float = param(SPLIT_DISTANCE, (0.5, 5.0), "m", "a pair farther than this is apart")
+    patience: float = param(HOLD_TIME, (0.1, 6.0), "s", "time apart after which a link breaks")
     idle: float = param(0.0, (0.0, 1.0), "m/s",
         "two people who are both slower than this are not near; 0: standing people can be linked")
     memory: float = param(1.0, (0.0, 5.0), "s", "time for which a member that is missed stays in the group")

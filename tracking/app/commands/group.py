@@ -140,7 +140,7 @@ def group(options: GroupOptions) -> CommandResult:
     folders = run_folders(sequences, options.source, options.out)
     for folder, tracks in zip(folders, stored, strict=True):
         _refuse_own(folder, tracks)
-        check_place(folder, "group" if tracks is None else tracks.info.get("tracker", "group"))
+        check_place(folder, "group" if tracks is None else tracks.info.get("tracker") or "group")
     rows = []
     with ProgressMeter("group", len(sequences)) as meter:
         for sequence, tracks, folder in zip(sequences, stored, folders, strict=True):
