@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import warnings
 import xml.etree.ElementTree as ET
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +18,10 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, bounded_number, person_ids, xml_root
-from sim.io.formats.labelled_truth import centres, labelled_sequence
+from sim.io.formats.labelled_truth import centres
 from sim.io.formats.mot_table import MotTable
 from sim.io.formats.mot_text import truth_of_table
-from sim.io.formats.options import NO_OPTIONS, RecordingOptions
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions, recorded_sequence
 from sim.scene.camera import scale_of_all_boxes, scale_of_first_boxes
 from sim.types import Sequence, Truth
 
@@ -119,9 +118,9 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     def truth() -> Truth:
         return truth_of_table(table, name, rate, length, px_per_m or scale_of_all_boxes(sides))
 
-    more = {"px_per_m_frames": learned} if learned else {}
-    sequence = labelled_sequence("caviar", path, name, rate, length, truth, scale, **more)
-    return replace(sequence, image_size=IMAGE_SIZE if own else None)
+    source = {"kind": "caviar", "path": str(path), **({"px_per_m_frames": learned} if learned else {})}
+    size = IMAGE_SIZE if own else None
+    return recorded_sequence(source, name, rate, length, load_truth=truth, px_per_m=scale, image_size=size)
 
 
 def is_caviar(path: Path) -> bool:

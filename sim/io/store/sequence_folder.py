@@ -5,10 +5,9 @@ A sequence that is read back equals the one written to the last bit, except pict
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import suppress
-from functools import lru_cache
-from itertools import repeat
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +18,14 @@ from sim import hashing
 from sim.hashing import versions
 from sim.io.files import atomic, tables
 from sim.io.files.own_files import is_side_file
+from sim.io.formats.options import recorded_sequence
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.stored_pictures import NO_PICTURES, StoredPictures, WrittenPictures, write_pictures
 from sim.io.store import seal, truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
 from sim.streams import check_streams, is_picture
-from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, Image, Sequence, Truth
+from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Image, Sequence, Truth
 
 
 def write_sequence(
@@ -135,10 +135,8 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     for error in seal.damaged_files(folder, manifest["files"], size_only=pictured):
         raise error
     about, has, pictures = manifest["sequence"], manifest["files"].keys(), StoredPictures(folder, manifest)
-    size, length, fps = about["image_size"], about["length"], about["fps"]
-    left, right = "left" in pictures.streams, "right" in pictures.streams
+    size, length = about["image_size"], about["length"]
     load_background, words = _background(pictures, background, length)
-    special: dict[str, Any] = {key: manifest[key] for key in ("origin", "stride") if key in manifest}
 
     def require_length(name: str, found: int) -> None:
         if found != length:
@@ -156,31 +154,21 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         require_length("gt/truth.parquet", found.length)
         return found
 
-    def bare() -> Iterator[Frame]:
-        for index in range(1, length + 1):
-            here = detections()[index - 1] if "det/det.parquet" in has else None
-            yield Frame(index, (index - 1) / fps, detections=here)
-
-    def frames() -> Iterator[Frame]:
-        nothing = repeat(None, length)
-        both = [pictures.all(name, length) if there else nothing for name, there in (("left", left), ("right", right))]
-        for frame, image, other in zip(bare(), *both, strict=True):
-            yield frame.replace(image=image, right=other)
-
-    return Sequence(
-        name=about["name"], fps=fps, length=length, frames=frames if left or right else bare,
+    source: dict[str, Any] = {
+        "kind": "generated", "path": str(folder), "seed": manifest["seed"], "repeat": manifest["repeat"],
+        "truth_hash": manifest["truth_hash"], "streams": list(pictures.streams), "images": manifest.get("images"),
+        **words, **{key: manifest[key] for key in ("origin", "stride") if key in manifest},
+    }  # fmt: skip
+    return recorded_sequence(
+        source, about["name"], about["fps"], length,
+        detections=(lambda index: detections()[index - 1]) if "det/det.parquet" in has else None,
+        left=partial(pictures.all, "left", length) if "left" in pictures.streams else None,
+        right=partial(pictures.all, "right", length) if "right" in pictures.streams else None,
         load_truth=truth if "gt/truth.parquet" in has else None,
         image_size=None if size is None else (size[0], size[1]),
         camera=read_camera(folder / "camera.json") if "camera.json" in has else None,
         scene=read_scene(folder / "scene.json") if "scene.json" in has else None,
-        px_per_m=tables.none_to_nan(about["px_per_m"]),
-        has_images=left, has_right=right, has_detections="det/det.parquet" in has, load_background=load_background,
-        source={
-            "kind": "generated", "path": str(folder), "seed": manifest["seed"], "repeat": manifest["repeat"],
-            "truth_hash": manifest["truth_hash"], "streams": list(pictures.streams), "images": manifest.get("images"),
-            **words, **special,
-        },
-        bare=bare if left or right else None,
+        px_per_m=tables.none_to_nan(about["px_per_m"]), load_background=load_background,
         load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,
         load_light=lambda: _light(folder, manifest),
     )  # fmt: skip
