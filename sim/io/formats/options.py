@@ -90,7 +90,8 @@ def recorded_sequence(
     pictured = left is not None or right is not None
     return Sequence(
         name=name, fps=fps, length=length, frames=frames if pictured else bare, bare=bare if pictured else None,
-        source=source, has_images=left is not None, has_right=right is not None, has_detections=detections is not None, **known,
+        source=source, has_images=left is not None, has_right=right is not None,
+        has_detections=detections is not None, **known,
     )  # fmt: skip
 
 

@@ -59,7 +59,7 @@ def layout_of(path: Path) -> str | None:
     return "kitti" if len(cells) in KITTI_CELLS and numbers == [True, True, False, True] else None
 
 
-def open_text(path: Path, layout: str, options: RecordingOptions) -> Sequence:
+def open_text(layout: str, path: Path, options: RecordingOptions) -> Sequence:
     """Returns a text as Sequence with truth, without pictures and detections. layout: as of `layout_of`."""
     rows, stated = LAYOUTS[layout](path, options.fps)
     if not len(rows.line):
