@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError
 from sim import hashing, streams
 from sim.io.files import atomic
-from sim.io.files.tables import Column, columns_of, read_table, table_bytes
+from sim.io.files.tables import MODAL, read_table, table_bytes, units_of
 from sim.io.pictures import video_files
 from sim.io.pictures.picture_folder import require_size
 from sim.io.pictures.video_files import VideoWriter, write_video
@@ -29,7 +29,6 @@ from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
 
 JPG_QUALITY = 95
 TABLE = "gt/pixels.parquet"
-BOX = ("modal_left", "modal_top", "modal_width", "modal_height")
 
 Facts = dict[str, dict[str, Any]]
 
@@ -146,12 +145,11 @@ def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
         return np.concatenate([getattr(pixels, name) for pixels in known])
 
     box = np.concatenate([pixels.box.reshape(-1, 4) for pixels in known])
-    columns = [
-        Column("frame", truth.frame), Column("id", truth.id), Column("visible_px", joined("visible_px"), "px²"),
-        Column("amodal_px", joined("amodal_px"), "px²"), Column("visibility_px", joined("visibility")),
-        *columns_of(BOX, box, "px"), Column("blob", joined("blob")),
-    ]  # fmt: skip
-    return table_bytes(columns, {"frames": len(known)})
+    columns = {
+        "frame": truth.frame, "id": truth.id, "visible_px": joined("visible_px"), "amodal_px": joined("amodal_px"),
+        "visibility_px": joined("visibility"), MODAL: box, "blob": joined("blob"),
+    }  # fmt: skip
+    return table_bytes(columns, {"frames": len(known)}, units_of("m"))
 
 
 @dataclass(frozen=True)
@@ -229,7 +227,7 @@ class StoredPictures:
         def columns() -> tuple[Ints, Array, Array, Array, Ints]:
             table = read_table(self.folder / TABLE)
             counts = (table.floats("visible_px"), table.floats("amodal_px"))
-            return table.ints("frame"), *counts, table.floats(*BOX), table.ints("blob")
+            return table.ints("frame"), *counts, table.floats(*MODAL), table.ints("blob")
 
         def pixels(index: int) -> PixelTruth:
             frame, visible, amodal, box, blob = columns()
