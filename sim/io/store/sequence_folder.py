@@ -5,7 +5,7 @@ A sequence that is read back equals the one written to the last bit, except pict
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path
@@ -20,12 +20,14 @@ from sim.io.files import atomic, tables
 from sim.io.files.own_files import is_side_file
 from sim.io.formats.options import recorded_sequence
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
-from sim.io.pictures.stored_pictures import NO_PICTURES, StoredPictures, WrittenPictures, write_pictures
+from sim.io.pictures.stored_pictures import StoredPictures, write_pictures
 from sim.io.store import seal, truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
-from sim.streams import check_streams, is_picture
+from sim.streams import check_streams, coding, is_picture
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Image, Sequence, Truth
+
+NOTHING: Mapping[str, Any] = {}
 
 
 def write_sequence(
@@ -55,11 +57,14 @@ def write_sequence(
     with atomic.new_folder(folder, lambda: keep() or _refuse_foreign(folder, names)) as partial:
         truth = sequence.truth  # raises for a failed script before a picture is drawn
         assert truth is None or truth.length == sequence.length
-        pictures = write_pictures(partial, sequence, wanted, images)
-        files = sequence_files(sequence, scenario=scenario, seed=seed, repeat=repeat, pictures=pictures)
+        pixels = write_pictures(partial, sequence, wanted, images)
+        pictures = {path.relative_to(partial).as_posix(): path for path in partial.rglob("*") if path.is_file()}
+        files = sequence_files(
+            sequence, scenario=scenario, seed=seed, repeat=repeat, images=images, pixels=pixels, pictures=pictures
+        )
         for name, body in files.items():
             atomic.write_inside(partial / name, body)
-        names |= {*files, *pictures.files}
+        names |= {*files, *pictures}
     return folder
 
 
@@ -77,16 +82,17 @@ def _refuse_foreign(folder: Path, names: set[str]) -> bool:
 
 
 def sequence_files(
-    sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, pictures: WrittenPictures = NO_PICTURES
-) -> dict[str, bytes]:
+    sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, images: str = "jpg",
+    pixels: Mapping[str, str] = NOTHING, pictures: Mapping[str, Path] = NOTHING,
+) -> dict[str, bytes]:  # fmt: skip
     """Returns the files of a sequence except its pictures: content by name, the manifest last.
 
-    pictures: what `write_pictures` returned, for the manifest.
+    images: file type of the pictures. pixels: what `write_pictures` returned. pictures: the files that it wrote.
     """
     frames = list(sequence.without_pictures())
     found = [f.detections for f in frames if f.detections is not None]
     assert len(found) in (0, len(frames)), "a sensor gives detections for every frame or for none"
-    files = {"scenario.toml": scenario.encode(), "seqinfo.ini": _seqinfo(sequence, len(frames), pictures)}
+    files = {"scenario.toml": scenario.encode(), "seqinfo.ini": _seqinfo(sequence, len(frames), coding(pixels, images))}
     if sequence.camera is not None:
         files["camera.json"] = tables.json_document(camera_document(sequence.camera))
     if sequence.scene is not None:
@@ -98,27 +104,25 @@ def sequence_files(
     files = dict(sorted(files.items()))
     truth = hashing.truth_hash(scenario, seed, repeat, sequence.truth)
     manifest: dict[str, Any] = {
-        **seal.identity(scenario, seed, repeat, pictures.streams, pictures.images or "jpg"),
+        **seal.identity(scenario, seed, repeat, pixels, images),
         **{key: sequence.source[key] for key in ("origin", "stride") if key in sequence.source},
-        "pixels": pictures.pixels, "truth_hash": truth,
-        "content_hash": hashing.content_hash(truth, found, pictures.pixels),
+        "pixels": dict(pixels), "truth_hash": truth, "content_hash": hashing.content_hash(truth, found, pixels),
         "sequence": {
             "name": sequence.name, "fps": sequence.fps, "length": len(frames),
             "image_size": None if sequence.image_size is None else list(sequence.image_size),
             "px_per_m": tables.plain(sequence.px_per_m),
         },
-        "versions": versions(bool(pictures.streams)),
-        "files": dict(sorted((seal.file_facts(files) | pictures.files).items())),
+        "versions": versions(bool(pixels)), "files": seal.file_facts({**files, **pictures}),
     }  # fmt: skip
     return {**files, MANIFEST: tables.json_document(seal.with_hash(manifest))}
 
 
-def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> bytes:
+def _seqinfo(sequence: Sequence, length: int, images: str | None) -> bytes:
     # imDir is always img1, so that MOTChallenge tools accept it.
     lines = ["[Sequence]", f"name={printable(sequence.name)}", "imDir=img1"]
     lines += [f"frameRate={str(sequence.fps).removesuffix('.0')}", f"seqLength={length}"]
     if sequence.image_size is not None:
-        suffix = ".png" if pictures.images == "png" else ".jpg"
+        suffix = ".png" if images == "png" else ".jpg"
         lines += ["imWidth={}".format(*sequence.image_size), "imHeight={1}".format(*sequence.image_size)]
         lines.append(f"imExt={suffix}")
     return "\n".join([*lines, ""]).encode()
