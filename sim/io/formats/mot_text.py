@@ -292,7 +292,6 @@ class DetectionTable:
     """The content of a det.txt, N rows sorted by frame, those of a frame in the order of the file."""
 
     frame: Ints  # (N,) from 1
-    id: Ints  # (N,) as in the file, usually -1
     plane: Plane  # "ground" (pos in m) or "image" (pos in px)
     pos: Array  # (N, 2) x, y on the ground, or the box's centre
     box: Array | None  # (N, 4) left, top, width, height in px, None if any row has none
@@ -322,7 +321,7 @@ def detections_of_table(table: MotTable, options: BoxOptions) -> DetectionTable:
         raise InputError(file=path, place="--min-score", got=got, expected=expected, remedy="lower it")
     rows, score = rows[good], score[good]
     box = None if boxless.any() else table.box[rows]
-    return DetectionTable(table.frame[rows], table.id[rows], plane, pos[rows], box, score)
+    return DetectionTable(table.frame[rows], plane, pos[rows], box, score)
 
 
 def _places(table: MotTable) -> tuple[Array | None, Bools]:
