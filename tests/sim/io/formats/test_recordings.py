@@ -115,9 +115,8 @@ def test_caviar_traps(tmp_path):
     truth = open_source(path, fps=25)[0].truth
     assert truth.frame.tolist() == [1, 1, 1, 2, 2, 2]
     assert truth.group.tolist() == [4, 4, -1, -1, -1, -1]
-    path = xml(tmp_path, (objects, [GROUP.format(4, "1,2"), GROUP.format(5, "2,3")]))
     with pytest.warns(UserWarning, match="two groups"):
-        truth = open_source(path, fps=25)[0].truth
+        truth = open_source(xml(tmp_path, (objects, [GROUP.format(4, "1,2"), GROUP.format(5, "2,3")])), fps=25)[0].truth
     assert truth.group.tolist() == [4, 4, 5]
 
 
