@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import Any, TypedDict, Unpack, cast
+from typing import Any, cast
 from uuid import uuid4
 
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
@@ -177,17 +177,10 @@ class Folders(list[Path]):
         self.left_out = left_out or {}
 
 
-class Stored(TypedDict, total=False):
-    """What `generate` stores of each sequence."""
-
-    streams: Iterable[str]  # pictures: some of "left", "right", "disparity", "ids", "background"; () for none
-    images: str  # their file type, "jpg", "png" or "mp4"
-    stride: int  # N stores every N-th frame of the camera only: 1, 1 + N, …, numbered from 1
-
-
 def generate(
     entries: Iterable[Entry | str], seeds: range, out: str | Path, *, set: Iterable[str] = (),
-    workers: WorkerOptions = ONE_WORKER, progress: Progress | None = None, **stored: Unpack[Stored],
+    workers: WorkerOptions = ONE_WORKER, progress: Progress | None = None, streams: Iterable[str] = ("left",),
+    images: str = "jpg", stride: int = 1,
 ) -> Folders:  # fmt: skip
     """Simulates every entry with every seed, and stores each sequence as OUT/flockscope-<split>/<name>-s<seed>/.
 
@@ -201,7 +194,9 @@ def generate(
         set: "key=value" settings for entries given by name.
         workers: By default this process. Those of a cluster must share the folder `out` under the same path.
         progress: Called as progress(sequences done, sequences in all, name of the last one) after each.
-        **stored: Streams, images, stride (`Stored`); left jpg pictures of all frames by default.
+        streams: Pictures to store: some of "left", "right", "disparity", "ids", "background"; () for none.
+        images: Their file type, "jpg", "png" or "mp4".
+        stride: N stores every N-th frame of the camera only: 1, 1 + N, …, numbered from 1.
 
     Returns:
         The folders, in the order of entries, all seeds of an entry together. `left_out` has the errors of sequences
@@ -213,14 +208,13 @@ def generate(
     """
     split, root = split_of(seeds), Path(out) if workers.cluster is None else Path(out).absolute()
     folder = root / f"flockscope-{split}"
-    settings, stride, images = tuple(set), stored.get("stride", 1), stored.get("images", "jpg")
-    streams = check_streams(stored.get("streams", ("left",)), images)
+    settings, wanted = tuple(set), check_streams(streams, images)
     found = [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
     output_paths(folder, [entry.name for entry in found], source="entries")
     for entry in found:
         check_stride(stride, entry.scenario.camera.fps)
     paths = [(output_path(folder, e.name, f"-s{seed:05d}"), e, seed) for e, seed in product(found, seeds)]
-    jobs = [SequenceJob(*job, streams, images, stride) for job in paths]
+    jobs = [SequenceJob(*job, wanted, images, stride) for job in paths]
     with _dataset(root, folder):
         for job in jobs:
             stored_manifest(job)
@@ -286,45 +280,35 @@ def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
     return kind(**first.as_dict() | {"got": got, "remedy": remedy})
 
 
-@dataclass(frozen=True)
-class ReplayOptions:
-    """Options that all replays of a dataset share."""
-
-    view: ObservationSpec  # camera, sensor, light and picture, with the frame rate
-    cut: Cut = WHOLE  # the part of each recording to replay, default all
-    # camera, or its file, of recordings that have boxes but no ground positions; None if not needed; an error for
-    # others
-    calibration: Camera | str | Path | None = None
-    # pictures to store, some of "left", "right", "disparity", "ids", "background"; () for none
-    streams: tuple[str, ...] = ("left",)
-    images: str = "jpg"  # their file type, "jpg", "png" or "mp4"
-
-
 def store_replays(
-    sources: Iterable[Sequence], options: ReplayOptions, seeds: range, out: str | Path, progress: Progress | None = None
-) -> list[Path]:
+    sources: Iterable[Sequence], view: ObservationSpec, seeds: range, out: str | Path, *, cut: Cut = WHOLE,
+    calibration: Camera | str | Path | None = None, streams: Iterable[str] = ("left",), images: str = "jpg",
+    progress: Progress | None = None,
+) -> list[Path]:  # fmt: skip
     """Stores a replay of every source with every seed in folders named as by `generate`; returns the folders.
 
+    view: camera, sensor, light and picture, with the frame rate. cut: the part of each recording to replay.
+    calibration: camera, or its file, of recordings that have boxes but no ground positions; None if not needed; an
+    error for others. streams, images, progress: as for `generate`.
+
     The first error is raised and ends the work; replays stored before it are kept. Recordings of real motion need seeds
-    from 20,000 on, else InputError. progress: as for `generate`.
+    from 20,000 on, else InputError.
     """
     recordings, split, root = list(sources), split_of(seeds), Path(out)
-    folder, cut = root / f"flockscope-{split}", options.cut
+    folder = root / f"flockscope-{split}"
     output_paths(folder, [replay_name(recording.name, cut) for recording in recordings], source="recordings")
     if split in TUNING_SPLITS and any(is_real(recording) for recording in recordings):
         got, expected = f"{seeds.start} ({split})", "seeds from 20000 (test) on, for real motion"
         remedy = "choose other seeds: nothing is tuned on recordings"
         raise InputError(place="--seeds", got=got, expected=expected, remedy=remedy)
-    streams = check_streams(options.streams, options.images)
+    wanted = check_streams(streams, images)
     made: list[Path] = []
     with _dataset(root, folder):
         try:
             for recording, seed in product(recordings, seeds):
-                sequence, form = resolve_replay(
-                    recording, options.view, seed, cut=cut, calibration=options.calibration, streams=streams
-                )
+                sequence, form = resolve_replay(recording, view, seed, cut=cut, calibration=calibration, streams=wanted)
                 entry, path = Entry(form.name, cast(Any, form)), output_path(folder, form.name, f"-s{seed:05d}")
-                store(SequenceJob(path, entry, seed, streams, options.images), sequence)
+                store(SequenceJob(path, entry, seed, wanted, images), sequence)
                 made.append(path)
                 if progress is not None:
                     progress(len(made), len(recordings) * len(seeds), path.name)

@@ -130,7 +130,7 @@ def _one_alarm(
 def _draw_person(ids: Ints, seed: int, name: tuple[int, int], repeat: int) -> int:
     """Returns the id of the person with whom an alarm goes: the one of `ids` with the highest random draw.
 
-    name: of the alarm, as in Birth. Each draw has a random stream of its own, named by seed, repeat (number of
+    name: of the alarm, as of `_draw_births`. Each draw has a random stream of its own, named by seed, repeat (number of
     the suite entry's copy), the alarm and the person's id. One person more therefore changes few alarms. Raises
     ValueError if `ids` is empty, or for a negative seed or id.
     """
@@ -155,7 +155,7 @@ def _rows_of_person(truth: Truth, id: int, frame: Ints) -> tuple[Ints, Bools]:
 def _boxes_at_person(model: FalseAlarms, ground: VisibleGround, row: Ints, n: Array) -> tuple[Array, Array]:
     """Returns boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm beside a person.
 
-    row (L,): the person's rows of the truth. n (9,): standard normals, columns as `at_birth` of Birth. `model` gives
+    row (L,): the person's rows of the truth. n (9,): standard normals, columns LIFE …. `model` gives
     pairs (mean, standard deviation): across and foot, the shift of the middle to the right and of the lower edge
     downwards, in the person's box heights; near_height, the logarithm of height over the person's height. Boxes are 0
     if the truth has none. The points are at the middle of the lower edges, for a camera of kind "top" at the middle of
@@ -181,7 +181,7 @@ def _boxes_alone(
     """Returns boxes (L, 4), left, top, width, height in px, and points (L, 2) in m, of an alarm that stands or drifts
     alone.
 
-    age (L,): time since its birth in each frame, s. at_birth (9,): its uniforms, columns as `at_birth` of Birth; n
+    age (L,): time since its birth in each frame, s. at_birth (9,): its uniforms, columns LIFE …; n
     (9,): the same as standard normals. It starts near one of the sites `model.at` (shares of width and height of
     the ground part of the image), with a standard deviation of 0.03 and inside that part; without sites, anywhere
     on it. It moves with constant velocity, drawn with standard deviation `model.drift` (box heights per s) per

@@ -9,7 +9,9 @@ import os
 import os.path
 import warnings
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from scenarios.errors import InputError
@@ -93,7 +95,7 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
         raise InputError(file=path, got="nothing there", expected=KINDS, remedy="check the path")
     if not os.path.isdir(path):
         require_regular(path)
-        return [_open_file(path, options)]
+        return [_open_one(path, options)]
     found = list(_find(path, DEPTH))
     if not found:
         got, remedy = "a folder without sequences", "check the path"
@@ -103,7 +105,7 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
         elif sum(p.suffix.lower() in PICTURES for p in path.iterdir() if not is_hidden(p)) > 1:
             got, remedy = "a folder of pictures, without img1", f"move the pictures to {path / 'img1'}"
         raise InputError(file=path, got=got, expected=KINDS, remedy=remedy)
-    return _distinct([_open_folder(p, options) for p in found])
+    return _distinct([_open_one(p, options) for p in found])
 
 
 def _distinct(sequences: list[Sequence]) -> list[Sequence]:
@@ -130,7 +132,7 @@ def generated_folders(path: Path) -> list[Path]:
     Raises InputError if there are none, or a sequence is of another kind.
     """
     found = _find(path, DEPTH) if path.is_dir() else []
-    other = next((p for p in found if p.is_file() or _kind(p) != "generated"), None)
+    other = next((p for p in found if _kind(p) != "generated"), None)
     if not found or other is not None:
         got = "no sequences" if other is None else f"a recording, {other.name}"
         expected, remedy = "a generated sequence or dataset", "give what `flockscope generate` made"
@@ -144,39 +146,50 @@ def split_and_name(folder: Path) -> str:
     return "/".join(Path(os.path.abspath(folder)).parts[-2:])
 
 
-def _open_file(path: Path, options: RecordingOptions) -> Sequence:
-    suffix = path.suffix.lower()
-    if suffix == ".xml":
-        why = "its truth is in the image, without pictures"
-        options.reject(path, "a CAVIAR recording", why, "camera background box_options")
-        return caviar.open_file(path, options)
-    if path.name == "obsmat.txt":
-        return _open_folder(path.parent, options)
-    if suffix in video.SUFFIXES:
-        options.reject(path, "a video without --boxes", "it has no boxes", "box_options")
-        return video.open_video(path, options)
-    if suffix not in (".txt", ".csv", ".tsv", people_texts.NDJSON):
+def _open_one(path: Path, options: RecordingOptions) -> Sequence:
+    path = path.parent if path.name == "obsmat.txt" else path
+    kind, suffix = _kind(path), path.suffix.lower()
+    if kind is None:
         of_boxes = "if these are boxes: flockscope track TRACKER VIDEO --boxes FILE"
         remedy = of_boxes if suffix == ".json" else f"if it holds rows of people, write them as .csv, and {NAME_THEM}"
         raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy=remedy)
-    layout = people_texts.layout_of(path)
-    if layout is None:
-        options.reject(path, "a text", "it has no pictures", "background")
-        return mot_text.open_text(path, options)
-    kind, why, names = "KITTI", "its camera drives, and it has labels of people only", "camera background box_options"
-    if layout != "kitti":
-        kind, why, names = "trajectories", "it is in metres, without pictures", f"px_per_m {names}"
-    options.reject(path, f"a text of {kind}", why, names)
-    return people_texts.open_text(path, layout, options)
+    name, refused, why, read = READERS[kind]
+    options.reject(path, name, why, refused)
+    return read(path, options)
 
 
-def _kind(folder: Path) -> str | None:
-    if is_sequence(folder):
-        return "generated"
-    if is_present(folder / "obsmat.txt"):
-        return "biwi"
-    parts = ("seqinfo.ini", "gt/gt.txt", "det/det.txt", "img1")
-    return "mot" if any((folder / part).exists() for part in parts) else None
+def _generated(folder: Path, options: RecordingOptions) -> Sequence:
+    return sequence_folder.open_sequence(folder, background=options.background)
+
+
+IN_METRES, ON_LABELS = "it is in metres, without pictures", "camera background box_options"
+TRAJECTORIES = ("a text of trajectories", f"px_per_m {ON_LABELS}", IN_METRES)
+DRIVES = "its camera drives, and it has labels of people only"
+# of each kind of source its name, the options without effect on it, why they have none, and the reader
+READERS: dict[str, tuple[str, str, str, Callable[[Path, RecordingOptions], Sequence]]] = {
+    "generated": ("a generated sequence", "fps px_per_m camera box_options", "it knows its own", _generated),
+    "biwi": ("a BIWI recording", f"px_per_m {ON_LABELS}", IN_METRES, biwi.open_folder),
+    "mot": ("a MOTChallenge folder", "", "", mot_folder.open_folder),
+    "caviar": ("a CAVIAR recording", ON_LABELS, "its truth is in the image, without pictures", caviar.open_file),
+    "video": ("a video without --boxes", "box_options", "it has no boxes", video.open_video),
+    "text": ("a text", "background", "it has no pictures", mot_text.open_text),
+    "kitti": ("a text of KITTI", ON_LABELS, DRIVES, partial(people_texts.open_text, "kitti")),
+    **{k: (*TRAJECTORIES, partial(people_texts.open_text, k)) for k in people_texts.LAYOUTS if k != "kitti"},
+}
+
+
+def _kind(path: Path) -> str | None:
+    if path.is_dir():
+        if is_sequence(path):
+            return "generated"
+        if is_present(path / "obsmat.txt"):
+            return "biwi"
+        parts = ("seqinfo.ini", "gt/gt.txt", "det/det.txt", "img1")
+        return "mot" if any((path / part).exists() for part in parts) else None
+    suffix = path.suffix.lower()
+    if suffix in (".txt", ".csv", ".tsv", people_texts.NDJSON):
+        return people_texts.layout_of(path) or "text"
+    return "caviar" if suffix == ".xml" else "video" if suffix in video.SUFFIXES else None
 
 
 def _find(folder: Path, depth: int) -> list[Path]:
@@ -192,18 +205,3 @@ def _find(folder: Path, depth: int) -> list[Path]:
 def _is_recording(path: Path) -> bool:
     suffix = path.suffix.lower()
     return suffix in (*video.SUFFIXES, people_texts.NDJSON) or (suffix == ".xml" and caviar.is_caviar(path))
-
-
-def _open_folder(path: Path, options: RecordingOptions) -> Sequence:
-    if path.is_file():
-        return _open_file(path, options)
-    match _kind(path):
-        case "generated":
-            options.reject(path, "a generated sequence", "it knows its own", "fps px_per_m camera box_options")
-            return sequence_folder.open_sequence(path, background=options.background)
-        case "biwi":
-            why = "it is in metres, without pictures"
-            options.reject(path, "a BIWI recording", why, "px_per_m camera background box_options")
-            return biwi.open_folder(path, options)
-        case _:
-            return mot_folder.open_folder(path, options)

@@ -54,19 +54,29 @@ KEY = b"flockscope"
 REDO = "run the command that made it again"
 
 
-@dataclass(frozen=True, eq=False)
-class Column:
-    """A column of a Parquet table to write."""
+# names of columns of several tables
+AXES = ("x", "y", "z")
+BOX, VISIBLE, MODAL = (
+    tuple(f"{kind}_{side}" for side in ("left", "top", "width", "height")) for kind in ("box", "visible", "modal")
+)
+EXTENT = ("extent_xx", "extent_xy", "extent_yx", "extent_yy")
+# values by the name of a column: an array (R,), or lists as a pyarrow.Array; by a tuple of n names: an array (R, n); a
+# column that is None is left out
+Columns = Mapping[Any, Any]
 
-    name: str  # of the column
-    values: NDArray[Any] | list[NDArray[Any]]  # an array (R,), or R arrays of any lengths for a column of lists
-    unit: str = "1"  # its unit as a text, "1" for none
-    kind: type = np.float64  # number type of the arrays of a column of lists, by default float64; ignored otherwise
+
+def along(axes: Iterable[str]) -> tuple[str, ...]:
+    """Returns the names of the columns of velocities along axes."""
+    return tuple(f"v{axis}" for axis in axes)
 
 
-def columns_of(names: Iterable[str], values: Array | None, unit: str) -> list[Column]:
-    """Returns one Column for each of n names, from the columns of values (R, n); [] if values is None."""
-    return [] if values is None else [Column(name, values[:, k], unit) for k, name in enumerate(names)]
+def units_of(unit: str) -> dict[str, str]:
+    """Returns the units of the columns of stored tables by name. unit: of positions, "m" or "px"."""
+    state = dict.fromkeys(AXES, unit) | dict.fromkeys(along(AXES), f"{unit}/s")
+    covariances = {f"cov_{a}_{b}": f"{state[a]} {state[b]}" for a in state for b in state}
+    boxes = dict.fromkeys((*BOX, *VISIBLE, *MODAL), "px") | {"visible_px": "px²", "amodal_px": "px²"}
+    groups = dict.fromkeys(EXTENT, f"{unit}^2") | {"size": "people", "hull": f"{unit}: x1, y1, x2, …"}
+    return {**state, **covariances, **boxes, **groups, "heading": "rad", "height": "m"}
 
 
 @dataclass(frozen=True)
@@ -81,6 +91,10 @@ class StoredTable:
         """Returns the columns `names` as float64: one as (R,), n > 1 as (R, n)."""
         found = [np.asarray(self._numbers(name, "iufb", "numbers"), np.float64) for name in names]
         return found[0] if len(found) == 1 else np.stack(found, axis=1)
+
+    def known(self, *names: str) -> Array | None:
+        """Returns what `floats` does; None if there is no such column."""
+        return self.floats(*names) if names[0] in self.columns else None
 
     def ints(self, name: str) -> Ints:
         """Returns column `name` as (R,), int64."""
@@ -117,12 +131,19 @@ class StoredTable:
             raise InputError(file=self.file, place=place, got=got, expected=expected, remedy=REDO)
 
 
-def table_bytes(columns: Iterable[Column], facts: dict[str, Any]) -> bytes:
-    """Returns a Parquet file as bytes; `facts` is metadata in its schema. Equal content gives equal bytes."""
+def table_bytes(columns: Columns, facts: dict[str, Any], units: Mapping[str, str]) -> bytes:
+    """Returns a Parquet file as bytes; `facts` is metadata in its schema. Equal content gives equal bytes.
+
+    units: of columns, by name; columns that are not in it have none.
+    """
     import pyarrow as pa
 
-    arrays = {c: _arrow(c) for c in columns}
-    schema = pa.schema([pa.field(c.name, a.type, metadata={"unit": c.unit}) for c, a in arrays.items()])
+    arrays: dict[str, Any] = {}
+    for names, values in columns.items():
+        if values is not None:
+            several = zip(names, values.T, strict=True) if isinstance(names, tuple) else [(names, values)]
+            arrays |= {name: pa.array(column) for name, column in several}
+    schema = pa.schema([pa.field(name, a.type, metadata={"unit": units.get(name, "1")}) for name, a in arrays.items()])
     return parquet_bytes(pa.Table.from_arrays(list(arrays.values()), schema=schema), facts)
 
 
@@ -136,16 +157,6 @@ def parquet_bytes(table: Any, facts: Mapping[str, Any]) -> bytes:
     # Checksums of pages: a damaged file is an error, and not other numbers.
     pq.write_table(marked, sink, compression="zstd", write_page_checksum=True)
     return bytes(sink.getvalue())
-
-
-def _arrow(column: Column) -> Any:
-    import pyarrow as pa
-
-    if isinstance(column.values, np.ndarray):
-        return pa.array(column.values)
-    offsets = np.cumsum([0, *(len(v) for v in column.values)]).astype(np.int32)
-    flat = np.concatenate([np.zeros(0, column.kind), *column.values])
-    return pa.ListArray.from_arrays(pa.array(offsets), pa.array(flat))
 
 
 def read_table(path: Path) -> StoredTable:

@@ -19,8 +19,8 @@ from scenarios.limits import FRAME_RATES
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_rows
-from sim.io.formats.labelled_truth import differentiate, labelled_sequence, with_labels
-from sim.io.formats.options import NO_OPTIONS, RecordingOptions
+from sim.io.formats.labelled_truth import differentiate, with_labels
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions, recorded_sequence
 from sim.types import Ints, Sequence, Truth
 
 FPS = 2.5
@@ -114,26 +114,22 @@ def _rate(rows: NumericTable, frame: Ints, id: Ints) -> float:
     return rate
 
 
-def read_truth(folder: Path, fps: float = FPS) -> Truth:
-    """Returns the truth of a recording: positions m and velocities m/s on the ground, no boxes.
-
-    Groups are those of groups.txt in all frames. Without that file everybody is alone, and no frame counts as labelled.
-    """
-    rows, frame, id = _table(folder)
-    pos, vel = rows.values[:, (2, 4)], rows.values[:, (5, 7)]
-    length = int(frame.max(initial=0))
-    truth = Truth(
-        name=folder.name, fps=fps, length=length, px_per_m=float("nan"), frame=frame, id=id,
-        group=np.full(len(id), -1, np.int64), pos=pos, vel=vel, box=None, visibility=np.ones(len(id)),
-        z=np.zeros(len(id)), labelled=np.zeros(length, bool),
-    )  # fmt: skip
-    groups = folder / "groups.txt"
-    return with_labels(truth, labels_of(groups, id)) if is_present(groups) else truth
-
-
 def open_folder(folder: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
-    """Returns the recording in `folder` as Sequence, without pictures and detections, by default at 2.5 fps."""
+    """Returns the recording in `folder` as Sequence, without pictures and detections, by default at 2.5 fps.
+
+    Groups of its truth are those of groups.txt in all frames. Without that file everybody is alone, and no frame counts
+    as labelled.
+    """
     rows, frame, id = _table(folder)
     rate, length = options.fps or _rate(rows, frame, id), int(frame.max(initial=0))
 
-    return labelled_sequence("biwi", folder, folder.name, rate, length, lambda: read_truth(folder, rate))
+    def truth() -> Truth:
+        people = Truth(
+            name=folder.name, fps=rate, length=length, px_per_m=float("nan"), frame=frame, id=id,
+            group=np.full(len(id), -1, np.int64), pos=rows.values[:, (2, 4)], vel=rows.values[:, (5, 7)], box=None,
+            visibility=np.ones(len(id)), z=np.zeros(len(id)), labelled=np.zeros(length, bool),
+        )  # fmt: skip
+        groups = folder / "groups.txt"
+        return with_labels(people, labels_of(groups, id)) if is_present(groups) else people
+
+    return recorded_sequence({"kind": "biwi", "path": str(folder)}, folder.name, rate, length, load_truth=truth)

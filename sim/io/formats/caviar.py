@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import warnings
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +18,12 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import NumericTable, bounded_number, person_ids, xml_root
-from sim.io.formats.labelled_truth import labelled_sequence, with_labels
-from sim.io.formats.options import NO_OPTIONS, RecordingOptions
+from sim.io.formats.labelled_truth import centres
+from sim.io.formats.mot_table import MotTable
+from sim.io.formats.mot_text import truth_of_table
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions, recorded_sequence
 from sim.scene.camera import scale_of_all_boxes, scale_of_first_boxes
-from sim.types import Array, Ints, Sequence, Truth
+from sim.types import Sequence, Truth
 
 FPS = 25.0
 LAST_ID = 10**15 - 1  # ids pass through float64
@@ -30,29 +31,20 @@ IMAGE_SIZE = (384, 288)
 SMALLEST = 1e-6  # px: least width and height of a box
 
 
-@dataclass(frozen=True)
-class CaviarRecording:
-    """The content of a CAVIAR file: R boxes sorted by (frame, id), and `length` frames."""
-
-    name: str  # that in the file, else the file's name without suffix
-    length: int  # the last frame in the file
-    frame: Ints  # (R,) from 1
-    id: Ints  # (R,) the person's id
-    label: Ints  # (R,) the id of the person's group, -1 for alone
-    centre: Array  # (R, 2) x, y of the box's centre, px
-    size: Array  # (R, 2) width, height, px
-    labelled: bool  # True if the file has a list of groups, perhaps empty, in any frame
-    # True if it is one of CAVIAR's own recordings: people have hypotheses about what they do, and all boxes lie in
-    # CAVIAR's pictures
-    caviar: bool
-
-
-def read_xml(path: Path) -> CaviarRecording:
-    """Returns the people and groups in the CAVIAR file (CVML) `path`; our frame number is that of the file + 1."""
+def read_xml(path: Path) -> ET.Element:
+    """Returns the root of the CAVIAR file (CVML) `path`."""
     root = xml_root(path, "a CAVIAR file (CVML)", "fetch the file again")
     if root.tag != "dataset" or root.find("frame") is None:
         got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
         raise InputError(file=path, got=got, expected="<dataset> of CAVIAR (CVML)", remedy="give another file")
+    return root
+
+
+def people_of(path: Path, root: ET.Element) -> tuple[MotTable, int]:
+    """Returns the people in a CAVIAR file, sorted by (frame, id), and its number of frames.
+
+    Our frame number is that of the file + 1. The groups of the table are None if no frame has a list of groups.
+    """
     rows, length = list[tuple[float, ...]](), 0
     for element in root.iterfind("frame"):
         index = int(_number(path, "frame", element, "number", 0, FRAMES - 1, whole=True)) + 1
@@ -60,15 +52,11 @@ def read_xml(path: Path) -> CaviarRecording:
         label = _labels(path, index, element)
         rows += [_row(path, index, person, label) for person in element.iterfind("objectlist/object")]
     values = np.array(sorted(rows), np.float64).reshape(-1, 7)
-    table = NumericTable(path, values, values[:, 0].astype(np.int64) - 1, unit="frame")
     frame, id, label_ = (values[:, k].astype(np.int64) for k in range(3))
+    table = NumericTable(path, np.delete(values, 2, axis=1), frame - 1, unit="frame")
     table.reject(repeated_ids(frame, id), "each id once in a frame", "remove one of the two")
-    centre, size = values[:, 3:5], values[:, 5:7]
-    own = root.find("frame/objectlist/object/hypothesislist") is not None
-    return CaviarRecording(
-        root.get("name", path.stem), length, frame, id, label_, centre, size,
-        root.find("frame/grouplist") is not None, own and bool(((centre >= 0) & (centre <= IMAGE_SIZE)).all()),
-    )  # fmt: skip
+    group = None if root.find("frame/grouplist") is None else label_
+    return MotTable(table, frame, id, values[:, 3:], np.zeros((len(rows), 0)), group), length
 
 
 def _number(
@@ -93,55 +81,46 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
 
 
 def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> tuple[float, ...]:
-    """Returns (frame, id, label, centre x, centre y, width, height), px; label -1 for alone."""
+    """Returns (frame, id, label, left, top, width, height), px; label -1 for alone."""
     place, box = f"frame {index - 1}", person.find("box")
     id = int(_number(path, place, person, "id", 0, LAST_ID, whole=True))
     place += f": object {id}"
     if box is None:
         raise InputError(file=path, place=place, got="an object without box", expected="a box", remedy="add it")
     x, y = (_number(path, place, box, key) for key in ("xc", "yc"))
-    return (index, id, label.get(id, -1), x, y, *(_number(path, place, box, key, SMALLEST) for key in ("w", "h")))
-
-
-def read_truth(path: Path, fps: float = FPS, px_per_m: float | None = None) -> Truth:
-    """Returns the truth of a CAVIAR file in the image: boxes in px, no positions on the ground, no velocities.
-
-    Groups have one hull around their members' boxes. Events are measured from the centres. px_per_m: None: the median
-    of the boxes' longer sides / 1.7 m.
-    """
-    found = read_xml(path)
-    scale = scale_of_all_boxes(found.size.max(axis=1)) if px_per_m is None else px_per_m
-    box = np.concatenate([found.centre - found.size / 2, found.size], axis=1)
-    truth = Truth(
-        name=found.name, fps=fps, length=found.length, px_per_m=scale, frame=found.frame, id=found.id,
-        group=found.label, pos=None, vel=None, box=box, visibility=np.ones(len(box)),
-        labelled=np.zeros(found.length, bool),
-    )  # fmt: skip
-    return with_labels(truth, found.label) if found.labelled else truth
+    w, h = (_number(path, place, box, key, SMALLEST) for key in ("w", "h"))
+    return index, id, label.get(id, -1), x - w / 2, y - h / 2, w, h
 
 
 def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns the CAVIAR file `path` as Sequence, without pictures and detections.
 
-    `options.px_per_m` None: the scale is the median of the longer sides of the first 100 boxes / 1.7 m;
-    `source["px_per_m_frames"]` is then the last frame of these boxes.
+    Its truth is in the image. `options.px_per_m` None: the scale of the truth is the median of the longer sides of all
+    boxes / 1.7 m, that of the sequence the median of the first 100; `source["px_per_m_frames"]` is then the last frame
+    of these boxes.
     """
-    found, px_per_m = read_xml(path), options.px_per_m
+    root, px_per_m = read_xml(path), options.px_per_m
+    table, length = people_of(path, root)
+    name, sides, centre = root.get("name", path.stem), table.box[:, 2:].max(axis=1), centres(table.box)
+    # CAVIAR's own recordings have hypotheses about what people do, and all boxes lie in CAVIAR's pictures.
+    inside = bool(((centre >= 0) & (centre <= IMAGE_SIZE)).all())
+    own = inside and root.find("frame/objectlist/object/hypothesislist") is not None
     rate = options.fps or FPS
-    if options.fps is None and not found.caviar:
+    if options.fps is None and not own:
         got, expected = "labels without frame rate, not of CAVIAR's recordings", "the frames per second of the video"
         raise InputError(file=path, place="--fps", got=got, expected=expected, remedy="give --fps")
     if options.fps is None:
         # The text names no path, so that a command over many recordings prints it once.
         words = f"CAVIAR's recordings are taken at {FPS:g} fps, with pictures of {IMAGE_SIZE[0]}×{IMAGE_SIZE[1]} px"
         warnings.warn(f"{words} (--fps says otherwise)", stacklevel=3)
-    scale, learned = scale_of_first_boxes(found.frame, found.size.max(axis=1)) if px_per_m is None else (px_per_m, 0)
+    scale, learned = scale_of_first_boxes(table.frame, sides) if px_per_m is None else (px_per_m, 0)
 
-    sequence = labelled_sequence(
-        "caviar", path, found.name, rate, found.length, lambda: read_truth(path, rate, px_per_m), scale,
-        **({"px_per_m_frames": learned} if learned else {}),
-    )  # fmt: skip
-    return replace(sequence, image_size=IMAGE_SIZE if found.caviar else None)
+    def truth() -> Truth:
+        return truth_of_table(table, name, rate, length, px_per_m or scale_of_all_boxes(sides))
+
+    source = {"kind": "caviar", "path": str(path), **({"px_per_m_frames": learned} if learned else {})}
+    size = IMAGE_SIZE if own else None
+    return recorded_sequence(source, name, rate, length, load_truth=truth, px_per_m=scale, image_size=size)
 
 
 def is_caviar(path: Path) -> bool:

@@ -12,35 +12,18 @@ that of the positions per second.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sim.truth.merge_split_rules import frames_of
-from sim.types import Array, Frame, GroupEvent, Groups, Ints, Sequence, Truth
+from sim.types import Array, GroupEvent, Groups, Ints, Truth
 
 
 def centres(box: Array) -> Array:
     """Returns the middles (R, 2) of boxes (R, 4) left, top, width, height."""
     return np.asarray(box[:, :2] + box[:, 2:] / 2)
-
-
-def labelled_sequence(
-    kind: str, path: Path, name: str, fps: float, length: int, load_truth: Callable[[], Truth],
-    px_per_m: float = float("nan"), **more: Any,
-) -> Sequence:  # fmt: skip
-    """Returns a Sequence with a truth, but no pictures and detections. more: further entries of its `source`."""
-
-    def frames() -> Iterator[Frame]:
-        return (Frame(index, (index - 1) / fps) for index in range(1, length + 1))
-
-    return Sequence(
-        name=name, fps=fps, length=length, frames=frames, load_truth=load_truth, px_per_m=px_per_m,
-        source={"kind": kind, "path": str(path), **more},
-    )  # fmt: skip
 
 
 def labelled_truth_fields(

@@ -6,7 +6,7 @@ import configparser
 import warnings
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass
-from itertools import repeat
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,10 @@ from sim.io.files.numeric_text import bounded_number, read_text
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.mot_table import read_table, size_doubt
-from sim.io.formats.options import NO_OPTIONS, RecordingOptions
+from sim.io.formats.options import NO_OPTIONS, Pictures, RecordingOptions, recorded_sequence
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
-from sim.types import Frame, Image, Ints, Sequence, Truth
+from sim.types import Image, Ints, Sequence, Truth
 
 
 @dataclass(frozen=True)
@@ -109,18 +109,10 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         options.reject(path, "a recording without pictures", "it has none", "background")
     choice = (background or BackgroundChoice()).of(length, path, size) if pictures.files else None
 
-    def bare() -> Iterator[Frame]:
-        for index in range(1, length + 1):
-            yield Frame(index, (index - 1) / rate, detections=None if found is None else found.at(index, rate))
-
-    def shown(folder: PictureFolder, name: str) -> Iterator[Image | None]:
+    def shown(folder: PictureFolder, name: str) -> Pictures | None:
         every = range(1, length + 1)
-        return fill_gaps(folder.read(every, seen), length, name) if folder.files else repeat(None, length)
-
-    def frames() -> Iterator[Frame]:
-        both = shown(pictures, path.name), shown(right, f"{path.name}, right")
-        for frame, picture, beside in zip(bare(), *both, strict=True):
-            yield frame.replace(image=picture, right=beside)
+        there = images and pictures.files and folder.files
+        return (lambda: fill_gaps(folder.read(every, seen), length, name)) if there else None
 
     def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
         return pictures.read(wanted, seen or pictures.first_size())
@@ -131,14 +123,13 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     more: dict[str, Any] = {} if choice is None else {"background": str(choice)}
     more |= {} if pictures.numbering is None else {"numbering": astuple(pictures.numbering)}
-    return Sequence(
-        name=info.name, fps=rate, length=length, frames=frames if images and pictures.files else bare, bare=bare,
-        load_truth=truth if gt.is_file() else None,
-        image_size=size, camera=options.camera and scaled_to_image(options.camera, size, path),
-        px_per_m=options.scale, has_images=images and bool(pictures.files),
-        has_right=images and bool(pictures.files and right.files), has_detections=found is not None,
+    source = {"kind": "mot", "path": str(path), **of_boxes.given(), **more}
+    return recorded_sequence(
+        source, info.name, rate, length, detections=None if found is None else partial(found.at, fps=rate),
+        left=shown(pictures, path.name), right=shown(right, f"{path.name}, right"),
+        load_truth=truth if gt.is_file() else None, image_size=size, px_per_m=options.scale,
+        camera=options.camera and scaled_to_image(options.camera, size, path),
         load_background=None if choice is None else BackgroundSample(choice, length, path, sample),
-        source={"kind": "mot", "path": str(path), **of_boxes.given(), **more},
     )  # fmt: skip
 
 

@@ -17,9 +17,10 @@ people; other programs write categories, occlusion flags, zeros or pixels there.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,11 +29,11 @@ from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import LARGEST
 from sim.io.formats.biwi import labels_of
-from sim.io.formats.labelled_truth import centres, differentiate, labelled_sequence, with_labels
+from sim.io.formats.labelled_truth import centres, differentiate, with_labels
 from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, read_table, require_pixels
-from sim.io.formats.options import NO_OPTIONS, RATES, BoxOptions, Classes, RecordingOptions
+from sim.io.formats.options import NO_OPTIONS, RATES, BoxOptions, Classes, RecordingOptions, recorded_sequence
 from sim.scene.camera import scale_of_all_boxes
-from sim.types import Array, Bools, Detections, Frame, Ints, Plane, Sequence, Truth, Unscored
+from sim.types import Array, Bools, Detections, Ints, Plane, Sequence, Truth, Unscored
 
 # step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
 LONGEST = 12.0
@@ -291,7 +292,6 @@ class DetectionTable:
     """The content of a det.txt, N rows sorted by frame, those of a frame in the order of the file."""
 
     frame: Ints  # (N,) from 1
-    id: Ints  # (N,) as in the file, usually -1
     plane: Plane  # "ground" (pos in m) or "image" (pos in px)
     pos: Array  # (N, 2) x, y on the ground, or the box's centre
     box: Array | None  # (N, 4) left, top, width, height in px, None if any row has none
@@ -321,7 +321,7 @@ def detections_of_table(table: MotTable, options: BoxOptions) -> DetectionTable:
         raise InputError(file=path, place="--min-score", got=got, expected=expected, remedy="lower it")
     rows, score = rows[good], score[good]
     box = None if boxless.any() else table.box[rows]
-    return DetectionTable(table.frame[rows], table.id[rows], plane, pos[rows], box, score)
+    return DetectionTable(table.frame[rows], plane, pos[rows], box, score)
 
 
 def _places(table: MotTable) -> tuple[Array | None, Bools]:
@@ -429,17 +429,11 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     def truth() -> Truth:
         return truth_of_table(table, path.stem, rate, length, options.scale, of_boxes.person_class)
 
-    sequence = replace(
-        labelled_sequence("mot text", path, path.stem, rate, length, truth, options.scale, **of_boxes.given()),
-        camera=options.camera,
-    )
     require_classes(table, of_boxes.person_class)
-    if not (table.id == -1).all():
+    if (table.id == -1).all():
+        more: dict[str, Any] = {"detections": partial(detections_of_table(table, of_boxes).at, fps=rate)}
+    else:
         options.reject(path, "a text of people with ids", "it is for detections", "min_score")
-        return sequence
-    found = detections_of_table(table, of_boxes)
-
-    def frames() -> Iterator[Frame]:
-        return (Frame(k, (k - 1) / rate, detections=found.at(k, rate)) for k in range(1, length + 1))
-
-    return replace(sequence, frames=frames, load_truth=None, has_detections=True)
+        more = {"load_truth": truth}
+    source = {"kind": "mot text", "path": str(path), **of_boxes.given()}
+    return recorded_sequence(source, path.stem, rate, length, px_per_m=options.scale, camera=options.camera, **more)

@@ -25,10 +25,9 @@ from scenarios.limits import FRAME_RATES, is_number
 from scenarios.reading import parse_json
 from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_nan, read_rows, read_text, rows_among
 from sim.io.formats.biwi import frame_numbers
-from sim.io.formats.labelled_truth import labelled_sequence
 from sim.io.formats.mot_table import table_of_rows
 from sim.io.formats.mot_text import frame_rate, truth_of_table
-from sim.io.formats.options import RecordingOptions
+from sim.io.formats.options import RecordingOptions, recorded_sequence
 from sim.types import Sequence, Truth
 
 NDJSON = ".ndjson"
@@ -60,7 +59,7 @@ def layout_of(path: Path) -> str | None:
     return "kitti" if len(cells) in KITTI_CELLS and numbers == [True, True, False, True] else None
 
 
-def open_text(path: Path, layout: str, options: RecordingOptions) -> Sequence:
+def open_text(layout: str, path: Path, options: RecordingOptions) -> Sequence:
     """Returns a text as Sequence with truth, without pictures and detections. layout: as of `layout_of`."""
     rows, stated = LAYOUTS[layout](path, options.fps)
     if not len(rows.line):
@@ -73,7 +72,8 @@ def open_text(path: Path, layout: str, options: RecordingOptions) -> Sequence:
     def truth() -> Truth:
         return truth_of_table(table, path.stem, rate, length, options.scale)
 
-    return labelled_sequence("people text", path, path.stem, rate, length, truth, options.scale)
+    source = {"kind": "people text", "path": str(path)}
+    return recorded_sequence(source, path.stem, rate, length, load_truth=truth, px_per_m=options.scale)
 
 
 def _counted(rows: NumericTable) -> NumericTable:

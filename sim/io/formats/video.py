@@ -15,11 +15,11 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.formats.calibration import scaled_to_image
-from sim.io.formats.options import NO_OPTIONS, RATES, RecordingOptions
+from sim.io.formats.options import NO_OPTIONS, RATES, RecordingOptions, recorded_sequence
 from sim.io.pictures import video_files
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import fill_gaps, require_size, size_of
-from sim.types import Array, Bools, Frame, Image, Sequence
+from sim.types import Array, Bools, Image, Sequence
 
 SUFFIXES = (
     ".mp4", ".m4v", ".mov", ".3gp", ".mkv", ".webm", ".avi", ".wmv", ".flv", ".ogv", ".mpg", ".mpeg",
@@ -50,21 +50,12 @@ def open_video(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     rate, words = frame_rate(path.name, options.fps, index)
     choice = (options.background or BackgroundChoice()).of(length, path, size)
     times = None if options.fps is not None or index.ranks() is None or is_steady(index.times()) else index.times()
-
-    def bare(k: int) -> Frame:
-        return Frame(k, (k - 1) / rate if times is None else float(times[k - 1] - times[0]))
-
-    def frames() -> Iterator[Frame]:
-        for k, picture in enumerate(fill_gaps(_pictures(path, index, size), length, path.name), 1):
-            yield bare(k).replace(image=picture)
-
-    return Sequence(
-        name=path.stem, fps=rate, length=length, frames=frames,
-        image_size=size, has_images=True,
+    source = {"kind": "video", "path": str(path), "fps": words, "background": str(choice)}
+    return recorded_sequence(
+        source, path.stem, rate, length, times=None if times is None else (times - times[0]).tolist(),
+        left=lambda: fill_gaps(_pictures(path, index, size), length, path.name), image_size=size,
         camera=options.camera and scaled_to_image(options.camera, size, path, index.aspect), px_per_m=options.scale,
         load_background=BackgroundSample(choice, length, path, lambda wanted: _pictures(path, index, size, wanted)),
-        source={"kind": "video", "path": str(path), "fps": words, "background": str(choice)},
-        bare=lambda: map(bare, range(1, length + 1)),
     )  # fmt: skip
 
 

@@ -8,8 +8,8 @@ The hash of the table of visible pixels is not checked.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, nullcontext
-from dataclasses import dataclass, field
+from contextlib import ExitStack
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,54 +20,15 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError
 from sim import hashing, streams
 from sim.io.files import atomic
-from sim.io.files.tables import Column, columns_of, read_table, table_bytes
+from sim.io.files.tables import MODAL, read_table, table_bytes, units_of
 from sim.io.pictures import video_files
 from sim.io.pictures.picture_folder import require_size
-from sim.io.pictures.video_files import VideoWriter, write_video
-from sim.io.store.seal import REDO, check_file, file_facts
+from sim.io.pictures.video_files import write_video
+from sim.io.store.seal import REDO, check_file
 from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
 
 JPG_QUALITY = 95
 TABLE = "gt/pixels.parquet"
-BOX = ("modal_left", "modal_top", "modal_width", "modal_height")
-
-Facts = dict[str, dict[str, Any]]
-
-
-@dataclass(frozen=True)
-class WrittenPictures:
-    """What `write_pictures` wrote; all fields are empty if it wrote nothing."""
-
-    streams: tuple[str, ...] = ()  # names of the streams
-    images: str | None = None  # file type ("jpg", "png" or "mp4"), None if the streams leave no choice
-    pixels: dict[str, str] = field(default_factory=dict)  # hash of the raw pixels by stream
-    # {"sha256", "bytes"} of each file, by name relative to the sequence folder
-    files: Facts = field(default_factory=dict)
-
-
-NO_PICTURES = WrittenPictures()
-
-
-class StreamWriter:
-    """Writes one stream as picture files below `folder`, or into an open video.
-
-    State: the hash of the raw pixels so far, and {"sha256", "bytes"} of each picture file by name.
-    """
-
-    def __init__(self, folder: Path, stream: str, images: str, movie: VideoWriter | None) -> None:
-        self.folder, self.stream, self.images, self.movie = folder, stream, images, movie
-        self.pixels, self.files = hashing.PixelHash(), Facts()
-
-    def add(self, picture: NDArray[Any]) -> None:
-        """Writes the next picture: (H, W, 3) BGR uint8, or (H, W) uint16 for ids and disparity."""
-        self.pixels.add(picture)
-        if self.movie is not None:
-            self.movie.add(picture)
-            return
-        name = streams.file_name(self.stream, self.images, self.pixels.count)
-        body = encoded(picture, streams.suffix(self.stream, self.images))
-        atomic.write_inside(self.folder / name, body)
-        self.files |= file_facts({name: body})
 
 
 def encoded(picture: NDArray[Any], kind: str) -> bytes:
@@ -80,40 +41,46 @@ def encoded(picture: NDArray[Any], kind: str) -> bytes:
     return body.tobytes()
 
 
-def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], images: str) -> WrittenPictures:
+def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], images: str) -> dict[str, str]:
     """Draws the streams `wanted` of a sequence and writes them into a folder, one picture at a time.
 
     images: file type, "jpg", "png" or "mp4". gt/pixels.parquet is written if the sequence has exact pixels and truth.
+    Returns the hash of the raw pixels of each stream.
     """
     if not wanted:
-        return NO_PICTURES
+        return {}
     assert sequence.image_size is not None, "pictures have a size"
-    known: list[PixelTruth] = []
-    outputs, movies = dict[str, StreamWriter](), [name for name in wanted if streams.suffix(name, images) == "mp4"]
+    known, hashes = list[PixelTruth](), {name: hashing.PixelHash() for name in wanted}
     with ExitStack() as stack:
-        for name in wanted:
-            path = folder / streams.file_name(name, images, 1)
-            video = write_video(path, sequence.image_size, sequence.fps) if name in movies else nullcontext()
-            outputs[name] = StreamWriter(folder, name, images, stack.enter_context(video))
+        movies = {
+            name: stack.enter_context(
+                write_video(folder / streams.file_name(name, images, 1), sequence.image_size, sequence.fps)
+            )
+            for name in wanted if streams.suffix(name, images) == "mp4"
+        }  # fmt: skip
+
+        def add(name: str, picture: NDArray[Any]) -> None:
+            hashes[name].add(picture)
+            if name in movies:
+                movies[name].add(picture)
+            else:
+                body = encoded(picture, streams.suffix(name, images))
+                atomic.write_inside(folder / streams.file_name(name, images, hashes[name].count), body)
+
         empty = sequence.background() if "background" in wanted else ()
         if empty is None:
             raise _missing(sequence, "background")
         for picture in empty:
-            outputs["background"].add(picture)
-        for frame in sequence if {"left", "right"} & outputs.keys() else sequence.without_pictures():
+            add("background", picture)
+        for frame in sequence if {"left", "right"} & hashes.keys() else sequence.without_pictures():
             pixels = None if sequence.load_pixels is None else sequence.load_pixels(frame.index)
-            for name in (name for name in outputs if name != "background"):
-                outputs[name].add(_picture(name, sequence, frame, pixels))
+            for name in (name for name in wanted if name != "background"):
+                add(name, _picture(name, sequence, frame, pixels))
             if pixels is not None:
                 known.append(pixels.replace(ids=np.zeros((0, 0), np.int64), disparity=None))
-    files = {name: facts for output in outputs.values() for name, facts in output.files.items()}
-    files |= file_facts({(path := folder / streams.file_name(name, images, 1)).name: path for name in movies})
     if known and sequence.truth is not None:
-        body = pixel_table(sequence.truth, known)
-        atomic.write_inside(folder / TABLE, body)
-        files |= file_facts({TABLE: body})
-    hashes = {name: output.pixels.hex() for name, output in outputs.items()}
-    return WrittenPictures(wanted, streams.coding(wanted, images), hashes, files)
+        atomic.write_inside(folder / TABLE, pixel_table(sequence.truth, known))
+    return {name: pixels.hex() for name, pixels in hashes.items()}
 
 
 def _picture(name: str, sequence: Sequence, frame: Frame, pixels: PixelTruth | None) -> NDArray[Any]:
@@ -146,12 +113,11 @@ def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
         return np.concatenate([getattr(pixels, name) for pixels in known])
 
     box = np.concatenate([pixels.box.reshape(-1, 4) for pixels in known])
-    columns = [
-        Column("frame", truth.frame), Column("id", truth.id), Column("visible_px", joined("visible_px"), "px²"),
-        Column("amodal_px", joined("amodal_px"), "px²"), Column("visibility_px", joined("visibility")),
-        *columns_of(BOX, box, "px"), Column("blob", joined("blob")),
-    ]  # fmt: skip
-    return table_bytes(columns, {"frames": len(known)})
+    columns = {
+        "frame": truth.frame, "id": truth.id, "visible_px": joined("visible_px"), "amodal_px": joined("amodal_px"),
+        "visibility_px": joined("visibility"), MODAL: box, "blob": joined("blob"),
+    }  # fmt: skip
+    return table_bytes(columns, {"frames": len(known)}, units_of("m"))
 
 
 @dataclass(frozen=True)
@@ -175,15 +141,16 @@ class StoredPictures:
 
     def body(self, name: str) -> bytes:
         """Returns the bytes of a file; raises InputError if they differ from the hash in the manifest."""
-        return self.check(name, whole=True)
+        self.check(name)
+        return (self.folder / name).read_bytes()
 
-    def check(self, name: str, whole: bool = False) -> bytes:
-        """Raises InputError if a file differs from its hash in the manifest. Returns its bytes if `whole`, else b""."""
+    def check(self, name: str) -> None:
+        """Raises InputError if a file differs from its hash in the manifest."""
         path, files = self.folder / name, self.manifest["files"]
         if name not in files:
             got, expected = "a manifest that does not name it", "a file that manifest.json names"
             raise InputError(file=path, got=got, expected=expected, remedy=REDO)
-        return check_file(path, files[name], whole=whole)
+        check_file(path, files[name])
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
         """Returns picture `index` (from 1) of a stream of picture files: BGR, or uint16 codes of ids or disparity."""
@@ -229,7 +196,7 @@ class StoredPictures:
         def columns() -> tuple[Ints, Array, Array, Array, Ints]:
             table = read_table(self.folder / TABLE)
             counts = (table.floats("visible_px"), table.floats("amodal_px"))
-            return table.ints("frame"), *counts, table.floats(*BOX), table.ints("blob")
+            return table.ints("frame"), *counts, table.floats(*MODAL), table.ints("blob")
 
         def pixels(index: int) -> PixelTruth:
             frame, visible, amodal, box, blob = columns()

@@ -24,7 +24,7 @@ from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, INTEGER
 from sim.io.files import tables
 from sim.io.files.numeric_text import is_number_text, read_number, read_rows, read_text, whole_or_number
-from sim.io.files.tables import Column, Count, FrameNumber, Id, Number, Pair, StoredTable, columns_of, validated
+from sim.io.files.tables import AXES, EXTENT, Count, FrameNumber, Id, Number, Pair, StoredTable, along, validated
 from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
@@ -96,8 +96,6 @@ def read_script(path: Path) -> tuple[Order, ...]:
 
 
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")
-EXTENT = ("extent_xx", "extent_xy", "extent_yx", "extent_yy")
-AXES = ("x", "y", "z")
 
 
 def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
@@ -106,25 +104,25 @@ def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
     unit: "m" or "px". The file distinguishes three kinds of frames: groups unknown (None), no groups, and groups whose
     members are unknown.
     """
+    import pyarrow as pa
+
     known = [g for g in frames if g is not None]
     axes = AXES[: known[0].pos.shape[1]] if known else AXES[:2]
     counts = [0 if g is None else len(g.id) for g in frames]
     ids = [g.id for g in known]
-    pos, vel = _stack([g.pos for g in known], len(axes)), _stack([g.vel for g in known], len(axes))
-    extent = _stack([g.extent.reshape(-1, 4) for g in known], 4)
-    columns = [
-        Column("frame", np.repeat(np.arange(first, first + len(frames), dtype=np.int64), counts)),
-        Column("group", np.concatenate([np.zeros(0, np.int64), *ids])),
-        Column("members", _lists([g.members for g in known], ids, np.zeros(0, np.int64)), "1", np.int64),
-        *columns_of(axes, pos, unit), *columns_of([f"v{a}" for a in axes], vel, f"{unit}/s"),
-        *columns_of(EXTENT, extent, f"{unit}^2"),
-        Column("size", np.concatenate([np.zeros(0), *(g.size for g in known)]), "people"),
-        Column("hull", _lists([g.hull for g in known], ids, np.zeros(0)), f"{unit}: x1, y1, x2, …"),
-    ]  # fmt: skip
+    members = _lists([g.members for g in known], ids, np.zeros(0, np.int64))
+    columns: tables.Columns = {
+        "frame": np.repeat(np.arange(first, first + len(frames), dtype=np.int64), counts),
+        "group": np.concatenate([np.zeros(0, np.int64), *ids]), "members": pa.array(members, pa.list_(pa.int64())),
+        axes: _stack([g.pos for g in known], len(axes)), along(axes): _stack([g.vel for g in known], len(axes)),
+        EXTENT: _stack([g.extent.reshape(-1, 4) for g in known], 4),
+        "size": np.concatenate([np.zeros(0), *(g.size for g in known)]),
+        "hull": pa.array(_lists([g.hull for g in known], ids, np.zeros(0)), pa.list_(pa.float64())),
+    }  # fmt: skip
     missing = [first + k for k, g in enumerate(frames) if g is None]
     memberless = [first + k for k, g in enumerate(frames) if g is not None and len(g.members) < len(g.id)]
     facts = {"first": first, "frames": len(frames), "missing": missing, "memberless": memberless}
-    return tables.table_bytes(columns, facts)
+    return tables.table_bytes(columns, facts, tables.units_of(unit))
 
 
 def _lists(rows: list[tuple[Any, ...]], ids: list[Ints], empty: NDArray[Any]) -> list[NDArray[Any]]:
@@ -149,7 +147,7 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
     first, count = facts.first, facts.frames
     axes = AXES if "z" in table.columns else AXES[:2]
     id, size = table.ints("group"), table.floats("size")
-    pos, vel = table.floats(*axes), table.floats(*(f"v{a}" for a in axes))
+    pos, vel = table.floats(*axes), table.floats(*along(axes))
     extent = table.floats(*EXTENT).reshape(-1, 2, 2)
     members, flat = table.lists("members", np.int64), table.lists("hull", np.float64)
     table.reject(any(len(h) % 2 for h in flat), "hull", "half a vertex", "x and y of each vertex")

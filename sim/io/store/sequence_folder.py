@@ -5,10 +5,9 @@ A sequence that is read back equals the one written to the last bit, except pict
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from functools import lru_cache
-from itertools import repeat
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +18,16 @@ from sim import hashing
 from sim.hashing import versions
 from sim.io.files import atomic, tables
 from sim.io.files.own_files import is_side_file
+from sim.io.formats.options import recorded_sequence
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
-from sim.io.pictures.stored_pictures import NO_PICTURES, StoredPictures, WrittenPictures, write_pictures
+from sim.io.pictures.stored_pictures import StoredPictures, write_pictures
 from sim.io.store import seal, truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
-from sim.streams import check_streams, is_picture
-from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, Image, Sequence, Truth
+from sim.streams import check_streams, coding, is_picture
+from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Image, Sequence, Truth
+
+NOTHING: Mapping[str, Any] = {}
 
 
 def write_sequence(
@@ -55,11 +57,14 @@ def write_sequence(
     with atomic.new_folder(folder, lambda: keep() or _refuse_foreign(folder, names)) as partial:
         truth = sequence.truth  # raises for a failed script before a picture is drawn
         assert truth is None or truth.length == sequence.length
-        pictures = write_pictures(partial, sequence, wanted, images)
-        files = sequence_files(sequence, scenario=scenario, seed=seed, repeat=repeat, pictures=pictures)
+        pixels = write_pictures(partial, sequence, wanted, images)
+        pictures = {path.relative_to(partial).as_posix(): path for path in partial.rglob("*") if path.is_file()}
+        files = sequence_files(
+            sequence, scenario=scenario, seed=seed, repeat=repeat, images=images, pixels=pixels, pictures=pictures
+        )
         for name, body in files.items():
             atomic.write_inside(partial / name, body)
-        names |= {*files, *pictures.files}
+        names |= {*files, *pictures}
     return folder
 
 
@@ -77,16 +82,17 @@ def _refuse_foreign(folder: Path, names: set[str]) -> bool:
 
 
 def sequence_files(
-    sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, pictures: WrittenPictures = NO_PICTURES
-) -> dict[str, bytes]:
+    sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, images: str = "jpg",
+    pixels: Mapping[str, str] = NOTHING, pictures: Mapping[str, Path] = NOTHING,
+) -> dict[str, bytes]:  # fmt: skip
     """Returns the files of a sequence except its pictures: content by name, the manifest last.
 
-    pictures: what `write_pictures` returned, for the manifest.
+    images: file type of the pictures. pixels: what `write_pictures` returned. pictures: the files that it wrote.
     """
     frames = list(sequence.without_pictures())
     found = [f.detections for f in frames if f.detections is not None]
     assert len(found) in (0, len(frames)), "a sensor gives detections for every frame or for none"
-    files = {"scenario.toml": scenario.encode(), "seqinfo.ini": _seqinfo(sequence, len(frames), pictures)}
+    files = {"scenario.toml": scenario.encode(), "seqinfo.ini": _seqinfo(sequence, len(frames), coding(pixels, images))}
     if sequence.camera is not None:
         files["camera.json"] = tables.json_document(camera_document(sequence.camera))
     if sequence.scene is not None:
@@ -98,27 +104,25 @@ def sequence_files(
     files = dict(sorted(files.items()))
     truth = hashing.truth_hash(scenario, seed, repeat, sequence.truth)
     manifest: dict[str, Any] = {
-        **seal.identity(scenario, seed, repeat, pictures.streams, pictures.images or "jpg"),
+        **seal.identity(scenario, seed, repeat, pixels, images),
         **{key: sequence.source[key] for key in ("origin", "stride") if key in sequence.source},
-        "pixels": pictures.pixels, "truth_hash": truth,
-        "content_hash": hashing.content_hash(truth, found, pictures.pixels),
+        "pixels": dict(pixels), "truth_hash": truth, "content_hash": hashing.content_hash(truth, found, pixels),
         "sequence": {
             "name": sequence.name, "fps": sequence.fps, "length": len(frames),
             "image_size": None if sequence.image_size is None else list(sequence.image_size),
             "px_per_m": tables.plain(sequence.px_per_m),
         },
-        "versions": versions(bool(pictures.streams)),
-        "files": dict(sorted((seal.file_facts(files) | pictures.files).items())),
+        "versions": versions(bool(pixels)), "files": seal.file_facts({**files, **pictures}),
     }  # fmt: skip
     return {**files, MANIFEST: tables.json_document(seal.with_hash(manifest))}
 
 
-def _seqinfo(sequence: Sequence, length: int, pictures: WrittenPictures) -> bytes:
+def _seqinfo(sequence: Sequence, length: int, images: str | None) -> bytes:
     # imDir is always img1, so that MOTChallenge tools accept it.
     lines = ["[Sequence]", f"name={printable(sequence.name)}", "imDir=img1"]
     lines += [f"frameRate={str(sequence.fps).removesuffix('.0')}", f"seqLength={length}"]
     if sequence.image_size is not None:
-        suffix = ".png" if pictures.images == "png" else ".jpg"
+        suffix = ".png" if images == "png" else ".jpg"
         lines += ["imWidth={}".format(*sequence.image_size), "imHeight={1}".format(*sequence.image_size)]
         lines.append(f"imExt={suffix}")
     return "\n".join([*lines, ""]).encode()
@@ -135,10 +139,8 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     for error in seal.damaged_files(folder, manifest["files"], size_only=pictured):
         raise error
     about, has, pictures = manifest["sequence"], manifest["files"].keys(), StoredPictures(folder, manifest)
-    size, length, fps = about["image_size"], about["length"], about["fps"]
-    left, right = "left" in pictures.streams, "right" in pictures.streams
+    size, length = about["image_size"], about["length"]
     load_background, words = _background(pictures, background, length)
-    special: dict[str, Any] = {key: manifest[key] for key in ("origin", "stride") if key in manifest}
 
     def require_length(name: str, found: int) -> None:
         if found != length:
@@ -156,31 +158,21 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         require_length("gt/truth.parquet", found.length)
         return found
 
-    def bare() -> Iterator[Frame]:
-        for index in range(1, length + 1):
-            here = detections()[index - 1] if "det/det.parquet" in has else None
-            yield Frame(index, (index - 1) / fps, detections=here)
-
-    def frames() -> Iterator[Frame]:
-        nothing = repeat(None, length)
-        both = [pictures.all(name, length) if there else nothing for name, there in (("left", left), ("right", right))]
-        for frame, image, other in zip(bare(), *both, strict=True):
-            yield frame.replace(image=image, right=other)
-
-    return Sequence(
-        name=about["name"], fps=fps, length=length, frames=frames if left or right else bare,
+    source: dict[str, Any] = {
+        "kind": "generated", "path": str(folder), "seed": manifest["seed"], "repeat": manifest["repeat"],
+        "truth_hash": manifest["truth_hash"], "streams": list(pictures.streams), "images": manifest.get("images"),
+        **words, **{key: manifest[key] for key in ("origin", "stride") if key in manifest},
+    }  # fmt: skip
+    return recorded_sequence(
+        source, about["name"], about["fps"], length,
+        detections=(lambda index: detections()[index - 1]) if "det/det.parquet" in has else None,
+        left=partial(pictures.all, "left", length) if "left" in pictures.streams else None,
+        right=partial(pictures.all, "right", length) if "right" in pictures.streams else None,
         load_truth=truth if "gt/truth.parquet" in has else None,
         image_size=None if size is None else (size[0], size[1]),
         camera=read_camera(folder / "camera.json") if "camera.json" in has else None,
         scene=read_scene(folder / "scene.json") if "scene.json" in has else None,
-        px_per_m=tables.none_to_nan(about["px_per_m"]),
-        has_images=left, has_right=right, has_detections="det/det.parquet" in has, load_background=load_background,
-        source={
-            "kind": "generated", "path": str(folder), "seed": manifest["seed"], "repeat": manifest["repeat"],
-            "truth_hash": manifest["truth_hash"], "streams": list(pictures.streams), "images": manifest.get("images"),
-            **words, **special,
-        },
-        bare=bare if left or right else None,
+        px_per_m=tables.none_to_nan(about["px_per_m"]), load_background=load_background,
         load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,
         load_light=lambda: _light(folder, manifest),
     )  # fmt: skip

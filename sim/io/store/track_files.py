@@ -24,16 +24,15 @@ from scenarios.errors import InputError
 from sim.arrays import repeated_ids
 from sim.io.files import tables
 from sim.io.files.atomic import lock_folder, replace_sealed
-from sim.io.files.tables import Column, Count, Rate, columns_of, table_bytes
+from sim.io.files.tables import AXES, BOX, Count, Rate, along, table_bytes, units_of
 from sim.io.formats import people_texts
 from sim.io.formats.labelled_truth import centres, chords
 from sim.io.formats.mot_table import read_table, require_pixels, table_of_rows
 from sim.io.formats.mot_text import ground_positions, of_class, reject_duplicate_ids, require_metres, unit_scores
 from sim.io.formats.options import BoxScale, Classes
 from sim.io.store import group_files
-from sim.io.store.group_files import AXES
 from sim.io.store.seal import EXACT, NAMES, PAIRS, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
-from sim.io.store.truth_files import BOX, mot_text, score_and_place, scores_or_ones, with_ground_height
+from sim.io.store.truth_files import mot_text, score_and_place, scores_or_ones, with_ground_height
 from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Camera, GroupEvent, Groups, Ints, Plane, Scene, Tracks
 
@@ -108,31 +107,26 @@ def flatten(every: list[Tracks]) -> RunRows:
     )  # fmt: skip
 
 
-def _state(plane: str) -> list[str]:
-    axes = AXES[:3] if plane == "space" else AXES[:2]
-    return [*axes, *(f"v{a}" for a in axes)]
+def _columns(plane: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Returns the names of the columns of position and velocity, and of their covariance."""
+    axes = AXES if plane == "space" else AXES[:2]
+    state = (*axes, *along(axes))
+    return state, tuple(f"cov_{a}_{b}" for a in state for b in state)
 
 
 def track_table(rows: RunRows, every: list[Tracks], fps: float) -> bytes:
     """Returns the content of tracks.parquet, a row per track and frame. rows: `flatten(every)`. fps: frames/s."""
-    unit, state = "px" if rows.plane == "image" else "m", _state(rows.plane)
-    values = np.concatenate([rows.pos, rows.vel], axis=1)
-    units = [f"{unit}/s" if name.startswith("v") else unit for name in state]
-    columns = [
-        Column("frame", rows.frame), Column("id", rows.id), Column("group", rows.group),
-        *(Column(name, values[:, k], u) for k, (name, u) in enumerate(zip(state, units, strict=True))),
-        *columns_of(BOX, rows.box, "px"), Column("score", rows.score), Column("seen", rows.seen),
-        *(
-            Column(f"cov_{a}_{b}", rows.cov[:, i, j], f"{units[i]} {units[j]}")
-            for i, a in enumerate(state) for j, b in enumerate(state)
-        ),
-    ]  # fmt: skip
+    state, cov = _columns(rows.plane)
+    columns: tables.Columns = {
+        "frame": rows.frame, "id": rows.id, "group": rows.group, state: np.concatenate([rows.pos, rows.vel], axis=1),
+        BOX: rows.box, "score": rows.score, "seen": rows.seen, cov: rows.cov.reshape(-1, len(cov)),
+    }  # fmt: skip
     facts = {
         "plane": rows.plane, "unit": rows.unit, "fps": fps, "first": every[0].index if every else 1,
         "frames": len(every), "boxless": [t.index for t in every if t.box is None],
         "derived": bool(every) and all(t.derived for t in every),
     }  # fmt: skip
-    return table_bytes(columns, facts)
+    return table_bytes(columns, facts, units_of("px" if rows.plane == "image" else "m"))
 
 
 def pair_table(frame: Ints, a: Ints, b: Ints, probability: Array) -> bytes:
@@ -140,7 +134,7 @@ def pair_table(frame: Ints, a: Ints, b: Ints, probability: Array) -> bytes:
 
     frame (R,): from 1. a, b (R,): person ids. probability (R,): 0 to 1.
     """
-    return table_bytes([Column("frame", frame), Column("a", a), Column("b", b), Column("probability", probability)], {})
+    return table_bytes({"frame": frame, "a": a, "b": b, "probability": probability}, {}, {})
 
 
 class _TrackFacts(BaseModel):
@@ -157,14 +151,12 @@ def read_track_table(folder: Path) -> list[Tracks]:
     """Returns the tracks of tracks.parquet in `folder`, one Tracks per frame, with groups but without events."""
     table = tables.read_table(folder / EXACT)
     f = table.facts_as(_TrackFacts)
-    state = _state(f.plane)
-    d = len(state) // 2
-    values, frame = table.floats(*state), table.ints("frame")
-    cov = table.floats(*(f"cov_{a}_{b}" for a in state for b in state)).reshape(-1, 2 * d, 2 * d)
+    state, cov = _columns(f.plane)
+    d, values, frame = len(state) // 2, table.floats(*state), table.ints("frame")
     rows = RunRows(
-        f.plane, f.unit, frame, table.ints("id"), table.ints("group"), values[:, :d], values[:, d:], cov,
-        table.floats(*BOX), np.isin(frame, list(f.boxless)), table.floats("score"),
-        table.floats("seen") > 0 if "seen" in table.columns else np.ones(len(frame), bool),
+        f.plane, f.unit, frame, table.ints("id"), table.ints("group"), values[:, :d], values[:, d:],
+        table.floats(*cov).reshape(-1, 2 * d, 2 * d), table.floats(*BOX), np.isin(frame, list(f.boxless)),
+        table.floats("score"), table.floats("seen") > 0 if "seen" in table.columns else np.ones(len(frame), bool),
     )  # fmt: skip
     rows.reject_faults(table.file, tables.REDO)
     groups, found = _groups(folder / "groups.parquet", f.first, f.frames), []

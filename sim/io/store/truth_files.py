@@ -17,14 +17,22 @@ from pydantic import BaseModel
 
 from scenarios.reading import is_present
 from sim.io.files import tables
-from sim.io.files.tables import Column, Count, FrameNumber, Rate, Scale, StoredTable, columns_of, read_table
+from sim.io.files.tables import (
+    AXES,
+    BOX,
+    VISIBLE,
+    Columns,
+    Count,
+    FrameNumber,
+    Rate,
+    Scale,
+    StoredTable,
+    along,
+    read_table,
+)
 from sim.io.store import group_files
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Detections, Groups, Ints, Order, Scene, Truth
-
-BOX = ("box_left", "box_top", "box_width", "box_height")
-VISIBLE = ("visible_left", "visible_top", "visible_width", "visible_height")
-SINGLE = (("z", "m"), ("heading", "rad"), ("height", "m"), ("truncation", "1"))
 
 
 def truth_files(truth: Truth) -> dict[str, bytes]:
@@ -50,19 +58,16 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
 
 
 def _table(truth: Truth) -> bytes:
-    columns = [
-        Column("frame", truth.frame), Column("id", truth.id), Column("group", truth.group),
-        *columns_of(("x", "y"), truth.pos, "m"), *columns_of(("vx", "vy"), truth.vel, "m/s"),
-        *columns_of(BOX, truth.box, "px"), *columns_of(VISIBLE, truth.visible_box, "px"),
-        Column("visibility", truth.visibility),
-    ]  # fmt: skip
-    singles = ((name, unit, getattr(truth, name)) for name, unit in SINGLE)
-    columns += [Column(name, array, unit) for name, unit, array in singles if array is not None]
+    columns: Columns = {
+        "frame": truth.frame, "id": truth.id, "group": truth.group, ("x", "y"): truth.pos, ("vx", "vy"): truth.vel,
+        BOX: truth.box, VISIBLE: truth.visible_box, "visibility": truth.visibility, "z": truth.z,
+        "heading": truth.heading, "height": truth.height, "truncation": truth.truncation,
+    }  # fmt: skip
     facts = {
         "name": truth.name, "fps": truth.fps, "length": truth.length, "px_per_m": tables.plain(truth.px_per_m),
         "labelled": None if truth.labelled is None else spans(truth.labelled),
     }  # fmt: skip
-    return tables.table_bytes(columns, facts)
+    return tables.table_bytes(columns, facts, tables.units_of("m"))
 
 
 def _order(order: Order) -> dict[str, Any]:
@@ -126,19 +131,15 @@ def read_truth(folder: Path) -> Truth:
     table = read_table(gt / "truth.parquet")
     facts = table.facts_as(_TruthFacts)
     length = facts.length
-
-    def several(*names: str) -> Array | None:
-        return table.floats(*names) if names[0] in table.columns else None
-
     frame, id = table.ints("frame"), table.ints("id")
     _check_rows(table, length)
     events = group_files.read_events(gt / "events.json") if is_present(gt / "events.json") else None
     return Truth(
         name=facts.name, fps=facts.fps, length=length, px_per_m=tables.none_to_nan(facts.px_per_m),
         frame=frame, id=id, group=table.ints("group"),
-        pos=several("x", "y"), vel=several("vx", "vy"), box=several(*BOX), visible_box=several(*VISIBLE),
-        visibility=table.floats("visibility"),
-        z=several("z"), heading=several("heading"), height=several("height"), truncation=several("truncation"),
+        pos=table.known("x", "y"), vel=table.known("vx", "vy"), box=table.known(*BOX),
+        visible_box=table.known(*VISIBLE), visibility=table.floats("visibility"), z=table.known("z"),
+        heading=table.known("heading"), height=table.known("height"), truncation=table.known("truncation"),
         groups=_groups(gt / "groups.parquet"), groups_px=_groups(gt / "groups_px.parquet"),
         labelled=None if facts.labelled is None else _flags(table, facts.labelled, length),
         events=None if events is None else tuple(e for e, _ in events),
@@ -169,23 +170,20 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     forms = {(d.plane, d.box is not None, d.vel is not None) for d in detections}
     assert len(forms) <= 1, f"detections of one sequence differ in kind: {sorted(forms)}"
     plane, boxed, moving = next(iter(forms), ("image", True, False))
-    axes = ("x", "y", "z")[: detections[0].pos.shape[1]] if detections else ("x", "y")
-    unit = "px" if plane == "image" else "m"
+    axes = AXES[: detections[0].pos.shape[1]] if detections else AXES[:2]
     pos = np.concatenate([np.zeros((0, len(axes))), *(d.pos for d in detections)])
     score = np.concatenate([np.zeros(0), *(scores_or_ones(d.score, len(d.pos)) for d in detections)])
     frame = np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), [len(d.pos) for d in detections])
     vel = np.concatenate([d.vel for d in detections if d.vel is not None]) if moving else None
     box = np.concatenate([d.box for d in detections if d.box is not None]) if boxed else None
-    columns = [
-        Column("frame", frame), *columns_of(axes, pos, unit), Column("score", score),
-        *columns_of([f"v{a}" for a in axes], vel, f"{unit}/s"), *columns_of(BOX, box, "px"),
-    ]  # fmt: skip
+    columns: Columns = {"frame": frame, axes: pos, "score": score, along(axes): vel, BOX: box}
     facts = {"plane": plane, "frames": len(detections), "fps": fps}
     rest = score_and_place(score, None if plane == "image" else with_ground_height(pos, scene))
     # An alarm at the picture's edge may be a box without width.
     shown = np.full((len(score), 4), np.nan) if box is None else np.c_[box[:, :2], np.maximum(box[:, 2:], 0.01)]
     text = mot_text(frame, np.full(len(frame), -1), shown, rest)
-    return {"det/det.parquet": tables.table_bytes(columns, facts), "det/det.txt": text}
+    units = tables.units_of("px" if plane == "image" else "m")
+    return {"det/det.parquet": tables.table_bytes(columns, facts, units), "det/det.txt": text}
 
 
 def scores_or_ones(score: Array, rows: int) -> Array:
@@ -210,10 +208,9 @@ class _DetectionFacts(BaseModel):
 def read_detections(path: Path) -> list[Detections]:
     """Returns the detections in a det.parquet, one Detections for each frame from 1."""
     table = read_table(path)
-    axes = ("x", "y", "z") if "z" in table.columns else ("x", "y")
+    axes = AXES if "z" in table.columns else AXES[:2]
     pos, score, facts = table.floats(*axes), table.floats("score"), table.facts_as(_DetectionFacts)
-    vel = table.floats(*(f"v{a}" for a in axes)) if "vx" in table.columns else None
-    box = table.floats(*BOX) if BOX[0] in table.columns else None
+    vel, box = table.known(*along(axes)), table.known(*BOX)
     found = []
     for k, (a, b) in enumerate(pairwise(table.cuts(1, facts.frames).tolist())):
         cut = (pos[a:b], None if vel is None else vel[a:b], None if box is None else box[a:b], score[a:b])

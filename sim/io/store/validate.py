@@ -36,17 +36,14 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
     folder = Path(folder)
     if not folder.is_dir():
         raise _problem(folder, "no folder", "a generated dataset, a sequence, or tracks", "check the path")
-    if seal.is_sequence(folder):
-        return _sequence(folder)
-    if is_run(folder):
-        return _run(folder)
-    sequences, runs = _inside(folder, seal.is_sequence), _inside(folder, is_run)
+    if seal.is_sequence(folder) or is_run(folder):
+        return list(_faults(folder))
+    every = [*_inside(folder, seal.is_sequence), *_inside(folder, is_run)]
     partial = sorted(folder.glob(f"**/{PARTIAL}*"))
     found = [_problem(path, "left by an interrupted run", "no such file or folder") for path in partial]
-    if not sequences and not runs and not found:
+    if not every and not found:
         raise _problem(folder, "no sequences", "a generated dataset, or tracks", "check the path")
-    checks = [*map(_sequence, sequences), *map(_run, runs)]
-    return found + [problem for problems in checks for problem in problems]
+    return [*found, *(fault for each in every for fault in _faults(each))]
 
 
 def _inside(root: Path, kind: Callable[[Path], bool]) -> list[Path]:
@@ -63,24 +60,18 @@ def _problem(path: Path, got: object, expected: object, remedy: str = seal.REDO)
     return InputError(file=path, got=got, expected=expected, remedy=remedy)
 
 
-def _sequence(folder: Path) -> list[FlockscopeError]:
+def _faults(folder: Path) -> Iterator[FlockscopeError]:
     try:
-        manifest = seal.read_manifest(folder)
-        problems: list[FlockscopeError] = list(seal.damaged_files(folder, manifest["files"]))
-        return problems or list(_extra(folder, manifest))
-    except FlockscopeError as error:
-        return [error]
-
-
-def _run(folder: Path) -> list[FlockscopeError]:
-    try:
-        run = read_run(folder)
-        problems: list[FlockscopeError] = list(run_problems(folder, run))
+        if seal.is_sequence(folder):
+            manifest = seal.read_manifest(folder)
+            yield from list(seal.damaged_files(folder, manifest["files"])) or _extra(folder, manifest)
+            return
+        problems = list(run_problems(folder, read_run(folder)))
+        yield from problems
         if not problems:
             read_tracks(folder)
-        return problems
     except FlockscopeError as error:
-        return [error]
+        yield error
 
 
 def _extra(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:

@@ -9,7 +9,7 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load, load_observation
-from sim.dataset.generate import ReplayOptions, store_replays
+from sim.dataset.generate import store_replays
 from sim.dataset.replay import Cut
 from sim.dataset.splits import is_real
 from sim.io.formats.biwi import open_folder
@@ -29,8 +29,8 @@ def walk(tmp_path: Path) -> Sequence:
 
 
 def test_a_dataset_like_any_other(walk: Sequence, tmp_path: Path) -> None:
-    how, told = ReplayOptions(SMALL, Cut(1.0, 2.0)), []
-    made = store_replays([walk], how, range(20_000, 20_002), tmp_path / "a", lambda *words: told.append(words))
+    told, where = [], (SMALL, range(20_000, 20_002), tmp_path / "a")
+    made = store_replays([walk], *where, cut=Cut(1.0, 2.0), progress=lambda *words: told.append(words))
     assert [p.name for p in made] == ["walk-t1-s20000", "walk-t1-s20001"]
     assert told[-1] == (2, 2, "walk-t1-s20001")
     assert validate(tmp_path / "a") == []
@@ -45,25 +45,25 @@ def test_a_dataset_like_any_other(walk: Sequence, tmp_path: Path) -> None:
 
 
 def test_same_bytes_again_and_what_is_there_is_kept(walk: Sequence, tmp_path: Path) -> None:
-    how = ReplayOptions(SMALL, Cut(0.0, 1.0), streams=("left", "ids"))
-    (first,) = store_replays([walk], how, range(20_000, 20_001), tmp_path / "a")
-    (second,) = store_replays([walk], how, range(20_000, 20_001), tmp_path / "b")
+    how = {"cut": Cut(0.0, 1.0), "streams": ("left", "ids")}
+    (first,) = store_replays([walk], SMALL, range(20_000, 20_001), tmp_path / "a", **how)
+    (second,) = store_replays([walk], SMALL, range(20_000, 20_001), tmp_path / "b", **how)
     assert content(first) == content(second)
     stamp = (first / "manifest.json").stat().st_mtime_ns
-    store_replays([walk], how, range(20_000, 20_001), tmp_path / "a")
+    store_replays([walk], SMALL, range(20_000, 20_001), tmp_path / "a", **how)
     assert (first / "manifest.json").stat().st_mtime_ns == stamp
     (first / "gt" / "gt.txt").write_text("")
-    store_replays([walk], how, range(20_000, 20_001), tmp_path / "a")
+    store_replays([walk], SMALL, range(20_000, 20_001), tmp_path / "a", **how)
     assert content(first) == content(second)
 
 
 def test_real_motion_stays_out_of_what_is_tuned_on(walk: Sequence, tmp_path: Path) -> None:
     for first in (0, 10_000):
         with pytest.raises(InputError, match="20000"):
-            store_replays([walk], ReplayOptions(SMALL, streams=()), range(first, first + 1), tmp_path)
+            store_replays([walk], SMALL, range(first, first + 1), tmp_path, streams=())
     own = simulate(load("merge", set=["duration=2.0", "event=[]"]), 3, streams=())
-    (made,) = store_replays([own], ReplayOptions(SMALL, streams=()), range(1), tmp_path)
+    (made,) = store_replays([own], SMALL, range(1), tmp_path, streams=())
     assert made.parent.name == "flockscope-train"
     assert not is_real(open_source(made)[0])
     with pytest.raises(InputError, match="unique names"):
-        store_replays([walk, walk], ReplayOptions(SMALL, streams=()), range(20_000, 20_001), tmp_path)
+        store_replays([walk, walk], SMALL, range(20_000, 20_001), tmp_path, streams=())

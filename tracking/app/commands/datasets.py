@@ -52,7 +52,7 @@ def validate(options: ValidateOptions) -> CommandResult:
 def replay(options: ReplayCommandOptions) -> CommandResult:
     """Stores one sequence for every recording of the source and every seed, all seeds of a recording together."""
     from scenarios.loading.resolve import load_observation
-    from sim.dataset.generate import ReplayOptions, store_replays
+    from sim.dataset.generate import store_replays
     from sim.dataset.replay import Cut
     from sim.io.source import open_source
 
@@ -63,8 +63,11 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
     settings = option_parsing.scenario_settings(options.settings)
     view = load_observation(options.camera, [*option_parsing.sensor_settings(options.sensor), *settings])
     recordings = open_source(options.source, fps=options.fps, images=False)
-    replays = ReplayOptions(view, Cut(options.start, options.duration), options.calibration, streams, images)
+    cut = Cut(options.start, options.duration)
     with ProgressMeter("replay") as meter:
-        folders = store_replays(recordings, replays, seeds, options.out, meter.update)
+        folders = store_replays(
+            recordings, view, seeds, options.out, cut=cut, calibration=options.calibration, streams=streams,
+            images=images, progress=meter.update,
+        )  # fmt: skip
     text = f"{counted(len(folders), 'sequence')} in {folders[0].parent}"
     return CommandResult({"sequences": folders, "folder": folders[0].parent}, text)

@@ -11,7 +11,7 @@ import numpy as np
 from scenarios.errors import InputError, counted, printable
 from sim.io.files.atomic import lock_folder, write_file
 from sim.io.files.own_files import refuse_foreign_file
-from sim.io.files.tables import Column, json_document, plain, table_bytes
+from sim.io.files.tables import json_document, plain, table_bytes
 from sim.types import Array, DetectionMode
 from tracking.app import option_parsing
 from tracking.app.command_options import StressOptions
@@ -137,14 +137,12 @@ def _failure(failure: SearchedScene, place: int) -> dict[str, Any]:
 def _parquet(sweep: Sweep) -> bytes:
     rows = sweep.rows()
     words = ("tracker", "scenario", "left_out", "failed", "traceback")
-    columns = [Column(key, np.array([row[key] for row in rows], object)) for key in words]
-    columns += [Column("seed", np.array([row["seed"] for row in rows]))]
-    columns += [Column(axis.name, np.array([row["values"][axis.name] for row in rows])) for axis in sweep.plan.axes]
-    columns += [
-        Column(score.key, np.array([row["scores"].get(score.key, np.nan) for row in rows], float), score.unit)
-        for score in CATALOGUE.values()
-    ]
-    return table_bytes(columns, {"axes": [axis.name for axis in sweep.plan.axes]})
+    columns = {key: np.array([row[key] for row in rows], object) for key in words}
+    columns["seed"] = np.array([row["seed"] for row in rows])
+    columns |= {axis.name: np.array([row["values"][axis.name] for row in rows]) for axis in sweep.plan.axes}
+    columns |= {key: np.array([row["scores"].get(key, np.nan) for row in rows], float) for key in CATALOGUE}
+    units = {key: score.unit for key, score in CATALOGUE.items()}
+    return table_bytes(columns, {"axes": [axis.name for axis in sweep.plan.axes]}, units)
 
 
 def _text(sweep: Sweep, data: dict[str, Any], out: Path) -> str:

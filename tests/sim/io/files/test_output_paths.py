@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scenarios.errors import InputError
 from sim.io.files import own_files
 from sim.io.files.atomic import PARTIAL, lock_folder
-from sim.io.files.tables import Column, table_bytes
+from sim.io.files.tables import table_bytes
 from sim.io.pictures.video_files import write_video
 
 EVIL = (
@@ -78,7 +78,7 @@ def test_a_marked_picture_shows_the_same():
 FILES = [
     ("x.json", b'{"a": "t", "b": {}, "c": 1}', True), ("x.json", b'{"a": "t", "b": []}', False),
     ("x.json", b'["a", "b"]', None), ("x.json", b'{"a": "t", "b": {}', None),
-    ("x.parquet", table_bytes([Column("a", np.arange(3))], {}), True), ("x.parquet", b"PAR1", None),
+    ("x.parquet", table_bytes({"a": np.arange(3)}, {}, {}), True), ("x.parquet", b"PAR1", None),
     ("x.html", PAGE, True), ("x.html", b"", False), ("x.toml", b"a = 1\n# flockscope x", False),
     ("x.png", own_files.marked_png(png()), True), ("x.png", png(), False), ("x.png", b"", False),
     ("x.mp4", b"flockscope", False), ("x.mp4", b"", False), ("x.txt", PAGE, False), ("x.toml", b"# flockscope x", True),

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.formats import biwi, caviar
+from sim.io.formats import biwi
 from sim.io.source import open_source
 
 ROW = "{} {} {} 0 {} 2.5 0 0.0\n"
@@ -112,12 +112,12 @@ def test_meet_walk_together_truth(shared_data):
 def test_caviar_traps(tmp_path):
     objects = [OBJECT.format(k, 10 * k) for k in (1, 2, 3)]
     path = xml(tmp_path, (objects, [GROUP.format(4, "1,2"), GROUP.format(5, "3")]), (objects, []))
-    found = caviar.read_xml(path)
-    assert found.frame.tolist() == [1, 1, 1, 2, 2, 2]
-    assert found.label.tolist() == [4, 4, -1, -1, -1, -1]
+    truth = open_source(path, fps=25)[0].truth
+    assert truth.frame.tolist() == [1, 1, 1, 2, 2, 2]
+    assert truth.group.tolist() == [4, 4, -1, -1, -1, -1]
     with pytest.warns(UserWarning, match="two groups"):
-        found = caviar.read_xml(xml(tmp_path, (objects, [GROUP.format(4, "1,2"), GROUP.format(5, "2,3")])))
-    assert found.label.tolist() == [4, 4, 5]
+        truth = open_source(xml(tmp_path, (objects, [GROUP.format(4, "1,2"), GROUP.format(5, "2,3")])), fps=25)[0].truth
+    assert truth.group.tolist() == [4, 4, 5]
 
 
 CVML = [
