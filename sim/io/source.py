@@ -32,6 +32,7 @@ KINDS = (
     "a CAVIAR XML, a video"
 )
 VIDEOS = f"{KINDS} ({' '.join(video.SUFFIXES)})"
+TEXTS = (".txt", ".csv", ".tsv")
 DEPTH = 3
 
 
@@ -102,6 +103,8 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
             remedy = "give the sequence or dataset first, then the tracks: swap the arguments"
         elif sum(p.suffix.lower() in PICTURES for p in path.iterdir() if not is_hidden(p)) > 1:
             got, remedy = "a folder of pictures, without img1", f"move the pictures to {path / 'img1'}"
+        elif texts := [p for p in path.iterdir() if p.suffix.lower() in TEXTS and not is_hidden(p)]:
+            got, remedy = f"a folder of texts, as {min(texts).name}", "give one text, with its path"
         raise InputError(file=path, got=got, expected=KINDS, remedy=remedy)
     return _distinct([_open_folder(p, options) for p in found])
 
@@ -155,7 +158,7 @@ def _open_file(path: Path, options: RecordingOptions) -> Sequence:
     if suffix in video.SUFFIXES:
         options.reject(path, "a video without --boxes", "it has no boxes", "box_options")
         return video.open_video(path, options)
-    if suffix not in (".txt", ".csv", ".tsv", people_texts.NDJSON):
+    if suffix not in (*TEXTS, people_texts.NDJSON):
         of_boxes = "if these are boxes: flockscope track TRACKER VIDEO --boxes FILE"
         remedy = of_boxes if suffix == ".json" else f"if it holds rows of people, write them as .csv, and {NAME_THEM}"
         raise InputError(file=path, got=f"a {suffix or 'nameless'} file", expected=VIDEOS, remedy=remedy)

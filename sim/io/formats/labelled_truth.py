@@ -22,10 +22,30 @@ import numpy as np
 from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, Frame, GroupEvent, Groups, Ints, Sequence, Truth
 
+SOME = 4  # people who are not all within one metre, on one line along an axis, or in haste
+RUN = 3.0  # m/s
+
 
 def centres(box: Array) -> Array:
     """Returns the middles (R, 2) of boxes (R, 4) left, top, width, height."""
     return np.asarray(box[:, :2] + box[:, 2:] / 2)
+
+
+def warn_of_places(file: Path, id: Ints, pos: Array, vel: Array) -> None:
+    """Warns if positions (R, 2) of people id (R,), nan if unknown, or velocities (R, 2) can hardly be in m and m/s."""
+    known = np.isfinite(pos[:, 0])
+    if len(np.unique(id[known])) < SOME:
+        return
+    span, speed = np.ptp(pos[known], axis=0), np.median(np.hypot(*vel[known].T))
+    doubt = ""
+    if span.max() <= 1:
+        doubt = "all are within 1 m: write metres, if they are shares of a picture or degrees"
+    elif span.min() == 0:
+        doubt = f"all have the same {'xy'[span.argmin()]}: give x and y on the ground, if it is the height"
+    elif speed > RUN:
+        doubt = f"their median speed is {speed:.3g} m/s: check their unit, and the frame rate"
+    if doubt:
+        warnings.warn(f"{file}: positions of people: {doubt}", stacklevel=4)
 
 
 def labelled_sequence(

@@ -26,7 +26,7 @@ from scenarios.reading import parse_json
 from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_nan, read_rows, read_text, rows_among
 from sim.io.formats.biwi import frame_numbers
 from sim.io.formats.labelled_truth import labelled_sequence
-from sim.io.formats.mot_table import table_of_rows
+from sim.io.formats.mot_table import reject_swapped, table_of_rows
 from sim.io.formats.mot_text import frame_rate, truth_of_table
 from sim.io.formats.options import RecordingOptions
 from sim.types import Sequence, Truth
@@ -68,6 +68,8 @@ def open_text(path: Path, layout: str, options: RecordingOptions) -> Sequence:
     rate = frame_rate(options.fps, stated, "trajectories", ETH_FPS)
     table = table_of_rows(rows, boxless=True)
     rows.reject(table.id < 0, "ids from 0", "correct the id")
+    if layout in ("eth", "pedpy"):
+        reject_swapped(rows)
     length = int(table.frame.max())
 
     def truth() -> Truth:
