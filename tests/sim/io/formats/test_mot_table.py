@@ -73,8 +73,8 @@ PLACES = [
 
 @pytest.mark.parametrize(("x", "y", "words"), PLACES)
 def test_places_that_are_hardly_metres_on_the_ground_are_warned_of(tmp_path, x, y, words):
+    rows = [f"{f},{k},{x * (5 * k + f)},{y * (5 * k - f)}\n" for f in range(1, 5) for k in range(1, 6)]
     with pytest.warns(UserWarning, match=words):
-        rows = [f"{f},{k},{x * (5 * k + f)},{y * (5 * k - f)}\n" for f in range(1, 5) for k in range(1, 6)]
         opened(tmp_path, "frame,id,x,y\n" + "".join(rows)).truth  # noqa: B018
 
 
