@@ -14,18 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError, shortened
+from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_rows
-from sim.io.formats.labelled_truth import differentiate, labelled_sequence, warn_of_places, with_labels
+from sim.io.formats.labelled_truth import differentiate, labelled_sequence, with_labels
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.types import Ints, Sequence, Truth
 
 FPS = 2.5
-
-SHOWN = 80  # characters of numbers of lines that a warning shows at most
 
 LABELS = 5  # lines `id label`, with a label in several, that are not taken for pairs of people
 
@@ -65,7 +63,7 @@ def _parted(slot: Ints, people: list[set[int]]) -> Ints:
 
 def read_groups(path: Path) -> dict[int, int]:
     """Returns by person id the group label that a groups.txt gives each person; people alone have no entry."""
-    label, shared = dict[int, int](), list[str]()
+    label: dict[int, int] = {}
     lines = read_rows(path)
     _reject_labels(path, list(lines.cells()))
     for number, line in zip(lines.line, lines.text, strict=True):
@@ -76,21 +74,17 @@ def read_groups(path: Path) -> dict[int, int]:
         name = min(earlier, default=max(label.values(), default=0) + 1)
         # Lines that share a person become one group, with the lowest label.
         if earlier:
-            shared.append(str(number))
+            text = f"{path}: line {number}: shares a person with an earlier line; taken as one group"
+            warnings.warn(text, stacklevel=2)
         for person in [p for p, g in label.items() if g in earlier] + sorted(members):
             label[person] = name
-    if shared:
-        where = f"line {shortened(', '.join(shared), SHOWN)}"
-        warnings.warn(f"{path}: {where}: shares a person with an earlier line; taken as one group", stacklevel=2)
     return label
 
 
 def _reject_labels(path: Path, rows: list[list[str]]) -> None:
     """Raises InputError if each row seems to hold the id of a person and the label of a group."""
-    if len(rows) < LABELS or any(len(row) != 2 for row in rows):
-        return
-    people, labels = map(set, zip(*rows, strict=True))
-    if len(people) == len(rows) > len(labels):
+    people, labels = ({row[k] for row in rows} for k in (0, -1))
+    if len(rows) >= LABELS and all(len(row) == 2 for row in rows) and len(people) == len(rows) > len(labels):
         got, expected = f"two numbers in all {len(rows)} lines, with labels in the second place", "the ids of one group"
         remedy = "write all ids of a group on one line; or name the columns of the people, and add a column group"
         raise InputError(file=path, place="each line", got=got, expected=expected, remedy=remedy)
@@ -139,7 +133,6 @@ def read_truth(folder: Path, fps: float = FPS) -> Truth:
     """
     rows, frame, id = _table(folder)
     pos, vel = rows.values[:, (2, 4)], rows.values[:, (5, 7)]
-    warn_of_places(rows.file, id, pos, vel)
     length = int(frame.max(initial=0))
     truth = Truth(
         name=folder.name, fps=fps, length=length, px_per_m=float("nan"), frame=frame, id=id,

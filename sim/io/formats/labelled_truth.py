@@ -31,21 +31,20 @@ def centres(box: Array) -> Array:
     return np.asarray(box[:, :2] + box[:, 2:] / 2)
 
 
-def warn_of_places(file: Path, id: Ints, pos: Array, vel: Array) -> None:
-    """Warns if positions (R, 2) of people id (R,), nan if unknown, or velocities (R, 2) can hardly be in m and m/s."""
-    known = np.isfinite(pos[:, 0])
-    if len(np.unique(id[known])) < SOME:
-        return
-    span, speed = np.ptp(pos[known], axis=0), np.median(np.hypot(*vel[known].T))
-    doubt = ""
+def warned_of_places(file: Path, truth: Truth) -> Truth:
+    """Returns the truth of a file, and warns if positions and velocities can hardly be on the ground in m and m/s."""
+    known = np.zeros(0, bool) if truth.pos is None else np.isfinite(truth.pos[:, 0])
+    if truth.pos is None or truth.vel is None or len(np.unique(truth.id[known])) < SOME:
+        return truth
+    span, speed = np.ptp(truth.pos[known], axis=0), np.median(np.hypot(*truth.vel[known].T))
+    doubt = f"their median speed is {speed:.3g} m/s: check their unit, and the frame rate" if speed > RUN else ""
     if span.max() <= 1:
         doubt = "all are within 1 m: write metres, if they are shares of a picture or degrees"
     elif span.min() == 0:
         doubt = f"all have the same {'xy'[span.argmin()]}: give x and y on the ground, if it is the height"
-    elif speed > RUN:
-        doubt = f"their median speed is {speed:.3g} m/s: check their unit, and the frame rate"
     if doubt:
         warnings.warn(f"{file}: positions of people: {doubt}", stacklevel=4)
+    return truth
 
 
 def labelled_sequence(
@@ -58,8 +57,8 @@ def labelled_sequence(
         return (Frame(index, (index - 1) / fps) for index in range(1, length + 1))
 
     return Sequence(
-        name=name, fps=fps, length=length, frames=frames, load_truth=load_truth, px_per_m=px_per_m,
-        source={"kind": kind, "path": str(path), **more},
+        name=name, fps=fps, length=length, frames=frames, load_truth=lambda: warned_of_places(path, load_truth()),
+        px_per_m=px_per_m, source={"kind": kind, "path": str(path), **more},
     )  # fmt: skip
 
 

@@ -83,11 +83,9 @@ def reject_swapped(rows: NumericTable) -> None:
     known = rows.values[rows.values[:, 1] >= 0]
     as_read, swapped = (_usual_step(known[:, [*columns, 2, 3]]) for columns in ((1, 0), (0, 1)))
     if swapped < SWAPPED * as_read:
-        raise InputError(
-            file=rows.file, place="columns", got=f"steps of {as_read:.3g}, but of {swapped:.3g} if frame and id change "
-            "places", expected="first the frame, then the id", remedy="exchange columns 1 and 2, or name the columns "
-            "in the first line, as id,frame,x,y",
-        )  # fmt: skip
+        got = f"steps of {as_read:.3g}, but of {swapped:.3g} if frame and id change places"
+        expected, remedy = "the frame first", "exchange columns 1 and 2, or name the columns in the first line"
+        raise InputError(file=rows.file, place="columns", got=got, expected=expected, remedy=remedy)
 
 
 def _usual_step(rows: Array) -> float:

@@ -28,7 +28,7 @@ from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import LARGEST
 from sim.io.formats.biwi import labels_of
-from sim.io.formats.labelled_truth import centres, differentiate, labelled_sequence, warn_of_places, with_labels
+from sim.io.formats.labelled_truth import centres, differentiate, labelled_sequence, with_labels
 from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, read_table, require_pixels
 from sim.io.formats.options import NO_OPTIONS, RATES, BoxOptions, Classes, RecordingOptions
 from sim.scene.camera import scale_of_all_boxes
@@ -363,9 +363,6 @@ def truth_of_table(
         table.rows.reject((v > 1) | ((v < 0) & (v != -1)), "visibility from 0 to 1, or -1", "correct the last column")
         visibility = np.where(v[order] < 0, 1.0, v[order])
     place = None if ground is None else ground[order]
-    vel = None if place is None else differentiate(frame, id, place[:, :2], fps)
-    if place is not None and vel is not None and not _vouched(table):
-        warn_of_places(table.rows.file, id, place[:, :2], vel)
     if not np.isfinite(px_per_m) and boxed:
         px_per_m = scale_of_all_boxes(box[:, 3])
     frames = length if length is not None else int(frame.max(initial=0))
@@ -373,7 +370,7 @@ def truth_of_table(
         name=name, fps=fps, length=frames, px_per_m=px_per_m, frame=frame, id=id,
         group=np.full(len(order), -1, np.int64),
         pos=None if place is None else place[:, :2],
-        vel=vel,
+        vel=None if place is None else differentiate(frame, id, place[:, :2], fps),
         box=box if boxed else None, visibility=visibility,
         z=None if place is None else place[:, 2],
         labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,

@@ -68,8 +68,7 @@ def open_text(path: Path, layout: str, options: RecordingOptions) -> Sequence:
     rate = frame_rate(options.fps, stated, "trajectories", ETH_FPS)
     table = table_of_rows(rows, boxless=True)
     rows.reject(table.id < 0, "ids from 0", "correct the id")
-    if layout in ("eth", "pedpy"):
-        reject_swapped(rows)
+    reject_swapped(rows)
     length = int(table.frame.max())
 
     def truth() -> Truth:
