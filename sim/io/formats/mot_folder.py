@@ -19,6 +19,7 @@ from scenarios.reading import is_present
 from sim.io.files.numeric_text import bounded_number, read_text
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
+from sim.io.formats.labelled_truth import warned_of_places
 from sim.io.formats.mot_table import read_table, size_doubt
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
@@ -127,7 +128,8 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     def truth() -> Truth:
         table = read_table(gt, length=length, boxless=True)
-        return mot_text.truth_of_table(table, info.name, rate, length, options.scale, of_boxes.person_class)
+        people = mot_text.truth_of_table(table, info.name, rate, length, options.scale, of_boxes.person_class)
+        return warned_of_places(gt, people)
 
     more: dict[str, Any] = {} if choice is None else {"background": str(choice)}
     more |= {} if pictures.numbering is None else {"numbering": astuple(pictures.numbering)}
