@@ -34,6 +34,7 @@ KINDS = (
     "a CAVIAR XML, a video"
 )
 VIDEOS = f"{KINDS} ({' '.join(video.SUFFIXES)})"
+TEXTS = (".txt", ".csv", ".tsv")
 DEPTH = 3
 
 
@@ -104,6 +105,8 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
             remedy = "give the sequence or dataset first, then the tracks: swap the arguments"
         elif sum(p.suffix.lower() in PICTURES for p in path.iterdir() if not is_hidden(p)) > 1:
             got, remedy = "a folder of pictures, without img1", f"move the pictures to {path / 'img1'}"
+        elif texts := [p for p in path.iterdir() if p.suffix.lower() in TEXTS and not is_hidden(p)]:
+            got, remedy = f"a folder of texts, as {min(texts).name}", "give one text, with its path"
         raise InputError(file=path, got=got, expected=KINDS, remedy=remedy)
     return _distinct([_open_one(p, options) for p in found])
 
@@ -187,7 +190,7 @@ def _kind(path: Path) -> str | None:
         parts = ("seqinfo.ini", "gt/gt.txt", "det/det.txt", "img1")
         return "mot" if any((path / part).exists() for part in parts) else None
     suffix = path.suffix.lower()
-    if suffix in (".txt", ".csv", ".tsv", people_texts.NDJSON):
+    if suffix in (*TEXTS, people_texts.NDJSON):
         return people_texts.layout_of(path) or "text"
     return "caviar" if suffix == ".xml" else "video" if suffix in video.SUFFIXES else None
 

@@ -10,17 +10,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from sim.io.formats.labelled_truth import chords
+from sim.io.formats.labelled_truth import RUN, chords
 from sim.types import Tracks
-
-# m/s: a median speed above it is no crowd's. It is 0.6 to 1.4 in seq_hotel, zara01, mwt1gt, PETS09, TownCentre and
-# TUD-Campus.
-FAST = 3.0
 
 
 def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float) -> Iterator[str]:
-    """Yields a warning (text) if people occur only in every n-th frame, and one if half move faster than 3 m/s. name:
-    of the sequence; px_per_m: image scale, used only for people in the image."""
+    """Yields a warning (text) if people occur only in every n-th frame, and one if half move faster than 3 m/s in the
+    image; readers warn of positions on the ground. name: of the sequence; px_per_m: image scale."""
     present = [t for t in people if len(t.id)]
     step = math.gcd(*np.diff([t.index for t in present]).astype(int).tolist())
     if step > 1:
@@ -28,14 +24,10 @@ def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float
             f"{name}: people only in every {step}th frame, so groups may not last. Number these frames 1, 2, 3, … and "
             f"give their own rate: --fps {fps:g} if the labels have this rate, --fps {fps / step:g} if the video has it"
         )
-    if not present:
-        return
-    in_image = present[0].plane == "image"
-    scale = px_per_m if in_image else 1.0
-    median = median_speed(people, fps, scale)
-    if median > FAST:
-        unit = "that positions are in metres" if not in_image else f"--px-per-m, here {scale:.4g}"
-        yield f"{name}: half of the people are faster than {median:.3g} m/s. Check --fps, here {fps:g}, and {unit}"
+    median = median_speed(people, fps, px_per_m)
+    if median > RUN and present[0].plane == "image":
+        words = f"half of the people are faster than {median:.3g} m/s"
+        yield f"{name}: {words}. Check --fps, here {fps:g}, and --px-per-m, here {px_per_m:.4g}"
 
 
 def median_speed(people: Sequence[Tracks], fps: float, px_per_m: float) -> float:

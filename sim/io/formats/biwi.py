@@ -19,11 +19,13 @@ from scenarios.limits import FRAME_RATES
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_rows
-from sim.io.formats.labelled_truth import differentiate, with_labels
+from sim.io.formats.labelled_truth import differentiate, warn_of_places, with_labels
 from sim.io.formats.options import NO_OPTIONS, RecordingOptions, recorded_sequence
 from sim.types import Ints, Sequence, Truth
 
 FPS = 2.5
+
+LABELS = 5  # lines `id label`, with a label in several, that are not taken for pairs of people
 
 
 def frame_numbers(raw: Ints, id: Ints | None = None) -> Ints:
@@ -63,6 +65,7 @@ def read_groups(path: Path) -> dict[int, int]:
     """Returns by person id the group label that a groups.txt gives each person; people alone have no entry."""
     label: dict[int, int] = {}
     lines = read_rows(path)
+    _reject_labels(path, list(lines.cells()))
     for number, line in zip(lines.line, lines.text, strict=True):
         members = person_ids(path, f"line {number}", line)
         if len(members) < 2:
@@ -76,6 +79,15 @@ def read_groups(path: Path) -> dict[int, int]:
         for person in [p for p, g in label.items() if g in earlier] + sorted(members):
             label[person] = name
     return label
+
+
+def _reject_labels(path: Path, rows: list[list[str]]) -> None:
+    """Raises InputError if each row seems to hold the id of a person and the label of a group."""
+    people, labels = ({row[k] for row in rows} for k in (0, -1))
+    if len(rows) >= LABELS and all(len(row) == 2 for row in rows) and len(people) == len(rows) > len(labels):
+        got, expected = f"two numbers in all {len(rows)} lines, with labels in the second place", "the ids of one group"
+        remedy = "write all ids of a group on one line; or name the columns of the people, and add a column group"
+        raise InputError(file=path, place="each line", got=got, expected=expected, remedy=remedy)
 
 
 def labels_of(path: Path, id: Ints) -> Ints:
@@ -129,6 +141,7 @@ def open_folder(folder: Path, options: RecordingOptions = NO_OPTIONS) -> Sequenc
             group=np.full(len(id), -1, np.int64), pos=rows.values[:, (2, 4)], vel=rows.values[:, (5, 7)], box=None,
             visibility=np.ones(len(id)), z=np.zeros(len(id)), labelled=np.zeros(length, bool),
         )  # fmt: skip
+        warn_of_places(folder, people)
         groups = folder / "groups.txt"
         return with_labels(people, labels_of(groups, id)) if is_present(groups) else people
 

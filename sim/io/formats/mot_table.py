@@ -28,7 +28,9 @@ from sim.types import LENGTH_UNITS, Array, Bools, Ints
 
 ENOUGH = 10  # rows that are needed to judge by how their columns vary
 
-MOST_SHARE = 2.0  # greatest left and top of boxes in shares of the picture; people may be partly outside
+LOWEST = 3.0  # px: most boxes of people are higher, unless they are shares of the picture or metres
+
+SWAPPED = 1 / 3  # People whose steps are shorter than this part of those read have ids in the column of frames
 
 PERSON = (1.2, 6.0)  # height of a person's box divided by its width
 
@@ -76,13 +78,31 @@ def _lasts(frame: Array, id: Array) -> bool:
     return bool(near.mean() >= STAY)
 
 
+def reject_swapped(rows: NumericTable) -> None:
+    """Raises InputError if rows frame, id, x, y, … seem to begin with the id: people would then make shorter steps."""
+    known = rows.values[rows.values[:, 1] >= 0]
+    as_read, swapped = (_usual_step(known[:, [*columns, 2, 3]]) for columns in ((1, 0), (0, 1)))
+    if swapped < SWAPPED * as_read:
+        got = f"steps of {as_read:.3g}, but of {swapped:.3g} if frame and id change places"
+        expected, remedy = "the frame first", "exchange columns 1 and 2, or name the columns in the first line"
+        raise InputError(file=rows.file, place="columns", got=got, expected=expected, remedy=remedy)
+
+
+def _usual_step(rows: Array) -> float:
+    """Returns the median step from row to row of one id in rows id, frame, x, y; nan for few steps."""
+    rows = rows[np.lexsort(rows[:, 1::-1].T)]
+    step = np.hypot(*np.diff(rows[:, 2:], axis=0).T)[np.diff(rows[:, 0]) == 0]
+    return float(np.median(step)) if len(step) >= ENOUGH else float("nan")
+
+
 def require_pixels(rows: NumericTable, box: Array) -> None:
-    """Raises InputError if all boxes (B, 4) seem to be shares of the picture: none is larger than one pixel."""
-    if len(box) and (np.abs(box[:, :2]) <= MOST_SHARE).all() and (box[:, 2:] <= 1).all():
+    """Raises InputError if most boxes (B, 4) are too low for people in pixels: shares of the picture, or metres."""
+    if len(box) and np.median(box[:, 3]) <= LOWEST:
         raise InputError(
-            file=rows.file, place="boxes", got=f"numbers up to {box.max():.3g} in all {len(box)} boxes",
-            expected="pixels", remedy="if they are shares of the picture, add --box-scale WIDTH,HEIGHT, its size in px "
-            "(not for labels); if x, y are centres, as YOLO's, name the columns frame,id,cx,cy,w,h,… in the first line",
+            file=rows.file, place="boxes", got=f"heights of {np.median(box[:, 3]):.3g}", expected="pixels",
+            remedy="if they are shares of the picture, add --box-scale WIDTH,HEIGHT, its size in px (not for labels); "
+            "if x, y are centres, as YOLO's, name the columns frame,id,cx,cy,w,h,… in the first line; if they are "
+            "metres, leave the size out: frame,id,x,y",
         )  # fmt: skip
 
 
@@ -301,6 +321,7 @@ def read_table(
         return table_of_rows(rows, length, boxless, box_scale, group)
     rows = text.numbers((GROUND_COLUMNS, *range(6, 11)), layout=LAYOUT)
     reject_missing_ids(rows)
+    reject_swapped(rows)
     return table_of_rows(rows, length, boxless, box_scale)
 
 

@@ -29,7 +29,7 @@ from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import LARGEST
 from sim.io.formats.biwi import labels_of
-from sim.io.formats.labelled_truth import centres, differentiate, with_labels
+from sim.io.formats.labelled_truth import centres, differentiate, warn_of_places, with_labels
 from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, read_table, require_pixels
 from sim.io.formats.options import NO_OPTIONS, RATES, BoxOptions, Classes, RecordingOptions, recorded_sequence
 from sim.scene.camera import scale_of_all_boxes
@@ -234,6 +234,7 @@ def classes_of(table: MotTable, named: bool) -> Array | None:
         return None
     column = table.rest[:, 1]
     if table.rest.shape[1] < 4:
+        table.rows.reject(column != np.round(column), "a whole number as class in column 8", "name the columns")
         return column
     whole = (column >= 0).all() and (column == np.round(column)).all()
     # If columns 8 to 10 are no metres, column 8 may be a category, as in VisDrone.
@@ -374,6 +375,7 @@ def truth_of_table(
         z=None if place is None else place[:, 2],
         labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip
+    warn_of_places(table.rows.file, truth)
     if table.group is not None:
         return with_labels(truth, table.group[order])
     path = group_file(table.rows.file)

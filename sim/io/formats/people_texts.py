@@ -25,7 +25,7 @@ from scenarios.limits import FRAME_RATES, is_number
 from scenarios.reading import parse_json
 from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_nan, read_rows, read_text, rows_among
 from sim.io.formats.biwi import frame_numbers
-from sim.io.formats.mot_table import table_of_rows
+from sim.io.formats.mot_table import reject_swapped, table_of_rows
 from sim.io.formats.mot_text import frame_rate, truth_of_table
 from sim.io.formats.options import RecordingOptions, recorded_sequence
 from sim.types import Sequence, Truth
@@ -67,6 +67,7 @@ def open_text(layout: str, path: Path, options: RecordingOptions) -> Sequence:
     rate = frame_rate(options.fps, stated, "trajectories", ETH_FPS)
     table = table_of_rows(rows, boxless=True)
     rows.reject(table.id < 0, "ids from 0", "correct the id")
+    reject_swapped(rows)
     length = int(table.frame.max())
 
     def truth() -> Truth:

@@ -42,12 +42,20 @@ def test_rows_without_ids_are_no_guess(tmp_path, score):
     assert "as the first line" in error.value.remedy
 
 
-def test_shares_of_the_picture_are_refused_and_scaled(tmp_path):
+@pytest.mark.parametrize("columns", [4, 6])
+def test_ids_in_the_place_of_frames_are_refused(tmp_path, columns):
+    rows = people()[:, [1, 0, 2, 3, 4, 5]]
+    with pytest.raises(InputError, match=r"steps of .*, but of 7\.28 if frame and id change places"):
+        open_source(written(tmp_path, rows[:, :columns]), fps=10)
+
+
+@pytest.mark.parametrize("size", [(1920, 1080), (70, 70)])
+def test_shares_of_the_picture_and_metres_are_refused_and_scaled(tmp_path, size):
     rows = people(ids=False)
-    scaled = written(tmp_path, np.c_[rows[:, :2], rows[:, 2:] / (1920, 1080, 1920, 1080)])
-    with pytest.raises(InputError, match=r"numbers up to .* expected pixels; .*--box-scale WIDTH,HEIGHT"):
+    scaled = written(tmp_path, np.c_[rows[:, :2], rows[:, 2:] / (*size, *size)])
+    with pytest.raises(InputError, match=r"heights of .* expected pixels; .*--box-scale WIDTH,HEIGHT"):
         open_source(scaled, fps=10)
-    (sequence,) = open_source(scaled, fps=10, box_scale="1920,1080")
+    (sequence,) = open_source(scaled, fps=10, box_scale="{},{}".format(*size))
     box = np.concatenate([frame.detections.box for frame in sequence])
     assert box == pytest.approx(rows[:, 2:], rel=1e-5)
 

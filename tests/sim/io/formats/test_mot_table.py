@@ -66,6 +66,18 @@ def test_what_is_read_otherwise_than_it_is_written_is_warned_of(tmp_path, text):
     assert truth.pos.tolist() == [[0.5, 1], [0.6, 1]]
 
 
+PLACES = [
+    (0.04, 0.04, "all are within 1 m"), (0, 0.3, "all have the same x"), (0.1, 0.1, r"their median speed is 3\.54 m/s"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("x", "y", "words"), PLACES)
+def test_places_that_are_hardly_metres_on_the_ground_are_warned_of(tmp_path, x, y, words):
+    rows = [f"{f},{k},{x * (5 * k + f)},{y * (5 * k - f)}\n" for f in range(1, 5) for k in range(1, 6)]
+    with pytest.warns(UserWarning, match=words):
+        opened(tmp_path, "frame,id,x,y\n" + "".join(rows)).truth  # noqa: B018
+
+
 def test_one_group_of_all_is_warned_of(tmp_path):
     with pytest.warns(UserWarning, match="all are one group"):
         opened(tmp_path, "frame,id,x,y,group\n1,1,0.5,1,0\n1,2,0.6,1,0\n").truth  # noqa: B018

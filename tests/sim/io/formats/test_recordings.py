@@ -63,6 +63,7 @@ def test_biwi_without_groups_is_not_labelled(tmp_path):
 
 BAD_BIWI = [
     ("1 x\n", None, "line 1: .*ids of people"),
+    ("1 1\n2 1\n3 2\n4 2\n5 3\n", None, "two numbers in all 5 lines, with labels in the second place"),
     ("", [(1, 1, 0, 0), (1, 1, 0, 0)], "line 2: .*once"),
     ("", [(1, 1, "nan", 0)], "line 1: .*finite"),
     ("", [(1, 1.5, 0, 0)], "line 1: .*whole"),

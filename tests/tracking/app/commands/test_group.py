@@ -207,7 +207,7 @@ def every_tenth() -> str:
 
 SPEEDS = [
     (every_tenth, ["--fps", "10"], "--fps 10 if the labels have this rate, --fps 1 if the video has it"),
-    (text, ["--fps", "100"], "Check --fps, here 100, and that positions are in metres"),
+    (text, ["--fps", "100"], "check their unit, and the frame rate"),
     (boxes, ["--fps", "10", "--px-per-m", "4"], "--px-per-m, here 4"),
     (boxes, ["--fps", "10"], ""),
 ]
