@@ -122,29 +122,22 @@ def _near_discs(rows, s, last, found):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _pair(state, tag, i, j, dx, dy, d2, out):  # type: ignore[no-untyped-def]
     """Adds the forces between persons i and j to out (N, 2); (dx, dy) = position i - position j, d2 its square."""
+    strength, reach, strangers = SHOVE, 2.0 * PERSON_RADIUS, False
     if tag[i, GROUP] == tag[j, GROUP]:
-        if d2 >= SEPARATION_RANGE * SEPARATION_RANGE:
-            return
-        d = max(sqrt(d2), TINY)
-        f = SEPARATION * (1.0 - d / SEPARATION_RANGE) / d
-        fx, fy = f * dx, f * dy
+        strength, reach = SEPARATION, SEPARATION_RANGE
     elif tag[i, QUEUE] >= 0 and tag[i, QUEUE] == tag[j, QUEUE]:
-        if d2 >= QUEUE_SEPARATION_RANGE * QUEUE_SEPARATION_RANGE:
-            return
-        d = max(sqrt(d2), TINY)
-        f = SEPARATION * (1.0 - d / QUEUE_SEPARATION_RANGE) / d
-        fx, fy = f * dx, f * dy
+        strength, reach = SEPARATION, QUEUE_SEPARATION_RANGE
     else:
-        size = 2.0 * PERSON_RADIUS
+        strangers = True
+    if d2 < reach * reach:
+        d = max(sqrt(d2), TINY)
+        f = strength * (1.0 - d / reach) / d
+        fx, fy = f * dx, f * dy
+    elif strangers:
         wx, wy = state[i, VX] - state[j, VX], state[i, VY] - state[j, VY]
-        if d2 < size * size:
-            d = max(sqrt(d2), TINY)
-            f = SHOVE * (1.0 - d / size) / d
-            fx, fy = f * dx, f * dy
-        else:
-            fx, fy = _power_law(dx, dy, wx, wy, size, AVOID_PERSON)
-            if fx == 0.0 and fy == 0.0:
-                return
+        fx, fy = _power_law(dx, dy, wx, wy, reach, AVOID_PERSON)
+    else:
+        return
     out[i, X] += fx
     out[i, Y] += fy
     out[j, X] -= fx

@@ -1,7 +1,7 @@
 """The state of groups while the simulation runs: who belongs to which group, each group's way, and people's places in
 formations and queues.
 
-Nothing here touches a position, a velocity or a force. The physics reads this state through `fill` and the kernels'
+Nothing here touches a position, a velocity or a force. The physics reads this state through `rows` and the kernels'
 arrays.
 """
 
@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.crowd import forces
-from sim.crowd.forces import END, GATHER, LEAVE, NARROW, PASS, STAND, GroupArrays, PeopleArrays
+from sim.crowd.forces import END, GATHER, IN_GROUP, LEAVE, NARROW, PASS, STAND, TO_TARGET, GroupArrays, PeopleArrays
 from sim.crowd.formation import assign, standing, to_world, walking
 from sim.crowd.navigation import Navigator
 from sim.crowd.population import EnteringGroup, walking_speed
@@ -27,10 +26,11 @@ class GroupState:
 
     State: alive: index of each existing group by name; arrays: the ways of groups, as the kernels use them; next_group:
     index of the next new group; settled: indices of groups that stand in a circle. By group index, also for groups that
-    ended: members (columns), spacing (m), goals (point and "stand", "leave" or "walk"). By column: group_of (group
-    index), queue_of (index of the queue order, -1 in no queue), present, free_speed (m/s), places (P, 2): place in the
-    formation, m; held: True for a person who stays behind at a stop; targets (P, 2): place in the queue, or where a
-    held person stands, m; waypoint: index of the first waypoint that the person has not passed.
+    ended: members (columns), spacing (m), goals (point and "stand", "leave" or "walk"). everybody: all people, by
+    column, as the kernels use those who are present; its columns are also places (in the formation, m), targets (place
+    in the queue, or where a held person stands, m), group_of (group index), mode, queue_of (index of the queue order,
+    -1 in no queue) and waypoint (the first one not passed). Also by column: held: True for a person who stays behind
+    at a stop; present; free_speed (m/s).
     """
 
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, slowdown: float) -> None:
@@ -44,14 +44,13 @@ class GroupState:
         self.spacing: dict[int, float] = {g.index: g.spacing for g in entering}
         self.goals: dict[int, tuple[Array, str]] = {g.index: (g.goal, g.finish) for g in entering}
         self.free_speed = np.array([m.free_speed for m in people])
-        self.group_of = np.zeros(len(people), np.int64)
+        self.everybody = PeopleArrays.empty(len(people))
+        self.places, self.targets = self.everybody.place, self.everybody.target
+        self.group_of, self.mode, self.queue_of, self.waypoint = self.everybody.tag.T
+        self.waypoint[:] = 0
         for index, columns in self.members.items():
             self.group_of[columns] = index
-        self.places = np.zeros((len(people), 2))
-        self.targets = np.zeros((len(people), 2))
-        self.queue_of = np.full(len(people), -1)
         self.held = np.zeros(len(people), np.bool_)
-        self.waypoint = np.zeros(len(people), np.int64)
         self.present = np.zeros(len(people), np.bool_)
         self.settled: set[int] = set()
 
@@ -164,13 +163,8 @@ class GroupState:
                 changed = True
         return changed
 
-    def fill(self, people: PeopleArrays, columns: Ints) -> None:
-        """Overwrites place, target, pace and tag of `people` (N rows) with the state of the people in columns (N,)."""
-        queue = self.queue_of[columns]
-        people.place[:] = self.places[columns]
-        people.target[:] = self.targets[columns]
-        people.pace[:] = np.minimum(self.arrays.speed[self.group_of[columns]], MAX_QUEUE_SPEED)
-        people.tag[:, forces.GROUP] = self.group_of[columns]
-        people.tag[:, forces.MODE] = np.where((queue >= 0) | self.held[columns], forces.TO_TARGET, forces.IN_GROUP)
-        people.tag[:, forces.QUEUE] = queue
-        people.tag[:, forces.WAYPOINT] = self.waypoint[columns]
+    def rows(self, columns: Ints) -> PeopleArrays:
+        """Returns copies of the arrays of the people in columns (N,), for the kernels."""
+        self.everybody.pace[:] = np.minimum(self.arrays.speed[self.group_of], MAX_QUEUE_SPEED)
+        self.mode[:] = np.where((self.queue_of >= 0) | self.held, TO_TARGET, IN_GROUP)
+        return PeopleArrays._make(values[columns] for values in self.everybody)

@@ -225,7 +225,7 @@ class OrderExecution:
         """Fires the orders that are due at this tick of time t (s), and serves queues.
 
         state (P, 4): x, y, vx, vy by column, nan while absent. Groups that have arrived to stand form a circle. Returns
-        True if `GroupState.fill` must be called afterwards.
+        True if `GroupState.rows` must be called afterwards.
         """
         changed = bool(self.queues)
         for pending in self.pending:

@@ -48,7 +48,7 @@ class Stops:
         self.stray: dict[int, float] = {}
 
     def advance(self, t: float, state: Array) -> bool:
-        """Lets groups stop and walk on at time t (s); returns True if `GroupState.fill` must be called afterwards.
+        """Lets groups stop and walk on at time t (s); returns True if `GroupState.rows` must be called afterwards.
 
         state (P, 4): x, y, vx, vy by column, nan while absent. A group that comes near a stop walks to the free place
         nearest to the stop and stands there in a circle until the time of the stop is over. If only some members stop,

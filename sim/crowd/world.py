@@ -22,7 +22,7 @@ import pymunk.batch
 from scenarios.errors import WorkError
 from scenarios.schema.scenario import Scenario
 from sim.clock import PHYSICS_RATE, SCRIPT_RATE, STEPS, FrameTimes
-from sim.crowd.forces import WAYPOINT, GroupArrays, Obstacles, PeopleArrays
+from sim.crowd.forces import AMPLITUDE, COS, SIN, WAYPOINT, GroupArrays, Obstacles, PeopleArrays
 from sim.crowd.group_state import GroupState
 from sim.crowd.heading import facings, headings
 from sim.crowd.navigation import Navigator, blocked, scene_of
@@ -71,7 +71,7 @@ class World:
     """The running simulation of one scenario and seed; it can be run once. Column = person id - 1.
 
     State: `space`, `bodies` (by column): of the physics. state (N, 4): x, y, vx, vy, and `people`: of the N people
-    present, whose columns are `columns`. gait (P, 5): as in PeopleArrays, by column. force: of the N people, then zeros
+    present, whose columns are `columns`. force: of the N people, then zeros
     for static bodies. states (P, 4), group_of (P,): at the present tick, by column, nan and -1 while absent. between
     (STEPS + 1, P, 4): states from the present tick to the next, step by step, before people come and go there; None if
     all frames lie on ticks.
@@ -94,8 +94,8 @@ class World:
         self.bodies: dict[int, pymunk.Body] = {}
         self.columns = np.zeros(0, np.int64)
         phase = np.array([m.phase for m in self.members])
-        still = np.zeros_like(phase)
-        self.gait = np.stack([cos(phase), sin(phase), still, still, [m.sway for m in self.members]], axis=1)
+        strides = np.stack([cos(phase), sin(phase), [m.sway for m in self.members]], axis=1)
+        self.groups.everybody.gait[:, [COS, SIN, AMPLITUDE]] = strides
         self.states = np.full((len(self.members), 4), np.nan)
         self.group_of = np.full(len(self.members), -1, np.int64)
         on_ticks = scenario.camera.fps == SCRIPT_RATE
@@ -140,7 +140,7 @@ class World:
                 self.group_of[self.columns] = self.groups.group_of[self.columns]
                 changed |= self.orders.advance(tick, t, self.states)
             if changed:
-                self._fill_people()
+                self.people = self.groups.rows(self.columns)
             if tick >= 0:
                 yield self.states, self.group_of
 
@@ -165,7 +165,7 @@ class World:
             if self.between is not None:
                 self.between[step, self.columns] = self.state
         self.groups.waypoint[self.columns] = self.people.tag[:, WAYPOINT]
-        self.gait[self.columns] = self.people.gait
+        self.groups.everybody.gait[self.columns] = self.people.gait
 
     def _come_and_go(self, t: float, first: bool) -> None:
         """Removes people who leave at time t (s, negative in the warm-up), and adds groups that enter."""
@@ -216,17 +216,12 @@ class World:
         self._write_buffer.set_float_buf(self.force)
         self._read(READ)
         self.state = np.frombuffer(self._read_buffer.float_buf()).reshape(-1, 4)[:n]
-        self.people = PeopleArrays.empty(n)
+        self.people = self.groups.rows(self.columns)
         self.states[:], self.group_of[:] = np.nan, -1
-        self._fill_people()
 
     def _read(self, fields: pymunk.batch.BodyFields) -> None:
         self._read_buffer.clear()
         pymunk.batch.get_space_bodies(self.space, fields, self._read_buffer)
-
-    def _fill_people(self) -> None:
-        self.groups.fill(self.people, self.columns)
-        self.people.gait[:] = self.gait[self.columns]
 
     def _motion(self, ticks: Array, groups: Ints, state: Array, intent: Ints, frames: FrameTimes) -> Motion:
         """Returns the Motion of states and group indices at the ticks, and in the frames."""

@@ -46,7 +46,7 @@ def _set_hit(hit, kind, normal_x, normal_y, normal_z, index, place):  # type: ig
 
 
 @njit(cache=True)
-def _hit_wall(o, d, wall, height, hit, best, index):  # type: ignore[no-untyped-def]
+def hit_wall(o, d, wall, height, hit, best, index):  # type: ignore[no-untyped-def]
     """Returns the t at which the ray o + t d meets one wall (4,) if below `best`, and sets hit; else `best`."""
     ex, ey = wall[X2] - wall[X1], wall[Y2] - wall[Y1]
     cross = d[0] * ey - d[1] * ex
@@ -65,7 +65,7 @@ def _hit_wall(o, d, wall, height, hit, best, index):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
-def _hit_pillar(o, d, pillar, height, hit, best, index):  # type: ignore[no-untyped-def]
+def hit_pillar(o, d, pillar, height, hit, best, index):  # type: ignore[no-untyped-def]
     """Returns the t at which the ray o + t d meets one pillar (3,) if below `best`, and sets hit; else `best`."""
     px, py, r = o[0] - pillar[CENTRE_X], o[1] - pillar[CENTRE_Y], pillar[RADIUS]
     a, b, c = d[0] * d[0] + d[1] * d[1], px * d[0] + py * d[1], px * px + py * py - r * r
@@ -190,9 +190,9 @@ def first_hit(o, d, solids, hit):  # type: ignore[no-untyped-def]
             best = t
             _set_hit(hit, GROUND, 0.0, 0.0, 1.0, 0, 0.0)
     for k in range(len(solids.walls)):
-        best = _hit_wall(o, d, solids.walls[k], solids.wall_height, hit, best, k)
+        best = hit_wall(o, d, solids.walls[k], solids.wall_height, hit, best, k)
     for k in range(len(solids.pillars)):
-        best = _hit_pillar(o, d, solids.pillars[k], solids.pillar_height, hit, best, k)
+        best = hit_pillar(o, d, solids.pillars[k], solids.pillar_height, hit, best, k)
     for k in range(len(solids.flights)):
         best = _hit_flight(o, d, solids.flights[k], hit, best, k)
     return best

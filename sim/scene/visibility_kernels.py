@@ -10,7 +10,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.scene.body import XX, XY, YY
 from sim.scene.raycast import CENTRE_X, CENTRE_Y, HIT_SLOTS, RADIUS, X1, X2, Y1, Y2
-from sim.scene.raycast_kernels import at_pixel, first_hit
+from sim.scene.raycast_kernels import at_pixel, first_hit, hit_pillar, hit_wall
 
 COLUMNS, ROWS = 16, 32  # cells laid over each amodal box, one sample in the middle of each
 LEFT, TOP, WIDTH, HEIGHT = range(4)  # columns of boxes
@@ -71,34 +71,6 @@ def _pillars_before(x, y, eye, pillars, found):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _meets_wall(d, eye, wall, height):  # type: ignore[no-untyped-def]
-    """Returns True if the ray eye + s d meets the upright rectangle over one wall."""
-    ex, ey = wall[X2] - wall[X1], wall[Y2] - wall[Y1]
-    ax, ay = wall[X1] - eye[0], wall[Y1] - eye[1]
-    cross = d[0] * ey - d[1] * ex
-    if cross == 0.0:
-        return False
-    s = (ax * ey - ay * ex) / cross
-    t = (ax * d[1] - ay * d[0]) / cross
-    z = eye[2] + s * d[2]
-    return s > 0 and 0 <= t <= 1 and 0 <= z <= height
-
-
-@njit(cache=True)
-def _meets_pillar(d, eye, pillar, height):  # type: ignore[no-untyped-def]
-    """Returns True if the ray eye + s d meets one upright pillar."""
-    px, py = pillar[CENTRE_X] - eye[0], pillar[CENTRE_Y] - eye[1]
-    a = d[0] * d[0] + d[1] * d[1]
-    b = px * d[0] + py * d[1]
-    root = b * b - a * (px * px + py * py - pillar[RADIUS] * pillar[RADIUS])
-    if root <= 0 or a == 0.0 or b <= 0:
-        return False
-    enter = eye[2] + max(0.0, (b - np.sqrt(root)) / a) * d[2]
-    leave = eye[2] + (b + np.sqrt(root)) / a * d[2]
-    return min(enter, leave) <= height and max(enter, leave) >= 0
-
-
-@njit(cache=True)
 def visible_span(start, length, cells, low, high, first, last, limit):  # type: ignore[no-untyped-def]
     """Returns start and length in px of the cells low … high along one axis of a box, clipped to 0 … limit.
 
@@ -112,14 +84,15 @@ def visible_span(start, length, cells, low, high, first, last, limit):  # type: 
 
 
 @njit(cache=True)
-def _meets_any(d, eye, between, n_walls, before, n_pillars, solids):  # type: ignore[no-untyped-def]
+def _meets_any(d, eye, between, n_walls, before, n_pillars, solids, hit):  # type: ignore[no-untyped-def]
     """Returns True if the ray eye + s d meets one of the first n_walls walls or n_pillars pillars that are listed."""
-    hit = False
     for k in range(n_walls):
-        hit = hit or _meets_wall(d, eye, solids.walls[between[k]], solids.wall_height)
+        if hit_wall(eye, d, solids.walls[between[k]], solids.wall_height, hit, np.inf, k) < np.inf:
+            return True
     for k in range(n_pillars):
-        hit = hit or _meets_pillar(d, eye, solids.pillars[before[k]], solids.pillar_height)
-    return hit
+        if hit_pillar(eye, d, solids.pillars[before[k]], solids.pillar_height, hit, np.inf, k) < np.inf:
+            return True
+    return False
 
 
 @njit(cache=True)
@@ -182,7 +155,7 @@ def sample_visibility(  # type: ignore[no-untyped-def]
                             break
                     if solids is not None and not hidden and n_walls + n_pillars > 0:
                         at_pixel(unproject, u, v, d)
-                        hidden = _meets_any(d, eye, between, n_walls, before, n_pillars, solids)
+                        hidden = _meets_any(d, eye, between, n_walls, before, n_pillars, solids, hit)
                     if stairs is not None:
                         at_pixel(unproject, u, v, d)
                         dx, dy = pos[i, 0] - eye[0], pos[i, 1] - eye[1]

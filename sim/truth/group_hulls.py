@@ -6,7 +6,7 @@ ground a hull encloses discs of 0.25 m round the members, in the image their box
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from sim.geometry.polygons import footprint_hulls
 from sim.types import Array, Groups, Ints
 
-__all__ = ["box_groups", "groups_over_time", "member_rows"]
+Hulls = Callable[[Ints, Ints], Sequence[Array]]
 
 
 def groups_over_time(
@@ -26,10 +26,12 @@ def groups_over_time(
     m and m/s. In the image they are px and px/s, and px_per_m is the scale by which the discs round the members are
     drawn. Results are in the same units. extent is the covariance of x and y.
     """
-    order, starts = member_rows(frame, id, group)
-    hulls = footprint_hulls(pos[order, :2] / px_per_m, np.diff(np.append(starts, len(order))))
-    rows = frame[order], id[order], group[order], pos[order], vel[order]
-    return _assemble(*rows, starts, [h * px_per_m for h in hulls], first, length)
+
+    def hulls(rows: Ints, starts: Ints) -> list[Array]:
+        around = footprint_hulls(pos[rows, :2] / px_per_m, np.diff(np.append(starts, len(rows))))
+        return [h * px_per_m for h in around]
+
+    return groups_in_hulls(frame, id, group, pos, vel, hulls, first, length)
 
 
 def box_groups(
@@ -42,13 +44,13 @@ def box_groups(
     """
     from sim.geometry.hull_kernels import convex_hulls
 
-    order, starts = member_rows(frame, id, group)
     low, high = box[:, :2], box[:, :2] + box[:, 2:]
     corners = np.stack([low, np.stack([high[:, 0], low[:, 1]], 1), high, np.stack([low[:, 0], high[:, 1]], 1)], 1)
-    ends = np.append(starts, len(order))
-    hulls = convex_hulls([corners[order[a:b]].reshape(-1, 2) for a, b in pairwise(ends)])
-    rows = frame[order], id[order], group[order], pos[order], vel[order]
-    return _assemble(*rows, starts, hulls, first, length)
+
+    def hulls(rows: Ints, starts: Ints) -> Sequence[Array]:
+        return convex_hulls([part.reshape(-1, 2) for part in np.split(corners[rows], starts[1:])])
+
+    return groups_in_hulls(frame, id, group, pos, vel, hulls, first, length)
 
 
 def member_rows(frame: Ints, id: Ints, group: Ints) -> tuple[Ints, Ints]:
@@ -65,23 +67,25 @@ def member_rows(frame: Ints, id: Ints, group: Ints) -> tuple[Ints, Ints]:
     return rows[several], np.flatnonzero(new[several])
 
 
-def _assemble(
-    frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, starts: Ints, hulls: Sequence[Array], first: int,
-    length: int,
-) -> list[Groups]:  # fmt: skip
-    counts = np.diff(np.append(starts, len(id)))
+def groups_in_hulls(
+    frame: Ints, id: Ints, group: Ints, pos: Array, vel: Array, hulls: Hulls, first: int, length: int
+) -> list[Groups]:
+    """Returns the Groups of each of the frames first … first + length - 1, with any hulls.
+
+    Like `groups_over_time`. hulls: takes the results of `member_rows`, and returns the hull of each group.
+    """
+    rows, starts = member_rows(frame, id, group)
     if not len(starts):
         return [Groups.none()] * length
-    middle = np.add.reduceat(pos, starts) / counts[:, None]
-    speed = np.add.reduceat(vel, starts) / counts[:, None]
-    arm = (pos - np.repeat(middle, counts, axis=0))[:, :2]
+    counts = np.diff(np.append(starts, len(rows)))
+    around, members = hulls(rows, starts), np.split(id[rows], starts[1:])
+    middle, speed = (np.add.reduceat(values[rows], starts) / counts[:, None] for values in (pos, vel))
+    arm = (pos[rows] - np.repeat(middle, counts, axis=0))[:, :2]
     extent = np.add.reduceat(arm[:, :, None] * arm[:, None], starts) / counts[:, None, None]
-    members = [id[a:b] for a, b in pairwise([*starts.tolist(), len(id)])]
-    cuts = np.searchsorted(frame[starts], np.arange(first, first + length + 1))
-    name = group[starts]
-    size, nobody = counts.astype(float), Groups.none()
+    cuts = np.searchsorted(frame[rows[starts]], np.arange(first, first + length + 1))
+    name, size, nobody = group[rows[starts]], counts.astype(float), Groups.none()
     return [
-        Groups(name[a:b], tuple(members[a:b]), middle[a:b], speed[a:b], extent[a:b], size[a:b], tuple(hulls[a:b]))
+        Groups(name[a:b], tuple(members[a:b]), middle[a:b], speed[a:b], extent[a:b], size[a:b], tuple(around[a:b]))
         if a < b
         else nobody
         for a, b in pairwise(cuts.tolist())

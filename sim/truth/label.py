@@ -9,7 +9,6 @@ inscribed in the ellipses of body and head.
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from sim.clock import FrameTicks
 from sim.scene.body import Ellipsoids, Outlines, RecordedBodies, contour, outlines, recorded_bodies
 from sim.scene.camera import project, px_per_m_at_centre
 from sim.scene.visibility import measure_visibility
+from sim.truth.group_hulls import groups_in_hulls, groups_over_time
 from sim.truth.merge_split_events import GroupsAndEvents
 from sim.truth.motion_rows import MotionRows
 from sim.truth.order_fulfilment import fulfilment
@@ -26,8 +26,8 @@ POINTS = 24  # vertices of each polygon
 INSTANT = 0.02  # s: half the step by which ground velocities become image velocities
 
 
-def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shapes: Ellipsoids) -> tuple[Groups, ...]:
-    """Returns the Groups of each frame as the camera sees them, with the ids, members and sizes of the ground groups.
+def image_groups(truth: Truth, camera: Camera, shapes: Ellipsoids) -> tuple[Groups, ...]:
+    """Returns the Groups of each frame as the camera sees them.
 
     shapes: ellipsoids of body and head, one row for each row of the truth. Of the result, pos and extent are those of
     the middles of the members' boxes, px; hull is the convex hull of their silhouettes, empty if a member is not wholly
@@ -35,43 +35,21 @@ def image_groups(truth: Truth, ground: tuple[Groups, ...], camera: Camera, shape
     """
     assert truth.box is not None
     assert truth.vel is not None
-    rows, cuts = _members(truth, ground)
-    centre = (truth.box[:, :2] + truth.box[:, 2:] / 2)[rows]
-    vel = image_velocities(camera, shapes.centre[rows, 0], truth.vel[rows])
-    pos, speed = _means(centre, cuts), _means(vel, cuts)
-    off = centre - np.repeat(pos, np.diff(cuts), axis=0)
-    extent = _means(off[:, :, None] * off[:, None, :], cuts)
-    hull = hulls(outlines(camera, Ellipsoids(shapes.centre[rows], shapes.shape[rows])), cuts)
-    ends = np.cumsum([0, *(len(groups.id) for groups in ground)])
-    return tuple(
-        groups.replace(pos=pos[a:b], vel=speed[a:b], extent=extent[a:b], hull=tuple(hull[a:b]))
-        for groups, (a, b) in zip(ground, pairwise(ends), strict=True)
-    )
+
+    def silhouettes(rows: Ints, starts: Ints) -> list[Array]:
+        return hulls(outlines(camera, Ellipsoids(shapes.centre[rows], shapes.shape[rows])), starts)
+
+    middle = truth.box[:, :2] + truth.box[:, 2:] / 2
+    vel = image_velocities(camera, shapes.centre[:, 0], truth.vel)
+    rows = truth.frame, truth.id, truth.group
+    return tuple(groups_in_hulls(*rows, middle, vel, silhouettes, 1, truth.length))
 
 
-def _members(truth: Truth, ground: tuple[Groups, ...]) -> tuple[Ints, Ints]:
-    """Returns the truth's rows of all groups' members, and where each of the G groups begins in them (G + 1,)."""
-    starts = np.searchsorted(truth.frame, np.arange(1, len(ground) + 1))
-    rows, sizes = [np.zeros(0, np.int64)], [0]
-    for index, (start, groups) in enumerate(zip(starts, ground, strict=True), start=1):
-        if len(groups.id):
-            sizes += [len(members) for members in groups.members]
-            rows.append(start + np.searchsorted(truth.id[truth.rows(index)], np.concatenate(groups.members)))
-    return np.concatenate(rows), np.cumsum(sizes)
-
-
-def _means(values: Array, cuts: Ints) -> Array:
-    count = np.diff(cuts).reshape(-1, *[1] * (values.ndim - 1))
-    return np.asarray(np.add.reduceat(values, cuts[:-1], axis=0) / count) if len(count) else values[:0]
-
-
-def hulls(ellipses: Outlines, cuts: Ints) -> list[Array]:
-    """Returns the convex hull (V, 2) px of each of G groups. cuts (G + 1,): its first row in `ellipses`, then N."""
+def hulls(ellipses: Outlines, starts: Ints) -> list[Array]:
+    """Returns the convex hull (V, 2) px of each of G groups. starts (G,): the first row of each in `ellipses`."""
     from sim.geometry import hull_kernels
 
-    edge = contour(ellipses, POINTS)[: cuts[-1]]
-    sets = np.split(edge.reshape(-1, 2), edge.shape[1] * cuts[1:])
-    return list(hull_kernels.convex_hulls(sets[:-1]))
+    return list(hull_kernels.convex_hulls([p.reshape(-1, 2) for p in np.split(contour(ellipses, POINTS), starts[1:])]))
 
 
 def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
@@ -101,7 +79,6 @@ def bodies(motion: Motion, camera: Camera | None, people: RecordedBodies | None 
 
 def label(motion: Motion, camera: Camera | None) -> Truth:
     """Returns the whole Truth of a motion: that of `bodies`, with groups, events and hard negatives added."""
-    from sim.truth.group_hulls import groups_over_time
     from sim.truth.merge_split_events import groups_and_events
 
     people = recorded_bodies(motion)
@@ -117,7 +94,7 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     ground = tuple(groups_over_time(truth.frame, truth.id, truth.group, truth.pos, truth.vel, 1, truth.length))
     events, orders = _events_in_frames(_events(rows, found, s.rate), motion, group, shown)
     return truth.replace(
-        groups=ground, groups_px=None if camera is None else image_groups(truth, ground, camera, people.shapes),
+        groups=ground, groups_px=None if camera is None else image_groups(truth, camera, people.shapes),
         labelled=np.ones(truth.length, dtype=np.bool_), events=events, near=_near_in_frames(found.near, shown),
         orders=orders,
     )  # fmt: skip

@@ -20,9 +20,11 @@ from sim.detector.box_noise import box_errors, perturb_boxes
 from sim.io.store.truth_files import scores_or_ones
 from sim.scene.visibility import image_size_of_boxes, with_visibility
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth, Unscored
-from tracking.filters.assignment import optimal
 from tracking.scoring.annotated_frames import annotated_frames
+from tracking.scoring.candidate_pairs import compare, same_frame
+from tracking.scoring.matching import match
 from tracking.scoring.misreading import shifted_boxes
+from tracking.scoring.rows import FrameRows
 
 GATE = 0.3  # least overlap of a match
 IGNORED = 0.5  # least overlap of an unmatched detection with an unscored box for the detection to be dropped
@@ -134,17 +136,15 @@ def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) ->
     if usual is not None:
         bias = BoxNoise(**dict(zip(("across", "foot", "top", "width"), ((float(e), 0.0) for e in usual), strict=True)))
         whole, part = (perturb_boxes(b, np.ones(len(b)), bias, np.zeros((len(b), 4))) for b in (whole, part))
-    rows, columns = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
-    for index in range(1, truth.length + 1):
-        r = truth.rows(index)
-        low, high = np.searchsorted(frame, (index, index + 1))
-        if r.stop > r.start and high > low:
-            here = box[low:high]
-            cost = 1.0 - np.maximum(box_iou(whole[r, None], here), box_iou(part[r, None], here))
-            i, j = optimal(cost, 1.0 - GATE)
-            rows.append(i + r.start)
-            columns.append(j + low)
-    return np.concatenate(rows), np.concatenate(columns)
+
+    def overlap(i: Ints, j: Ints) -> tuple[Ints, Array]:
+        iou = np.maximum(box_iou(whole[i], box[j]), box_iou(part[i], box[j]))
+        near = np.flatnonzero(iou > GATE)
+        return near, iou[near]
+
+    pairs = compare(FrameRows(truth.frame, truth.id), FrameRows(frame, np.arange(len(frame))), overlap)
+    chosen = match(pairs.frame, pairs.i, pairs.j, pairs.s - GATE)
+    return pairs.i[chosen], pairs.j[chosen]
 
 
 def box_iou(a: Array, b: Array) -> Array:
@@ -164,7 +164,6 @@ def _covered(frame: Ints, box: Array, unscored: Unscored | None) -> Bools:
     """Returns which detections overlap an unscored box of their frame by an IoU of 0.5 or more, (M,)."""
     covered = np.zeros(len(box), bool)
     if unscored is not None:
-        for index in np.unique(unscored.frame):
-            here, there = (slice(*np.searchsorted(f, (index, index + 1))) for f in (frame, unscored.frame))
-            covered[here] = (box_iou(box[here, None], unscored.box[there]) >= IGNORED).any(axis=1)
+        for i, j in same_frame(unscored.frame, frame):
+            covered[j[box_iou(unscored.box[i], box[j]) >= IGNORED]] = True
     return covered

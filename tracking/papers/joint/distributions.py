@@ -19,7 +19,7 @@ from tracking.filters.person_streams import NOBODY, Keys, PersonStreams
 from tracking.papers.joint import group_proposal_kernels, partition_labels_kernels
 from tracking.papers.joint.config import ALPHA, SCALES, VALIDITY_RATE, JointConfig
 from tracking.papers.joint.decentralised_filter import log_sum
-from tracking.papers.joint.group_proposal_kernels import CROSS, PLACE, RATE, group_dynamics, own_dynamics
+from tracking.papers.joint.group_proposal_kernels import CROSS, PLACE, RATE, group_dynamics
 
 
 def process_noise(place: float, velocity: float, dt: float) -> Array:
@@ -38,9 +38,9 @@ def precision_of(cov: Array) -> tuple[Array, float]:
 def log_density(x: Array, mean: Array, cov: Array) -> Array:
     """Returns log N(x; mean, Sigma) of states (N, K, 4) with Sigma of one axis cov (3,), (N, K)."""
     precision, scale = precision_of(cov)
-    out = np.empty(x.shape[:2])
-    own_dynamics(np.ascontiguousarray(x), np.ascontiguousarray(mean), precision, scale, 0.0, out)
-    return out
+    place, rate = np.split(x - mean, 2, axis=-1)
+    square = precision[PLACE] * place * place + 2 * precision[CROSS] * place * rate + precision[RATE] * rate * rate
+    return np.asarray(scale - square.sum(axis=-1) / 2)
 
 
 def moved(state: Array, dt: float) -> Array:
@@ -164,11 +164,8 @@ class FrameModel:
         out = np.zeros(z.shape[:2])
         if self.config.variant != "full":
             return out
-        precision, scale = precision_of(self.sigma)
-        own = np.empty(new.shape[:2])
-        own_dynamics(new, x, precision, scale, self.dt, own)
-        group_dynamics(new, x, z, precision, scale, self.dt, out)
-        return np.asarray(out - own.sum(axis=1)[:, None])
+        group_dynamics(new, x, z, *precision_of(self.sigma), self.dt, out)
+        return np.asarray(out - log_density(new, moved(x, self.dt), self.sigma).sum(axis=1)[:, None])
 
     def groups(self, new: Array, x: Array, z: Ints) -> Ints:
         """Step 7: returns Z' drawn from pi(Z_{t+1} | X_{0:t+1}, Z_t, y), eqs 6 and 7; in VAR2 and VAR3 from all

@@ -281,16 +281,3 @@ def group_dynamics(
                     residual[d + 2] = new[i, k, d + 2] - old[i, k, d + 2]
                 total += log_normal(residual, precision, log_scale)
             out[i, j] = total
-
-
-@njit(cache=True)
-def own_dynamics(new: Array, old: Array, precision: Array, log_scale: float, dt: float, out: Array) -> None:
-    """Writes log N(x_{t+1}; A x_t, Sigma) of each person, (N_x, K), eq. 3; dt = 0: the person stands still."""
-    particles, n, _ = new.shape
-    residual = np.empty(4)
-    for i in range(particles):
-        for k in range(n):
-            for d in range(2):
-                residual[d] = new[i, k, d] - (old[i, k, d] + dt * old[i, k, d + 2])
-                residual[d + 2] = new[i, k, d + 2] - old[i, k, d + 2]
-            out[i, k] = log_normal(residual, precision, log_scale)

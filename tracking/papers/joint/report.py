@@ -23,7 +23,7 @@ from sim.truth.motion_rows import MotionRows
 from sim.types import Array, Bools, GroupEvent, Groups, Ints
 from tracking.grouping.belief import EVENTS, UNSEEN, default_belief
 from tracking.grouping.belief_kernels import linked_groups
-from tracking.grouping.group_events import SEARCHED, Parts, TrackedMotion, corrects, event_of_change
+from tracking.grouping.group_events import SEARCHED, TrackedMotion, corrects, event_of_change
 from tracking.grouping.group_labels import LinkedPeople, parts_of_change
 from tracking.grouping.online_belief import PairBelief
 from tracking.papers.joint import partition_labels_kernels
@@ -86,22 +86,14 @@ class ReportedEvents:
         changes = [c for c in changes if not corrects(c, parted)]
         if not changes:
             return ()
-        ids, motion = self._motion()
-        column = {person: k for k, person in enumerate(ids)}
-        begin, out = self.frames - len(self.recent), []
-        for change in changes:
-            found = parts_of_change(change, old, self.people)
-            *sets, gone = (frozenset(column[p] for p in part if p in column) for part in (*found.sets, found.gone))
-            parts = Parts(sets, found.since - begin if found.sets else 0, gone)
-            own = replace(change, members=tuple(sorted(column[p] for p in change.members if p in column)))
-            event = event_of_change(own, len(self.recent) - 1, parts, motion)
-            if event is not None:
-                x, y = event.pos
-                out.append(replace(
-                    event, start=event.start + begin, end=event.end + begin, emitted=self.frames,
-                    members=tuple(sorted(ids[p - 1] for p in event.members)), pos=(x * scale, y * scale),
-                ))  # fmt: skip
-        return tuple(out)
+        motion = self._motion()
+        made = (event_of_change(c, self.frames - 1, parts_of_change(c, old, self.people), motion) for c in changes)
+        # people are ids here, and columns plus 1 in events
+        return tuple(
+            replace(e, members=tuple(p - 1 for p in e.members), pos=(e.pos[0] * scale, e.pos[1] * scale))
+            for e in made
+            if e is not None
+        )
 
     def _lasting(self, id: Ints, log_odds: Array) -> list[PersonSet]:
         belief, group = default_belief(), np.full((2, len(id)), -1)
@@ -118,18 +110,22 @@ class ReportedEvents:
         self.evidence = {(a, b): before.get((a, b), 0.0) + float(log_odds[row[a], row[b]]) for a, b in pairs}
         return {frozenset(pair): before[pair] > 0 for pair in before.keys() - self.evidence.keys()}
 
-    def _motion(self) -> tuple[list[int], TrackedMotion]:
-        ids = sorted({person for id, _, _ in self.recent for person in id.tolist()})
-        pos, measured = np.full((len(self.recent), len(ids), 2), np.nan), np.zeros((len(self.recent), len(ids)), bool)
-        for t, (id, place, seen) in enumerate(self.recent):
-            column = np.searchsorted(ids, id)
-            pos[t, column], measured[t, column] = place, seen
-        chord, vel = frames_of(CHORD, self.fps), np.full_like(pos, np.nan)
-        vel[chord:] = (pos[chord:] - pos[:-chord]) * self.fps / chord
-        there, alone = np.isfinite(pos[..., 0]), np.full(pos.shape[:2], -1)
-        measured[:, ~measured.any(axis=0)] = True
-        rows, known = (MotionRows.of_table(pos, vel, present, alone) for present in (there, there & measured))
-        return ids, TrackedMotion(rows, self.fps, known)
+    def _motion(self) -> TrackedMotion:
+        """Returns the motion of the last frames, with ids as columns."""
+        first, chord = self.frames - len(self.recent), frames_of(CHORD, self.fps)
+        frame = np.repeat(np.arange(first, self.frames), [len(id) for id, _, _ in self.recent])
+        id, pos, seen = (np.concatenate(part) for part in zip(*self.recent, strict=True))
+        order = np.lexsort((frame, id))
+        frame, id, pos, seen = frame[order], id[order], pos[order], seen[order]
+        key, vel, alone = id * self.frames + frame, np.full_like(pos, np.nan), np.full(len(id), -1)
+        before = np.searchsorted(key, key - chord)
+        known = (frame >= first + chord) & (key[before] == key - chord)
+        vel[known] = (pos[known] - pos[before[known]]) * self.fps / chord
+        measured = seen | ~np.isin(id, id[seen])
+        every, some = (
+            MotionRows(frame[k], id[k], pos[k], vel[k], alone[k], self.frames) for k in (slice(None), measured)
+        )
+        return TrackedMotion(every, self.fps, some)
 
 
 def known_groups(groups: Members, ids: Ints) -> Ints:

@@ -78,7 +78,7 @@ def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, c
     and m/s; exist (P, K); weights (P, K), sum 1 for each person.
     """
     particles, n = exist.shape
-    share = np.empty((particles, n))
+    share, away = np.empty((particles, n)), np.empty(4)
     for p in range(particles):  # in the order in which arrays lie in memory
         for k in range(n):
             total[k] += weights[p, k] * exist[p, k]
@@ -86,25 +86,16 @@ def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, c
         for k in range(n):
             w = weights[p, k] * exist[p, k] / total[k] if total[k] > 0.0 else weights[p, k]
             share[p, k] = w
-            mean[k, 0] += w * pos[p, k, 0]
-            mean[k, 1] += w * pos[p, k, 1]
-            mean[k, 2] += w * vel[p, k, 0]
-            mean[k, 3] += w * vel[p, k, 1]
+            for d in range(2):
+                mean[k, d] += w * pos[p, k, d]
+                mean[k, d + 2] += w * vel[p, k, d]
     for p in range(particles):
         for k in range(n):
-            w, out = share[p, k], cov[k]
-            x, y = pos[p, k, 0] - mean[k, 0], pos[p, k, 1] - mean[k, 1]
-            u, v = vel[p, k, 0] - mean[k, 2], vel[p, k, 1] - mean[k, 3]
-            out[0, 0] += w * x * x
-            out[1, 0] += w * y * x
-            out[1, 1] += w * y * y
-            out[2, 0] += w * u * x
-            out[2, 1] += w * u * y
-            out[2, 2] += w * u * u
-            out[3, 0] += w * v * x
-            out[3, 1] += w * v * y
-            out[3, 2] += w * v * u
-            out[3, 3] += w * v * v
+            for d in range(2):
+                away[d], away[d + 2] = pos[p, k, d] - mean[k, d], vel[p, k, d] - mean[k, d + 2]
+            for a in range(4):
+                for b in range(a + 1):
+                    cov[k, a, b] += share[p, k] * away[a] * away[b]
     for k in range(n):
         for a in range(4):
             for b in range(a):

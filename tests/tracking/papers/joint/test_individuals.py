@@ -11,7 +11,7 @@ from tests.reference_joint import all_partitions, label_of, log_group_dynamics
 from tracking.filters.person_streams import PersonStreams
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.distributions import FrameModel, Proposal, log_density, moved, precision_of, process_noise
-from tracking.papers.joint.group_proposal_kernels import group_dynamics, own_dynamics
+from tracking.papers.joint.group_proposal_kernels import group_dynamics
 
 DT, NOISE = 0.1, 0.1
 SIGMA = process_noise(0.2, 0.8, DT)
@@ -54,11 +54,9 @@ def test_the_informed_proposal_is_the_posterior_of_the_step():
 
 
 def dynamics(new, old, label):
-    precision, scale = precision_of(SIGMA)
-    out, own = np.empty(label.shape[:2]), np.empty(new.shape[:2])
-    group_dynamics(new, old, label, precision, scale, DT, out)
-    own_dynamics(new, old, precision, scale, DT, own)
-    return out, own
+    out = np.empty(label.shape[:2])
+    group_dynamics(new, old, label, *precision_of(SIGMA), DT, out)
+    return out, log_density(new, moved(old, DT), SIGMA)
 
 
 def test_eq_5_is_that_of_all_partitions():
