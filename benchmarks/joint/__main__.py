@@ -1,4 +1,4 @@
-"""`joint`: the paper's Table 2, what departures and eq. 5 are worth, and the fit of its event classifier.
+"""`joint`: the paper's Table 2, what departures are worth, and what eq. 5 is worth for two people.
 
     python -m benchmarks.joint MODE [--seeds a:b] [--filter-seeds a:b] [--set k=v]… [--only A,B]
 
@@ -6,7 +6,6 @@ table2      the paper's Tables 2 and 3b: full, VAR1, VAR2, VAR3 and .2 of the pr
             friends-meet and on a recording; differences of variants, paired
 ablation    friends-meet: scores without each departure from the paper, paired differences
 coupling    two people: what eq. 5 is worth by the exact posterior, and by the decentralised filter
-events      the weights of the event classifier, fitted to two scenarios: tracking/papers/joint/event_classifier.toml
 
 One sequence of each scenario counts. Group scores are pooled over the frames of all sequences together; differences
 are of the means over sequences, with 95 % intervals. Detections are the points of the simulated detector; `.2` has
@@ -15,15 +14,13 @@ true positions, as in the paper.
 
 from __future__ import annotations
 
-from benchmarks.joint import events, exact, settings, table2
+from benchmarks.joint import exact, settings, table2
 from benchmarks.support.options import add_seeds, new_parser, one_thread, seed_range
 
 
 def main() -> None:
     parser = new_parser(__doc__)
-    modes = {
-        "table2": table2.table2, "ablation": settings.ablation, "coupling": exact.coupling, "events": events.events,
-    }  # fmt: skip
+    modes = {"table2": table2.table2, "ablation": settings.ablation, "coupling": exact.coupling}
     parser.add_argument("mode", choices=modes)
     add_seeds(parser, "20000:20001")
     parser.add_argument("--filter-seeds", type=seed_range, default="0:5", metavar="A:B", help="seeds of the filters")

@@ -12,19 +12,14 @@ from unittest.mock import patch
 import numpy as np
 
 import tracking
-from benchmarks.relational.errors import HIDDEN, LENGTHS, config_of, errors, hidden_partner, run
+from benchmarks.relational.errors import HIDDEN, LENGTHS, errors, hidden_partner
+from benchmarks.relational.groups import COLUMNS, differences, sequences, title, tracked
 from benchmarks.support import tables
-from scenarios.loading.resolve import resolve
-from sim.sequence import simulate
 from sim.types import Array, Ints, Sequence
 from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import with_groups, without_groups
 from tracking.papers.relational import sensor, tracker, transition_kernels
-from tracking.stats import paired
 
-COLUMNS = ("HOTA", "IDF1", "group_F1_hull", "pairwise_F1")
-# The seed of a filter is that of the scene, and so much more for each further filter seed.
-OFFSET = 1_000_000
 # Settings of the ablation beside the defaults. With relation_bias 40 partners count fully; detect_prob 1 and
 # clutter_density 0 are the paper's sensor and weights. Capitals: of SWITCHES.
 DEPARTURES = (
@@ -57,13 +52,11 @@ def ablation(given: argparse.Namespace) -> None:
     hidden partner, as in mode hidden, in PARTNERS walks.
     """
     warnings.simplefilter("ignore")
-    entries = (e for e in resolve(f"suite:{given.suite}") if not given.entry or e.name in given.entry.split(","))
-    made = [(seed, simulate(entry.scenario, seed, 0, ())) for entry in entries for seed in given.seeds]
+    made = list(sequences(given, given.suite))
     names = ("error, m", "hidden people, m", *COLUMNS)
-    print(f"\nsuite {given.suite}, {len(made)} sequences, {given.counts[0]} particles, "
-          f"filter seeds {given.filter_seeds.start}:{given.filter_seeds.stop}")  # fmt: skip
+    title(given, len(made))
     tables.head(["setting", *names, *(f"Δ {name}" for name in names)])
-    _compared(given, lambda changed: np.array([_mean_scores(seed, q, changed) for seed, q in made]))
+    _compared(given, lambda changed: np.array([_mean_scores(seed, q, changed) for _, seed, q in made]))
     names = tuple(f"{length:g} s" for length in LENGTHS)
     print(f"\nerror of a hidden partner by the length of the occlusion, m; {PARTNERS} walks")
     tables.head(["setting", *names, *(f"Δ {name}" for name in names)])
@@ -81,14 +74,7 @@ def _compared(given: argparse.Namespace, measured: Callable[[argparse.Namespace]
             rows = measured(changed)
         defaults = rows if defaults is None else defaults
         means = (f"{value:.3f}" for value in np.nanmean(rows, axis=0))
-        tables.row([setting or "defaults", *means, *_differences(defaults, rows)])
-
-
-def _differences(before: Array, after: Array) -> list[str]:
-    """Returns the paired differences of each column over the sequences (N, C) in which both values are known."""
-    known = np.isfinite(before) & np.isfinite(after)
-    pairs = [paired(a[k], b[k]) for a, b, k in zip(before.T, after.T, known.T, strict=True)]
-    return [tables.signed(*map(float, p)) for p in pairs]
+        tables.row([setting or "defaults", *means, *differences(defaults, rows)])
 
 
 def _mean_scores(seed: int, q: Sequence, given: argparse.Namespace) -> Array:
@@ -97,7 +83,7 @@ def _mean_scores(seed: int, q: Sequence, given: argparse.Namespace) -> Array:
 
 def _scored(seed: int, further: int, q: Sequence, given: argparse.Namespace) -> list[float]:
     """Returns the error, that of hidden people, m, and the COLUMNS of one run."""
-    tracks = run("relational", config_of("relational", given.counts[0], given), seed + further * OFFSET, q)
+    tracks = tracked("relational", seed, q, given, further=further)
     scored = tracking.evaluate(q.truth, with_groups(without_groups(tracks), q.fps, q.px_per_m, default_belief()))
     assert q.truth.visibility is not None
     away = errors(q.truth, tracks)

@@ -8,12 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.relational.table import LABELS
 from benchmarks.support import chart, tables
+from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA
 from scenarios.loading.resolve import resolve
+from sim.io.source import open_source
 from sim.sequence import simulate
-from sim.types import Array, Context, Detections, Frame, Sequence, Tracks, Truth
+from sim.types import Array, Bools, Context, Detections, Frame, Plane, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
+from tracking.fitting.relational import LABELS
 from tracking.papers.relational.config import ParticleConfig
 from tracking.running.prepare import prepare
 from tracking.running.tracker_registry import find
@@ -28,21 +30,32 @@ HIDDEN = 0.2
 CUT = 2.0
 # Lengths of the occlusion in mode hidden, s.
 LENGTHS = (0.2, 0.5, 1.0, 2.0, 3.0)
+# Mode recordings: s from one occlusion to the next, its length, standard deviation of a detection per axis, m.
+PERIOD, AWAY, ROUGH = 6.0, 2.0, 0.1
 # Mode hidden: frames per second, s before the occlusion, standard deviation of a detection, m.
 FPS, SEEN, NOISE = 10.0, 4.0, 0.05
-# Mode hidden: where a filter places a hidden person, also if the person has probably left.
+# Modes hidden and recordings: where a filter places a hidden person, also if the person has probably left.
 EVERYBODY = "report_existence=0"
+
+
+def places(truth: Truth) -> tuple[Array, float]:
+    """Returns the places (R, 2) of the people of each row, and the unit of a metre: on the ground in m and 1; in the
+    image the centres of boxes in px and the scale."""
+    if truth.pos is not None:
+        return truth.pos[:, :2], 1.0
+    assert truth.box is not None
+    return truth.box[:, :2] + truth.box[:, 2:] / 2, truth.px_per_m
 
 
 def errors(truth: Truth, tracks: list[Tracks]) -> Array:
     """Returns the error of each person and frame of the truth, (R,), m."""
     out = np.full(len(truth.id), CUT)
-    assert truth.pos is not None
+    pos, unit = places(truth)
     for t in tracks:
         rows = truth.rows(t.index)
-        away = np.hypot(*(truth.pos[rows][:, None] - t.pos).transpose(2, 0, 1))
+        away = np.hypot(*(pos[rows][:, None] - t.pos[None, :, :2]).transpose(2, 0, 1)) / unit
         people, found = optimal(away, CUT)
-        out[rows.start + people] = away[people, found]
+        out[np.arange(rows.start, rows.stop)[people]] = away[people, found]
     return out
 
 
@@ -154,3 +167,42 @@ def hidden(given: argparse.Namespace) -> None:
         shown = {name: mean_interval(values) for name, values in found.items()}
         title = "error of a hidden partner, m"
         chart.lines([chart.Panel(title, LENGTHS, shown, "length of the occlusion, s", y_range=(0, 1.6))], given.chart)
+
+
+def hiding_frames(truth: Truth, seed: int, fps: float) -> tuple[Bools, list[Frame]]:
+    """Returns which rows of the truth are hidden, (R,), and the frames of a detector.
+
+    The member of each true group with the highest id is not detected in the last AWAY s of every PERIOD s. Positions
+    err by ROUGH m.
+    """
+    pos, unit = places(truth)
+    plane: Plane = "image" if truth.pos is None else "ground"
+    rng, hidden, frames = np.random.default_rng(seed), np.zeros(len(truth.id), bool), []
+    last = {int(g): int(truth.id[truth.group == g].max()) for g in np.unique(truth.group[truth.group >= 0])}
+    chosen = np.array([last.get(g) == p for g, p in zip(truth.group.tolist(), truth.id.tolist(), strict=True)])
+    for index in range(1, truth.length + 1):
+        rows, t = truth.rows(index), (index - 1) / fps
+        hidden[rows] = chosen[rows] & (t % PERIOD >= PERIOD - AWAY)
+        points = (pos[rows] + rng.normal(0, ROUGH * unit, (rows.stop - rows.start, 2)))[~hidden[rows]]
+        frames.append(Frame(index, t, detections=Detections(index, t, plane, points, score=np.ones(len(points)))))
+    return hidden, frames
+
+
+def recordings(given: argparse.Namespace) -> None:
+    """Prints a table: rows are recordings, columns the errors of both filters in hidden and in other rows."""
+    tables.head(["recording", "people", *FILTERS, DIFFERENCE])
+    for label, path in (("seq_hotel", HOTEL), ("zara01", ZARA), ("Meet_WalkTogether1", WALK_TOGETHER)):
+        (q,) = open_source(given.recordings / path)
+        found: dict[str, dict[str, list[float]]] = {
+            kind: {name: [] for name in FILTERS} for kind in ("hidden", "others")
+        }
+        for seed in given.seeds:
+            hidden, frames = hiding_frames(q.truth, seed, q.fps)
+            for name in FILTERS:
+                tracker = find(name)(config_of(name, given.counts[0], given).with_set(EVERYBODY))
+                tracker.reset(Context(q.fps, places(q.truth)[1] if q.truth.pos is None else float("nan")), seed)
+                away = errors(q.truth, [tracker.step(frame, frame.detections) for frame in frames])
+                found["hidden"][name].append(float(away[hidden].mean()))
+                found["others"][name].append(float(away[~hidden].mean()))
+        for kind, mean in found.items():
+            _row(f"{label} | {kind}", mean)

@@ -67,8 +67,8 @@ COMMANDS: dict[str, tuple[type, str]] = {}
 class Options:
     """The options of a command. Each subclass is made a frozen dataclass; its docstring is the command's help.
 
-    words: the words of the command, such as "fit sensor". run: the function that takes the options, as
-    "module:function" in `commands/`.
+    words: the words of the command, such as "fit joint". run: the function that takes the options, as "module:function"
+    in `commands/`.
     """
 
     def __init_subclass__(cls, words: str = "", run: str = "") -> None:
@@ -386,13 +386,29 @@ class FitSensorOptions(Options, words="fit sensor", run="fit:fit_sensor"):
     fps: float | None = FPS()
 
 
-class FitGroupingOptions(Options, words="fit grouping", run="fit:fit_grouping"):
-    """Fit the belief of who belongs together to simulated scenes."""
+class FitJointOptions(Options, words="fit joint", run="fit:fit_joint"):
+    """Learn the merges and splits of the tracker joint from simulated truth."""
 
     names: list[str] = NAMES()
-    out: Path = TOML("File to write, for --grouping.")
+    out: Path = TOML("File to write: parameters of joint, for --params.")
     seeds: str = SEEDS("Seeds of the scenes to fit to.", "30000:30002")
+
+
+class FitGroupingOptions(FitJointOptions, words="fit grouping", run="fit:fit_grouping"):
+    """Fit the belief of who belongs together to simulated scenes."""
+
+    out: Path = TOML("File to write, for --grouping.")
     events: list[str] = option(
         "Fit the log-odds of events to this scenario or suite. Can be given several times. Default: the NAMEs.", [],
         metavar="NAME", flag="--events")
+
+
+class FitRelationalOptions(Options, words="fit relational", run="fit:fit_relational"):
+    """Learn the speed table of the tracker relational from simulated truth."""
+
+    names: list[str] = NAMES()
+    out: Path = TOML("File to write: parameters of relational, for --params.")
+    seeds: str = SEEDS(SEEDS_HELP, "30000:30004")
+    observed: bool = option(
+        "Learn speed table and noise of positions from successive detections, as the paper does.", False)
 # fmt: on

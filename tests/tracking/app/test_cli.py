@@ -101,6 +101,13 @@ COMMANDS = {
         "fit grouping side-by-side --seeds 0 --out {out}/mine.toml",
         "fit grouping no-such-scene --out {out}/mine.toml",
     ),
+    "fit relational": (
+        "fit relational cross --seeds 30000 --out {out}/mine.toml",
+        "fit relational no-such-scene --out {out}/mine.toml",
+    ),
+    "fit joint": (
+        "fit joint party --seeds 30000 --out {out}/mine.toml", "fit joint no-such-scene --out {out}/mine.toml",
+    ),
     "track": ("track " + FAKE + " {data} --out {out}", "track " + FAKE + " {out}/nothing --out {out}/x"),
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
     "group": ("group {data} --out {out}", "group {out}/nothing --out {out}/x"),

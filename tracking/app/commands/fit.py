@@ -1,16 +1,20 @@
-"""`flockscope fit`: the errors of a detector, from recordings; the belief of who belongs together, from simulations."""
+"""`flockscope fit`: the errors of a detector, from recordings; and from simulated truth the belief of who belongs
+together, the events of `joint`, and the speed table of `relational`.
+"""
 
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from scenarios.errors import printable
 from sim.io.files.own_files import output_file
+from sim.types import Truth
 from tracking.app import option_parsing
-from tracking.app.command_options import FitGroupingOptions, FitSensorOptions
+from tracking.app.command_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.command_result import CommandResult
 
 # Seeds of the simulated detections whose statistics are shown beside the measured ones.
@@ -58,12 +62,73 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     changes = sample_of(list(pair_scenes(options.events, seeds))) if options.events else None
     belief = fit_belief(sample, changes)
     scores = belief_scores(sample, belief.log_odds(sample.values)[:, 0])
-    events = [word for name in options.events for word in ("--events", name)]
-    command = shlex.join(["flockscope", "fit", "grouping", *options.names, "--seeds", options.seeds, *events])
-    fitted = f"fitted, seeds {options.seeds}: " + ", ".join(f"{name} {value:.4g}" for name, value in scores.items())
-    write_file(out, belief.toml_text(f"{command}\n{fitted}").encode())
-    return CommandResult({"file": out, "fitted": scores}, f"{fitted}\n{_use('--grouping', out)}")
+    asked = [word for name in options.events for word in ("--events", name)]
+    comments = _comments("grouping", options, asked, scores)
+    write_file(out, belief.toml_text("\n".join(comments)).encode())
+    return CommandResult({"file": out, "fitted": scores}, "\n".join([*comments[1:], _use("--grouping", out)]))
+
+
+def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]]:
+    from scenarios.loading.resolve import resolve
+    from tracking.fitting.grouping_scenes import simulated
+
+    entries = [entry for name in names for entry in resolve(name)]
+    return ((seed, simulated(entry, seed)) for entry in entries for seed in seeds)
 
 
 def _use(option: str, out: Path) -> str:
     return f"→ {out}: use it as {shlex.join([option, str(out)])}"
+
+
+def _comments(kind: str, options: FitJointOptions, more: Iterable[str], scores: Mapping[str, float]) -> list[str]:
+    """Returns the command that fits, and a line of scores."""
+    values = ", ".join(f"{name} {value:.4g}" for name, value in scores.items())
+    command = shlex.join(["flockscope", "fit", kind, *options.names, "--seeds", options.seeds, *more])
+    return [command, f"fitted, seeds {options.seeds}: {values}"]
+
+
+def fit_joint(options: FitJointOptions) -> CommandResult:
+    """Writes the fitted weights of the event classifier as a TOML file, with command and scores as comments."""
+    from sim.io.files.atomic import write_file
+    from tracking.fitting.joint_events import EventRows, event_rows, event_scores, fit_events
+    from tracking.papers.joint.config import EVENT_TIME
+
+    out, seeds = output_file(options.out, ".toml"), option_parsing.seeds(options.seeds)
+    scenes = _simulated(options.names, seeds)
+    rows = EventRows.joined(event_rows(truth, EVENT_TIME, seed) for seed, truth in scenes)
+    params = fit_events(rows)
+    scores = event_scores(rows, params)
+    comments = _comments("joint", options, (), scores)
+    body = [f"{name} = {value}" for name, value in params.items()]
+    text = "\n".join([*(f"# {line}" for line in comments), 'tracker = "joint"', "", "[params]", *body, ""])
+    write_file(out, text.encode())
+    result = "\n".join([*comments[1:], "", *body, "", _use("--params", out)])
+    return CommandResult({"file": out, "params": params, "fitted": scores}, result)
+
+
+def fit_relational(options: FitRelationalOptions) -> CommandResult:
+    """Writes the fitted parameters of `relational` as a TOML file."""
+    from scenarios.loading.resolve import resolve
+    from sim.io.files.atomic import write_file
+    from sim.sequence import simulate
+    from tracking.fitting import relational
+    from tracking.papers.relational.config import RelationalConfig
+
+    out, seeds = output_file(options.out, ".toml"), option_parsing.seeds(options.seeds)
+    params: dict[str, float | list[float]]
+    if options.observed:
+        entries = [entry for name in options.names for entry in resolve(name, relational.LABELS)]
+        scenes = (simulate(entry.scenario, seed, entry.repeat, ()) for entry in entries for seed in seeds)
+        ends = relational.PAPER_ENDS
+        params = {"speed_ends": list(ends), **relational.fit_observed(scenes, ends)}
+    else:
+        truths = (truth for _, truth in _simulated(options.names, seeds))
+        params = relational.fit_relational(truths, RelationalConfig().speed_ends)
+    config = RelationalConfig.from_dict(dict(params), out)
+    write_file(out, f"# flockscope fit relational\n{config.to_toml()}".encode())
+    width, body = max(map(len, params)), config.as_dict()
+    lines = [
+        f"{name:<{width}}  {np.round(np.array(body[name]), 4)}  {RelationalConfig.known(name).unit}" for name in params
+    ]
+    lines += ["", _use("--params", out)]
+    return CommandResult({"file": out, "params": params}, "\n".join(lines))

@@ -1,7 +1,7 @@
 """The parameters of `joint`. Lengths are metres; in the image positions are divided by px per m.
 
-The weights of the event classifier are the file event_classifier.toml of this folder; it names the command, the seeds
-and the log loss of the fit.
+The weights of the event classifier are the file event_classifier.toml of this folder, which `flockscope fit joint`
+writes; it names the command, the seeds and the scores of the fit.
 """
 
 from __future__ import annotations

@@ -16,8 +16,8 @@ particles of X, N_z partitions under each. The steps of a frame, with the number
     2  resample X and Z by w                                                                 decentralised_filter
 
 p_Nz(X' | X) is the normaliser of step 5. Steps 4 to 7 run when the new frame is there, as the proposal uses it.
-pi(e | X, g, g') of step 7 is a multinomial logistic regression, learned from simulated truth (event_classifier.toml has
-its weights and the command).
+pi(e | X, g, g') of step 7 is a multinomial logistic regression, learned from simulated truth by `flockscope fit joint`
+(event_classifier.toml has its weights, command and scores).
 
 Readings, where the paper is silent or contradicts itself:
 
