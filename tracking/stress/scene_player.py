@@ -91,7 +91,7 @@ def play_oracle(task: OracleTask, opened: OpenedSource) -> Outcome:
     frames = () if mode == "image" else sequence.without_pictures()
     kind = input_kind(find(task.tracker).needs, mode, sequence, frames)
     try:
-        scores = opened.judge.scorer.evaluate(oracle(sequence, {"detections": mode, "input": kind}))
+        scores = opened.scorer.evaluate(oracle(sequence, {"detections": mode, "input": kind}))
     except FlockscopeError as error:
         return _outcome(error)
     return Outcome({key: value for key, value in scores.items() if value == value}, frames=sequence.length or 0)
