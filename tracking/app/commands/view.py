@@ -13,7 +13,7 @@ from sim.types import Sequence
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import checked_key
-from tracking.app.commands.scored_sequence import ScoringJob, read_runs, run_names, stored_runs
+from tracking.app.commands.scored_sequence import read_runs, run_names, scoring_jobs
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import find_tracks, match_tracks
@@ -62,12 +62,10 @@ def _pages(
     from tracking.app.report.moments import shown_errors
 
     words = [*names] if len(names) > 1 else [""] * len(names)
-    runs = dict(
-        zip((s.name for s in sequences), zip(*stored_runs(names.values(), sequences), strict=True), strict=False)
-    )
+    jobs = dict(zip((s.name for s in sequences), scoring_jobs(names.values(), sequences), strict=True))
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
-        given = read_runs(sequence, ScoringJob(runs.get(sequence.name, ())))
+        given = read_runs(sequence, jobs[sequence.name])
         errors = [known.get(sequence.name) or shown_errors(sequence, run) for run in given]
         shown = [Run(run, own.errors, word) for word, run, own in zip(words, given, errors, strict=True)]
         first, other = shown[0] if shown else Run(), shown[1] if len(shown) > 1 else None
