@@ -213,7 +213,7 @@ def _replays(sequences: list[Sequence], runs: Runs, folder: Path) -> dict[str, l
     videos = [page_video(one, output_path(folder, one.name, ".html"), "beside") for one in sequences]
     return {
         name: [
-            write_page(one, Run(run), folder / f"{name}-{one.name}.html", video=video)
+            write_page(one, [Run(run)], folder / f"{name}-{one.name}.html", video)
             for one, run, video in zip(sequences, found, videos, strict=True)
         ]
         for name, found in runs.items()

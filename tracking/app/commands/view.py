@@ -68,8 +68,7 @@ def _pages(
         given = read_runs(sequence, jobs[sequence.name])
         errors = [known.get(sequence.name) or shown_errors(sequence, run) for run in given]
         shown = [Run(run, own.errors, word) for word, run, own in zip(words, given, errors, strict=True)]
-        first, other = shown[0] if shown else Run(), shown[1] if len(shown) > 1 else None
-        write_page(sequence, first, path, video=page_video(sequence, path, options.video, step), other=other)
+        write_page(sequence, shown, path, page_video(sequence, path, options.video, step))
 
     return _write_each("view", sequences, options.out, ".html", write, by_picture=options.video != "none")
 

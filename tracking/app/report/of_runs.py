@@ -49,14 +49,12 @@ def report_of_runs(
     ranked = ranked_runs(list(names), sequences, [one.scored for one in found], by)
     played = list(_played(ranked))
 
-    def replayed(one: Played, rival: str) -> tuple[Sequence, Run, Run | None]:
+    def replayed(one: Played, rival: str) -> tuple[Sequence, list[Run]]:
         k = ranked.comparison.sequences.index(one.sequence)
         places = [names.index(name) for name in (one.name, rival) if name]
-        tracks = read_runs(sequences[k], replace(found[k].job, sources=tuple(found[k].job.sources[r] for r in places)))
-        run, *other = (
-            Run(tracked, found[k].errors[r].errors, names[r]) for r, tracked in zip(places, tracks, strict=True)
-        )
-        return sequences[k], run, other[0] if other else None
+        job = replace(found[k].job, sources=tuple(found[k].job.sources[r] for r in places))
+        tracks = zip(places, read_runs(sequences[k], job), strict=True)
+        return sequences[k], [Run(tracked, found[k].errors[r].errors, names[r]) for r, tracked in tracks]
 
     c = ranked.comparison
     shown = [row["run"] for row in ranked.table if row["first"] is not None]
