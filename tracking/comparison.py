@@ -18,7 +18,7 @@ from scenarios.errors import InputError
 from sim.types import Array, Sequence, Tracks
 from tracking.oracle import oracle
 from tracking.ranking import Ranking, rank, recording_rankings
-from tracking.running.run import TrackingRun, input_name
+from tracking.running.run import TrackingRun, input_name, input_summary
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer, Scores
 from tracking.scoring.group_scores import GroupMatch
@@ -36,7 +36,8 @@ class ComparedSequence:
     """The scores of R runs on one sequence."""
 
     scores: list[Scores]  # of each run
-    inputs: list[str]  # what each run got, in words
+    inputs: list[str]  # what each run got, in few words
+    given: list[str]  # the same with background and settings of the sensor; "" without run.json
     oracles: Mapping[str, Scores]  # by input; if no run says what it got, of the stored detections, else of the labels
     blocks: Mapping[str, Ranking] | None = None  # by score, the ranking with intervals by weights of blocks of frames
 
@@ -212,7 +213,8 @@ def compare_one(
             weighted = [one.weighted_scores(group_match) for one in compared[len(best) :]]
             drawn = recording_rankings(scorer.truth, weighted, blocks)
     own = dict(zip(best, found, strict=False))
-    return ComparedSequence(found[len(best) :], [name or UNKNOWN for name in inputs], own, drawn)
+    named, summaries = [name or UNKNOWN for name in inputs], [input_summary(info) for info in infos]
+    return ComparedSequence(found[len(best) :], named, summaries, own, drawn)
 
 
 @contextmanager

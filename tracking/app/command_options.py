@@ -230,7 +230,7 @@ class ErrorsOptions(BoxOptions, words="errors"):
     """List what went wrong in a run: each error with its frames, people, cause and cost, and a sum by cause."""
 
     truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
-    tracks: Path = ARGUMENT("Output of `track`, or MOT text.", metavar="TRACKS")
+    tracks: str = ARGUMENT("Output of `track`, MOT text, or a tracker class (file.py:Class).", metavar="TRACKS")
     limit: int = option("Number of errors to show, the dearest first; --json has all.", 20, low=0, metavar="N")
     similarity: Similarity = SIMILARITY()
     workers: int = PROCESSES()

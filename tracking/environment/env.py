@@ -24,12 +24,12 @@ from sim.dataset.splits import split_of
 from sim.types import DetectionMode, Tracker
 from tracking.config import Config
 from tracking.environment.episode_cache import DEFAULT_LIMIT, OpenedSource, Source, SourceCache, SourceSpec, sources
-from tracking.environment.episodes import AnyTracker, Rollout, streams_for
+from tracking.environment.episodes import Rollout, streams_for
 from tracking.environment.observation import NAMES, Observer
 from tracking.parameter_space import Space, decode, decode_and_build, space_of
 from tracking.running.detection_mode import choose_mode
 from tracking.running.prepare import Params, config_of
-from tracking.running.tracker_registry import checked, config_class, find
+from tracking.running.tracker_registry import config_class, find
 from tracking.scoring.people_comparison import Similarity
 
 RESET_OPTIONS = ("scenario", "seed", "params")
@@ -47,7 +47,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
     """
 
     def __init__(
-        self, tracker: AnyTracker, suite: SourceSpec | Source = "quick", *, seeds: Iterable[int] = range(100),
+        self, tracker: str | type[Tracker], suite: SourceSpec | Source = "quick", *, seeds: Iterable[int] = range(100),
         set: Iterable[str] = (), detections: DetectionMode | None = None, similarity: Similarity | None = None,
         params: Params = None, decision_every: int | None = None, cache: int = DEFAULT_LIMIT, tracker_seed: int = 0,
     ) -> None:  # fmt: skip
@@ -71,7 +71,7 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         """
         _check_choice("detections", detections, (None, *get_args(DetectionMode)))
         _check_choice("similarity", similarity, (None, *get_args(Similarity)))
-        self.tracker: type[Tracker] = find(tracker) if isinstance(tracker, str) else checked(tracker, str(tracker))
+        self.tracker = find(tracker)
         self.decision_every, self.tracker_seed, self.similarity = decision_every, tracker_seed, similarity
         self.config_class = config_class(self.tracker, self.tracker.__name__)
         self.defaults = config_of(self.config_class, params)

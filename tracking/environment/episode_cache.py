@@ -25,7 +25,7 @@ from sim.types import Frame, Sequence, Truth
 
 if TYPE_CHECKING:
     from scenarios.loading.resolve import Entry
-    from tracking.fast_objective import ObjectiveScorer
+    from tracking.scoring.evaluation import Scorer
 
 T = TypeVar("T")
 SourceSpec = str | Path | Sequence | Iterable["str | Path | Sequence | Source"]
@@ -166,12 +166,12 @@ class OpenedSource:
         return truth
 
     @cached_property
-    def judge(self) -> ObjectiveScorer:
-        """An `ObjectiveScorer` of the sequence's truth, built on first use. Raises InputError without labels."""
-        from tracking.fast_objective import ObjectiveScorer
+    def scorer(self) -> Scorer:
+        """A `Scorer` of the sequence's truth, built on first use. Raises InputError without labels."""
+        from tracking.scoring.evaluation import Scorer
 
-        self._kept.append(judge := ObjectiveScorer(self.truth))
-        return judge
+        self._kept.append(scorer := Scorer(self.truth))
+        return scorer
 
     @property
     def bytes(self) -> int:

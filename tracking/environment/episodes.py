@@ -161,32 +161,25 @@ class Rollout:
     def scores(self, every: bool = False) -> dict[str, float]:
         """Returns the scores of the frames so far by key, without those that are nan: objective, HOTA and group_F1, or
         if `every` is True all. Raises InputError if tracks and labels cannot be compared."""
+        from tracking.grouping.foot_points import completed
+        from tracking.running.run import TrackingRun
         from tracking.scoring.people_comparison import IncomparableError
 
-        px_per_m = self.prepared.px_per_m(self.tracks)
+        known, source = self.prepared.context, self.prepared.input
+        tracks, _ = completed(
+            self.tracks, known.fps, self.prepared.px_per_m(self.tracks), camera=known.camera, scene=known.scene,
+            source=source, image_size=known.image_size,
+        )  # fmt: skip
         try:
-            if every:
-                found: Mapping[str, float] = self._every_score(px_per_m)
-            else:
-                found = self.opened.judge.scores(self.tracks, px_per_m, self.prepared.input, self.similarity)
+            run = TrackingRun(tracks, {"input": source})
+            (compared,) = self.opened.scorer.compare([run], self.similarity, len(run))
+            found: Mapping[str, float] = compared.scores("hull") if every else compared.objective_scores()
         except IncomparableError as error:
             expected, remedy = "what tracks and labels have", "choose another similarity, or other detections"
             raise InputError(
                 file=self.source.name, place="similarity", got=str(error), expected=expected, remedy=remedy
             ) from None
         return {key: value for key, value in found.items() if value == value}
-
-    def _every_score(self, px_per_m: float) -> Mapping[str, float]:
-        from tracking.grouping.foot_points import completed
-        from tracking.running.run import TrackingRun
-
-        context, mode, judge = self.prepared.context, self.prepared.mode, self.opened.judge
-        tracks, _ = completed(
-            self.tracks, context.fps, px_per_m, camera=context.camera, scene=context.scene,
-            source=self.prepared.input, image_size=context.image_size,
-        )  # fmt: skip
-        run = TrackingRun(tracks, {"detections": mode})
-        return judge.scorer.evaluate(run, similarity=self.similarity, frames=len(run))
 
 
 def streams_for(tracker: AnyTracker, detections: DetectionMode | None) -> tuple[str, ...]:

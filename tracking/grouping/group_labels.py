@@ -73,7 +73,6 @@ def label_people(
     spells = _spells(frame, column, frames_of(rule.memory, motion.fps), length)
     state, events = LinkedPeople(), []
     group, group_of = np.full(len(frame), -1), np.full(int(column.max(initial=0)) + 1, -1)
-    assert found.links is not None
     links, shown, changes_now = found.links, dict[int, PersonSet](), _changes(found)
     cuts, rows = (np.searchsorted(x, np.arange(length + 1)) for x in (links.frame, frame))
     for t, until in pairwise([*sorted({*spells, *changes_now, *links.frame.tolist()}), length]):

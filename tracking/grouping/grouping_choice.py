@@ -28,7 +28,7 @@ from tracking.grouping.tracks_table import TracksTable
 class FoundGroups:
     """Who belongs together in a sequence: the links between people, from which events follow, and the groups now."""
 
-    links: Links | None  # None: not asked for
+    links: Links
     now: StepGroups | None = None  # by step of `size` frames; None: as linked
     size: int = 1
 
@@ -78,14 +78,13 @@ def groups_of_steps(
 
 
 def belief_groups(
-    frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief, measured: Bools | None = None,
-    *, events: bool = True,
-) -> FoundGroups:  # fmt: skip
+    frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief, measured: Bools | None = None
+) -> FoundGroups:
     """Returns the groups of a sequence of `length` frames by a belief.
 
     frame, column (R,), from 0, pos (R, 2), m: one row per person and frame. measured (R,): False in rows of people who
-    are predicted only, which are no evidence; None: all are measured. events: False leaves `links` None. Any two
-    members of a group from which events follow are linked.
+    are predicted only, which are no evidence; None: all are measured. Any two members of a group from which events
+    follow are linked.
     """
     size = frames_per_step(fps)
     people = int(column.max(initial=0)) + 1
@@ -108,18 +107,8 @@ def belief_groups(
     pairs = (step, found.a[row], found.b[row])
     gain = _gain(found.log_odds[row, 0], belief)
     now = groups_of_steps(shape, *pairs, gain, float(_gain(UNSEEN, belief)))
-    if not events:
-        return FoundGroups(None, now, size)
     lasting = groups_of_steps(shape, *pairs, log_odds, UNSEEN, belief.stay, belief.come)
     return FoundGroups(_links(lasting, size, found), now, size)
-
-
-def groups_now(table: TracksTable, fps: float, belief: Belief) -> Ints:
-    """Returns for each row of a table a number that people of one frame share if they are together now, -1 alone, (R,).
-    The numbers are person numbers, not group ids that last."""
-    found = belief_groups(table.frame, table.column, table.pos, table.length, fps, belief, table.seen, events=False)
-    assert found.now is not None
-    return found.now.of(table.frame // found.size, table.column)
 
 
 def _gain(log_odds: Array | float, belief: Belief) -> Array:

@@ -132,7 +132,7 @@ def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) 
             raise InputError(place="params", got=got, expected="a class or a name", remedy="configure the instance")
         return type(tracker).__name__, tracker, getattr(tracker, "config", None)
     name = tracker if isinstance(tracker, str) else tracker.__name__
-    found: Any = tracker_registry.find(tracker) if isinstance(tracker, str) else tracker_registry.checked(tracker, name)
+    found: Any = tracker_registry.find(tracker)
     kind: type[Config] | None = getattr(found, "config_class", None)
     if kind is None and params is not None:
         remedy = "leave the parameters out, or give the class a config_class (docs/guides/your-own-tracker.md)"

@@ -38,7 +38,7 @@ class TimeLimited:
         InputError: The tracker is not given by name, or the limit is out of range.
     """
 
-    def __init__(self, tracker: str, seconds: float) -> None:
+    def __init__(self, tracker: str | type[Tracker], seconds: float) -> None:
         if not isinstance(tracker, str):
             expected, remedy = "a name that another process can look up", "give file.py:Class or module:Class"
             raise InputError(place="--step-timeout", got="no name of a tracker", expected=expected, remedy=remedy)

@@ -36,8 +36,11 @@ def names() -> tuple[str, ...]:
     return tuple(REGISTRY)
 
 
-def find(spec: str) -> type[Tracker]:
-    """Returns the tracker class that `spec` names: a registered name, "file.py:Class" or "module:Class"."""
+def find(spec: str | type[Tracker]) -> type[Tracker]:
+    """Returns the tracker class that `spec` names, a registered name, "file.py:Class" or "module:Class", or that it is.
+    Raises InputError if there is none."""
+    if not isinstance(spec, str):
+        return checked(spec, getattr(spec, "__name__", str(spec)))
     target = REGISTRY.get(spec, spec)
     where, colon, class_name = target.rpartition(":")
     if not colon:

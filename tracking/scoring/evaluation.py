@@ -33,8 +33,8 @@ from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.annotated_frames import annotated_frames, seen_in
 from tracking.scoring.candidate_pairs import Pairs, box_pairs
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.group_and_event_scores import ComparedSides
-from tracking.scoring.group_scores import GroupMatch
+from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
+from tracking.scoring.group_scores import GroupMatch, f1, groups_found, shared_members
 from tracking.scoring.matching import mapped_people
 from tracking.scoring.people_and_groups import PersonRows, Surface, TrueGroups, tracked_people, true_groups, true_people
 from tracking.scoring.people_comparison import (
@@ -129,6 +129,19 @@ class MatchedSides:
         found = unweighted(self._weighted(group_match), len(inside))
         length = sides.truth.length
         return Scores(found, self.similarity, sides.surface, group_match, int(inside.sum()), length, self.step)
+
+    def objective_scores(self) -> dict[str, float]:
+        """Returns HOTA, group_F1 and objective as `scores` does, by key, in a tenth of the time."""
+        found, size = {"HOTA": math.nan, "group_F1": math.nan}, len(self.sides.inside)
+        if self.people is not None:
+            self.people.require_unique_ids()
+            found["HOTA"] = unweighted(weighted_hota(self.people, size), size)["HOTA"]
+        if self.groups is not None and (tracked := tracked_groups(self.sides)).known:
+            true, est = self.groups.groups, tracked.counted
+            shared = shared_members(true, est, tracked.person, len(self.sides.true.rows))
+            found["group_F1"] = f1(int(groups_found(true, est, shared).sum()), len(true), len(est))
+        mean = objective(*(np.array([score]) for score in found.values()))
+        return {**found, "objective": float(mean[0])}
 
     def weighted_scores(self, group_match: GroupMatch) -> Callable[[Array], Array]:
         """Returns a function from weights of frames to scores; group_match as of `evaluate`.

@@ -33,7 +33,7 @@ TRACE_LINES = 8  # of the traceback of a failed tracker, the last ones
 class OracleTask:
     """An episode of the oracle with the input that a tracker gets."""
 
-    tracker: str
+    tracker: TunedTracker
     source: Source
     detections: DetectionMode
 
@@ -78,7 +78,7 @@ def play_scene(tasks: Tasks) -> list[Outcome]:
     played and all outcomes are `left_out`."""
     first = tasks[0]
     try:
-        opened = opened_sources().open(first.source, streams_for(first.tracker, first.detections))
+        opened = opened_sources().open(first.source, streams_for(first.tracker.tracker, first.detections))
         _ = opened.truth
     except FlockscopeError as error:
         return [Outcome({}, left_out=error.line())] * len(tasks)
@@ -89,9 +89,9 @@ def play_oracle(task: OracleTask, opened: OpenedSource) -> Outcome:
     """Returns the outcome of the oracle on an opened sequence, scored as by `tracking.comparison.compare_one`."""
     sequence, mode = opened.sequence, task.detections
     frames = () if mode == "image" else sequence.without_pictures()
-    kind = input_kind(find(task.tracker).needs, mode, sequence, frames)
+    kind = input_kind(task.tracker.needs, mode, sequence, frames)
     try:
-        scores = opened.judge.scorer.evaluate(oracle(sequence, {"detections": mode, "input": kind}))
+        scores = opened.scorer.evaluate(oracle(sequence, {"detections": mode, "input": kind}))
     except FlockscopeError as error:
         return _outcome(error)
     return Outcome({key: value for key, value in scores.items() if value == value}, frames=sequence.length or 0)

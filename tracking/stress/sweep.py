@@ -153,9 +153,8 @@ class Sweep:
 
     def _task(self, name: str, source: Source) -> EpisodeTask | OracleTask:
         if name == ORACLE:
-            return OracleTask(str(self._first.tracker), source, self.plan.detections)
-        tracker = self.trackers[name]
-        return EpisodeTask(tracker.tracker, source, {}, self.plan.detections, True, tracker.code, tracker.step_timeout)
+            return OracleTask(self._first, source, self.plan.detections)
+        return EpisodeTask(self.trackers[name], source, {}, self.plan.detections, every_score=True)
 
     @property
     def _first(self) -> TunedTracker:

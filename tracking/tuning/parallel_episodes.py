@@ -17,8 +17,10 @@ from sim.types import DetectionMode, Tracker
 from sim.workers.pool import RunItems
 from tracking.environment.episodes import Episode, Source, SourceCache, play
 from tracking.grouping.link_rule import LinkRule
+from tracking.running.time_limit import TimeLimited
+from tracking.running.tracker_registry import code_hash, find
 from tracking.scoring.people_comparison import Similarity
-from tracking.tuning.tuned_tracker import RULE, TunedTracker, tuned_tracker
+from tracking.tuning.tuned_tracker import RULE, TunedTracker
 
 CACHE_BYTES = 512 * 2**20  # Bytes of sequences that each process keeps for later episodes.
 
@@ -27,13 +29,11 @@ CACHE_BYTES = 512 * 2**20  # Bytes of sequences that each process keeps for late
 class EpisodeTask:
     """One episode to play by a worker."""
 
-    tracker: str | type[Tracker]
+    tracker: TunedTracker
     source: Source
     values: dict[str, Any]  # the tracker's parameters by name; others have their defaults
     detections: DetectionMode
     every_score: bool
-    code: str  # hash of the tracker's file where the search runs, "" if there is no file
-    step_timeout: float | None = None  # seconds that each `reset` and `step` may take
     similarity: Similarity | None = None
 
 
@@ -62,8 +62,8 @@ def episode_player(
         def play_all(
             sources: Sequence[Source], values: dict[str, Any], every_score: bool
         ) -> Generator[EpisodeOrError, None, None]:
-            given = (values, detections, every_score, tracker.code, tracker.step_timeout, similarity)
-            yield from results_in_order(run, play_task, [EpisodeTask(tracker.tracker, s, *given) for s in sources])
+            given = (values, detections, every_score, similarity)
+            yield from results_in_order(run, play_task, [EpisodeTask(tracker, s, *given) for s in sources])
 
         yield play_all
 
@@ -78,9 +78,9 @@ def playing_workers(workers: int = 1, cluster: str | None = None) -> Iterator[Ru
         try:
             yield run
         finally:
-            for tracker in _trackers.values():
-                tracker.close()
-            _trackers.clear()
+            for limited in _limited.values():
+                limited.close()
+            _limited.clear()
             opened_sources.cache_clear()
 
 
@@ -90,14 +90,14 @@ def play_task(task: EpisodeTask) -> EpisodeOrError:
     The process keeps the tracker and the opened sequences for later tasks. The tracker's seed is the source's seed. If
     the scene's script does not come true, the episode says so in `left_out`.
     """
-    tracker, source, cache = _tracker(task.tracker, task.code, task.step_timeout), task.source, opened_sources()
+    source, cache, tracker = task.source, opened_sources(), _runnable(task.tracker)
     try:
-        if tracker.name == RULE:
+        if tracker == RULE:
             from tracking.tuning.grouping_episodes import play_rule
 
             return play_rule(source, LinkRule.from_dict(task.values), cache)
         return play(
-            tracker.limited or tracker.tracker, source, task.values or None, detections=task.detections,
+            tracker, source, task.values or None, detections=task.detections,
             tracker_seed=source.seed, cache=cache, every_score=task.every_score, similarity=task.similarity,
         )  # fmt: skip
     except OrderError as error:  # the scene's fault, whatever the parameters
@@ -106,19 +106,20 @@ def play_task(task: EpisodeTask) -> EpisodeOrError:
         return error
 
 
-# In a worker: the trackers of its tasks. One with a limit of time has a process.
-_trackers: dict[tuple[str | type[Tracker], float | None], TunedTracker] = {}
+_limited: dict[TunedTracker, TimeLimited] = {}  # In a worker: the processes of trackers with a limit of time.
 
 
-def _tracker(name: str | type[Tracker], code: str, step_timeout: float | None) -> TunedTracker:
-    tracker = _trackers.get((name, step_timeout)) or tuned_tracker(name, step_timeout)
-    _trackers[name, step_timeout] = tracker
-    if tracker.code != code:
+def _runnable(tracker: TunedTracker) -> str | type[Tracker] | TimeLimited:
+    if tracker.name != RULE and code_hash(find(tracker.tracker)) != tracker.code:
         raise WorkError(
             place="tracker", got=f"another {tracker.name} in a worker", expected="the file as it is here",
             remedy="put the same file there, and start the workers anew",
         )  # fmt: skip
-    return tracker
+    if isinstance(tracker.tracker, type) or tracker.step_timeout is None:
+        return tracker.tracker
+    if tracker not in _limited:
+        _limited[tracker] = TimeLimited(tracker.tracker, tracker.step_timeout)
+    return _limited[tracker]
 
 
 @cache

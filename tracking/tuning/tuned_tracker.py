@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, cast, get_args
+from typing import get_args
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Tracker
@@ -11,7 +11,7 @@ from tracking.config import Config
 from tracking.environment.episodes import Source, streams_for
 from tracking.grouping.link_rule import LinkRule
 from tracking.running.time_limit import TimeLimited
-from tracking.running.tracker_registry import checked, code_hash, config_class, find, located
+from tracking.running.tracker_registry import code_hash, config_class, find, located
 from tracking.scoring.people_comparison import Similarity
 
 RULE = LinkRule.tracker
@@ -27,25 +27,14 @@ class TunedTracker:
     code: str = ""  # hash of the file that defines the tracker, "" if there is none
     objective: str = "objective"  # key of the score that it is tuned for by default
     detections: DetectionMode = "file"  # its input by default
-    # in a process of its own, with a limit of time for each step; never for a class and the rule
-    limited: TimeLimited | None = None
+    step_timeout: float | None = None  # seconds that each `reset` and `step` may take; never for a class and the rule
 
     @property
     def config_class(self) -> type[Config]:
         """The tracker's config class, `LinkRule` for the rule. Raises InputError if the tracker has no parameters."""
         if self.name == RULE:
             return LinkRule
-        return config_class(find(self.tracker) if isinstance(self.tracker, str) else self.tracker, self.name)
-
-    @property
-    def step_timeout(self) -> float | None:
-        """Seconds that each `reset` and `step` may take, None without a limit."""
-        return None if self.limited is None else self.limited.seconds
-
-    def close(self) -> None:
-        """Ends the tracker's process if it has one; the next episode starts a new process."""
-        if self.limited is not None:
-            self.limited.close()
+        return config_class(find(self.tracker), self.name)
 
     def check_input(self, source: Source, detections: DetectionMode, similarity: Similarity | None) -> None:
         """Raises InputError if the tracker cannot work on this source with these detections and this similarity."""
@@ -71,9 +60,10 @@ def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = Non
             remedy = "leave it out: the rule has no steps"
             raise InputError(place="--step-timeout", got=step_timeout, expected="a tracker", remedy=remedy)
         return TunedTracker(RULE, RULE, ("points", "boxes"), objective="pairwise_F1", detections="truth")
-    name = tracker if isinstance(tracker, str) else getattr(tracker, "__name__", str(tracker))
-    found: Any = find(tracker) if isinstance(tracker, str) else checked(tracker, name)
-    spec = located(tracker) if isinstance(tracker, str) else tracker  # workers of a cluster run in another folder
-    limited = None if step_timeout is None else TimeLimited(cast(str, spec), step_timeout)
+    found = find(tracker)
+    name, spec = (tracker, located(tracker)) if isinstance(tracker, str) else (found.__name__, found)
+    if step_timeout is not None:
+        TimeLimited(spec, step_timeout)  # refuses a class, and a wrong limit
     mode: DetectionMode = "file" if {"boxes", "points"} & {*found.needs} else "image"
-    return TunedTracker(spec, name, tuple(found.needs), code_hash(found), detections=mode, limited=limited)
+    code = code_hash(found)
+    return TunedTracker(spec, name, tuple(found.needs), code, detections=mode, step_timeout=step_timeout)

@@ -10,7 +10,6 @@ from sim.sequence import simulate
 from sim.types import Groups, Truth, Unscored
 from tests.hand_made import with_rows
 from tracking import track
-from tracking.fast_objective import ObjectiveScorer
 from tracking.scoring import evaluate, score_arrays
 from tracking.scoring.annotated_frames import annotated_frames
 from tracking.scoring.catalogue import CATALOGUE
@@ -118,7 +117,7 @@ def test_sparse_labels_score_as_these_frames_of_both_sides(merge: tuple[Truth, t
     assert found["MOTA"] > 0.5 > 1 - step * 0.9
     assert found["merge_F1"] == evaluate(dense, run)["merge_F1"]
     known = {key: found[key] for key in ("HOTA", "group_F1", "objective")}
-    assert ObjectiveScorer(sparse).scores(run, float("nan")) == pytest.approx(known)
+    assert Scorer(sparse).compare([run])[0].objective_scores() == known
     weighted = Scorer(sparse).compare([run])[0].weighted_scores("hull")(np.ones((1, dense.length)))[0]
     assert dict(zip(CATALOGUE, weighted, strict=True)) == pytest.approx(dict(found), nan_ok=True)
 

@@ -16,7 +16,7 @@ from tests.hand_made import Scene, event, tracks, truth, with_rows
 from tracking import track
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import IncomparableError, Scores
+from tracking.scoring.evaluation import IncomparableError, Scorer, Scores
 
 NAMES = sorted(path.stem for path in Path(scenarios.__file__).parent.glob("*.toml"))
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
@@ -136,3 +136,17 @@ def test_an_id_twice_in_a_frame_is_refused() -> None:
 def test_every_key_of_the_catalogue_is_returned_and_the_other_way_round() -> None:
     scene = [Scene(TWO, {1: ((1, 2), None)})] * 3
     assert set(evaluate(truth(scene), tracks(scene))) == set(CATALOGUE)
+
+
+@pytest.mark.parametrize("name", ["blob", "group-pda"])
+def test_the_objective_alone_is_that_of_all_scores(name: str) -> None:
+    sequence = simulate(load("crowd", ["camera.fps=5", "duration=10", "sensor.clutter_rate=2"]), 3, streams=())
+    run, true = track(name, sequence), sequence.truth
+    unlabelled = true.replace(groups=None, groups_px=None, events=None)
+    in_part = true.replace(labelled=np.arange(true.length) % 3 == 0)
+    for labels, length in ((true, None), (true, 1), (true, 30), (unlabelled, None), (in_part, None)):
+        for answers in (run, [t.replace(groups=None, derived=False) for t in run]):
+            (compared,) = Scorer(labels).compare([answers], None, length)
+            found, expected = compared.objective_scores(), compared.scores("hull")
+            assert found == pytest.approx({key: expected[key] for key in found}, abs=1e-12, nan_ok=True)
+            assert list(found) == ["HOTA", "group_F1", "objective"]

@@ -36,14 +36,13 @@ def scene(folder: Path, seed: int = 1):
 
 
 def task(name: str, source, step_timeout: float | None = None) -> EpisodeTask:
-    made = contender(name, step_timeout)
-    return EpisodeTask(made.tracker, source, {}, "file", True, made.code, step_timeout)
+    return EpisodeTask(contender(name, step_timeout), source, {}, "file", every_score=True)
 
 
 def test_scores_are_those_of_compare(tmp_path: Path) -> None:
     """A tracker without parameters, one with, and the oracle."""
     source = scene(tmp_path)
-    own, toy, best = play_scene((task(FAKE, source), task(TOY, source), OracleTask(FAKE, source, "file")))
+    own, toy, best = play_scene((task(FAKE, source), task(TOY, source), OracleTask(contender(FAKE), source, "file")))
     sequence = source.open(())
     runs = {n: [tracking.track(n, sequence, detections="file", seed=source.seed)] for n in (FAKE, TOY)}
     compared = tracking.compare([sequence], runs)
@@ -78,7 +77,7 @@ def test_a_scene_that_cannot_be_made_is_nobodys_failure(tmp_path: Path) -> None:
     order = '{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", goal = [8, 5], when = { time = 1 } }'
     (tmp_path / "late.toml").write_text(text.replace("group = [", f"event = [{order}]\ngroup = ["))
     (source,) = sources(tmp_path / "late.toml", (1,))
-    for outcome in play_scene((task(FAKE, source), OracleTask(FAKE, source, "file"))):
+    for outcome in play_scene((task(FAKE, source), OracleTask(contender(FAKE), source, "file"))):
         assert "merge" in outcome.left_out
         assert not outcome.failed
 

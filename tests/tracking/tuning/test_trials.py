@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -94,10 +95,10 @@ def test_a_search_without_any_value_is_an_error(tmp_path, game, more, words):
 def test_a_worker_whose_tracker_is_another_one_ends_it_all(tmp_path: Path) -> None:
     """An answer would be taken for one about the parameters."""
     (source,) = sources(write_scenes(tmp_path)[0], (1,))
-    same, other = (EpisodeTask(TOY, source, {}, "file", False, code) for code in (tuned_tracker(TOY).code, "another"))
-    assert play_task(same).frames == 20
+    same = tuned_tracker(TOY)
+    assert play_task(EpisodeTask(same, source, {}, "file", every_score=False)).frames == 20
     with pytest.raises(WorkError, match=r"another .*toy_tracker.py:Toy in a worker; .* start the workers anew"):
-        play_task(other)
+        play_task(EpisodeTask(replace(same, code="another"), source, {}, "file", every_score=False))
 
 
 def test_trackers_that_draw_do_so_by_the_source(tmp_path: Path) -> None:
@@ -109,8 +110,8 @@ def test_trackers_that_draw_do_so_by_the_source(tmp_path: Path) -> None:
     name = f"{tmp_path / 'lucky.py'}:Toy"
     for source in sources(write_scenes(tmp_path)[0], (5, 9)):
         own, fixed = (
-            play_task(EpisodeTask(name, source, {}, "file", True, tuned_tracker(name).code)),
-            play_task(EpisodeTask(TOY, source, {"skip": source.seed % 5}, "file", True, tuned_tracker(TOY).code)),
+            play_task(EpisodeTask(tuned_tracker(name), source, {}, "file", every_score=True)),
+            play_task(EpisodeTask(tuned_tracker(TOY), source, {"skip": source.seed % 5}, "file", every_score=True)),
         )
         assert own.scores == fixed.scores
 

@@ -4,29 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-from sim.io.formats.options import BoxScale
 from sim.types import Sequence
 from tracking.app.command_options import ErrorsOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import figure, table
-from tracking.app.commands.scored_sequence import box_scale_of
+from tracking.app.commands.scored_sequence import ScoringJob, read_runs, scoring_jobs
 from tracking.app.sequence_workers import over_sequences, source_of
-from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.errors.found import RunErrors, errors_of_run, sums_by_cause
 from tracking.errors.repairs import SHOWN
-from tracking.scoring.people_comparison import Similarity
 from tracking.stats import mean_of_known
-
-Job = tuple[StoredTracks, Similarity | None, BoxScale | None]
 
 
 def errors(options: ErrorsOptions) -> CommandResult:
-    """Lists the errors of the stored tracks on every sequence of the truth, with causes and costs."""
+    """Lists the errors of a run on every sequence of the truth, with causes and costs."""
     source = source_of(options, options.truth, without="box_scale")
     sequences = source.open()
-    stored = [tracks for _, tracks in match_tracks(sequences, find_tracks(options.tracks))]
-    box_scale = box_scale_of(options.box_scale, stored)
-    jobs: list[Job] = [(one, options.similarity, box_scale) for one in stored]
+    jobs = scoring_jobs([options.tracks], sequences, options.box_scale, similarity=options.similarity)
     found = list(over_sequences("errors", errors_of, sequences, jobs, source, options.workers))
     every = [
         {
@@ -42,10 +35,10 @@ def errors(options: ErrorsOptions) -> CommandResult:
     return CommandResult({"sequences": every, "causes": causes}, _tables(found, every, causes, options.limit))
 
 
-def errors_of(sequence: Sequence, job: Job) -> RunErrors:
-    """Returns the errors of one stored run of the sequence; job: the stored tracks, the similarity, the box scale."""
-    stored, similarity, box_scale = job
-    return errors_of_run(sequence, stored.read(sequence, box_scale), similarity)
+def errors_of(sequence: Sequence, job: ScoringJob) -> RunErrors:
+    """Returns the errors of the only run of a job on the sequence."""
+    (run,) = read_runs(sequence, job)
+    return errors_of_run(sequence, run, job.similarity)
 
 
 def _tables(found: list[RunErrors], sequences: list[dict[str, Any]], causes: list[dict[str, Any]], limit: int) -> str:

@@ -153,13 +153,13 @@ def _write_page(path: Path, setup: TrackerSetup, failure: Failure, sequence: Seq
     from tracking.app.report.moments import shown_errors
 
     if failure.kind == CRASH:
-        write_page(sequence, Run(), path)
+        write_page(sequence, [], path)
         return
     with warnings.catch_warnings(action="ignore", category=UserWarning):  # as in the search
         tracks = setup.run(sequence)
     errors = shown_errors(sequence, tracks).errors
     own = (one.error.start for one in errors if one.error.kind == failure.kind)
-    write_page(sequence, Run(tracks, errors, setup.tracker), path, start=next(own, 1))
+    write_page(sequence, [Run(tracks, errors, setup.tracker)], path, start=next(own, 1))
 
 
 def _result(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence as SequenceOf
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,18 +14,10 @@ from sim.types import Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_ranking import ranked_runs, ranking_result, scoring_notes
-from tracking.app.commands.score_tables import Means, SequenceScores, checked_key, tables
-from tracking.app.commands.scored_sequence import (
-    ScoredSequence,
-    ScoringJob,
-    box_scale_of,
-    is_class,
-    run_names,
-    score_sequence,
-    stored_runs,
-)
+from tracking.app.commands.score_tables import Means, checked_key, tables
+from tracking.app.commands.scored_sequence import is_class, run_names, score_sequence, scoring_jobs
 from tracking.app.sequence_workers import over_sequences, source_of
-from tracking.comparison import check_blocks
+from tracking.comparison import ComparedSequence, check_blocks
 from tracking.scoring.catalogue import ALL, CATALOGUE
 from tracking.scoring.evaluation import Scores
 from tracking.stats import mean_interval
@@ -45,38 +36,35 @@ def score(options: ScoreOptions, ranked: bool = False) -> CommandResult:
     if options.by is not None:
         checked_key(options.by)
     names = run_names(options.tracks)
-    runs = stored_runs(names.values(), sequences)
-    how = (options.similarity, options.group_match, options.blocks, ranked, box_scale_of(options.box_scale, runs[0]))
-    jobs = [ScoringJob(sources, *how) for sources in zip(*runs, strict=True)]
+    how = {"similarity": options.similarity, "group_match": options.group_match, "blocks": options.blocks}
+    jobs = scoring_jobs(names.values(), sequences, options.box_scale, oracles=ranked, **how)
     found = list(over_sequences("score", score_sequence, sequences, jobs, source, options.workers))
     if not ranked:
         return _run_result(sequences, found)
     return ranking_result(ranked_runs(list(names), sequences, found, options.by))
 
 
-def _run_result(sequences: list[Sequence], found: list[ScoredSequence]) -> CommandResult:
-    rows = [SequenceScores(s.name, one.scores[0], one.given[0]) for s, one in zip(sequences, found, strict=True)]
-    blocks, means = found[0].compared.blocks, summary([row.scores for row in rows])
-    for key, r in ({} if blocks is None else blocks).items():
+def _run_result(sequences: list[Sequence], found: list[ComparedSequence]) -> CommandResult:
+    rows = [(sequence.name, one.scores[0]) for sequence, one in zip(sequences, found, strict=True)]
+    given = [one.given[0] for one in found]
+    means, notes = summary([scores for _, scores in rows]), scoring_notes(sequences, found)
+    for key, r in (found[0].blocks or {}).items():
         means[key] = {"mean": float(r.mean[0]), "low": float(r.low[0]), "high": float(r.high[0])}
-    notes = scoring_notes(sequences, found)
-    mixed = len({row.given for row in rows}) > 1
+    mixed = len({*given}) > 1
     if mixed:  # what trackers saw differently has no mean
         means = {key: {**one, "low": math.nan} for key, one in means.items()}
         notes.append("no mean: the sequences have different detections")
     data = {
         "sequences": [
-            {**_row_data(row), "truth": tracked_hash(sequence)} for row, sequence in zip(rows, sequences, strict=True)
+            {
+                "name": name, "similarity": s.similarity, "surface": s.surface, "group_match": s.group_match,
+                "given": words, "frames_scored": s.frames, "label_step": s.step, **s, "truth": tracked_hash(sequence),
+            }
+            for sequence, (name, s), words in zip(sequences, rows, given, strict=True)
         ],
         "mean": None if mixed else means, "notes": notes,
     }  # fmt: skip
-    return CommandResult(data, tables(rows, means, notes))
-
-
-def _row_data(row: SequenceScores) -> dict[str, Any]:
-    s = row.scores
-    chosen = {"similarity": s.similarity, "surface": s.surface, "group_match": s.group_match, "given": row.given}
-    return {"name": row.sequence, **chosen, "frames_scored": s.frames, "label_step": s.step, **s}
+    return CommandResult(data, tables(rows, given, means, notes))
 
 
 def summary(scores: SequenceOf[Scores]) -> Means:

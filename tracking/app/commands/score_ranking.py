@@ -14,8 +14,7 @@ from scenarios.errors import counted, printable, shortened
 from sim.types import Sequence
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import GROUP_MATCH, LOWER, SIMILARITY, TABLES, arrow, chance, number, table
-from tracking.app.commands.scored_sequence import ScoredSequence
-from tracking.comparison import ComparedRuns, joined
+from tracking.comparison import ComparedRuns, ComparedSequence, joined
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import FEWEST, SURE, mean_of_known
 
@@ -34,10 +33,12 @@ class RankedRuns:
     notes: list[str]
 
 
-def ranked_runs(names: list[str], sequences: list[Sequence], found: list[ScoredSequence], by: str | None) -> RankedRuns:
+def ranked_runs(
+    names: list[str], sequences: list[Sequence], found: list[ComparedSequence], by: str | None
+) -> RankedRuns:
     """Returns the ranking of runs. names: of the runs; found: their scores on each sequence; by: key of the score that
     ranks, None for `usual_key`."""
-    comparison = joined(names, [s.name for s in sequences], [one.compared for one in found])
+    comparison = joined(names, [s.name for s in sequences], found)
     key, scenarios = by or usual_key(comparison), dict[str, list[int]]()
     for k, sequence in enumerate(sequences):
         scenarios.setdefault(_scenario(sequence.name), []).append(k)
@@ -57,7 +58,7 @@ def usual_key(comparison: ComparedRuns) -> str:
     return "group_F1" if people.any() and not people.all() else "objective"
 
 
-def scoring_notes(sequences: list[Sequence], found: list[ScoredSequence]) -> list[str]:
+def scoring_notes(sequences: list[Sequence], found: list[ComparedSequence]) -> list[str]:
     """Returns notes on sparse labels and on intervals of a short recording."""
     scores, notes = [one.scores[0] for one in found], list[str]()
     sparse = [one for one in scores if one.step != 1]
@@ -67,7 +68,7 @@ def scoring_notes(sequences: list[Sequence], found: list[ScoredSequence]) -> lis
         scored, length = (sum(getattr(s, name) for s in sparse) for name in ("frames", "length"))
         notes.append(f"labels{where} are sparse ({steps}): only annotated frames are scored, {scored} of {length}")
     seconds = scores[0].length / sequences[0].fps
-    if found[0].compared.blocks is not None and seconds < SURE:
+    if found[0].blocks is not None and seconds < SURE:
         notes.append(f"intervals are indicative under {SURE:g} s: the recording lasts {seconds:.4g} s")
     return notes
 

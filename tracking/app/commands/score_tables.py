@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from scenarios.errors import InputError, counted, printable
 from tracking.scoring.catalogue import CATALOGUE
@@ -44,27 +43,19 @@ SURFACE = {"ground": "on the ground, m", "image": "in the image, px"}
 
 LOWER = "↓ lower is better"  # The meaning of the arrow in headings.
 
+Rows = Sequence[tuple[str, Scores]]  # Name and scores of each sequence; scores are nan where unknown.
 Means = dict[str, dict[str, float]]  # By key: "mean", and "low" and "high" of its 95 % interval; nan where unknown.
 
 
-@dataclass(frozen=True)
-class SequenceScores:
-    """The scores of one sequence."""
-
-    sequence: str
-    scores: Scores  # by key, nan where unknown
-    given: str = ""  # what detections the tracker got, in words; "" without run.json
-
-
-def tables(rows: list[SequenceScores], means: Means, notes: Sequence[str] = ()) -> str:
+def tables(rows: Rows, given: Sequence[str], means: Means, notes: Sequence[str] = ()) -> str:
     """Returns text: a table for each family of scores with a known mean, then lines on detections, comparison and
-    notes. rows: one per sequence; means: by key, the mean over sequences."""
-    given = " and ".join(dict.fromkeys(printable(row.given) or "unknown (no run.json)" for row in rows))
+    notes. given: of each sequence the detections in words, "" if unknown; means: by key, the mean over sequences."""
+    detections = " and ".join(dict.fromkeys(printable(words) or "unknown (no run.json)" for words in given))
     people = _any_known(PEOPLE[1:], means)
     titles = TABLES if people else GROUP_TRACKER_TABLES
     known = {title: keys for title, keys in titles.items() if _any_known(keys, means)}
     parts = [_family(title, keys, rows, means) for title, keys in known.items()]
-    lines = [LOWER, f"detections {given}", *_comparison_lines(rows, people, "groups, strict" in known)]
+    lines = [LOWER, f"detections {detections}", *_comparison_lines(rows, people, "groups, strict" in known)]
     if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
         lines.append("intervals by weights of blocks of frames")
     return "\n".join([*parts, *lines, *notes])
@@ -74,16 +65,16 @@ def _any_known(keys: Sequence[str], means: Means) -> bool:
     return any(math.isfinite(means[key]["mean"]) for key in keys)
 
 
-def _family(title: str, keys: tuple[str, ...], rows: list[SequenceScores], means: Means) -> str:
-    shown = [[row.sequence, *(number(key, row.scores[key]) for key in keys)] for row in rows]
+def _family(title: str, keys: tuple[str, ...], rows: Rows, means: Means) -> str:
+    shown = [[name, *(number(key, scores[key]) for key in keys)] for name, scores in rows]
     if any(math.isfinite(means[key]["low"]) for key in keys):
         for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high"))[len(rows) == 1 :]:
             shown.append([name, *(number(key, means[key][part], mean=True) for key in keys)])
     return table(title, ["sequence"], [_heading(key, rows) for key in keys], shown)
 
 
-def _heading(key: str, rows: Sequence[SequenceScores]) -> str:
-    unit = "/".join(dict.fromkeys("m" if row.scores.surface == "ground" else "px" for row in rows))
+def _heading(key: str, rows: Rows) -> str:
+    unit = "/".join(dict.fromkeys("m" if scores.surface == "ground" else "px" for _, scores in rows))
     short = key.removeprefix("group_").removesuffix("_core")
     named = f"{short} ({unit})" if CATALOGUE[key].unit == "m | px" else short
     return named + arrow(key).removeprefix(key)
@@ -119,9 +110,9 @@ def table(
     return "\n".join([*([printable(title)] if title else []), *lines, *([foot] if foot else []), ""])
 
 
-def _comparison_lines(rows: list[SequenceScores], people: bool, groups: bool) -> list[str]:
+def _comparison_lines(rows: Rows, people: bool, groups: bool) -> list[str]:
     def each(words: dict[str, str], name: str) -> str:
-        return ", ".join(words[kind] for kind in dict.fromkeys(getattr(row.scores, name) for row in rows))
+        return ", ".join(words[kind] for kind in dict.fromkeys(getattr(scores, name) for _, scores in rows))
 
     lines = [f"people compared by {each(SIMILARITY, 'similarity')}" if people else "people are not tracked"]
     if not groups:

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from scenarios.errors import InputError
 from sim.io.formats.options import BoxScale, parse_box_scale
@@ -13,8 +14,7 @@ from sim.types import DetectionMode, Sequence
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.comparison import ComparedSequence, compare_one
-from tracking.running.run import TrackingRun, input_summary
-from tracking.scoring.evaluation import Scores
+from tracking.running.run import TrackingRun
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.misreading import likely_misreading
 from tracking.scoring.people_comparison import Similarity
@@ -34,19 +34,6 @@ class ScoringJob:
     box_scale: BoxScale | None = None  # factors of x and y of the boxes of texts
 
 
-@dataclass(frozen=True)
-class ScoredSequence:
-    """The scores of runs of one sequence."""
-
-    compared: ComparedSequence
-    given: list[str]  # the detections that each run got, in words; "" without run.json
-
-    @property
-    def scores(self) -> list[Scores]:
-        """The scores of each run."""
-        return self.compared.scores
-
-
 def is_class(text: str) -> bool:
     """Returns True if a text names a class, as file.py:Class or module:Class, and no path."""
     return ":" in text and not Path(text).exists()
@@ -62,26 +49,27 @@ def run_names(texts: list[str]) -> dict[str, str]:
     return {name if short.count(name) == 1 and name else text: text for name, text in zip(short, texts, strict=True)}
 
 
-def stored_runs(texts: Iterable[str], sequences: list[Sequence]) -> list[list[Source]]:
-    """Returns for each run a list with one source per sequence: its stored tracks, or the text that names a class."""
-    return [
+def scoring_jobs(
+    texts: Iterable[str], sequences: list[Sequence], box_scale: str | None = None, **how: Any
+) -> list[ScoringJob]:
+    """Returns a job for each sequence. texts: of each run, the path of stored tracks, or what names a tracker class.
+    box_scale: the text of --box-scale; raises InputError if all are runs of flockscope. how: other fields of the jobs,
+    by name."""
+    runs = [
         [text] * len(sequences)
         if is_class(text)
         else [stored for _, stored in match_tracks(sequences, find_tracks(Path(text)))]
         for text in texts
     ]
-
-
-def box_scale_of(text: str | None, sources: Iterable[Source]) -> BoxScale | None:
-    """Returns the factors of x and y in the text of --box-scale, None for None. Raises InputError if all sources are
-    runs of flockscope, which need no factor."""
-    if text is not None and all(isinstance(source, str) or source.info for source in sources):
+    given = [source for run in runs for source in run]
+    if box_scale is not None and all(isinstance(source, str) or source.info for source in given):
         got, expected = "runs of `flockscope track`", "a text of another program"
         raise InputError(place="--box-scale", got=got, expected=expected, remedy="give it to `flockscope track`")
-    return None if text is None else parse_box_scale(text)
+    factors = None if box_scale is None else parse_box_scale(box_scale)
+    return [ScoringJob(tuple(run[k] for run in runs), box_scale=factors, **how) for k in range(len(sequences))]
 
 
-def score_sequence(sequence: Sequence, job: ScoringJob) -> ScoredSequence:
+def score_sequence(sequence: Sequence, job: ScoringJob) -> ComparedSequence:
     """Reads or makes the runs of a job on one sequence, and returns the scores of all of them."""
     return score_runs(sequence, read_runs(sequence, job), job)
 
@@ -97,12 +85,11 @@ def read_runs(sequence: Sequence, job: ScoringJob) -> list[TrackingRun]:
     ]
 
 
-def score_runs(sequence: Sequence, runs: list[TrackingRun], job: ScoringJob) -> ScoredSequence:
+def score_runs(sequence: Sequence, runs: list[TrackingRun], job: ScoringJob) -> ComparedSequence:
     """Returns the scores of these runs of one sequence, as the job says; warns of tracks read wrongly."""
     for source, run in zip(job.sources, runs, strict=True):
         text = "" if sequence.truth is None else likely_misreading(sequence.truth, run, sequence.image_size)
         if text:
             name = source if isinstance(source, str) else source.path
             warnings.warn(f"{sequence.name}, {name}: {text}", stacklevel=2)
-    compared = compare_one(sequence, runs, job.similarity, job.group_match, job.blocks, job.oracles)
-    return ScoredSequence(compared, [input_summary(run.info) for run in runs])
+    return compare_one(sequence, runs, job.similarity, job.group_match, job.blocks, job.oracles)

@@ -13,7 +13,7 @@ from sim.types import Sequence
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import checked_key
-from tracking.app.commands.scored_sequence import ScoringJob, read_runs, run_names, stored_runs
+from tracking.app.commands.scored_sequence import read_runs, run_names, scoring_jobs
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import find_tracks, match_tracks
@@ -62,16 +62,13 @@ def _pages(
     from tracking.app.report.moments import shown_errors
 
     words = [*names] if len(names) > 1 else [""] * len(names)
-    runs = dict(
-        zip((s.name for s in sequences), zip(*stored_runs(names.values(), sequences), strict=True), strict=False)
-    )
+    jobs = dict(zip((s.name for s in sequences), scoring_jobs(names.values(), sequences), strict=True))
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
-        given = read_runs(sequence, ScoringJob(runs.get(sequence.name, ())))
+        given = read_runs(sequence, jobs[sequence.name])
         errors = [known.get(sequence.name) or shown_errors(sequence, run) for run in given]
         shown = [Run(run, own.errors, word) for word, run, own in zip(words, given, errors, strict=True)]
-        first, other = shown[0] if shown else Run(), shown[1] if len(shown) > 1 else None
-        write_page(sequence, first, path, video=page_video(sequence, path, options.video, step), other=other)
+        write_page(sequence, shown, path, page_video(sequence, path, options.video, step))
 
     return _write_each("view", sequences, options.out, ".html", write, by_picture=options.video != "none")
 
@@ -79,9 +76,8 @@ def _pages(
 def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str]) -> CommandResult:
     """Writes index.html, the report on all runs; for one run it links to the pages of the sequences."""
     from tracking.app.report.of_runs import judged_runs, report_of_runs
-    from tracking.app.report.page import check_packages, write_report
+    from tracking.app.report.page import write_report
 
-    check_packages()
     refuse_foreign_file(options.out / INDEX)
     index, pages = options.out / INDEX, CommandResult({"files": []})
     found = judged_runs(names, sequences, source_of(options, options.source), options.workers)

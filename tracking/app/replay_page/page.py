@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -29,6 +28,8 @@ from tracking.running.run import grouped
 
 HERE = Path(__file__).parent
 EVER = 10**9  # after the last frame
+UNNAMED = "the tracker"
+SIDES = ("tracks", "other")  # names in the page's data of the first run, and of a second one beside it
 
 # The scripts of the page, in the order in which they run.
 SCRIPTS = (
@@ -41,24 +42,24 @@ SCRIPTS = (
 class Run:
     """Tracks of a tracker on a page, and their errors."""
 
-    tracks: SequenceOf[Tracks] | None = None
+    tracks: SequenceOf[Tracks]
     errors: SequenceOf[FoundError] = ()
     name: str = ""  # "": of the tracker
 
+    @property
+    def tracker(self) -> str:
+        """The name that the page shows."""
+        return self.name or str(getattr(self.tracks, "info", {}).get("tracker", UNNAMED))
+
 
 def write_page(
-    sequence: Sequence,
-    run: Run,
-    out: str | Path,
-    video: PageVideo | None = None,
-    other: Run | None = None,
-    start: int = 1,
+    sequence: Sequence, runs: SequenceOf[Run], out: str | Path, video: PageVideo | None = None, start: int = 1
 ) -> Path:
     """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all.
 
-    other: the run of a second tracker, which is shown beside the first. start: the frame that is shown first, from 1.
+    runs: none, one, or two that are shown beside each other. start: the frame that is shown first, from 1.
     """
-    shown = page_data(sequence, run, other, start=start)
+    shown = page_data(sequence, runs, start=start)
     shown |= {"video": None if video is None else video.facts()}
     film = "" if video is None else video.content
     text = page_html(sequence.name, script_json(shown), film)
@@ -91,12 +92,10 @@ def script_json(value: Json) -> str:
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
-def page_data(
-    sequence: Sequence, run: Run, other: Run | None = None, span: tuple[int, int] | None = None, start: int = 1
-) -> Json:
+def page_data(sequence: Sequence, runs: SequenceOf[Run], span: tuple[int, int] | None = None, start: int = 1) -> Json:
     """Returns all that the page shows except the video, as a JSON object.
 
-    span: first and last frame that are shown; start: the frame that is shown first.
+    runs: as of `write_page`. span: first and last frame that are shown; start: the frame that is shown first.
     """
     truth, (low, high) = sequence.truth, span or (1, EVER)
 
@@ -105,17 +104,16 @@ def page_data(
         return rows, encode_rows(rows, [e for e in events if e.start <= high and e.end >= low])
 
     sides = {} if truth is None else {"truth": side(rows_of_truth(truth), truth.events or ())}
-    for name, shown in (("tracks", run), ("other", other)):
-        if shown is not None and shown.tracks is not None:
-            complete = grouped(shown.tracks, sequence)
-            sides[name] = side(rows_of_tracks(complete), [e for t in complete for e in t.events])
+    for name, run in zip(SIDES, runs, strict=False):
+        complete = grouped(run.tracks, sequence)
+        sides[name] = side(rows_of_tracks(complete), [e for t in complete for e in t.events])
     encoded = {name: found for name, (_, found) in sides.items()}
     detections = _detections(sequence, low, high)
     both = [rows for rows, _ in sides.values()]
     length = _length(sequence, both, detections)
     return {
         "name": sequence.name,
-        "tracker": _tracker(run),
+        "tracker": runs[0].tracker if runs else UNNAMED,
         "fps": sequence.fps,
         "length": length,
         "from": low,
@@ -128,22 +126,17 @@ def page_data(
         "camera": plain(sequence.camera),
         "truth": encoded.get("truth"),
         "tracks": encoded.get("tracks"),
-        "other": None if other is None else {"tracker": _tracker(other), "tracks": encoded.get("other")},
+        "other": {"tracker": runs[1].tracker, "tracks": encoded["other"]} if len(runs) > 1 else None,
         "detections": detections,
         "background": None,
         "unlabelled": [] if truth is None or truth.labelled is None else spans(~truth.labelled),
         "errors": [
             {**one.facts(sequence.fps), "side": side}
-            for side, shown in (("tracks", run), ("other", other))
-            for one in (() if shown is None else shown.errors)
+            for side, run in zip(SIDES, runs, strict=False)
+            for one in run.errors
             if one.error.start <= high and one.error.end >= low
         ],
     }
-
-
-def _tracker(run: Run) -> str:
-    info: Mapping[str, Any] = getattr(run.tracks, "info", {})
-    return run.name or str(info.get("tracker", "the tracker"))
 
 
 def _length(sequence: Sequence, both: list[PageRows], detections: Json | None) -> int:

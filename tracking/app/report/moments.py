@@ -26,7 +26,7 @@ LONGEST = 40.0  # s of a replay
 JPEG_QUALITY = 60
 
 
-Runs = Callable[[Played, str], tuple[Sequence, Run, Run | None]]  # the sequence, its run, that of a rival, "" without
+Runs = Callable[[Played, str], tuple[Sequence, list[Run]]]  # the sequence, its run, and that of a rival, "" without
 
 
 def chosen(played: SequenceOf[Played], most: int = MOST) -> list[Played]:
@@ -63,15 +63,15 @@ def moments(played: SequenceOf[Played], runs: Runs) -> list[Moment]:
     return found
 
 
-def _moment(one: Played, sequence: Sequence, run: Run, rival: Run | None) -> Moment:
-    dearest = max(run.errors, key=lambda error: error.cost or 0.0, default=None)
-    length = sequence.length or len(run.tracks or ())
+def _moment(one: Played, sequence: Sequence, runs: list[Run]) -> Moment:
+    dearest = max(runs[0].errors, key=lambda error: error.cost or 0.0, default=None)
+    length = sequence.length or len(runs[0].tracks)
     first, last = (1, length) if dearest is None else (dearest.error.start, dearest.error.end)
     around, longest = round(AROUND * sequence.fps), round(LONGEST * sequence.fps)
     low = max(first - around, 1)
     span = low, min(last + around, low + longest, length)
     start = max(first - round(sequence.fps), low)
-    data = page_data(sequence, run, rival, span=span, start=start)
+    data = page_data(sequence, runs, span, start)
     data["background"], data["video"] = _background(sequence), None
     kind, words = ("", "") if dearest is None else (dearest.error.kind, _words(dearest))
     return Moment(one, (first - 1) / sequence.fps, kind, words, script_json(data))

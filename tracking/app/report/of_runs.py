@@ -11,11 +11,12 @@ from scenarios.errors import counted
 from sim.types import Sequence
 from tracking.app.commands.score_ranking import RankedRuns, rank_words, ranked_runs, verdict
 from tracking.app.commands.score_tables import SIMILARITY
-from tracking.app.commands.scored_sequence import ScoredSequence, ScoringJob, read_runs, score_runs, stored_runs
+from tracking.app.commands.scored_sequence import ScoringJob, read_runs, score_runs, scoring_jobs
 from tracking.app.replay_page.page import Run
 from tracking.app.report.content import Played, Report, heat_map
 from tracking.app.report.moments import COSTS, cause_rows, moments, shown_errors
 from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.comparison import ComparedSequence
 from tracking.errors.found import RunErrors
 
 
@@ -24,7 +25,7 @@ class JudgedRuns:
     """The scores and errors of all runs on a sequence."""
 
     job: ScoringJob
-    scored: ScoredSequence
+    scored: ComparedSequence
     errors: list[RunErrors]  # of each run
 
 
@@ -33,8 +34,7 @@ def judged_runs(
 ) -> list[JudgedRuns]:
     """Returns for each sequence the scores and errors of all runs. names: by the run's name, the text of the command
     line that names stored tracks or a tracker class."""
-    runs = stored_runs(names.values(), sequences)
-    jobs = [ScoringJob(sources, oracles=True) for sources in zip(*runs, strict=True)]
+    jobs = scoring_jobs(names.values(), sequences, oracles=True)
     return list(over_sequences("report", _judge, sequences, jobs, source, workers))
 
 
@@ -49,14 +49,12 @@ def report_of_runs(
     ranked = ranked_runs(list(names), sequences, [one.scored for one in found], by)
     played = list(_played(ranked))
 
-    def replayed(one: Played, rival: str) -> tuple[Sequence, Run, Run | None]:
+    def replayed(one: Played, rival: str) -> tuple[Sequence, list[Run]]:
         k = ranked.comparison.sequences.index(one.sequence)
         places = [names.index(name) for name in (one.name, rival) if name]
-        tracks = read_runs(sequences[k], replace(found[k].job, sources=tuple(found[k].job.sources[r] for r in places)))
-        run, *other = (
-            Run(tracked, found[k].errors[r].errors, names[r]) for r, tracked in zip(places, tracks, strict=True)
-        )
-        return sequences[k], run, other[0] if other else None
+        job = replace(found[k].job, sources=tuple(found[k].job.sources[r] for r in places))
+        tracks = zip(places, read_runs(sequences[k], job), strict=True)
+        return sequences[k], [Run(tracked, found[k].errors[r].errors, names[r]) for r, tracked in tracks]
 
     c = ranked.comparison
     shown = [row["run"] for row in ranked.table if row["first"] is not None]

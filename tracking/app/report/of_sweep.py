@@ -110,12 +110,12 @@ def _played(sweep: Sweep, scene: Scene, entries: Mapping[str, SuiteEntry]) -> It
 
 def _replay(
     sweep: Sweep, names: tuple[str, str], scene: Scene, found: list[tuple[str, RunErrors]]
-) -> tuple[Sequence, Run, Run | None]:
+) -> tuple[Sequence, list[Run]]:
     """Returns the tracks of a tracker and its rival; the errors of the first are added to `found`."""
     mode, trackers = sweep.plan.detections, [sweep.trackers[name].tracker for name in names if name]
     streams = dict.fromkeys(stream for tracker in trackers for stream in streams_for(tracker, mode))
     sequence = opened_sources().open(scene.source, tuple(streams)).sequence  # it may be open still
     runs = [track(tracker, sequence, detections=mode, seed=scene.source.seed) for tracker in trackers]
-    found.append((names[0], shown_errors(sequence, runs[0], COSTS, causes=True)))
-    rivals = [Run(run, shown_errors(sequence, run).errors, names[1]) for run in runs[1:]]
-    return sequence, Run(runs[0], found[-1][1].errors, names[0]), rivals[0] if rivals else None
+    errors = [shown_errors(sequence, runs[0], COSTS, causes=True), *(shown_errors(sequence, run) for run in runs[1:])]
+    found.append((names[0], errors[0]))
+    return sequence, [Run(run, own.errors, name) for run, own, name in zip(runs, errors, names, strict=False)]

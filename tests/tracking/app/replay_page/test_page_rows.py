@@ -19,7 +19,7 @@ from tracking.app.replay_page.page_rows import Bar, bars, links
 
 def test_bars_and_links_of_groups(sequence: Sequence) -> None:
     """Their sizes are those estimated; what merges and splits joins bars of both sides."""
-    data = page_data(sequence, Run(wholes(sequence, "ground")))
+    data = page_data(sequence, [Run(wholes(sequence, "ground"))])
     assert {bar[0]: (*bar[1:3], bar[4]) for bar in data["tracks"]["bars"]} == {
         1: (1, 160, 5), 2: (1, 53, 2), 3: (114, 160, 2),
     }  # fmt: skip

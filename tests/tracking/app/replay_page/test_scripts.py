@@ -44,7 +44,7 @@ def test_groups(sequence: Sequence, plane: str) -> None:
     shown = """[...tracks.rows(60)].map(row => [tracks.id[row], [tracks.x[row], tracks.y[row]],
         extentPoints(tracks, row, (x, y) => [x, y]), tracks.groupRows.hull[row], tracks.groupRows.speed[row],
         groupWords(tracks, row)])"""
-    rows = ran(page_data(sequence, Run(answers)), ("decode.js", "whole_groups.js"), shown)
+    rows = ran(page_data(sequence, [Run(answers)]), ("decode.js", "whole_groups.js"), shown)
     now, near = answers[59], {"atol": 0.05 if plane == "ground" else 3.0}
     assert [row[0] for row in rows] == now.id.tolist()
     for k, (_, at, around, hull, speed, words) in enumerate(rows):

@@ -13,7 +13,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from tests.coded_pictures import SIZE, number, sequence
-from tracking.app.replay_page.page import Run, write_page
+from tracking.app.replay_page.page import write_page
 from tracking.app.replay_page.video import PageVideo, page_video
 
 
@@ -71,7 +71,7 @@ def test_neither_source_nor_overlay_is_replaced(tmp_path: Path) -> None:
 def test_the_page_holds_the_video(tmp_path: Path) -> None:
     bare = sequence(5)
     made = page_video(bare, tmp_path / "page.html")
-    page = write_page(bare, Run(), tmp_path / "page.html", video=made).read_text()
+    page = write_page(bare, [], tmp_path / "page.html", video=made).read_text()
     (held,) = re.findall(r'<script type="text/plain" id="film">(.*?)</script>', page, re.DOTALL)
     assert held == made.content
     (data,) = re.findall(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
@@ -79,5 +79,5 @@ def test_the_page_holds_the_video(tmp_path: Path) -> None:
     assert facts["video"] == {"src": "", "fps": 10.0, "lost": []}
     assert facts["image"] == list(SIZE)
     assert json.loads(
-        re.findall(r'id="data">(.*?)</script>', write_page(bare, Run(), tmp_path / "x.html").read_text(), re.DOTALL)[0]
+        re.findall(r'id="data">(.*?)</script>', write_page(bare, [], tmp_path / "x.html").read_text(), re.DOTALL)[0]
     )["video"] is None  # fmt: skip
