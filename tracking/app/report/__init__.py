@@ -1,1 +1,1 @@
-"""The report on several trackers: what it shows, and the page."""
+"""The report on several trackers: what it shows, its charts, and the page."""
