@@ -6,16 +6,17 @@ The first page has videos of one scene, and tables of scores that link to replay
 from __future__ import annotations
 
 import os
+import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from html import escape
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
 
 from scenarios.errors import counted
-from sim.io.files.own_files import output_path
+from sim.io.files.own_files import GENERATOR, output_path
 from sim.types import DetectionMode, Sequence
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
@@ -26,6 +27,7 @@ from tracking.app.progress import ProgressMeter
 from tracking.comparison import ComparedRuns, compare
 from tracking.running import tracker_registry
 from tracking.running.run import TrackingRun
+from tracking.scoring.catalogue import CATALOGUE
 
 SCENES = ("merge", "split", "cross", "queue")
 SEEDS = range(40_000, 40_002)
@@ -35,6 +37,9 @@ PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)  # The scene that is re
 
 PIXEL_SETTINGS = ("duration=12",)  # The group has split by then.
 QUICK_PIXEL_SETTINGS = ("camera.fps=5", "camera.image=[480,360]")
+
+VIDEO = """<figure><video src="{video}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
+<figcaption><a href="{page}"><code>{tracker}</code></a></figcaption></figure>"""
 
 Runs = Mapping[str, list[TrackingRun]]  # By tracker, the run of each sequence.
 
@@ -54,7 +59,7 @@ def demo(options: DemoOptions) -> CommandResult:
     from sim.io.files.atomic import write_file
     from sim.io.files.own_files import refuse_foreign_file
     from sim.io.source import open_source
-    from tracking.app.report.page import from_template
+    from tracking.app.replay_page.page import theme
 
     start, out, quick = time.monotonic(), options.out, options.quick
     page = out / "index.html"
@@ -75,15 +80,26 @@ def demo(options: DemoOptions) -> CommandResult:
     for job in sorted(runs, key=lambda job: trackers.index(job.tracker)):
         of_boxes = "boxes" in tracker_registry.find(job.tracker).needs
         given["pixels" if job.overlay else "boxes" if of_boxes else "points"][job.tracker] = runs[job]
-    parts, cells = list[dict[str, Any]](), list[list[str]]()
+    parts, cells = list[str](), list[list[str]]()
     for word, found in given.items():
         of = scenes if word == "pixels" else sequences
-        parts.append(_part(word, compare(of, found), _replays(of, found, out / "pages" / word), out))
-        rows = (row for row in parts[-1]["ranking"] if row["rank"])
+        compared = compare(of, found)
+        key = usual_key(compared)
+        pages = _replays(of, found, out / "pages" / word)
+        parts += [f"<h2>Trackers from {word}</h2>", _ranking(compared, key), _scenes(compared, key, pages, out)]
+        rows = (row for row in compared.to_arrow(key).to_pylist() if row["first"] is not None)
         cells += [[f"{row['run']}, from {word}", *(number(k, row[k]) for k in COLUMNS)] for row in rows]
-    frames, meant = scenes[0].length or 0, ("objective", *COLUMNS)
-    start_of_films = f"{0.4 * frames / scenes[0].fps:.1f}"
-    write_file(page, from_template("demo.html", parts=parts, meant=meant, frames=frames, start=start_of_films).encode())
+    frames = scenes[0].length or 0
+    films = "".join(
+        VIDEO.format(
+            video=escape(f"pages/pixels/{name}.mp4"), start=0.4 * frames / scenes[0].fps, tracker=name,
+            page=escape(page.relative_to(out).as_posix()),
+        ) for name, (page,) in pages.items()
+    )  # fmt: skip
+    text = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
+    words = {"GENERATOR": GENERATOR, "STYLE": theme(), "FRAMES": str(frames), "PARTS": "\n".join(parts), "FILMS": films}
+    words["MEANINGS"] = "".join(f"<dt>{k}</dt><dd>{escape(CATALOGUE[k].meaning)}</dd>" for k in ("objective", *COLUMNS))
+    write_file(page, re.sub("@@([A-Z]+)@@", lambda found: words[found[1]], text).encode())
     lines = [table("", ["tracker"], COLUMNS, cells)]
     lines += [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]
     lines += [f"{time.monotonic() - start:.0f} s; open this page:", str(page.resolve())]
@@ -204,17 +220,31 @@ def _replays(sequences: list[Sequence], runs: Runs, folder: Path) -> dict[str, l
     }
 
 
-def _part(word: str, compared: ComparedRuns, pages: Mapping[str, list[Path]], root: Path) -> dict[str, Any]:
-    """Returns what the page shows of trackers from one kind of input. pages: by tracker, the replay of each scene."""
-    key = usual_key(compared)
+def _ranking(compared: ComparedRuns, key: str) -> str:
     entries = compared.to_arrow(key).to_pylist()
-    replays = {}
+    keys = shown_columns(entries, key)
+    rows = []
+    for e in entries:
+        name, mean = escape(e["run"]), f"{number(key, e['mean'], mean=True)}<br><small>{interval(key, e)}</small>"
+        rows.append([name if e["first"] else f"<em>{name}</em>", rank_words(e), mean])
+        rows[-1] += [number(k, e[k], mean=True) for k in keys]
+    words = "; ".join(verdict(compared, key))
+    sure = f"<p><strong>Result:</strong> {escape(words)}.</p>" if words else ""
+    by = f"people compared by {SIMILARITY[compared.similarity]}; small: 95 % interval"
+    note = f"<p>{counted(len(compared.sequences), 'scene')}, {by}.</p>"
+    return note + sure + _table(["<th>tracker</th>", "<th>rank</th>", *(f"<th>{k}</th>" for k in (key, *keys))], rows)
+
+
+def _scenes(compared: ComparedRuns, key: str, pages: Mapping[str, list[Path]], root: Path) -> str:
+    """Returns a table of the scores of all runs, which link to their replays."""
+    rows = [[escape(name)] for name in compared.sequences]
     for name, own in pages.items():
-        scored = zip(own, compared.scores[name], strict=True)
-        replays[name] = [(page.relative_to(root).as_posix(), scores[key]) for page, scores in scored]
-    return {
-        "input": word, "by": key, "columns": shown_columns(entries, key), "replays": replays,
-        "scenes": counted(len(compared.sequences), "scene"), "similarity": SIMILARITY[compared.similarity],
-        "verdict": "; ".join(verdict(compared, key)), "sequences": compared.sequences,
-        "ranking": [{**row, "rank": rank_words(row), "interval": interval(key, row)} for row in entries],
-    }  # fmt: skip
+        for row, page, scores in zip(rows, own, compared.scores[name], strict=True):
+            row.append(f'<a href="{escape(page.relative_to(root).as_posix())}">{number(key, scores[key])}</a>')
+    head = ["<th>sequence</th>", *(f"<th>{escape(name)}</th>" for name in pages)]
+    return f"<details><summary>Replays, by {key}</summary>{_table(head, rows)}</details>"
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    return f'<div class="wide"><table><thead><tr>{"".join(head)}</tr></thead><tbody>{body}</tbody></table></div>'

@@ -33,8 +33,9 @@ MOST_AXES = 2  # without a search
 def stress(options: StressOptions) -> CommandResult:
     """Plays a sweep, or with --search a search for the worst scenes, stores the episodes, and returns the findings."""
     from tracking.app.report.of_sweep import report_of_sweep
-    from tracking.app.report.page import write_report
+    from tracking.app.report.page import check_packages, write_report
 
+    check_packages()
     trackers = {name: contender(name, options.step_timeout) for name in dict.fromkeys(options.trackers)}
     detects = all({"boxes", "points"} & {*tracker.needs} for tracker in trackers.values())
     plan = _plan(options, options.detections or ("file" if detects else "image"))

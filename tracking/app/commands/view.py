@@ -76,8 +76,9 @@ def _pages(
 def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str]) -> CommandResult:
     """Writes index.html, the report on all runs; for one run it links to the pages of the sequences."""
     from tracking.app.report.of_runs import judged_runs, report_of_runs
-    from tracking.app.report.page import write_report
+    from tracking.app.report.page import check_packages, write_report
 
+    check_packages()
     refuse_foreign_file(options.out / INDEX)
     index, pages = options.out / INDEX, CommandResult({"files": []})
     found = judged_runs(names, sequences, source_of(options, options.source), options.workers)
