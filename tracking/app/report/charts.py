@@ -1,20 +1,51 @@
-"""The charts of a report: the colours and numbers that report.html and report.js draw."""
+"""The charts of a report, as models of Bokeh. Colours of text and lines are set by report.js, by the reader's theme."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence as SequenceOf
+from typing import Any
 
 import numpy as np
+from bokeh.core.types import ID
+from bokeh.embed import json_item
+from bokeh.models import ColumnDataSource, HoverTool
+from bokeh.models.annotations import Legend
+from bokeh.plotting import figure
+from bokeh.resources import Resources
 
-from sim.io.files.tables import plain
-from tracking.app.report.content import Curves, Json
+from tracking.app.report.content import Curves, Json, Report
 from tracking.errors.found import CauseRow
 from tracking.scoring.catalogue import CATALOGUE
 
 # Their contrast to both backgrounds is 3 : 1 or more.
 COLOURS = ("#2f81d8", "#d9730d", "#1a9e6c", "#c2478f", "#8a63d2", "#a08000", "#d6453d", "#3d8ea3", "#6b7a2f", "#8b6f5c")
 GREY = "#808890"
+DASHES = ("solid", "dashed", "dotdash", "dotted")
 GAINS = ("HOTA", "group_F1")
+TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
+
+
+def scripts() -> str:
+    """Returns Bokeh's script, which the page carries."""
+    return Resources(mode="inline", components=["bokeh"]).js_raw[0]
+
+
+def charts(report: Report) -> Json:
+    """Returns the charts of a report as JSON for Bokeh, by the id of the HTML element that each fills."""
+    found: dict[str, Any] = {}
+    if report.curves:
+        found["chart-curves"] = _curves(report.curves, report.by)
+    if report.causes:
+        found["chart-causes"] = _causes(report.causes)
+    return {name: json_item(model, ID(name)) for name, model in found.items()}
+
+
+def _figure(height: int, **given: Any) -> Any:
+    made = figure(height=height, sizing_mode="stretch_width", tools=TOOLS, toolbar_location="above", **given)
+    made.background_fill_color = made.border_fill_color = made.outline_line_color = None
+    made.toolbar.logo, made.toolbar.autohide, made.toolbar.active_drag = None, True, None
+    made.min_border_right = 16
+    return made
 
 
 def colour(k: int) -> str:
@@ -22,16 +53,25 @@ def colour(k: int) -> str:
     return COLOURS[k % len(COLOURS)]
 
 
-def curve_data(curves: Curves, by: str) -> Json:
-    """Returns the curves for report.js: the axis, its values, and for each tracker mean, low and high of the score `by`
-    within its range, None where unknown, and "at", the breaking point."""
-    shown = []
+def _curves(curves: Curves, by: str) -> Any:
+    plot = _figure(380, x_axis_label=f"{curves.axis}: {curves.about}" if curves.about else curves.axis, y_axis_label=by)
+    plot.x_range.start, plot.x_range.end = first, last = curves.values[0], curves.values[-1]
+    plot.x_range.flipped = first > last
+    items, order = [], np.argsort(curves.values)
     for k, (name, one) in enumerate(curves.curves.items()):
-        ends = {key: CATALOGUE[by].within(np.array(one[key], float)) for key in ("mean", "low", "high")}
-        shown.append({"name": name, "colour": colour(k), "at": (one["break"] or {}).get("at"), **ends})
-    axis = f"{curves.axis}: {curves.about}" if curves.about else curves.axis
-    found: Json = plain({"axis": axis, "by": by, "values": [*curves.values], "curves": shown})
-    return found
+        data = {key: CATALOGUE[by].within(np.array(one[key], float)) for key in ("mean", "low", "high")}
+        source, look = ColumnDataSource({"x": curves.values, **data}), {"color": colour(k)}
+        band = plot.varea("x", "low", "high", source=source, fill_alpha=0.14, **look)
+        line = plot.line("x", "mean", source=source, line_width=2.4, line_dash=DASHES[k % len(DASHES)], **look)
+        dots = plot.scatter("x", "mean", source=source, size=6, **look)
+        parts = [line, dots, band]
+        if one["break"] is not None and (at := one["break"]["at"]) is not None:
+            height = np.interp(at, np.array(curves.values)[order], data["mean"][order])
+            parts.append(plot.scatter([at], [height], size=15, marker="x", line_width=3, **look))
+        plot.add_tools(HoverTool(renderers=[dots], tooltips=[("", name), (curves.axis, "@x"), (by, "@mean{0.000}")]))
+        items.append((name, parts))
+    plot.add_layout(Legend(items=items, click_policy="hide", orientation="horizontal", ncols=2), "below")
+    return plot
 
 
 def cause_parts(causes: SequenceOf[tuple[str, CauseRow]]) -> dict[str, tuple[str, dict[str, float]]]:
@@ -47,3 +87,14 @@ def cause_parts(causes: SequenceOf[tuple[str, CauseRow]]) -> dict[str, tuple[str
     if kinds[most:]:
         parts["other"] = GREY, {name: sum(gains[kind].get(name, 0.0) for kind in kinds[most:]) for name, _ in causes}
     return parts
+
+
+def _causes(causes: SequenceOf[tuple[str, CauseRow]]) -> Any:
+    names, parts = list(dict.fromkeys(name for name, _ in causes)), cause_parts(causes)
+    plot = _figure(80 + 34 * len(names), y_range=names[::-1], x_axis_label="what the repair adds to HOTA + group_F1")
+    data = {kind: [gains.get(name, 0.0) for name in names] for kind, (_, gains) in parts.items()}
+    fills, source = [fill for fill, _ in parts.values()], ColumnDataSource({"name": names, **data})
+    bars = plot.hbar_stack([*parts], y="name", height=0.7, source=source, color=fills, line_color=None)
+    plot.add_tools(HoverTool(renderers=bars, tooltips=[("", "@name"), ("$name", "@$name{0.000}")]))
+    plot.x_range.start = 0
+    return plot

@@ -11,7 +11,6 @@ from sim.io.files.atomic import write_file
 from sim.io.files.own_files import GENERATOR
 from tracking.app.commands.score_tables import number
 from tracking.app.replay_page.page import page_html, script_json, theme
-from tracking.app.report.charts import cause_parts, curve_data
 from tracking.app.report.content import Report
 from tracking.scoring.catalogue import CATALOGUE
 
@@ -29,6 +28,7 @@ PARTS = {
 def check_packages() -> None:
     """Raises InputError if a package that reports need is not installed."""
     try:
+        import bokeh  # noqa: F401
         import jinja2  # noqa: F401
     except ImportError as error:
         raise InputError(
@@ -46,6 +46,8 @@ def report_html(report: Report) -> str:
     """Returns the report as HTML."""
     from markupsafe import Markup
 
+    from tracking.app.report.charts import cause_parts, charts, scripts
+
     drawn = [("scenes" if name == "heat" else name, word) for name, word in PARTS.items() if getattr(report, name)]
     known = {key for row in report.ranking for key in KEYS if math.isfinite(row.get(key, math.nan))}
     keys = [key for key in KEYS if key != report.by and key in known]
@@ -55,8 +57,8 @@ def report_html(report: Report) -> str:
         meanings={key: score.meaning for key, score in CATALOGUE.items()},
         style=Markup(theme() + (HERE / "report.css").read_text(encoding="utf-8")),
         script=Markup((HERE / "report.js").read_text(encoding="utf-8")),
-        cause_parts=cause_parts(report.causes),
-        curves=None if report.curves is None else Markup(script_json(curve_data(report.curves, report.by))),
+        bokeh=Markup(scripts()), cause_parts=cause_parts(report.causes),
+        charts=Markup(script_json(charts(report))),
         replay_page=Markup(replay),
     )  # fmt: skip
     return str(found)
@@ -68,5 +70,4 @@ def _environment() -> Environment:
     made = Environment(loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined)
     made.globals["nan"] = math.nan
     made.filters["score"] = lambda value: number("HOTA", value)
-    made.filters["sum_of"] = lambda parts, name: sum(gains.get(name, 0.0) for _, gains in parts)
     return made

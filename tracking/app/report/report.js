@@ -1,78 +1,29 @@
-// The report: draws the curves in the reader's theme, filters the worst moments, and opens their replays.
+// The report: draws the charts in the reader's theme, filters the worst moments, and opens their replays.
 
 const $ = id => document.getElementById(id);
+const dark = matchMedia("(prefers-color-scheme: dark)");
 const items = [...document.querySelectorAll("#list li")];
 let open = -1;
 
-// A new element of an SVG; words: its text, or of a shape what is shown where the mouse rests.
-function drawn(parent, kind, looks, words) {
-  const made = parent.appendChild(document.createElementNS("http://www.w3.org/2000/svg", kind));
-  for (const [name, value] of Object.entries(looks)) made.setAttribute(name, value);
-  if (kind === "text") made.textContent = words;
-  else if (words) drawn(made, "title", {}).textContent = words;
-  return made;
-}
-
-// About five round numbers from low to high.
-function ticks(low, high) {
-  const unit = 10 ** Math.floor(Math.log10((high - low) / 4)), step = [1, 2, 5, 10].map(k => k * unit).find(s => (high - low) / s <= 6);
-  const first = Math.ceil(low / step - 1e-9);
-  return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, k) => Number(((first + k) * step).toPrecision(6)));
-}
-
-// The curves, easy end of the axis to the left; a gap where a value is unknown.
-function drawCurves() {
-  const { axis, by, values, curves } = JSON.parse($("curves-data").textContent);
-  const wide = $("chart-curves").clientWidth, high = 380, left = 52, right = wide - 14, top = 26, bottom = high - 46;
-  const known = curves.flatMap(c => [...c.mean, ...c.low, ...c.high]).filter(v => v !== null);
-  const low = Math.min(...known, 1), most = Math.max(...known, low + 0.05);
-  const first = values[0], last = values[values.length - 1];
-  const x = v => left + (v - first) / (last - first) * (right - left), y = v => bottom - (v - low) / (most - low) * (bottom - top);
-  const at = keys => values.flatMap((v, k) => keys.every(c => c[k] !== null) ? [k] : []);
-  $("chart-curves").replaceChildren();
-  const svg = drawn($("chart-curves"), "svg", { width: wide, height: high, role: "img" });
-  for (const v of ticks(low, most)) {
-    drawn(svg, "path", { class: "grid", d: `M${left} ${y(v)}H${right}` });
-    drawn(svg, "text", { x: left - 8, y: y(v) + 4, "text-anchor": "end" }, v);
+// Text and lines of Bokeh's models follow the theme; their colours of data suit both.
+function colourCharts() {
+  const ink = dark.matches ? "#c9d1d9" : "#3b434b", line = dark.matches ? "#39424d" : "#d0d7de";
+  const looks = {
+    Axis: { axis_label_text_color: ink, major_label_text_color: ink, axis_line_color: line, major_tick_line_color: line, minor_tick_line_color: null },
+    Grid: { grid_line_color: line, grid_line_alpha: 0.6 },
+    Legend: { label_text_color: ink, background_fill_alpha: 0, border_line_alpha: 0 },
+    Text: { text_color: ink },
+  };
+  for (const document of Bokeh.documents) for (const model of document._all_models.values()) {
+    for (const [kind, look] of Object.entries(looks)) if (model.type.endsWith(kind)) model.setv(look);
   }
-  for (const v of ticks(Math.min(first, last), Math.max(first, last))) {
-    drawn(svg, "path", { class: "grid", d: `M${x(v)} ${top}V${bottom}` });
-    drawn(svg, "text", { x: x(v), y: bottom + 18, "text-anchor": "middle" }, v);
-  }
-  drawn(svg, "text", { x: left, y: 14 }, by);
-  drawn(svg, "text", { x: (left + right) / 2, y: high - 6, "text-anchor": "middle" }, axis);
-  curves.forEach((c, k) => {
-    const part = drawn(svg, "g", { fill: c.colour, stroke: c.colour }), dash = ["", "8 5", "8 4 2 4", "2 4"][k % 4];
-    const line = (indices, key) => indices.map(i => `${x(values[i])} ${y(c[key][i])}`).join("L");
-    const ends = at([c.low, c.high]), means = at([c.mean]);
-    if (ends.length) drawn(part, "path", { d: `M${line(ends, "low")}L${line(ends.reverse(), "high")}Z`, opacity: 0.14, stroke: "none" });
-    if (means.length) drawn(part, "path", { d: `M${line(means, "mean")}`, fill: "none", "stroke-width": 2.4, "stroke-dasharray": dash });
-    for (const i of means) {
-      drawn(part, "circle", { cx: x(values[i]), cy: y(c.mean[i]), r: 4 }, `${c.name}\n${values[i]}: ${by} ${c.mean[i].toFixed(3)}`);
-    }
-    const after = means.findIndex((i, n) => n > 0 && (values[means[n - 1]] - c.at) * (values[i] - c.at) <= 0);
-    if (c.at !== null && after > 0) {
-      const a = means[after - 1], b = means[after], share = (c.at - values[a]) / (values[b] - values[a]);
-      const cx = x(c.at), cy = y(c.mean[a] + share * (c.mean[b] - c.mean[a]));
-      drawn(part, "path", { d: `M${cx - 7} ${cy - 7}l14 14m0 -14l-14 14`, "stroke-width": 3 }, `${c.name} breaks at ${c.at.toPrecision(3)}`);
-    }
-    part.toggleAttribute("hidden", $("curve-names").children[k]?.ariaPressed === "false");
-  });
 }
 
-function nameCurves() {
-  JSON.parse($("curves-data").textContent).curves.forEach(({ name, colour }, k) => {
-    const button = $("curve-names").appendChild(document.createElement("button"));
-    button.append(document.createElement("span"), name);
-    button.firstChild.style.background = colour;
-    button.ariaPressed = "true";
-    button.addEventListener("click", () => {
-      button.ariaPressed = String(button.ariaPressed === "false");
-      drawCurves();
-    });
-  });
-  drawCurves();
-  addEventListener("resize", drawCurves);
+async function drawCharts() {
+  Bokeh.logger.set_level("error");
+  for (const [id, item] of Object.entries(JSON.parse($("charts").textContent))) await Bokeh.embed.embed_item(item, id);
+  colourCharts();
+  dark.addEventListener("change", colourCharts);
 }
 
 function filter(choice = {}) {
@@ -118,7 +69,7 @@ function onKey(event) {
   if (event.key === "Escape") $("player").close();
 }
 
-if ($("curves-data")) nameCurves();
+drawCharts();
 if (items.length) {
   filter();
   for (const select of document.querySelectorAll("#filters select")) select.addEventListener("change", () => filter());
