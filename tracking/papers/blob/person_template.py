@@ -21,65 +21,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Bools, Image, Ints
+from sim.types import Array, Bools
 from tracking.detect import blobs
-from tracking.detect.blobs import Labels
 from tracking.detect.person_size import SLIM, SMALLEST, PersonSize
 from tracking.papers.blob import new_people_kernels as new
 from tracking.papers.blob import person_template_kernels as kernels
-from tracking.papers.blob import person_template_search_kernels as search
-from tracking.papers.blob.person_template_kernels import ELLIPSE
+from tracking.papers.blob.person_template_kernels import ELLIPSE, Cover
 
 LEAST = 0.3  # a region smaller than this share of a person's area is ignored
 MOST = 6  # most people found in one region in a frame
 LOWEST = 0.98  # quantile of the rows of a part's pixels at which its foot is guessed
 ROAM = 0.25  # standard deviation of a first guess, of a person's height
-
-
-class ExplainedForeground:
-    """One frame's foreground, and what explains it: templates (upright ellipses x, foot, h, w, px) and blobs of one
-    person.
-
-    A template fills a box h high and w wide round column x, with its lower edge at row foot; whole px are edges of
-    pixels, 0 the left and upper edge of the image. Made from the foreground. State: foreground (H, W) bool. cover (H,
-    W) int16: the number of templates painted over each pixel, plus kernels.EXPLAINED = 1000 where a blob of one person
-    explains the pixel; 0 at first.
-    """
-
-    def __init__(self, foreground: Bools) -> None:
-        self.foreground = foreground
-        self.cover: kernels.Cover = np.zeros(foreground.shape, np.int16)
-
-    def mark_explained(self, label: Labels, rows: Ints) -> None:
-        """Marks the pixels of blobs as explained: templates get no support from them."""
-        which = np.zeros(int(rows.max(initial=-1)) + 2, bool)
-        which[rows + 1] = True
-        kernels.mark_explained(self.cover, label, which)
-
-    def unexplained(self) -> Bools:
-        """Returns a mask (H, W): foreground that no painted template covers and no blob explains."""
-        return np.asarray(self.foreground & (self.cover == 0))
-
-    def fit_places(self, templates: Array, spread: Array, evidence: float, image: Image, looks: Array) -> Array:
-        """Returns the templates (K, 4) x, foot, h, w, px, at the places where they explain most together; paints them.
-
-        Places are better where the picture shows the looks (K, POINTS, 5) of the people; (0, POINTS, 5): ignored.
-        """
-        return search.fit_places(self.foreground, self.cover, templates, spread, evidence, image, looks)
-
-    def prune(self, templates: Array, least: float, *, pieces: bool = False) -> Ints:
-        """Returns the rows, ascending, of painted templates (K, 4) x, foot, h, w, px, that have enough support; erases
-        the others, weakest first."""
-        return np.flatnonzero(kernels.prune(self.foreground, self.cover, templates, least, pieces))
-
-    def support(self, templates: Array) -> Array:
-        """Returns the support (K,) of painted templates (K, 4) x, foot, h, w, px: at most 1, may be negative."""
-        return kernels.supports(self.foreground, self.cover, templates, 1)
-
-    def visible_share(self, templates: Array) -> Array:
-        """Returns the share (K,), 0 to 1, of each template (K, 4) that no template with a lower foot and no explained
-        blob covers."""
-        return kernels.visible_share(self.cover, templates)
 
 
 def template_mask(shape: tuple[int, ...], templates: Array) -> Bools:
@@ -90,10 +42,10 @@ def template_mask(shape: tuple[int, ...], templates: Array) -> Bools:
     return cover > 0
 
 
-def find_new_people(scene: ExplainedForeground, size: PersonSize, support: float) -> Array:
-    """Returns the templates (K, 4) x, foot (row of the lower edge), h, w, px, of new people, and paints them into
-    `scene`."""
-    found = blobs.find(scene.unexplained(), LEAST * SMALLEST**2 * SLIM * ELLIPSE)
+def find_new_people(foreground: Bools, cover: Cover, size: PersonSize, support: float) -> Array:
+    """Returns the templates (K, 4) x, foot, h, w, px, of new people in the foreground (H, W) that no template and no
+    blob explains; paints them into `cover` (H, W)."""
+    found = blobs.find(foreground & (cover == 0), LEAST * SMALLEST**2 * SLIM * ELLIPSE)
     box = found.box
     h, w = size.at(np.stack([box[:, 0] + box[:, 2] / 2, box[:, 1] + box[:, 3]], 1)).T
     person = ELLIPSE * h * w
@@ -102,16 +54,17 @@ def find_new_people(scene: ExplainedForeground, size: PersonSize, support: float
         return np.zeros((0, 4))
     most = np.minimum((found.area[rows] / person[rows]).astype(int) + 2, MOST)
     guesses = [_guesses(found, row, n, size) for row, n in zip(rows.tolist(), most.tolist(), strict=True)]
-    return np.concatenate([_in_region(scene, g, p, support) for g, p in zip(guesses, person[rows], strict=True)])
+    regions = zip(guesses, person[rows], strict=True)
+    return np.concatenate([_in_region(foreground, cover, *region, support) for region in regions])
 
 
-def _in_region(scene: ExplainedForeground, guesses: Array, person: float, support: float) -> Array:
+def _in_region(foreground: Bools, cover: Cover, guesses: Array, person: float, support: float) -> Array:
     known = np.asarray(np.isfinite(guesses).all(1))
     sure = len(known) if known.all() else int(known.argmin())
     most = int((np.sqrt(8 * sure + 1) - 1) / 2)  # 1 + 2 + ... + most <= sure
     guesses = guesses[: most * (most + 1) // 2]
     spread = np.maximum(ROAM * guesses[:, 2:3], 1.0) * np.ones(2)
-    return new.fit_new_people(scene.foreground, scene.cover, guesses, most, person, support, spread)
+    return new.fit_new_people(foreground, cover, guesses, most, person, support, spread)
 
 
 def _guesses(found: blobs.Blobs, row: int, most: int, size: PersonSize) -> Array:

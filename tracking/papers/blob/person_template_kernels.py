@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from sim.compiler import njit
 from sim.types import Array, Bools, Ints
-from tracking.detect.blobs import Labels
 
 Cover = NDArray[np.int16]
 # Slots of a template.
@@ -107,20 +106,6 @@ def paint_all(cover: Cover, templates: Array, more: int) -> None:
     """
     for k in range(len(templates)):
         paint(cover, templates[k], more)
-
-
-@kernel
-def mark_explained(cover: Cover, label: Labels, which: Bools) -> None:
-    """Add EXPLAINED = 1000 to the cover (H, W), in place, at the pixels of marked blobs.
-
-    label (H, W): k > 0 in the pixels of blob k, 0 for none. which: flags by label; a label beyond its end is not
-    marked.
-    """
-    for row in range(cover.shape[0]):
-        for column in range(cover.shape[1]):
-            k = label[row, column]
-            if 0 < k < len(which) and which[k]:
-                cover[row, column] += EXPLAINED
 
 
 @kernel

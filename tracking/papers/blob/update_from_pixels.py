@@ -30,10 +30,10 @@ from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground, Segmented
 from tracking.detect.person_size import KEPT, PersonSize, upright
 from tracking.filters import kalman
-from tracking.papers.blob import box_geometry, person_look_kernels, person_template, person_template_kernels
+from tracking.papers.blob import box_geometry, person_look_kernels, person_template, person_template_search_kernels
+from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.person_look_kernels import LEARN_SHOWN, LOOK_TIME
-from tracking.papers.blob.person_template import ExplainedForeground, template_mask
 from tracking.papers.blob.track_management import TrackedEllipses
 from tracking.running import image_scale
 
@@ -126,7 +126,7 @@ class PixelUpdater:
 
     def _protected(self) -> Bools:
         boxes = self._person_boxes(self.people.upright_boxes()[self.people.confirmed])
-        return template_mask(self.foreground.shape, box_geometry.standing(boxes))
+        return person_template.template_mask(self.foreground.shape, box_geometry.standing(boxes))
 
     def reported_boxes(self, rows: Ints) -> Array:
         """Returns the boxes (K, 4) that the tracker reports for the tracks at positions `rows` (K,): centre x, y,
@@ -143,12 +143,11 @@ class PixelUpdater:
         made, taken, d2 = self._associate(z, angle_var)
         unexplained = np.delete(z, taken, 0) if split else z[~np.isfinite(self._gated(d2, angle_var)).any(0)]
         if split:
-            scene = ExplainedForeground(seen.mask)
-            scene.mark_explained(found.label, columns)
+            cover = np.append(0, kernels.EXPLAINED * lone).astype(np.int16).take(found.label)
             for confirmed in (True, False):
-                made = made.joined(self._measure_by_templates(scene, seen.image, expected, made.rows, confirmed))
-            entered = box_geometry.centred(person_template.find_new_people(scene, self.size, ENTRY_SUPPORT))
-            unexplained = np.concatenate([unexplained, self._person_ellipses(entered)])
+                made = made.joined(self._measure_by_templates(seen, cover, expected, made.rows, confirmed))
+            entered = person_template.find_new_people(seen.mask, cover, self.size, ENTRY_SUPPORT)
+            unexplained = np.concatenate([unexplained, self._person_ellipses(box_geometry.centred(entered))])
         d2, log_det = people.directed_innovations(made.z, made.angle_var)
         each = np.arange(len(made.rows))
         evidence = people.evidence(d2, log_det)[made.rows, each]
@@ -174,7 +173,7 @@ class PixelUpdater:
         people = self.people
         at = box_geometry.standing(self._person_boxes(people.upright_boxes()))
         gain = -np.expm1(-people.dynamics.dt / LOOK_TIME)
-        shares = person_template_kernels.visible_share(np.zeros(image.shape[:2], np.int16), at)
+        shares = kernels.visible_share(np.zeros(image.shape[:2], np.int16), at)
         person_look_kernels.learn(image, at, people.look, rows[shares[rows] >= LEARN_SHOWN], gain)
 
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
@@ -203,7 +202,7 @@ class PixelUpdater:
         return np.where(d2 <= self.gates[directed], d2, np.inf)
 
     def _measure_by_templates(
-        self, scene: ExplainedForeground, image: Image, expected: Array, rows: Ints, confirmed: bool
+        self, seen: Segmented, cover: kernels.Cover, expected: Array, rows: Ints, confirmed: bool
     ) -> Measured:
         people = self.people
         open_rows = np.setdiff1d(np.flatnonzero(people.confirmed == confirmed), rows)
@@ -214,10 +213,11 @@ class PixelUpdater:
         var = (people.bank[kalman.VAR, open_rows] + people.noise)[:, :2]
         spread = np.sqrt(var) * people.scale[open_rows, None]
         looks = people.look[open_rows if confirmed else []]
-        at = scene.fit_places(at, spread, EVIDENCE, image, looks)
-        keep = scene.prune(at, TRACK_SUPPORT if confirmed else ENTRY_SUPPORT, pieces=confirmed)
+        at = person_template_search_kernels.fit_places(seen.mask, cover, at, spread, EVIDENCE, seen.image, looks)
+        least = TRACK_SUPPORT if confirmed else ENTRY_SUPPORT
+        keep = np.flatnonzero(kernels.prune(seen.mask, cover, at, least, confirmed))
         at = at[keep]
-        support, visible = scene.support(at), scene.visible_share(at)
+        support, visible = kernels.supports(seen.mask, cover, at, 1), kernels.visible_share(cover, at)
         noise = people.noise / np.maximum(visible, LEAST_SHOWN)[:, None] ** 2
         noise[:, 2:] *= BLIND
         ellipses = self._person_ellipses(box_geometry.centred(at))

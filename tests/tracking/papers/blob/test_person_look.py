@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from tests import reference_templates as slow
-from tests.tracking.papers.blob.test_person_template import HIGH, NO_LOOKS, WIDE, scenery
+from tests.tracking.papers.blob.test_person_template import HIGH, NO_LOOKS, WIDE, fitted, scenery
 from tracking.papers.blob import person_look_kernels as looks
-from tracking.papers.blob.person_template import ExplainedForeground
 
 RED, BLUE, GREY = (30, 30, 200), (200, 30, 30), (120, 120, 120)
 
@@ -74,8 +73,8 @@ def test_looks_tell_who_is_whom_in_a_shared_blob():
     mask = (image != GREY).any(2)
     expected, spread = np.stack([blue, red]) - [1.0, 0, 0, 0], np.full((2, 2), 6.0)
     known = learned((red, RED), (blue, BLUE))
-    swapped = ExplainedForeground(mask).fit_places(expected, spread, 10.0, *NO_LOOKS)
-    right = ExplainedForeground(mask).fit_places(expected, spread, 10.0, image, known)
+    swapped = fitted(mask, expected, spread, 10.0, *NO_LOOKS)
+    right = fitted(mask, expected, spread, 10.0, image, known)
     assert swapped[0, 0] > swapped[1, 0]
     assert np.abs(right - np.stack([red, blue])).max() <= 2.5
 
@@ -83,9 +82,9 @@ def test_looks_tell_who_is_whom_in_a_shared_blob():
 def test_people_without_a_look_are_placed_by_the_foreground_alone():
     _, foreground, _, expected = scenery(0)
     image, spread = picture(), np.full((len(expected), 2), 4.0)
-    plain = ExplainedForeground(foreground).fit_places(expected, spread, 10.0, *NO_LOOKS)
+    plain = fitted(foreground, expected, spread, 10.0, *NO_LOOKS)
     unknown = looks.unknown(len(expected))
-    assert np.array_equal(ExplainedForeground(foreground).fit_places(expected, spread, 10.0, image, unknown), plain)
+    assert np.array_equal(fitted(foreground, expected, spread, 10.0, image, unknown), plain)
 
 
 def test_people_who_touch_nobody_are_placed_by_the_foreground_alone():
@@ -94,4 +93,4 @@ def test_people_who_touch_nobody_are_placed_by_the_foreground_alone():
     image = picture((aside[0], RED), (aside[1], BLUE))
     mask = (picture((apart[0], RED), (apart[1], BLUE)) != GREY).any(2)
     known = learned((apart[0], RED), (apart[1], BLUE))
-    assert np.array_equal(ExplainedForeground(mask).fit_places(apart, spread, 10.0, image, known), apart)
+    assert np.array_equal(fitted(mask, apart, spread, 10.0, image, known), apart)

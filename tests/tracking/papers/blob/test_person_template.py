@@ -8,15 +8,23 @@ import pytest
 from tests import reference_templates as slow
 from tests.tracking.papers.blob.test_new_people import mask_of
 from tracking.papers.blob import person_template_kernels as kernels
-from tracking.papers.blob import person_template_search_kernels
+from tracking.papers.blob import person_template_search_kernels as search
 from tracking.papers.blob.person_look_kernels import POINTS
-from tracking.papers.blob.person_template import ExplainedForeground, template_mask
+from tracking.papers.blob.person_template import template_mask
 from tracking.papers.blob.person_template_kernels import EXPLAINED
 
 HIGH, WIDE = 90, 120
 # A picture and looks for who is placed by the foreground alone.
 NO_LOOKS = np.zeros((0, 0, 3), np.uint8), np.zeros((0, POINTS, 5))
 NO_LOOKS[0].setflags(write=False)
+
+
+def bare():
+    return np.zeros((HIGH, WIDE), np.int16)
+
+
+def fitted(foreground, *args):
+    return search.fit_places(foreground, bare(), *args)
 
 
 def somewhere(r, n):
@@ -39,7 +47,7 @@ def scenery(seed):
 def test_kernels_are_the_slow_way(seed):
     _, foreground, cover, some = scenery(seed)
     for t in some:
-        got = person_template_search_kernels.worth_when_moved(foreground, cover, t, 2, 1.5)
+        got = search.worth_when_moved(foreground, cover, t, 2, 1.5)
         assert np.array_equal(got / 2, slow.moved(foreground, cover, t, 2, 1.5))
     area = [slow.area(cover.shape, t) for t in some]
     got = kernels.supports(foreground, cover, some, 0)
@@ -50,30 +58,20 @@ def test_kernels_are_the_slow_way(seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_all_together_are_the_slow_way(seed):
     r, foreground, cover, expected = scenery(seed)
-    scene, spread = ExplainedForeground(foreground), r.uniform(1, 6, (len(expected), 2))
-    scene.cover[:] = cover
-    at = scene.fit_places(expected, spread, 40.0, *NO_LOOKS)
+    painted, spread = cover.copy(), r.uniform(1, 6, (len(expected), 2))
+    at = search.fit_places(foreground, painted, expected, spread, 40.0, *NO_LOOKS)
     assert np.array_equal(at, slow.settle(foreground, cover, expected, spread, 40.0))
-    assert np.array_equal(scene.cover, cover + slow.painted(cover.shape, at))
-    assert np.allclose(scene.support(at), slow.alone(foreground, cover, at), atol=1e-12)
-    pieces = kernels.supports(scene.foreground, scene.cover, at, 1, True)
+    assert np.array_equal(painted, cover + slow.painted(cover.shape, at))
+    assert np.allclose(kernels.supports(foreground, painted, at, 1), slow.alone(foreground, cover, at), atol=1e-12)
+    pieces = kernels.supports(foreground, painted, at, 1, True)
     assert np.allclose(pieces, slow.pieces(foreground, cover, at), atol=1e-12)
-    assert np.allclose(scene.visible_share(at), slow.shown(cover, at), atol=1e-12)
+    assert np.allclose(kernels.visible_share(painted, at), slow.shown(cover, at), atol=1e-12)
     for by_pieces in (True, False):
-        again = ExplainedForeground(foreground)
-        again.cover[:] = scene.cover
-        rows = again.prune(at, 0.45, pieces=by_pieces)
-        assert rows.tolist() == slow.prune(foreground, cover, at, 0.45, by_pieces).tolist()
-        assert 0 < len(rows) < len(at)
-        assert np.array_equal(again.cover, cover + slow.painted(cover.shape, at[rows]))
-
-
-def test_closed_regions_are_explained_and_no_others():
-    label = np.random.default_rng(0).integers(0, 6, (HIGH, WIDE)).astype(np.int32)
-    for rows in ([], [0], [1, 3]):
-        scene = ExplainedForeground(label > 0)
-        scene.mark_explained(label, np.array(rows, int))
-        assert np.array_equal(scene.cover >= EXPLAINED, np.isin(label, np.add(rows, 1)))
+        again = painted.copy()
+        stays = kernels.prune(foreground, again, at, 0.45, by_pieces)
+        assert np.flatnonzero(stays).tolist() == slow.prune(foreground, cover, at, 0.45, by_pieces).tolist()
+        assert 0 < stays.sum() < len(at)
+        assert np.array_equal(again, cover + slow.painted(cover.shape, at[stays]))
 
 
 def test_support_is_one_on_ones_own_pixels_and_minus_a_half_on_none():
@@ -87,7 +85,7 @@ def test_support_is_one_on_ones_own_pixels_and_minus_a_half_on_none():
 def test_two_in_one_blob_settle_where_they_are(gap):
     true = np.array([[50.0, 80.0, 60.0, 24.0], [50.0 + gap, 76.0, 60.0, 24.0]])
     expected = true + np.array([[3.0, -2.0, 0, 0], [-3.0, 2.0, 0, 0]])
-    found = ExplainedForeground(mask_of(*true)).fit_places(expected, np.full((2, 2), 4.0), 100.0, *NO_LOOKS)
+    found = fitted(mask_of(*true), expected, np.full((2, 2), 4.0), 100.0, *NO_LOOKS)
     assert np.abs(found - true).max() <= 1.5
 
 
@@ -95,7 +93,8 @@ def test_a_post_in_front_keeps_the_template_whole():
     one = np.array([[60.0, 80.0, 60.0, 24.0]])
     cut = mask_of(one[0])
     cut[:, 57:62] = False
-    found = ExplainedForeground(cut).fit_places(one + np.array([2.0, 1.0, 0, 0]), np.full((1, 2), 4.0), 20.0, *NO_LOOKS)
+    moved = one + np.array([2.0, 1.0, 0, 0])
+    found = fitted(cut, moved, np.full((1, 2), 4.0), 20.0, *NO_LOOKS)
     assert np.abs(found - one).max() <= 1.5
 
 
@@ -104,11 +103,11 @@ def test_a_piece_of_who_is_partly_covered_is_enough_but_two_on_one_are_one():
     near, far = np.array([60.0, 84.0, 60.0, 24.0]), np.array([72.0, 80.0, 60.0, 24.0])
     cut = mask_of(near, far)
     cut[:48, 73:] = False
-    scene, both = ExplainedForeground(cut), np.stack([near, far])
-    kernels.paint_all(scene.cover, both, 1)
-    assert 0.4 < kernels.supports(scene.foreground, scene.cover, both, 1, True)[1] < 0.9
-    assert scene.prune(both, 0.3, pieces=True).tolist() == [0, 1]
+    cover, both = bare(), np.stack([near, far])
+    kernels.paint_all(cover, both, 1)
+    assert 0.4 < kernels.supports(cut, cover, both, 1, True)[1] < 0.9
+    assert kernels.prune(cut, cover, both, 0.3, True).tolist() == [True, True]
     twice = np.stack([near, near + np.array([4.0, 0, 0, 0])])
-    scene = ExplainedForeground(mask_of(near))
-    kernels.paint_all(scene.cover, twice, 1)
-    assert scene.prune(twice, 0.3, pieces=True).tolist() == [0]
+    cover = bare()
+    kernels.paint_all(cover, twice, 1)
+    assert kernels.prune(mask_of(near), cover, twice, 0.3, True).tolist() == [True, False]
