@@ -20,6 +20,7 @@ from tracking.papers.group_pda.association import walking_reach
 from tracking.papers.group_pda.group_bank import GroupBank, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
+ARRIVAL = 1.0  # s: who is there so soon after the first frame was there before it, and does not enter.
 ExpectedMembers = tuple[Array, Array, Ints]
 
 
@@ -55,7 +56,9 @@ def add_newborns(
     bank.add(born)
 
 
-def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) -> Iterator[WholeGroupEvent]:
+def confirm(
+    bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds, begin: float
+) -> Iterator[WholeGroupEvent]:
     """Gives ids to tentative groups that were measured for longer than `confirm_time`; yields an event of each that is
     no part of a group."""
     for row in np.flatnonzero(~bank.confirmed & (bank.measured_time > scaled.config.confirm_time + 1e-9)).tolist():
@@ -63,7 +66,7 @@ def confirm(bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds) 
             # its group is gone
             bank.parent[row], bank.first_seen[row] = NO_ID, t - bank.measured_time[row] + scaled.dt
         bank.id[row] = ids.new()
-        if bank.parent[row] == NO_ID:
+        if bank.parent[row] == NO_ID and bank.first_seen[row] > begin + ARRIVAL:
             place = tuple(bank.x[row, :2].tolist())
             yield WholeGroupEvent("enter", float(bank.first_seen[row]), (), (int(bank.id[row]),), place)
 

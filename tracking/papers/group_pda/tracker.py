@@ -103,6 +103,7 @@ Departures. Those marked (c) are off with `corrections` off.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import ClassVar
 
@@ -112,6 +113,7 @@ from sim.arrays import no_ids
 from sim.geometry.hull_kernels import convex_hulls
 from sim.geometry.polygons import FOOTPRINT
 from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Plane, Tracks
+from tracking.filters.existence import LIFETIME
 from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, whole_group_tracks
 from tracking.papers.group_pda.association import (
     PointClaims,
@@ -171,7 +173,8 @@ class GroupPda:
         self.pixels = None if context.background is None else ForegroundPoints(self.config, context)
         if self.pixels is not None:
             self.context = context.replace(px_per_m=self.pixels.scale)
-        self.scaled: ScaledParameters | None = None
+        self.begin: float | None = None
+        self.interval, self.last_interval = 0, 1
         flat = context.camera is None and context.px_per_m > 0
         self.plane: Plane = "image" if flat or self.pixels is not None else "ground"
         self.colours = np.zeros(0, np.int64)
@@ -197,26 +200,25 @@ class GroupPda:
         if self.pixels is not None and self.pixels.config is not self.config:
             self.pixels.follow(self.config)
         points, weights = self._points(frame, detections)
-        if points is None and self.scaled is None and self.pixels is None:
+        if points is None and self.begin is None and self.pixels is None:
             return self._no_tracks(frame)
-        scaled = self._scaled_parameters()
+        scaled = self._scaled_parameters(1)
         bank, t = self.bank, frame.t
         if bank.colour_hist.shape[1] != scaled.colour_bins:
             bank.colour_hist = np.zeros((len(bank), scaled.colour_bins))
         bank.predict(scaled)
-        events = list(remove_lost(bank, scaled, t))
-        if points is not None:
-            self._measure(points, weights, scaled, t)
-        events += self.changes.step(bank, scaled, t)
-        events += confirm(bank, scaled, t, self.ids)
-        return self._report(frame, events, scaled, self._about(detections))
+        self.interval += 1
+        events = [] if points is None else list(self._look(points, weights, t))
+        return self._report(frame, events, self._about(detections))
 
-    def _report(self, frame: Frame, events: list[WholeGroupEvent], scaled: ScaledParameters, outline: Array) -> Tracks:
+    def _report(self, frame: Frame, events: list[WholeGroupEvent], outline: Array) -> Tracks:
         """Returns the confirmed groups that had points within the last `report_coast` s, by id.
 
         outline (V, 2): a polygon round the origin, in the plane's unit, that stands for what covers the ground or the
         image about one member's place: a footprint or a usual box; without effect from pixels."""
-        seen = self.bank.confirmed & (frame.t - self.bank.last_seen <= self.config.report_coast + 1e-9)
+        unobserved = self.interval / self.context.fps
+        t = frame.t - unobserved * (1 - self.config.coast_time / LIFETIME)
+        seen = self.bank.confirmed & (t - self.bank.last_seen <= self.config.report_coast + 1e-9)
         bank = whole_groups(self.bank, np.flatnonzero(seen))
         rows = np.argsort(bank.id)
         hulls = convex_hulls(self._outlines(bank, rows, outline))
@@ -273,16 +275,30 @@ class GroupPda:
         none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
         return Tracks(frame.index, frame.t, self.plane, "group", ids, ids, none, none, np.zeros((0, 4, 4)))
 
-    def _scaled_parameters(self) -> ScaledParameters:
-        if self.scaled is not None and self.scaled.config is self.config:
-            return self.scaled
+    def _scaled_parameters(self, frames: int) -> ScaledParameters:
+        fps = self.context.fps / frames
         if self.pixels is not None:
-            self.scaled = scale_parameters(self.config, self.context.fps, 1.0, pixels=True)
-            return self.scaled
+            return scale_parameters(self.config, fps, 1.0, pixels=True)
         scale = required(self.context.px_per_m) if self.plane == "image" else 1.0
         sine = sine_tilt(self.context.camera) if self.plane == "image" else 1.0
-        self.scaled = scale_parameters(self.config, self.context.fps, scale, sine_tilt=sine)
-        return self.scaled
+        return scale_parameters(self.config, fps, scale, sine_tilt=sine)
+
+    def _look(self, points: Array, weights: Array, t: float) -> Iterator[WholeGroupEvent]:
+        """Updates all groups by the points of a frame that was observed, and yields the events.
+
+        The frame stands for the time since the one observed before, but for no more than that one did: what nobody
+        observed for longer is no evidence, and the groups' clocks rest in it."""
+        if self.begin is None:
+            self.begin = t
+        frames = min(self.interval, self.last_interval)
+        unobserved = (self.interval - frames) / self.context.fps
+        self.bank.last_seen += unobserved * (1 - self.config.coast_time / LIFETIME)
+        self.interval, self.last_interval = 0, self.interval
+        scaled = self._scaled_parameters(frames)
+        yield from remove_lost(self.bank, scaled, t)
+        self._measure(points, weights, scaled, t)
+        yield from self.changes.step(self.bank, scaled, t)
+        yield from confirm(self.bank, scaled, t, self.ids, self.begin)
 
     def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> None:
         bank, predicted = self.bank, self.bank.x[:, :2].copy()
