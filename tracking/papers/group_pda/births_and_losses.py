@@ -15,12 +15,14 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.filters.components import partition
+from tracking.grouping.group_events import ARRIVAL
 from tracking.grouping.whole_groups import NO_ID, GroupIds, WholeGroupEvent
 from tracking.papers.group_pda.association import walking_reach
 from tracking.papers.group_pda.group_bank import GroupBank, newborn
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 
-ARRIVAL = 1.0  # s: who is there so soon after the first frame was there before it, and does not enter.
+ALONE = 1.5  # People: fewer are one person, whose coming and going is no event.
+
 ExpectedMembers = tuple[Array, Array, Ints]
 
 
@@ -43,8 +45,6 @@ def add_newborns(
 ) -> None:
     """Appends to the bank the tentative groups that the unclaimed points form under the group constraint G_y (sec.
     3.3)."""
-    if not len(points):
-        return
     group = partition(points, weights, scaled.constraint)
     born, (place, reach, of) = newborn(points, weights, group, scaled, t), expected
     for k in range(len(born) if len(place) else 0):
@@ -59,32 +59,34 @@ def add_newborns(
 def confirm(
     bank: GroupBank, scaled: ScaledParameters, t: float, ids: GroupIds, begin: float
 ) -> Iterator[WholeGroupEvent]:
-    """Gives ids to tentative groups that were measured for longer than `confirm_time`; yields an event of each that is
-    no part of a group."""
+    """Gives ids to tentative groups that were measured for longer than `confirm_time`; yields an enter event of each of
+    several people that is no part of a group. begin: time, s, of the first observed frame; who is there so soon after
+    it does not enter."""
     for row in np.flatnonzero(~bank.confirmed & (bank.measured_time > scaled.config.confirm_time + 1e-9)).tolist():
         if bank.parent[row] != NO_ID and not (bank.group == bank.parent[row]).any():
             # its group is gone
             bank.parent[row], bank.first_seen[row] = NO_ID, t - bank.measured_time[row] + scaled.dt
         bank.id[row] = ids.new()
-        if bank.parent[row] == NO_ID and bank.first_seen[row] > begin + ARRIVAL:
+        entered = bank.first_seen[row] > begin + ARRIVAL and bank.size[row] > ALONE
+        if bank.parent[row] == NO_ID and entered:
             place = tuple(bank.x[row, :2].tolist())
             yield WholeGroupEvent("enter", float(bank.first_seen[row]), (), (int(bank.id[row]),), place)
 
 
 def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator[WholeGroupEvent]:
     """Removes groups and parts that were not measured for too long, at time t (s); yields a leave event of each group
-    of which no part is left. Else the largest part has its id."""
-    patience = np.where(bank.confirmed, scaled.config.coast_time, scaled.config.confirm_time)
-    patience = np.maximum(patience, scaled.dt)  # This frame is still to be measured: a frame before was missed.
+    of several people of which no part is left. Else the largest part has its id."""
+    # At least dt: this frame is still to be measured, and a frame before was missed.
+    patience = np.maximum(np.where(bank.confirmed, scaled.config.coast_time, scaled.config.confirm_time), scaled.dt)
     dead: Bools = t - bank.last_seen > patience + 1e-9
     for row in np.flatnonzero(dead & bank.confirmed & (bank.parent == NO_ID)).tolist():
         parts = np.flatnonzero(~dead & (bank.group == bank.id[row]))
         if len(parts):
             heir = parts[bank.size[parts].argmax()]
             bank.id[heir], bank.parent[heir] = bank.id[row], NO_ID
-            continue
-        last_seen = float(bank.last_seen[row])
-        place = bank.x[row, :2] - (t - last_seen) * bank.x[row, 2:]
-        yield WholeGroupEvent("leave", last_seen, (int(bank.id[row]),), (), tuple(place.tolist()))
+        elif bank.size[row] > ALONE:
+            last_seen = float(bank.last_seen[row])
+            place = bank.x[row, :2] - (t - last_seen) * bank.x[row, 2:]
+            yield WholeGroupEvent("leave", last_seen, (int(bank.id[row]),), (), tuple(place.tolist()))
     if dead.any():
         bank.keep(~dead)
