@@ -2,7 +2,7 @@
 
 A new group is tentative (without id). It is confirmed, and gets an id, once it has been measured long enough. A new
 group beside a member of a group is a part of that group (see merging_and_splitting). A group without points for too
-long is lost.
+long is lost. As in the truth, only groups of several people enter and leave.
 
 Each function changes the bank of groups in place. Events of confirmed groups are returned as `WholeGroupEvent`s.
 """
