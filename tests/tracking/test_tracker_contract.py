@@ -119,12 +119,13 @@ def test_contract(scenario: str, tracker: str, mode: str) -> None:
 def test_derived_groups_and_events_do_not_look_ahead(scenario: str, tracker: str) -> None:
     """Groups and events, reported or derived, of a sequence cut short are those of the whole one.
 
-    The last frame is left out: crossings and queues that are not over by then are reported there.
+    The last frame is left out: crossings and queues that are not over by then are reported there, but not by trackers
+    of whole groups.
     """
     sequence = simulate(load(scenario, [f"camera.fps={FPS}"]), 40_001, 0, ())
     tracks = run(prepare(tracker, first(sequence, 120), detections="file"))
     whole = with_groups(tracks, FPS, 1.0)
-    assert any(t.events for t in whole)
+    assert any(t.events for t in whole) or tracks[0].unit == "group"
     for length in range(15, len(tracks), 15):
         assert content(list(with_groups(tracks[:length], FPS, 1.0)))[:-1] == content(list(whole))[: length - 1]
 

@@ -81,9 +81,8 @@ def gated_distances(bank: GroupBank, points: Array, region: Array, scaled: Scale
     (eq. 2.2)."""
     d2 = kernels.search(points, bank.x, region, scaled.config.gate)
     tentative = ~bank.confirmed
-    if tentative.any():
-        claimed_by_confirmed = np.isfinite(d2[~tentative]).any(0)
-        d2[np.ix_(tentative, claimed_by_confirmed)] = np.inf
+    claimed_by_confirmed = np.isfinite(d2[~tentative]).any(0)
+    d2[np.ix_(tentative, claimed_by_confirmed)] = np.inf
     return d2
 
 

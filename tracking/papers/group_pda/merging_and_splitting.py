@@ -133,7 +133,7 @@ class GroupChanges:
             linked = [pair for pair in pairs if not self._apart(pair, scaled, t)]
             parts = [np.flatnonzero(np.isin(bank.id, ids)) for ids in _connected(linked, bank.id[rows].tolist())]
             if len(parts) > 1:
-                yield self._split_into(bank, group, parts, scaled, t)
+                yield from self._split_into(bank, group, parts, scaled, t)
 
     def _apart(self, pair: Pair, scaled: ScaledParameters, t: float) -> bool:
         if not scaled.config.corrections:
@@ -146,7 +146,7 @@ class GroupChanges:
 
     def _split_into(
         self, bank: GroupBank, group: int, parts: list[Ints], scaled: ScaledParameters, t: float
-    ) -> WholeGroupEvent:
+    ) -> Iterator[WholeGroupEvent]:
         heads = [rows[np.lexsort((-bank.size[rows], bank.id[rows] != group))[0]] for rows in parts]
         apart = []
         for i, j in (pair for two in combinations(parts, 2) for pair in product(*two)):
@@ -156,9 +156,9 @@ class GroupChanges:
         together = first.t - bank.first_seen[np.concatenate(parts)].min() > HOLD_TIME
         for rows, head in zip(parts, heads, strict=True):
             bank.parent[rows], bank.parent[head] = bank.id[head], NO_ID
-        children = tuple(sorted(bank.id[heads].tolist()))
-        kind = "split" if together else "enter"
-        return WholeGroupEvent(kind, first.t, (group,), children, tuple(first.middle.tolist()))
+        if together:
+            children = tuple(sorted(bank.id[heads].tolist()))
+            yield WholeGroupEvent("split", first.t, (group,), children, tuple(first.middle.tolist()))
 
     def _join_parts(self, bank: GroupBank, scaled: ScaledParameters, t: float) -> None:
         near = _overlapping(bank, np.flatnonzero(bank.confirmed & _measured(bank, t)), scaled.config.gate)
@@ -186,8 +186,8 @@ class GroupChanges:
             bank.keep(~(np.isin(bank.group, ids) & _measured(bank, t)))
             bank.parent[np.isin(bank.parent, ids)] = heir
             bank.add(union)
-            kind = "merge" if present.sum() > 1 else "enter"
-            yield WholeGroupEvent(kind, first.t, tuple(sorted(ids)), (heir,), tuple(first.middle.tolist()))
+            if present.sum() > 1:
+                yield WholeGroupEvent("merge", first.t, tuple(sorted(ids)), (heir,), tuple(first.middle.tolist()))
 
     def _extend(self, bank: GroupBank, i: int, j: int, scaled: ScaledParameters, t: float) -> list[PairMoment]:
         pair, (a, b) = _pair(bank, i, j), sorted((i, j), key=lambda row: bank.id[row])

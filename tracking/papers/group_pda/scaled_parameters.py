@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -42,6 +43,7 @@ class ScaledParameters:
     colour_bins: int
 
 
+@lru_cache(maxsize=16)
 def scale_parameters(
     config: GroupPdaConfig, fps: float, scale: float, sine_tilt: float = 1.0, pixels: bool = False
 ) -> ScaledParameters:

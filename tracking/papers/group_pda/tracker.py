@@ -50,8 +50,10 @@ Departures. Those marked (c) are off with `corrections` off.
 - stand-ins: associations of stand-ins alone leave x and P as they are, and are no infeasible time. Paper: none. Why:
   their places come from x.
 - Σ and N: rest until infeasible time is counted back. Paper: always updated. Why: they would swell.
-- no points: coasts, lost after `coast_time`; frames without detections are predicted only. Paper: null masses, as
-  before a split. Why: occlusion.
+- no points: coasts, lost after `coast_time`. Paper: null masses, as before a split. Why: occlusion.
+- frames that nobody observed: predicted only. The next observed frame stands for the time since the last, but for no
+  more than that one did; of the rest the share `coast_time` / 15 s counts as without points. Paper: none. Why: gaps
+  are no evidence, and who is in view leaves after 15 s on average.
 - an association without points: has no mass. Paper: j = 0 may be empty. Why: it has no centroid.
 - hidden feet: with boxes and a camera not overhead, points whose feet another box may hide are put no further than
   below heads at 1.5 m. Paper: points as they are. Why: hidden feet displace points.
@@ -88,8 +90,9 @@ Departures. Those marked (c) are off with `corrections` off.
 - merge: of confirmed, feasible groups whose part with the id is measured; their measured parts become one state; (c)
   once the evidence of the last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing
   groups.
-- enter: so is a merge reported if at most one of the groups was there 2 s before the onset, and a split if the group
-  was not. Paper: none. Why: they came together, or were never one group.
+- no event: a merge if at most one of the groups was there 2 s before the onset, and a split if the group was not; an
+  enter in the first second; an enter or leave of one person. Paper: none. Why: they came together, were never one
+  group, were there before, or are none.
 - hidden, (c): a group or part whose points are all more probably others' keeps x and P as predicted, and coasts. Paper:
   groups share points. Why: hidden groups follow others.
 - reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
@@ -103,6 +106,7 @@ Departures. Those marked (c) are off with `corrections` off.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import ClassVar
 
@@ -112,6 +116,7 @@ from sim.arrays import no_ids
 from sim.geometry.hull_kernels import convex_hulls
 from sim.geometry.polygons import FOOTPRINT
 from sim.types import Array, Bools, Context, Detections, Frame, Groups, Ints, Plane, Tracks
+from tracking.filters.existence import LIFETIME
 from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, whole_group_tracks
 from tracking.papers.group_pda.association import (
     PointClaims,
@@ -147,7 +152,8 @@ class GroupPda:
 
     State: config, which may be replaced between two frames; bank, the groups; ids, which gives the next id; changes,
     the past of pairs that may merge or split; pixels: grid points and background model, None from points; plane:
-    "ground" or "image"; context. All but config exist after `reset` only.
+    "ground" or "image"; context; begin: time of the first observed frame, inf before; interval, last_interval: frames
+    since the last observed frame, and from the one before to it. All but config exist after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
@@ -171,7 +177,7 @@ class GroupPda:
         self.pixels = None if context.background is None else ForegroundPoints(self.config, context)
         if self.pixels is not None:
             self.context = context.replace(px_per_m=self.pixels.scale)
-        self.scaled: ScaledParameters | None = None
+        self.begin, self.interval, self.last_interval = np.inf, 0, 1
         flat = context.camera is None and context.px_per_m > 0
         self.plane: Plane = "image" if flat or self.pixels is not None else "ground"
         self.colours = np.zeros(0, np.int64)
@@ -197,26 +203,19 @@ class GroupPda:
         if self.pixels is not None and self.pixels.config is not self.config:
             self.pixels.follow(self.config)
         points, weights = self._points(frame, detections)
-        if points is None and self.scaled is None and self.pixels is None:
-            return self._no_tracks(frame)
-        scaled = self._scaled_parameters()
-        bank, t = self.bank, frame.t
-        if bank.colour_hist.shape[1] != scaled.colour_bins:
-            bank.colour_hist = np.zeros((len(bank), scaled.colour_bins))
-        bank.predict(scaled)
-        events = list(remove_lost(bank, scaled, t))
-        if points is not None:
-            self._measure(points, weights, scaled, t)
-        events += self.changes.step(bank, scaled, t)
-        events += confirm(bank, scaled, t, self.ids)
-        return self._report(frame, events, scaled, self._about(detections))
+        if len(self.bank):
+            self.bank.predict(self._scaled_parameters(1))
+        self.interval += 1
+        events = [] if points is None else list(self._look(points, weights, frame.t))
+        return self._report(frame, events, self._about(detections))
 
-    def _report(self, frame: Frame, events: list[WholeGroupEvent], scaled: ScaledParameters, outline: Array) -> Tracks:
+    def _report(self, frame: Frame, events: list[WholeGroupEvent], outline: Array) -> Tracks:
         """Returns the confirmed groups that had points within the last `report_coast` s, by id.
 
         outline (V, 2): a polygon round the origin, in the plane's unit, that stands for what covers the ground or the
         image about one member's place: a footprint or a usual box; without effect from pixels."""
-        seen = self.bank.confirmed & (frame.t - self.bank.last_seen <= self.config.report_coast + 1e-9)
+        t = frame.t - self._no_evidence(self.interval)
+        seen = self.bank.confirmed & (t - self.bank.last_seen <= self.config.report_coast + 1e-9)
         bank = whole_groups(self.bank, np.flatnonzero(seen))
         rows = np.argsort(bank.id)
         hulls = convex_hulls(self._outlines(bank, rows, outline))
@@ -269,20 +268,31 @@ class GroupPda:
         """
         return self._outlines(self.bank, np.flatnonzero(self.bank.confirmed), self._about(None))
 
-    def _no_tracks(self, frame: Frame) -> Tracks:
-        none, ids = np.zeros((0, 2)), np.zeros(0, np.int64)
-        return Tracks(frame.index, frame.t, self.plane, "group", ids, ids, none, none, np.zeros((0, 4, 4)))
+    def _scaled_parameters(self, frames: int) -> ScaledParameters:
+        fps = self.context.fps / frames
+        if self.pixels is not None or self.plane == "ground":
+            return scale_parameters(self.config, fps, 1.0, pixels=self.pixels is not None)
+        return scale_parameters(self.config, fps, required(self.context.px_per_m), sine_tilt(self.context.camera))
 
-    def _scaled_parameters(self) -> ScaledParameters:
-        if self.scaled is not None and self.scaled.config is self.config:
-            return self.scaled
-        if self.pixels is not None:
-            self.scaled = scale_parameters(self.config, self.context.fps, 1.0, pixels=True)
-            return self.scaled
-        scale = required(self.context.px_per_m) if self.plane == "image" else 1.0
-        sine = sine_tilt(self.context.camera) if self.plane == "image" else 1.0
-        self.scaled = scale_parameters(self.config, self.context.fps, scale, sine_tilt=sine)
-        return self.scaled
+    def _look(self, points: Array, weights: Array, t: float) -> Iterator[WholeGroupEvent]:
+        """Updates all groups by the points of a frame that was observed, and yields the events.
+
+        The frame stands for the frames since the one observed before, but for no more than that one did."""
+        self.begin = min(self.begin, t)
+        frames = min(self.interval, self.last_interval)
+        self.bank.last_seen += self._no_evidence(self.interval - frames)
+        self.interval, self.last_interval = 0, self.interval
+        scaled = self._scaled_parameters(frames)
+        if self.bank.colour_hist.shape[1] != scaled.colour_bins:
+            self.bank.colour_hist = np.zeros((len(self.bank), scaled.colour_bins))
+        yield from remove_lost(self.bank, scaled, t)
+        self._measure(points, weights, scaled, t)
+        yield from self.changes.step(self.bank, scaled, t)
+        yield from confirm(self.bank, scaled, t, self.ids, self.begin)
+
+    def _no_evidence(self, frames: int) -> float:
+        """Returns the time, s, of so many unobserved frames, less its share in which people leave unseen."""
+        return frames / self.context.fps * (1 - self.config.coast_time / LIFETIME)
 
     def _measure(self, points: Array, weights: Array, scaled: ScaledParameters, t: float) -> None:
         bank, predicted = self.bank, self.bank.x[:, :2].copy()

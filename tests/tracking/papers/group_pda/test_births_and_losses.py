@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -66,6 +67,22 @@ def test_a_leave_tells_where_and_when_it_was_seen_last() -> None:
 @pytest.mark.parametrize(("hidden", "known"), [(range(40, 54), {1}), (range(40, 55), {1, 2})])
 def test_a_group_comes_back_until_coast_time_and_not_a_frame_later(hidden: range, known: set[int]) -> None:
     assert ids(track(walk((0.0, 0.0), hidden))) == known
+
+
+@pytest.mark.parametrize("observed", [range(100), [*range(16), *range(35, 100)], range(0, 100, 5)])
+def test_frames_that_nobody_observed_are_no_evidence(observed: Sequence[int]) -> None:
+    """All, none for longer than coast_time, or one in half a second: the group stays, is reported, and splits once."""
+    made = track([points if k in observed else None for k, points in enumerate(parting(0, 1.0, 0.8)[0])])
+    assert events(made, "enter", "leave", "merge", "split") == [("split", 52, (1,), (1, 2))]
+    assert all(len(t.id) for t in made[10:])
+
+
+def test_only_groups_of_several_people_who_come_later_enter_and_leave() -> None:
+    come, r = [block(2, 1, (0, 9)), block(1, 1, (9, 0))], np.random.default_rng(0)
+    made = track([noisy([block(2, 2), *come[: 2 * (30 <= k < 60)]], r) for k in range(90)])
+    assert made[50].id.tolist() == [1, 2, 3]
+    (pair,) = made[50].id[sizes(made[50]).round() == 2].tolist()
+    assert events(made, "enter", "leave") == [("enter", 31, (), (pair,)), ("leave", 60, (pair,), ())]
 
 
 @pytest.mark.parametrize(("fps", "coast"), [(10, 0.0), (10, 0.05), (0.5, 1.5)])

@@ -41,7 +41,7 @@ def test_who_has_left_does_not_follow_the_other_for_ever(seed: int, offset: floa
     made = track(meeting(0.0, np.inf, seed, offset))
     assert [len(t.id) for t in made[-20:]] == [1] * 20
     assert made[20].id.tolist() == [1, 2]
-    assert [e.kind for t in made for e in t.events] == ["enter", "enter", "leave"]
+    assert not any(t.events for t in made)  # The two were there before, and each is alone.
 
 
 def test_who_is_hidden_for_a_moment_has_his_id_afterwards() -> None:
