@@ -131,11 +131,9 @@ class ForegroundPoints:
         tall = np.minimum(high, feet - head)
         in_front = (feet[run] - row) // tall[run]
         whose = np.maximum(feet[run] - (in_front + 0.5) * tall[run], (head + tall / 2)[run])
-        pixels, middles = (
-            np.column_stack([self.view.along(self.lines[line[run]], self.view.row, v), v]) for v in (row, whose)
-        )
-        area = length * self.step * self.view.spacing(middle)
-        weights = (area / (np.pi / 4 * wide * high) / count)[run]
+        upright = self.lines[line[run]]
+        pixels, middles = (np.column_stack([self.view.along(upright, self.view.row, v), v]) for v in (row, whose))
+        weights = (length * self.step * self.view.spacing(middle) / (np.pi / 4 * wide * high) / count)[run]
         return pixels, self.view.places(middles), weights
 
     def outline(self, places: Array) -> Array:
