@@ -83,9 +83,9 @@ class ForegroundPoints:
     """Foreground pixels on a grid as points, each a share of a person, put where the middle of that person is.
 
     A run of foreground along the image of an upright line shows people one behind the other: it reaches from the head
-    of the last to the feet of the first. Their middles lie from half a person below its upper end to half a person
-    above its lower end. So its points are those of the run, shrunk about its middle by a person's height. A run shorter
-    than a person shows a piece of one, whose middle is found as if the next run hid, or were, the rest of that person.
+    of the last to the feet of the first. Who is in front is seen whole. So a run is cut into people from its lower end
+    upwards; the middle of the last lies half a person below its upper end. A run shorter than a person shows a piece of
+    one, whose middle is found as if the next run hid, or were, the rest of that person.
 
     State: config; foreground, the pipeline with its background model. scale: px per metre, the context's, or, if that
     is nan, learned from lone people in its background sample. step: px between the grid's points. view: from the image
@@ -125,13 +125,15 @@ class ForegroundPoints:
         wide, high = self._person_at(middle).T
         count = np.maximum(np.rint(length / self.step).astype(np.int64), 1)
         run = np.repeat(np.arange(len(line)), count)
-        share = (np.arange(len(run)) - (np.cumsum(count) - count)[run] + 0.5) / count[run] - 0.5
-        left = np.maximum(length - high, 0.0)
-        whole = with_other_pieces(line, top, bottom, high).mean(0)
-        rows = np.floor(middle[run] + share * length[run]) + 0.5, whole[run] + share * left[run]
-        pixels, middles = (np.column_stack([self.view.along(self.lines[line[run]], self.view.row, v), v]) for v in rows)
-        area = length * self.step * self.view.spacing(middle)
-        weights = (area / (np.pi / 4 * wide * high) / count)[run]
+        share = (np.arange(len(run)) - (np.cumsum(count) - count)[run] + 0.5) / count[run]
+        row = np.floor(top[run] + share * length[run]) + 0.5
+        head, feet = with_other_pieces(line, top, bottom, high)
+        tall = np.minimum(high, feet - head)
+        in_front = (feet[run] - row) // tall[run]
+        whose = np.maximum(feet[run] - (in_front + 0.5) * tall[run], (head + tall / 2)[run])
+        upright = self.lines[line[run]]
+        pixels, middles = (np.column_stack([self.view.along(upright, self.view.row, v), v]) for v in (row, whose))
+        weights = (length * self.step * self.view.spacing(middle) / (np.pi / 4 * wide * high) / count)[run]
         return pixels, self.view.places(middles), weights
 
     def outline(self, places: Array) -> Array:

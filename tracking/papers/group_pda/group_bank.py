@@ -110,10 +110,6 @@ class GroupBank:
         for f in fields(self):
             setattr(self, f.name, getattr(chosen, f.name))
 
-    def remove(self, row: int) -> None:
-        """Removes the group in `row` (from 0; another row changes nothing), in place; later rows move up by one."""
-        self.keep(np.arange(len(self)) != row)
-
     def add(self, other: GroupBank) -> None:
         """Appends the rows of another bank with as many colour bins (else ValueError), in place."""
         for f in fields(self):

@@ -293,7 +293,7 @@ def fall_apart(
         parts.parent[:] = bank.group[row]
         parts.parent[largest] = bank.parent[row]
         parts.id[:] = [bank.id[row] if k == largest else ids.new() for k in range(len(parts))]
-    bank.remove(row)
+    bank.keep(np.arange(len(bank)) != row)
     bank.add(parts)
 
 

@@ -58,10 +58,10 @@ Departures. Those marked (c) are off with `corrections` off.
 - hidden feet: with boxes and a camera not overhead, points whose feet another box may hide are put no further than
   below heads at 1.5 m. Paper: points as they are. Why: hidden feet displace points.
 - pixels: foreground of tracking.detect on a grid of 0.1 m, each a share of a person, put where on the ground that
-  person's middle is: the runs along the images of upright lines, less a person's height; a run shorter than a person is
-  continued to that height into the runs that it then reaches. The background rests where groups are. Paper: all of an
-  unnamed background subtraction, each counts one, in px. Why: N in people; speed; near and far people are alike, and
-  who stands behind is apart.
+  person's middle is: the runs along the images of upright lines are cut into people from the feet upwards, as who is in
+  front hides the others; a run shorter than a person is continued to that height into the runs that it then reaches.
+  The background rests where groups are. Paper: all of an unnamed background subtraction, each counts one, in px. Why: N
+  in people; speed; near and far people are alike, and who stands behind is apart.
 - too much foreground: predicted only, if the background adapts. Paper: none. Why: the light has changed.
 - colours: in the mass, order and division of shared points (`appearance`), from pixels; learned from unshared points,
   over `extent_time`. Paper: future work. Why: similar groups cross.

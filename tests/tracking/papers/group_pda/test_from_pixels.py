@@ -47,6 +47,20 @@ def test_two_who_part_split() -> None:
     assert start == pytest.approx(41, abs=10)
 
 
+def test_who_is_in_front_is_seen_whole() -> None:
+    """One behind the other, 30 px further up: the lower 68 px of 98 are the first one's, whose middle is at 166."""
+    tracker, r, empty = GroupPda(), np.random.default_rng(0), painted.sample(np.random.default_rng(0))
+    painted.watched(tracker, [], painted.TALL / 1.7, empty)
+    assert tracker.pixels is not None
+    found = tracker.pixels.points(painted.picture([(160.0, 170.0, painted.TALL), (160.0, 200.0, painted.TALL)], r), [])
+    assert found is not None
+    pixels, middles, _ = found
+    rows = tracker.pixels.view.image(middles)[np.abs(pixels[:, 0] - 160) < 3, 1]
+    front = rows > 151
+    assert rows == pytest.approx(np.where(front, 166, 136), abs=3)
+    assert front.mean() == pytest.approx(68 / 98, abs=0.05)
+
+
 @pytest.mark.parametrize("scale", [math.nan, 0.0, -3.0])
 def test_without_a_scale_and_without_anybody_it_is_asked_for(scale: float) -> None:
     with pytest.raises(InputError, match=r"context\.px_per_m"):
