@@ -54,7 +54,7 @@ class GroupPdaConfig(BackgroundSettings):
         "time for which a member is expected at its predicted place; from points a missed one stands in there (ours)")
     carry_reach: float = param(0.37, (0.05, 2.0), "m",
         "from points: a member is measured if a point is so near to its predicted place (ours)", sees="points")
-    pixel_radius: float = param(0.65, (0.05, 2.0), "m",
+    pixel_radius: float = param(0.55, (0.05, 2.0), "m",
         "from pixels: r of the region round a point (R_0, sec. 3.3)", sees="pixels")
     pixel_noise: float = param(0.12, (0.005, 1.0), "m",
         "from pixels: standard deviation of one silhouette's centroid", "log", sees="pixels")
