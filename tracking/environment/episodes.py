@@ -168,7 +168,7 @@ class Rollout:
         known, source = self.prepared.context, self.prepared.input
         tracks, _ = completed(
             self.tracks, known.fps, self.prepared.px_per_m(self.tracks), camera=known.camera, scene=known.scene,
-            source=source, image_size=known.image_size,
+            source=source, image_size=known.image_size, all_events=every,
         )  # fmt: skip
         try:
             run = TrackingRun(tracks, {"input": source})

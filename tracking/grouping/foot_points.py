@@ -87,22 +87,23 @@ def as_measured(pos: Array, camera: Camera) -> Array:
 
 def completed(
     tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None, *, camera: Camera | None,
-    scene: Scene | None, source: str | None = None, image_size: tuple[int, int] | None = None,
+    scene: Scene | None, source: str | None = None, image_size: tuple[int, int] | None = None, all_events: bool = True,
 ) -> tuple[tuple[Tracks, ...], Ground]:  # fmt: skip
     """Returns the tracks with groups and events filled in, and the ground that was used for them.
 
     If the ground under the boxes is known (`ground_below`), groups are derived from positions there, else as
     `with_groups` does. source: what the tracker worked on, an `InputKind`; None: unknown. image_size: width, height,
-    px; None: unknown.
+    px; None: unknown. all_events: as of `derive`.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks), Ground()
     ground = ground_below(tracks, camera, px_per_m, source, image_size)
     if ground.camera is None:
-        return with_groups(tracks, fps, px_per_m, rule), ground
+        return with_groups(tracks, fps, px_per_m, rule, all_events=all_events), ground
     stairs = None if camera is None else scene  # the boxes tell no place in the scene
     feet = standing(tracks, ground.camera, stairs) if plane_of_run(tracks) == "image" else tracks
-    grouped, named = with_groups(depth_as_measured(feet, ground.camera), fps, 1.0, rule), names_groups(tracks)
+    there, named = depth_as_measured(feet, ground.camera), names_groups(tracks)
+    grouped = with_groups(there, fps, 1.0, rule, all_events=all_events)
     out = [_grouped_as(t, g) for t, g in zip(with_velocities(tracks, fps), grouped, strict=True)]
     pairs = zip(out, groups_in_frames(out), strict=True)
     return tuple(t if named and t.groups is not None else t.replace(groups=g) for t, g in pairs), ground

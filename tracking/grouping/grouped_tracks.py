@@ -41,19 +41,19 @@ PORTION = 5_000  # Frames worked on together: bounds memory.
 
 
 def with_groups(
-    tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None
+    tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None, *, all_events: bool = True
 ) -> tuple[Tracks, ...]:
     """Returns the tracks of a sequence, one `Tracks` per frame, with groups, events and velocities filled in.
 
     px_per_m: image scale of tracks in the image; if it is nan for these, only velocities are filled in. rule: how
-    people are grouped; None takes the default grouping.
+    people are grouped; None takes the default grouping. all_events: as of `derive`.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks)
     tracks = with_velocities(tracks, fps)
     if tracks[0].plane == "image" and not math.isfinite(px_per_m):
         return tuple(tracks)
-    return tuple(derive(tracks, fps, px_per_m, rule))
+    return tuple(derive(tracks, fps, px_per_m, rule, all_events=all_events))
 
 
 def with_velocities(tracks: Sequence[Tracks], fps: float) -> Sequence[Tracks]:
@@ -92,12 +92,20 @@ def without_groups(tracks: Sequence[Tracks]) -> list[Tracks]:
     ]
 
 
-def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Grouping | None = None) -> list[Tracks]:
+def derive(
+    tracks: Iterable[Tracks],
+    fps: float,
+    px_per_m: float = 1.0,
+    rule: Grouping | None = None,
+    *,
+    all_events: bool = True,
+) -> list[Tracks]:
     """Returns the tracks with `group`, `groups` and `events` filled in where the tracker left them empty.
 
     tracks: of a whole sequence, in order, one per frame from frame 1. If the tracker names groups in its first frame
     with people, its groups are kept; otherwise the grouping forms all groups, and any that the tracker reports later
     are removed. Events of a kind are derived for the frames before the tracker reports this kind itself.
+    all_events: False leaves out crossings and queues, which take a third of the time.
     """
     given = list(tracks)
     if not given or any(t.unit == "group" for t in given):
@@ -109,7 +117,7 @@ def derive(tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Gr
     table, events = tabulate(given, fps, px_per_m), list[GroupEvent]()
     if not named or own.get("merge", math.inf) > 1:
         table, events = _grouped(table, named, fps, rule)
-    events += _crossings_and_queues(table, fps)
+    events += _crossings_and_queues(table, fps) if all_events else []
     return _filled(given, table, [e for e in events if (e.emitted or e.start) < own.get(e.kind, math.inf)])
 
 
