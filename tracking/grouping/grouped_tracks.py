@@ -93,13 +93,9 @@ def without_groups(tracks: Sequence[Tracks]) -> list[Tracks]:
 
 
 def derive(
-    tracks: Iterable[Tracks],
-    fps: float,
-    px_per_m: float = 1.0,
-    rule: Grouping | None = None,
-    *,
+    tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Grouping | None = None, *,
     all_events: bool = True,
-) -> list[Tracks]:
+) -> list[Tracks]:  # fmt: skip
     """Returns the tracks with `group`, `groups` and `events` filled in where the tracker left them empty.
 
     tracks: of a whole sequence, in order, one per frame from frame 1. If the tracker names groups in its first frame
