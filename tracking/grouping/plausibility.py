@@ -26,8 +26,7 @@ def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float
         )
     median = median_speed(people, fps, px_per_m)
     if median > RUN and present[0].plane == "image":
-        words = f"half of the people are faster than {median:.3g} m/s"
-        yield f"{name}: {words}. Check --fps, here {fps:g}, and --px-per-m, here {px_per_m:.4g}"
+        yield f"{name}: median speed {median:.3g} m/s. Check --fps, here {fps:g}, and --px-per-m, here {px_per_m:.4g}"
 
 
 def median_speed(people: Sequence[Tracks], fps: float, px_per_m: float) -> float:

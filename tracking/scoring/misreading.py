@@ -117,7 +117,7 @@ def likely_misreading(
         remedy = remedy if files else "give frames, order and units of the columns as in the truth"
         return f"{words}; {done}, {-matching:.0%} would: {remedy}"
     tried = " No other usual columns, scale or shift of frames match better." if len(together) else ""
-    return f"{words}.{tried} Unless the tracker fails, check columns and sequence"
+    return f"{words}.{tried} Unless the tracker fails, check the columns, and that these are tracks of this sequence"
 
 
 def shifted_boxes(truth: Truth, frame: Ints, box: Array) -> str:

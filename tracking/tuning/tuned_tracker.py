@@ -65,5 +65,4 @@ def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = Non
     if step_timeout is not None:
         TimeLimited(spec, step_timeout)  # refuses a class, and a wrong limit
     mode: DetectionMode = "file" if {"boxes", "points"} & {*found.needs} else "image"
-    code = code_hash(found)
-    return TunedTracker(spec, name, tuple(found.needs), code, detections=mode, step_timeout=step_timeout)
+    return TunedTracker(spec, name, tuple(found.needs), code_hash(found), detections=mode, step_timeout=step_timeout)

@@ -141,7 +141,8 @@ def open_folder(folder: Path, options: RecordingOptions = NO_OPTIONS) -> Sequenc
             group=np.full(len(id), -1, np.int64), pos=rows.values[:, (2, 4)], vel=rows.values[:, (5, 7)], box=None,
             visibility=np.ones(len(id)), z=np.zeros(len(id)), labelled=np.zeros(length, bool),
         )  # fmt: skip
-        warn_of_places(folder, people)
+        # by the rate: the velocities of the file say nothing of --fps
+        warn_of_places(folder, people.replace(vel=differentiate(frame, id, rows.values[:, (2, 4)], rate)))
         groups = folder / "groups.txt"
         return with_labels(people, labels_of(groups, id)) if is_present(groups) else people
 

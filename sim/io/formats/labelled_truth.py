@@ -34,8 +34,10 @@ def centres(box: Array) -> Array:
 
 def warn_of_places(file: Path, truth: Truth) -> None:
     """Warns if a file's positions and velocities can hardly be on the ground in m and m/s."""
-    known = np.zeros(0, bool) if truth.pos is None else np.isfinite(truth.pos[:, 0])
-    if truth.pos is None or truth.vel is None or len(np.unique(truth.id[known])) < SOME:
+    if truth.pos is None or truth.vel is None:
+        return
+    known = np.isfinite(truth.pos + truth.vel).all(axis=1)
+    if len(np.unique(truth.id[known])) < SOME:
         return
     span, speed = np.ptp(truth.pos[known], axis=0), np.median(np.hypot(*truth.vel[known].T))
     doubt = f"their median speed is {speed:.3g} m/s: check their unit, and the frame rate" if speed > RUN else ""

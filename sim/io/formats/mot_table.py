@@ -31,6 +31,7 @@ ENOUGH = 10  # rows that are needed to judge by how their columns vary
 LOWEST = 3.0  # px: most boxes of people are higher, unless they are shares of the picture or metres
 
 SWAPPED = 1 / 3  # People whose steps are shorter than this part of those read have ids in the column of frames
+LEAST = 1e-6  # px or m: changes of steps below it are rounding
 
 PERSON = (1.2, 6.0)  # height of a person's box divided by its width
 
@@ -79,20 +80,24 @@ def _lasts(frame: Array, id: Array) -> bool:
 
 
 def reject_swapped(rows: NumericTable) -> None:
-    """Raises InputError if rows frame, id, x, y, … seem to begin with the id: people would then make shorter steps."""
+    """Raises InputError if rows frame, id, x, y, … seem to begin with the id: people would then make shorter steps.
+
+    The steps must change less, too: at a low rate people walk further in a frame than they are apart.
+    """
     known = rows.values[rows.values[:, 1] >= 0]
-    as_read, swapped = (_usual_step(known[:, [*columns, 2, 3]]) for columns in ((1, 0), (0, 1)))
-    if swapped < SWAPPED * as_read:
-        got = f"steps of {as_read:.3g}, but of {swapped:.3g} if frame and id change places"
+    as_read, swapped = (_usual_steps(known[:, [*columns, 2, 3]]) for columns in ((1, 0), (0, 1)))
+    if (swapped + LEAST < SWAPPED * as_read).all():
+        got = f"steps of {as_read[0]:.3g}, but of {swapped[0]:.3g} if frame and id change places"
         expected, remedy = "the frame first", "exchange columns 1 and 2, or name the columns in the first line"
         raise InputError(file=rows.file, place="columns", got=got, expected=expected, remedy=remedy)
 
 
-def _usual_step(rows: Array) -> float:
-    """Returns the median step from row to row of one id in rows id, frame, x, y; nan for few steps."""
+def _usual_steps(rows: Array) -> Array:
+    """Returns the median step from row to row of one id, and the median change of it, (2,), in rows id, frame, x, y;
+    nan for few steps."""
     rows = rows[np.lexsort(rows[:, 1::-1].T)]
-    step = np.hypot(*np.diff(rows[:, 2:], axis=0).T)[np.diff(rows[:, 0]) == 0]
-    return float(np.median(step)) if len(step) >= ENOUGH else float("nan")
+    every = [np.hypot(*np.diff(rows[:, 2:], n, axis=0).T)[rows[n:, 0] == rows[:-n, 0]] for n in (1, 2)]
+    return np.array([np.median(found) if len(found) >= ENOUGH else np.nan for found in every])
 
 
 def require_pixels(rows: NumericTable, box: Array) -> None:

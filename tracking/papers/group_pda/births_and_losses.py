@@ -88,5 +88,4 @@ def remove_lost(bank: GroupBank, scaled: ScaledParameters, t: float) -> Iterator
             last_seen = float(bank.last_seen[row])
             place = bank.x[row, :2] - (t - last_seen) * bank.x[row, 2:]
             yield WholeGroupEvent("leave", last_seen, (int(bank.id[row]),), (), tuple(place.tolist()))
-    if dead.any():
-        bank.keep(~dead)
+    bank.keep(~dead)

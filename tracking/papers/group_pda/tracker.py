@@ -99,7 +99,7 @@ Departures. Those marked (c) are off with `corrections` off.
   search region. Why: lost groups are guesses.
 - onsets: a merge, (c), to when its evidence was least, else this frame; a split to when the last two parts would have
   been 1.5 m apart, had they moved straight, as fast as when it is decided, at least 0.7 m/s; enter and leave to the
-  first and last points. Paper: none. Why: decisions lag.
+  first and last points, a leave later by the unobserved time that is no evidence. Paper: none. Why: decisions lag.
 - depth of points in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px.
   Why: oblique views.
 """

@@ -45,8 +45,15 @@ def test_rows_without_ids_are_no_guess(tmp_path, score):
 @pytest.mark.parametrize("columns", [4, 6])
 def test_ids_in_the_place_of_frames_are_refused(tmp_path, columns):
     rows = people()[:, [1, 0, 2, 3, 4, 5]]
+    rows[:, 2] += 9 * rows[:, 0] ** 2  # people at unequal distances
     with pytest.raises(InputError, match=r"steps of .*, but of 7\.28 if frame and id change places"):
         open_source(written(tmp_path, rows[:, :columns]), fps=10)
+
+
+def test_people_side_by_side_may_walk_further_in_a_frame_than_they_are_apart(tmp_path):
+    rows = people()[:, :4] * (1, 1, 0, 0) + people()[:, [1, 0, 1, 0]] * (0, 0, 0.6, 2.6)
+    (sequence,) = open_source(written(tmp_path, rows), fps=0.5)
+    assert sequence.truth.pos[:PEOPLE] == pytest.approx(np.c_[0.6 * np.arange(1, 5), np.full(4, 2.6)])
 
 
 @pytest.mark.parametrize("size", [(1920, 1080), (70, 70)])

@@ -78,6 +78,13 @@ def test_places_that_are_hardly_metres_on_the_ground_are_warned_of(tmp_path, x, 
         opened(tmp_path, "frame,id,x,y\n" + "".join(rows)).truth  # noqa: B018
 
 
+def test_people_who_run_are_warned_of_where_some_have_no_place(tmp_path):
+    places = {True: "-1,-1,-1", False: "{},{},0"}
+    rows = [(f, k, places[(f + k) % 7 == 0].format(f / 2, k)) for f in range(1, 30) for k in range(1, 6)]
+    with pytest.warns(UserWarning, match=r"their median speed is 12\.5 m/s"):
+        opened(tmp_path, "".join(f"{f},{k},{9 * k + f},50,20,60,1,{place}\n" for f, k, place in rows)).truth  # noqa: B018
+
+
 def test_one_group_of_all_is_warned_of(tmp_path):
     with pytest.warns(UserWarning, match="all are one group"):
         opened(tmp_path, "frame,id,x,y,group\n1,1,0.5,1,0\n1,2,0.6,1,0\n").truth  # noqa: B018

@@ -49,6 +49,13 @@ def test_biwi_groups_survive_their_traps(tmp_path):
         assert biwi.read_groups(folder / "groups.txt") == {1: 1, 2: 1, 3: 1}
 
 
+def test_biwi_at_a_rate_at_which_people_run_is_warned_of(tmp_path):
+    folder = biwi_folder(tmp_path, rows=[(f, i, f / 10, i) for f in range(1, 81, 10) for i in range(4)])
+    with pytest.warns(UserWarning, match="their median speed is 10 m/s: check their unit, and the frame rate"):
+        open_source(folder, fps=10)[0].truth  # noqa: B018
+    open_source(folder, fps=2.5)[0].truth  # noqa: B018
+
+
 def test_biwi_without_groups_is_not_labelled(tmp_path):
     folder = biwi_folder(tmp_path)
     (folder / "groups.txt").unlink()
