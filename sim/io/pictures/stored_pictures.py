@@ -141,16 +141,15 @@ class StoredPictures:
 
     def body(self, name: str) -> bytes:
         """Returns the bytes of a file; raises InputError if they differ from the hash in the manifest."""
-        self.check(name)
-        return (self.folder / name).read_bytes()
+        return self.check(name, whole=True)
 
-    def check(self, name: str) -> None:
-        """Raises InputError if a file differs from its hash in the manifest."""
+    def check(self, name: str, whole: bool = False) -> bytes:
+        """Raises InputError if a file differs from its hash in the manifest. Returns its bytes if `whole`, else b""."""
         path, files = self.folder / name, self.manifest["files"]
         if name not in files:
             got, expected = "a manifest that does not name it", "a file that manifest.json names"
             raise InputError(file=path, got=got, expected=expected, remedy=REDO)
-        check_file(path, files[name])
+        return check_file(path, files[name], whole=whole)
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
         """Returns picture `index` (from 1) of a stream of picture files: BGR, or uint16 codes of ids or disparity."""

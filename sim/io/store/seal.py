@@ -145,15 +145,21 @@ def damaged_files(
 
 
 def check_file(
-    path: Path, facts: Mapping[str, Any], seal: str = MANIFEST, remedy: str = REDO, size_only: bool = False
-) -> None:
-    """Raises InputError if a file differs from the facts that a seal states of it. size_only: the size alone counts."""
+    path: Path, facts: Mapping[str, Any], seal: str = MANIFEST, remedy: str = REDO, size_only: bool = False,
+    whole: bool = False,
+) -> bytes:  # fmt: skip
+    """Raises InputError if a file differs from the facts that a seal states of it.
+
+    size_only: True compares the size alone. Returns the bytes of the file if `whole`, else b"".
+    """
     size = None
     try:
         if path.is_file():  # a FIFO would block its reader
             size = path.stat().st_size
-            if size == facts["bytes"] and (size_only or hashing.file_hash(path) == facts["sha256"]):
-                return
+            if size == facts["bytes"]:
+                body = path.read_bytes() if whole else b""
+                if size_only or hashing.file_hash(body if whole else path) == facts["sha256"]:
+                    return body
     except OSError:
         size = None
     kind = "truncated" if size is not None and size < facts["bytes"] else "altered"
