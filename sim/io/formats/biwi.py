@@ -20,7 +20,8 @@ from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, NumericTable, person_ids, read_rows
 from sim.io.formats.labelled_truth import differentiate, warn_of_places, with_labels
-from sim.io.formats.options import NO_OPTIONS, RecordingOptions, recorded_sequence
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions
+from sim.io.recorded_sequence import recorded_sequence
 from sim.types import Ints, Sequence, Truth
 
 FPS = 2.5

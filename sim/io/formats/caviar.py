@@ -21,7 +21,8 @@ from sim.io.files.numeric_text import NumericTable, bounded_number, person_ids, 
 from sim.io.formats.labelled_truth import centres
 from sim.io.formats.mot_table import MotTable
 from sim.io.formats.mot_text import truth_of_table
-from sim.io.formats.options import NO_OPTIONS, RecordingOptions, recorded_sequence
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions
+from sim.io.recorded_sequence import recorded_sequence
 from sim.scene.camera import scale_of_all_boxes, scale_of_first_boxes
 from sim.types import Sequence, Truth
 

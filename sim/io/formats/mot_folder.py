@@ -20,9 +20,10 @@ from sim.io.files.numeric_text import bounded_number, read_text
 from sim.io.formats import mot_text
 from sim.io.formats.calibration import scaled_to_image
 from sim.io.formats.mot_table import read_table, size_doubt
-from sim.io.formats.options import NO_OPTIONS, Pictures, RecordingOptions, recorded_sequence
+from sim.io.formats.options import NO_OPTIONS, RecordingOptions
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
+from sim.io.recorded_sequence import Pictures, recorded_sequence
 from sim.types import Image, Ints, Sequence, Truth
 
 

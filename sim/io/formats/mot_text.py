@@ -31,7 +31,8 @@ from sim.io.files.numeric_text import LARGEST
 from sim.io.formats.biwi import labels_of
 from sim.io.formats.labelled_truth import centres, differentiate, warn_of_places, with_labels
 from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, read_table, require_pixels
-from sim.io.formats.options import NO_OPTIONS, RATES, BoxOptions, Classes, RecordingOptions, recorded_sequence
+from sim.io.formats.options import NO_OPTIONS, RATES, BoxOptions, Classes, RecordingOptions
+from sim.io.recorded_sequence import recorded_sequence
 from sim.scene.camera import scale_of_all_boxes
 from sim.types import Array, Bools, Detections, Ints, Plane, Sequence, Truth, Unscored
 

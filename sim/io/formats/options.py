@@ -1,10 +1,9 @@
-"""The user's options for a recording: what it does not state itself, and how it is read; the Sequence of its parts."""
+"""The user's options for a recording: what it does not state itself, and how it is read."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from scenarios.errors import InputError
 from scenarios.limits import PICTURE_SIDE
 from sim.io.files.numeric_text import number_or_nan
 from sim.io.pictures.background_sample import BackgroundChoice
-from sim.types import Camera, Detections, Frame, Image, Sequence
+from sim.types import Camera
 
 Classes = tuple[str, ...]  # words, in lower case, or numbers as words
 RATES = (0.1, 300.0)  # plausible frames/s of a recording whose times are known
@@ -64,35 +63,6 @@ def refuse_options(values: Mapping[str, Any], names: str, path: Path, kind: str,
 
 
 NO_OPTIONS = RecordingOptions()
-Pictures = Callable[[], Iterator[Image | None]]  # a new iterator over one camera's picture of each frame
-
-
-def recorded_sequence(
-    source: dict[str, Any], name: str, fps: float, length: int, *, times: list[float] | None = None,
-    detections: Callable[[int], Detections] | None = None, left: Pictures | None = None, right: Pictures | None = None,
-    **known: Any,
-) -> Sequence:  # fmt: skip
-    """Returns the Sequence whose frames are put together from detections and pictures; None for what it has not.
-
-    times: of each frame, s; None: evenly spaced. detections: gives those of a frame (from 1). known: further fields.
-    """
-
-    def bare() -> Iterator[Frame]:
-        for k in range(1, length + 1):
-            t = (k - 1) / fps if times is None else times[k - 1]
-            yield Frame(k, t, detections=None if detections is None else detections(k))
-
-    def frames() -> Iterator[Frame]:
-        both = (repeat(None, length) if pictures is None else pictures() for pictures in (left, right))
-        for frame, image, beside in zip(bare(), *both, strict=True):
-            yield frame.replace(image=image, right=beside)
-
-    pictured = left is not None or right is not None
-    return Sequence(
-        name=name, fps=fps, length=length, frames=frames if pictured else bare, bare=bare if pictured else None,
-        source=source, has_images=left is not None, has_right=right is not None,
-        has_detections=detections is not None, **known,
-    )  # fmt: skip
 
 
 def parse_box_scale(text: str) -> BoxScale:

@@ -27,7 +27,8 @@ from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_
 from sim.io.formats.biwi import frame_numbers
 from sim.io.formats.mot_table import reject_swapped, table_of_rows
 from sim.io.formats.mot_text import frame_rate, truth_of_table
-from sim.io.formats.options import RecordingOptions, recorded_sequence
+from sim.io.formats.options import RecordingOptions
+from sim.io.recorded_sequence import recorded_sequence
 from sim.types import Sequence, Truth
 
 NDJSON = ".ndjson"

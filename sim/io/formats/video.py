@@ -15,10 +15,11 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.formats.calibration import scaled_to_image
-from sim.io.formats.options import NO_OPTIONS, RATES, RecordingOptions, recorded_sequence
+from sim.io.formats.options import NO_OPTIONS, RATES, RecordingOptions
 from sim.io.pictures import video_files
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.picture_folder import fill_gaps, require_size, size_of
+from sim.io.recorded_sequence import recorded_sequence
 from sim.types import Array, Bools, Image, Sequence
 
 SUFFIXES = (

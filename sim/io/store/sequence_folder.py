@@ -18,9 +18,9 @@ from sim import hashing
 from sim.hashing import versions
 from sim.io.files import atomic, tables
 from sim.io.files.own_files import is_side_file
-from sim.io.formats.options import recorded_sequence
 from sim.io.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.io.pictures.stored_pictures import StoredPictures, write_pictures
+from sim.io.recorded_sequence import recorded_sequence
 from sim.io.store import seal, truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.io.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
