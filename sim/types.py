@@ -285,11 +285,15 @@ class Motion(Frozen):
 @dataclass(frozen=True, slots=True, eq=False)
 class Unscored(Frozen):
     """L labelled rows that are not scored, sorted by frame. frame (L,). box (L, 4): left, top, width, height in px.
-    distractor (L,): True if a track on this box is left out of the scores."""
+    distractor (L,): True if a track on this box is left out of the scores. region (L,): True for a region in which
+    tracks on nobody are left out; None without regions. min_height: px; tracks on nobody of at most this height are
+    left out."""
 
     frame: Ints
     box: Array
     distractor: Bools
+    region: Bools | None = None
+    min_height: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -57,9 +57,9 @@ def annotated_frames(truth: Truth) -> AnnotatedFrames:
 
 
 def _labelled_frames(truth: Truth) -> Ints:
-    # Without distractors, such rows may stand between keyframes.
+    # Without distractors or regions, such rows may stand between keyframes.
     rest = truth.unscored
-    beside = [rest.frame] if rest is not None and rest.distractor.any() else []
+    beside = [rest.frame] if rest is not None and (rest.distractor.any() or rest.region is not None) else []
     grouped = [] if truth.labelled is None else [np.flatnonzero(truth.labelled) + 1]
     return np.unique(np.concatenate([truth.frame, *beside, *grouped]))
 

@@ -3,11 +3,7 @@
 This module decides what is compared (which frames, which similarity of people, which surface for groups). It calls the
 modules of the single scores and returns their results under the keys of the catalogue.
 
-Tracked people on distractors are left out of the scores, as MOTChallenge does.
-
-In each frame the boxes of tracks are matched with those of all labelled rows, people or not. The matching is one to
-one, at an IoU of 0.5 or more and with the greatest total IoU. A tracked box that is matched to a distractor is left
-out. So a track is kept where it fits a person better, and a second track on one distractor counts as false.
+Also here: pooled scores of several sequences (`pooled`), as TrackEval's COMBINED row.
 
 Also here: scores of one recording as functions of weights of its frames, for intervals by resampling.
 
@@ -27,11 +23,11 @@ from functools import cached_property
 
 import numpy as np
 
-from sim.types import Array, Bools, Tracks, Truth, Unscored
+from sim.types import Array, Bools, Tracks, Truth
 from tracking.grouping.foot_points import source_of
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.annotated_frames import annotated_frames, seen_in
-from tracking.scoring.candidate_pairs import Pairs, box_pairs
+from tracking.scoring.candidate_pairs import Pairs
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
 from tracking.scoring.group_scores import GroupMatch, f1, groups_found, shared_members
@@ -47,28 +43,15 @@ from tracking.scoring.people_comparison import (
     plane_of,
 )
 from tracking.scoring.position_errors import weighted_positions
-from tracking.scoring.rows import FrameRows
-from tracking.scoring.track_scores import weighted_clear, weighted_hota, weighted_identity
+from tracking.scoring.track_scores import hota_scores, hota_sums, weighted_clear, weighted_hota, weighted_identity
+from tracking.scoring.unscored_tracks import left_out
 from tracking.scoring.weighted_group_scores import weighted_groups_and_events
 from tracking.scoring.weighted_sums import WeightedScores, mean_of_known, unweighted
 
 PORTION = 100  # Draws that are computed together: bounds memory.
 
 
-def without_distractors(truth: Truth, unscored: Unscored, tracked: PersonRows) -> PersonRows:
-    """Returns the tracked people except those whose box is matched to a distractor; all if tracks have no boxes."""
-    if tracked.box is None:
-        return tracked
-    assert truth.box is not None
-    frame = np.concatenate([truth.frame, unscored.frame])
-    order = np.argsort(frame, kind="stable")
-    box = np.concatenate([truth.box, unscored.box])[order]
-    distractor = np.concatenate([np.zeros(len(truth.frame), bool), unscored.distractor])[order]
-    matched = mapped_people(box_pairs(FrameRows(frame[order], order), tracked.rows, box, tracked.box))
-    return tracked.keep(~((matched >= 0) & distractor[matched]))
-
-
-__all__ = ["IncomparableError", "MatchedSides", "Scorer", "Scores", "Similarity", "evaluate"]
+__all__ = ["IncomparableError", "MatchedSides", "Scorer", "Scores", "Similarity", "evaluate", "pooled"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +68,8 @@ class Scores(Mapping[str, float]):
         frames: number of scored frames.
         length: number of frames of the sequence.
         step: frames from one annotated frame to the next, 1 unless the labels are sparse; None if not evenly spaced.
+        left_out: number of tracked rows that the labels leave out: on distractors, in ignored regions, too low.
+        hota: sums (7, 19) of which `pooled` makes HOTA and its parts; None for a tracker of whole groups.
     """
 
     by_key: Mapping[str, float]
@@ -94,6 +79,8 @@ class Scores(Mapping[str, float]):
     frames: int
     length: int
     step: int | None
+    left_out: int = 0
+    hota: Array | None = None
 
     def __getitem__(self, key: str) -> float:
         return self.by_key[key]
@@ -106,6 +93,36 @@ class Scores(Mapping[str, float]):
 
     def __str__(self) -> str:
         return "\n".join(f"{key:28} {value:.4g}" for key, value in self.items() if not math.isnan(value))
+
+
+COUNTS = ("TP", "FN", "FP", "IDSW", "MT", "PT", "ML", "Frag", "IDTP")  # Scores that add up over sequences.
+
+
+def pooled(scores: Iterable[Scores]) -> dict[str, float]:
+    """Returns HOTA, CLEAR and Identity scores of all sequences together, by key, as TrackEval's COMBINED row.
+
+    Counts add up over the sequences, and the other scores are ratios of such sums. So a sequence weighs by its people,
+    and not as one value of many, as in a mean. No person or track is in two sequences. There is no interval.
+
+    Args:
+        scores: of one tracker on each sequence. Sequences without scores of people are left out.
+
+    Returns:
+        The pooled scores in the order of the catalogue; {} if no sequence has scores of people.
+    """
+    known = [one for one in scores if one.hota is not None]
+    if not known:
+        return {}
+    found = {key: sum(one[key] for one in known) for key in COUNTS}
+    hits, true, est, right = found["TP"], found["TP"] + found["FN"], found["TP"] + found["FP"], found["IDTP"]
+    similar = sum(one["MOTP"] * one["TP"] for one in known)
+    found |= {key: float(value[0]) for key, value in hota_scores(np.sum([[one.hota for one in known]], axis=1)).items()}
+    ratios = {
+        "MOTA": (hits - found["FP"] - found["IDSW"], true), "MOTP": (similar, hits),
+        "IDF1": (2 * right, true + est), "IDP": (right, est), "IDR": (right, true),
+    }  # fmt: skip
+    found |= {key: part / whole if whole else 0.0 for key, (part, whole) in ratios.items()}
+    return {key: found[key] for key in CATALOGUE if key in found}
 
 
 def objective(hota: Array, group_f1: Array) -> Array:
@@ -126,9 +143,19 @@ class MatchedSides:
     def scores(self, group_match: GroupMatch) -> Scores:
         """Returns every score of the catalogue; group_match as of `evaluate`."""
         sides, inside = self.sides, self.sides.inside
-        found = unweighted(self._weighted(group_match), len(inside))
-        length = sides.truth.length
-        return Scores(found, self.similarity, sides.surface, group_match, int(inside.sum()), length, self.step)
+        found, frames, length = unweighted(self._weighted(group_match), len(inside)), int(inside.sum()), len(inside) - 1
+        hota = None if self.hota is None else self.hota(np.ones((1, len(inside))))[0]
+        how = (self.similarity, sides.surface, group_match)
+        return Scores(found, *how, frames, length, self.step, sides.left_out, hota)
+
+    @cached_property
+    def hota(self) -> Callable[[Array], Array] | None:
+        """The function of `hota_sums`; None for a tracker of whole groups. Raises ValueError if an id is twice in a
+        frame."""
+        if self.people is None:
+            return None
+        self.people.require_unique_ids()
+        return hota_sums(self.people, len(self.sides.inside))
 
     def objective_scores(self) -> dict[str, float]:
         """Returns HOTA, group_F1 and objective as `scores` does, by key, in a tenth of the time."""
@@ -161,8 +188,8 @@ class MatchedSides:
 
     def _weighted(self, group_match: GroupMatch) -> WeightedScores:
         sides, parts = self.sides, list[WeightedScores]()
-        if self.people is not None:
-            parts += [weighted_people(self.people, len(sides.inside)), weighted_positions(sides)]
+        if self.people is not None and self.hota is not None:
+            parts += [weighted_people(self.people, len(sides.inside), self.hota), weighted_positions(sides)]
         if self.groups is not None:
             parts += weighted_groups_and_events(sides, self.groups, group_match)
 
@@ -247,15 +274,15 @@ class Scorer:
         return self._groups[surface]
 
     def sides(self, tracks: Sequence[Tracks], frames: Bools) -> ComparedSides:
-        """Returns the data of truth and tracks in the frames f where frames[f] is true. Tracked people on distractors
-        are left out. No tracked person is mapped to a true person yet."""
+        """Returns the data of truth and tracks in the frames f where frames[f] is true, without the tracked people that
+        the labels leave out. No tracked person is mapped to a true person yet."""
         kept = frames[self.people.rows.frame]
         true = self.people if kept.all() else self.people.keep(kept)
         est, plane = tracked_people(tracks), plane_of(self.truth, tracks)
-        if self.truth.unscored is not None and self.truth.unscored.distractor.any():
-            est = without_distractors(self.truth, self.truth.unscored, est)
-        nobody = np.full(len(est.rows), -1, np.int64)
-        return ComparedSides(self.truth, tracks, frames, self.labelled & frames, true, est, nobody, plane)
+        out = left_out(self.truth, est)
+        est = est.keep(~out) if out.any() else est
+        nobody, count = np.full(len(est.rows), -1, np.int64), int(out.sum())
+        return ComparedSides(self.truth, tracks, frames, self.labelled & frames, true, est, nobody, plane, count)
 
     def evaluate(
         self, tracks: Iterable[Tracks], *, similarity: Similarity | None = None, frames: int | range | None = None
@@ -319,9 +346,12 @@ def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
     return [by_frame[index] for index in sorted(by_frame)]
 
 
-def weighted_people(pairs: Pairs, size: int) -> WeightedScores:
+def weighted_people(pairs: Pairs, size: int, hota: Callable[[Array], Array]) -> WeightedScores:
     """Returns a function from weights (D, size) of frames to the scores of HOTA, CLEAR and identity, (D,) by key. size:
-    length of the recording + 1. Raises ValueError if an id is twice in a frame."""
-    pairs.require_unique_ids()
-    parts = [scores(pairs, size) for scores in (weighted_hota, weighted_clear, weighted_identity)]
-    return lambda weights: {key: value for part in parts for key, value in part(weights).items()}
+    length of the recording + 1. hota: as of `hota_sums`. No id may be twice in a frame."""
+    parts = [scores(pairs, size) for scores in (weighted_clear, weighted_identity)]
+
+    def score(weights: Array) -> dict[str, Array]:
+        return hota_scores(hota(weights)) | parts[0](weights) | parts[1](weights)
+
+    return score

@@ -34,6 +34,7 @@ class ComparedSides:
     est: PersonRows
     mapping: Ints  # (S,): row of `true` that each row of `est` is mapped to, -1 none
     plane: str  # of the tracks' positions: "ground", "space" or "image"
+    left_out: int = 0  # number of tracked people that the labels leave out of `est`
 
     @property
     def surface(self) -> Surface:

@@ -27,6 +27,7 @@ rows (one row per person and frame), IDR its share in the true rows, IDF1 the ha
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -42,11 +43,20 @@ LEAST = 1e-10  # keeps LocA at 1 where nothing is matched
 
 
 def weighted_hota(pairs: Pairs, size: int, by_level: bool = True) -> WeightedScores:
-    """Returns a function from weights (D, size) to HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr, LocA, (D,) by key.
+    """Returns a function from weights (D, size) to the scores of `hota_scores`, (D,) by key. Arguments as of
+    `hota_sums`."""
+    sums = hota_sums(pairs, size, by_level)
+    return lambda weights: hota_scores(sums(weights))
 
-    Each is the mean over `ALPHAS`. One matching serves all thresholds and all weights: in each frame the one with the
-    greatest sum of A(i, j) s(i, j). by_level: True adds similarities up by threshold first, False by frame first; only
-    the last bit of LocA depends on it."""
+
+def hota_sums(pairs: Pairs, size: int, by_level: bool = True) -> Callable[[Array], Array]:
+    """Returns a function from weights (D, size) to sums (D, 7, 19) at the thresholds `ALPHAS`, which `hota_scores`
+    takes.
+
+    The rows are TP, true rows, estimated rows, the sums over matches of AssA, AssRe and AssPr, and the sum of
+    similarities. Sums of several sequences add up. One matching serves all thresholds and all weights: in each frame
+    the one with the greatest sum of A(i, j) s(i, j). by_level: True adds similarities up by threshold first, False by
+    frame first; only the last bit of LocA depends on it."""
     true_id, est_id, link = pairs.links
     n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link
     m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
@@ -62,18 +72,21 @@ def weighted_hota(pairs: Pairs, size: int, by_level: bool = True) -> WeightedSco
     near = np.column_stack([np.bincount(frame, np.where(level >= k, s, 0.0), size) for k in range(1, bins)])
     total = _reached(np.bincount(level, weights=s, minlength=bins).astype(float))
 
-    def score(weights: Array) -> dict[str, Array]:
+    def sums(weights: Array) -> Array:
         rows = max(1, CELLS // max(1, len(used) * bins))
         parts = [of_part(weights[k : k + rows]) for k in range(0, len(weights), rows)]
-        return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]} if parts else {}
+        return np.concatenate([np.zeros((0, 7, len(ALPHAS))), *parts])
 
-    def of_part(weights: Array) -> dict[str, Array]:
+    def of_part(weights: Array) -> Array:
         n, m = true_rows(weights), est_rows(weights)
-        together = _reached(met(weights).reshape(len(weights), len(used), bins))
+        together = _reached(met(weights).reshape(len(weights), len(used), bins))  # (D, U, 19): matches of each link
         similar = total + (weights - 1) @ near if by_level else weights @ near
-        return _scores(together, similar, n[:, true_id], m[:, est_id], n.sum(axis=1), m.sum(axis=1))
+        own, other = n[:, true_id, None], m[:, est_id, None]
+        ass = [_share(together * together, of).sum(axis=1) for of in (own + other - together, own, other)]
+        rows = np.broadcast_arrays(n.sum(axis=1)[:, None], m.sum(axis=1)[:, None], similar)
+        return np.stack([together.sum(axis=1), *rows[:2], *ass, similar], axis=1)
 
-    return score
+    return sums
 
 
 def _reached(by_level: Array) -> Array:
@@ -81,28 +94,21 @@ def _reached(by_level: Array) -> Array:
     return np.cumsum(by_level[..., :0:-1], axis=-1)[..., ::-1]
 
 
-def _scores(together: Array, near: Array, n: Array, m: Array, true: Array, est: Array) -> dict[str, Array]:
-    """Returns the eight scores, (D,) by key.
-
-    At each threshold: together (D, U, 19), matches of each link; near (D, 19), sum of similarities. n, m (D, U):
-    frames of the two ids of each link. true, est (D,): rows of both sides.
-    """
-    found = together.sum(axis=1)
-    n, m, true, est = n[..., None], m[..., None], true[:, None], est[:, None]
-
-    def share(part: Array, whole: Array) -> Array:
-        return ratio(part, np.broadcast_to(whole, part.shape), 0.0)
-
-    def mean_share(of: Array) -> Array:
-        return share(share(together * together, of).sum(axis=1), found)
-
-    det, ass = share(found, true + est - found), mean_share(n + m - together)
+def hota_scores(sums: Array) -> dict[str, Array]:
+    """Returns HOTA, DetA, AssA, DetRe, DetPr, AssRe, AssPr and LocA, (D,) by key, each the mean over `ALPHAS`. sums (D,
+    7, 19): as of `hota_sums`."""
+    found, true, est, *parts, similar = np.moveaxis(sums, 1, 0)
+    det = _share(found, true + est - found)
+    ass, ass_re, ass_pr = (_share(part, found) for part in parts)
     curves = {
-        "HOTA": np.sqrt(det * ass), "DetA": det, "AssA": ass, "DetRe": share(found, true), "DetPr": share(found, est),
-        "AssRe": mean_share(n), "AssPr": mean_share(m),
-        "LocA": np.maximum(LEAST, near) / np.maximum(LEAST, found),
+        "HOTA": np.sqrt(det * ass), "DetA": det, "AssA": ass, "DetRe": _share(found, true), "DetPr": _share(found, est),
+        "AssRe": ass_re, "AssPr": ass_pr, "LocA": np.maximum(LEAST, similar) / np.maximum(LEAST, found),
     }  # fmt: skip
     return {key: curve.mean(axis=1) for key, curve in curves.items()}
+
+
+def _share(part: Array, whole: Array) -> Array:
+    return ratio(part, np.broadcast_to(whole, part.shape), 0.0)
 
 
 def alignment(pairs: Pairs, frames: Ints) -> Array:

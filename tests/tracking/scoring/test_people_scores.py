@@ -8,6 +8,7 @@ import pytest
 from tests.matrix_pairs import matrix_pairs
 from tests.reference_trackeval import trackeval_scores
 from tracking.scoring.evaluation import weighted_people
+from tracking.scoring.track_scores import hota_sums
 from tracking.scoring.weighted_sums import unweighted
 
 SEEDS = range(15)
@@ -28,7 +29,7 @@ def random_case(seed: int, values=None, crowd: int = 9):
 
 def assert_equal_to_trackeval(true, est, similarity, pairs=None) -> None:
     pairs = pairs or matrix_pairs(true, est, similarity)
-    found = unweighted(weighted_people(pairs, pairs.size), pairs.size)
+    found = unweighted(weighted_people(pairs, pairs.size, hota_sums(pairs, pairs.size)), pairs.size)
     assert found == pytest.approx(trackeval_scores(true, est, similarity), abs=1e-9)
 
 
