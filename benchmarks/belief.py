@@ -36,7 +36,7 @@ from scipy.sparse.csgraph import connected_components
 from benchmarks.support.chart import Panel, lines
 from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA, add_data, add_seeds, new_parser, seed_range
 from benchmarks.support.replaced_code import replaced_code
-from benchmarks.support.tables import head, interval, number, row, signed, table
+from benchmarks.support.tables import difference_cell, head, interval, mean_cell, number, row, signed, table
 from scenarios.loading.resolve import resolve
 from sim.io.source import open_source
 from sim.types import Array, Bools, Ints, Truth
@@ -50,7 +50,7 @@ from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.pair_evidence import NAMES, NEAR, QUANTITIES, TIMES
 from tracking.scoring.evaluation import evaluate
-from tracking.stats import block_intervals, mean_interval
+from tracking.stats import block_intervals
 
 # Scenes to which the default is fitted: for *now*, and for *events*.
 TRAIN = (("streets", "streets", "standard"), ("standard", "friends-meet", "friends-meet-hard", "streets"))
@@ -167,15 +167,10 @@ def scores_of(name: str, seeds: range, groupings: Mapping[str, Grouping]) -> dic
 def suites(names: Sequence[str], seeds: range, belief: Belief) -> None:
     for name in names:
         found = scores_of(name, seeds, {"rule": LinkRule(), "belief": belief})
-        cells = {key: [*_cells(interval, values), text] for key, (values, text) in found.items()}
-        cells["belief minus rule"] = [*_cells(signed, found["belief"][0] - found["rule"][0]), ""]
+        cells = {key: [*map(mean_cell, values.T), text] for key, (values, text) in found.items()}
+        cells["belief minus rule"] = [*map(difference_cell, (found["belief"][0] - found["rule"][0]).T), ""]
         title = f"{Path(name).stem}, seeds {seeds.start}:{seeds.stop}, {len(found['rule'][0])} sequences"
         table(title, "", COLUMNS, cells)
-
-
-def _cells(write: object, values: Array) -> list[str]:
-    ends = mean_interval(values)
-    return [write(*map(float, x)) for x in zip(*ends, strict=True)]  # type: ignore[operator]
 
 
 def late_groups(*rows: Any, **options: Any) -> FoundGroups:
@@ -220,7 +215,7 @@ def decisions(names: Sequence[str], seeds: range, belief: Belief, data: Path) ->
             rows |= {f"{name}, quarter {k} by people in view": q for k, q in enumerate(np.array_split(order, 4), 1)}
         for title, chosen in rows.items():
             scores = found[chosen][np.isfinite(found[chosen, 0])]
-            row([title, *_cells(interval, scores), *_cells(signed, scores[:, [1]] - scores[:, [3]])])
+            row([title, *map(mean_cell, scores.T), difference_cell(scores[:, 1] - scores[:, 3])])
 
 
 def calibration(names: Sequence[str], seeds: range, belief: Belief, out: Path | None) -> None:
@@ -270,8 +265,8 @@ def ablation(seeds: range, check: range, data: Path) -> None:
         suites = [scores_of(name, check, groupings) for name in ("standard", "friends-meet", "streets")]
         base = next(iter(groupings))
         for name, grouping in groupings.items():
-            write, minus = (interval, 0.0) if name == base else (signed, 1.0)
-            near, meet, far = (_cells(write, found[name][0] - minus * found[base][0]) for found in suites)
+            write, minus = (mean_cell, 0.0) if name == base else (difference_cell, 1.0)
+            near, meet, far = ([*map(write, (found[name][0] - minus * found[base][0]).T)] for found in suites)
             row(
                 [name, near[0], near[2], suites[0][name][1], meet[0], far[0], suites[2][name][1],
                  *(number(_f1(truth, grouping)) for truth in truths)]

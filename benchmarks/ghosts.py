@@ -24,7 +24,7 @@ import tracking
 from benchmarks.support.in_memory import people_in_view
 from benchmarks.support.options import PETS, add_data, add_seeds, new_parser
 from benchmarks.support.replaced_code import replaced_code
-from benchmarks.support.tables import head, row, signed
+from benchmarks.support.tables import difference_cell, head, row
 from scenarios import load
 from sim import simulate
 from sim.io.pictures.background_sample import parse_choice
@@ -34,7 +34,6 @@ from tracking.detect import foreground as pipeline_module
 from tracking.detect.background import Background
 from tracking.detect.foreground import Foreground, Segmented
 from tracking.running.run import track
-from tracking.stats import paired
 
 FPS, SECONDS = 7, 30
 VIEW = ("tilt_deg=20", "image=[480,360]", "focal_px=600", "crop=true", "baseline=0")
@@ -63,8 +62,9 @@ def rows_of(title: str, jobs: Iterable[tuple[object, ...]], of: Callable[..., Ar
     head([title, "HOTA without", "HOTA", "added", "MOTA without", "MOTA", "added", "mended, px", "of people, px"])
     for k, sample in enumerate(SAMPLES):
         without, with_search = found[:, k, 0], found[:, k, 1]
-        means, added = (without.mean(0), with_search.mean(0)), np.stack(paired(without, with_search))
-        scores = [[f"{means[0][n]:.3f}", f"{means[1][n]:.3f}", signed(*added[:, n])] for n in (0, 1)]
+        means, added = (without.mean(0), with_search.mean(0)), with_search - without
+        ends = [difference_cell(added[:, n], score) for n, score in enumerate(("HOTA", "MOTA"))]
+        scores = [[f"{means[0][n]:.3f}", f"{means[1][n]:.3f}", ends[n]] for n in (0, 1)]
         row([sample, *scores[0], *scores[1], f"{means[1][2]:.0f}", f"{means[1][3]:.0f}"])
 
 

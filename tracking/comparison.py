@@ -20,10 +20,10 @@ from tracking.oracle import oracle
 from tracking.ranking import Ranking, rank, recording_rankings
 from tracking.running.run import TrackingRun, input_name, input_summary
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import Scorer, Scores
+from tracking.scoring.evaluation import Scorer, Scores, pooled
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.people_comparison import IncomparableError, Similarity
-from tracking.stats import mean_of_finite
+from tracking.stats import FEWEST, SURE, mean_of_finite
 
 if TYPE_CHECKING:
     import pyarrow
@@ -40,6 +40,7 @@ class ComparedSequence:
     given: list[str]  # the same with background and settings of the sensor; "" without run.json
     oracles: Mapping[str, Scores]  # by input; if no run says what it got, of the stored detections, else of the labels
     blocks: Mapping[str, Ranking] | None = None  # by score, the ranking with intervals by weights of blocks of frames
+    seconds: float = 0.0  # length of the sequence
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +56,7 @@ class ComparedRuns:
         similarity: How people were compared in all sequences.
         blocks: For a single recording, the ranking by each score (by key), with intervals by resampling of blocks of
             frames; None if these were not computed.
+        seconds: Length of all sequences together.
     """
 
     runs: tuple[str, ...]
@@ -64,6 +66,7 @@ class ComparedRuns:
     oracles: Mapping[str, list[Scores | None]]
     similarity: Similarity
     blocks: Mapping[str, Ranking] | None = None
+    seconds: float = 0.0
 
     def rows(self) -> dict[str, list[Scores | None]]:
         """Returns lists of scores, one per sequence, by name: first the oracles ("oracle from INPUT"), then the runs. A
@@ -83,11 +86,24 @@ class ComparedRuns:
         values = self.values(key)
         return rank(values if sequences is None else values[:, sequences], CATALOGUE[key].better == "higher")
 
+    def pooled(self) -> dict[str, dict[str, float]]:
+        """Returns for each name of `rows` the scores of all sequences together by key, as `tracking.scoring.pooled`.
+        They have no interval and rank nobody."""
+        return {name: pooled(one for one in row if one is not None) for name, row in self.rows().items()}
+
+    def indicative(self, key: str = "objective") -> bool:
+        """Returns True if intervals of the score `key` are only indicative: of fewer than 6 sequences in which all runs
+        have it, or of a recording shorter than a minute."""
+        if self.blocks is not None:
+            return self.seconds < SURE
+        return self.ranking(key).sequences < FEWEST
+
     def to_arrow(self, key: str = "objective") -> pyarrow.Table:
         """Returns the ranking by a score as a table, one row per run, best first, after the oracles.
 
         Columns: run; input; first and last, the range of ranks, null for oracles; mean, low and high, the mean of the
-        score and the ends of its 95 % interval; then the mean of every score of the catalogue that some row has.
+        score and the ends of its 95 % interval; indicative, whether the interval is of few sequences; then the mean of
+        every score of the catalogue that some row has.
         """
         import pyarrow as pa
 
@@ -104,6 +120,8 @@ class ComparedRuns:
         for part in ("mean", "low", "high"):
             ends = np.concatenate([*(getattr(one, part) for one in of_oracles), getattr(ranking, part)])
             columns[part] = CATALOGUE[key].within(ends).tolist()
+        of_runs = [self.indicative(key)] * len(names)
+        columns["indicative"] = [*(one.sequences < FEWEST for one in of_oracles), *of_runs]
         for each in CATALOGUE:
             means = [mean_of_finite(_values(rows[name], each)) for name in columns["run"]]
             if np.isfinite(means).any():
@@ -184,8 +202,9 @@ def joined(names: SequenceOf[str], sequences: SequenceOf[str], found: SequenceOf
         name: [one.oracles.get(name) for one in found] for name in sorted({n for one in found for n in one.oracles})
     }
     blocks = found[0].blocks if len(found) == 1 else None
+    seconds = sum(one.seconds for one in found)
     return ComparedRuns(
-        tuple(names), tuple(sequences), scores, inputs, oracles, next(iter(ways), "ground"), blocks
+        tuple(names), tuple(sequences), scores, inputs, oracles, next(iter(ways), "ground"), blocks, seconds
     )  # fmt: skip
 
 
@@ -214,7 +233,8 @@ def compare_one(
             drawn = recording_rankings(scorer.truth, weighted, blocks)
     own = dict(zip(best, found, strict=False))
     named, summaries = [name or UNKNOWN for name in inputs], [input_summary(info) for info in infos]
-    return ComparedSequence(found[len(best) :], named, summaries, own, drawn)
+    seconds = scorer.truth.length / scorer.truth.fps
+    return ComparedSequence(found[len(best) :], named, summaries, own, drawn, seconds)
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from sim.types import Array
+from tracking.scoring.catalogue import Score
 
 DRAWS = 2000  # Draws of weights, or bootstrap samples.
 LEVEL = 0.95  # Confidence level of all intervals.
@@ -141,3 +142,14 @@ def block_weights(frames: int, block: int, draws: int, r: np.random.Generator) -
     # The first frame follows the last one, so that every frame is drawn equally often.
     weights = np.cumsum(change, axis=1)
     return np.asarray(weights[:, :frames] + weights[:, frames:-1])
+
+
+def score_interval(score: Score, values: Array, difference: bool = False) -> dict[str, Array]:
+    """Returns "mean", "low" and "high" as `mean_interval` does, cut at the range of the score, and "indicative", (K,)
+    each.
+
+    An interval is indicative if fewer than `FEWEST` sequences are known. values: (S, K). difference: True if values are
+    differences of the score.
+    """
+    mean, low, high = (score.within(end, difference) for end in mean_interval(values))
+    return {"mean": mean, "low": low, "high": high, "indicative": np.isfinite(values).sum(axis=0) < FEWEST}

@@ -16,7 +16,7 @@ import numpy as np
 
 import tracking
 from benchmarks.support.replaced_code import Replacement, replaced_code
-from benchmarks.support.tables import head, interval, row, signed
+from benchmarks.support.tables import difference_cell, head, mean_cell, row
 from scenarios.loading.resolve import Entry, resolve
 from sim.sequence import simulate
 from sim.types import Array, Sequence
@@ -24,7 +24,6 @@ from tracking.grouping import foot_points, ground_of_boxes
 from tracking.grouping.ground_of_boxes import Ground
 from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import Scorer
-from tracking.stats import mean_interval
 
 CAMERAS: Mapping[str, tuple[str, ...]] = {
     "the suite's camera": (),
@@ -67,11 +66,6 @@ def _bare(sequence: Sequence) -> Sequence:
     return replace(sequence, camera=None, scene=None, px_per_m=float("nan"))
 
 
-def _ends(values: Array) -> tuple[float, float, float]:
-    mean, low, high = (float(end[0]) for end in mean_interval(values[:, None]))
-    return mean, low, high
-
-
 def ground(seeds: range) -> None:
     """Prints the table."""
     warnings.simplefilter("ignore", UserWarning)  # of what a part that is left out makes of its tracks
@@ -79,10 +73,10 @@ def ground(seeds: range) -> None:
             for name, settings in CAMERAS.items()}  # fmt: skip
     head(["", *CAMERAS])
     base = {name: pairwise(scenes) for name, scenes in made.items()}
-    row(["`blob`", *(interval(*_ends(values)) for values in base.values())])
+    row(["`blob`", *(mean_cell(values) for values in base.values())])
     for name, part in PARTS.items():
         with replaced_code([part]):
-            row([name, *(signed(*_ends(pairwise(scenes) - base[key])) for key, scenes in made.items())])
+            row([name, *(difference_cell(pairwise(scenes) - base[key]) for key, scenes in made.items())])
     for name, parts in {"with its camera": [], "with its camera, depth counts in full": [DEPTH]}.items():
         with replaced_code(parts):
-            row([name, *(signed(*_ends(pairwise(scenes, known=True) - base[key])) for key, scenes in made.items())])
+            row([name, *(difference_cell(pairwise(scenes, known=True) - base[key]) for key, scenes in made.items())])

@@ -27,12 +27,11 @@ from benchmarks.blob.boxes import (
 from benchmarks.peers import synthetic
 from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE
 from benchmarks.support.replaced_code import Replacement, replaced_code
-from benchmarks.support.tables import head, row, signed
+from benchmarks.support.tables import difference_cell, head, row
 from sim.io.source import open_source
 from tracking.filters import existence
 from tracking.papers.blob import track_management, update_from_boxes
 from tracking.papers.blob.track_management import TrackedPeople
-from tracking.stats import mean_interval
 
 DOUBLED = 0.1
 RECORDINGS = (TOWN_CENTRE, PETS, CAMPUS)
@@ -83,9 +82,7 @@ def differences(made: Sequence[list[Scene]], base: Sequence[np.ndarray], change:
     """Returns the cells of a row: HOTA minus `base`, with an interval where there are several scenes."""
     cells = []
     for scenes, before in zip(made, base, strict=True):
-        difference = hota(scenes, change) - before
-        mean, low, high = (float(v[0]) for v in mean_interval(difference[:, None]))
-        cells.append(signed(mean, low, high) if len(scenes) > 1 else f"{mean:+.3f}")
+        cells.append(difference_cell(hota(scenes, change) - before))
     return cells
 
 

@@ -17,11 +17,10 @@ import numpy as np
 
 from benchmarks.group_pda.runs import REPLACED, Row, TrackingJob, Variant, measure, trackers, with_points
 from benchmarks.support.options import seeds_text
-from benchmarks.support.tables import interval, share, signed, table
+from benchmarks.support.tables import difference_cell, mean_cell, share, table
 from scenarios.loading.resolve import Entry, resolve
 from sim.types import Array
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.stats import mean_interval, paired
 
 SCENES = ("merge", "split", "cross", "queue", "side-by-side")
 DENSE = ("cross-dense", "pass-by-dense")  # Of the suite `standard`.
@@ -46,9 +45,13 @@ def _ids_kept(row: Row) -> float:
     return row["kept"] / row["pairs"] if row["pairs"] else float("nan")
 
 
+def _score(key: str) -> str:
+    return "HOTA" if key == "ids" else key  # another share
+
+
 def mean_of(key: str) -> Column:
     """Mean of a score over the sequences in which it is known."""
-    return lambda rows: interval(*(float(x[0]) for x in mean_interval(values(rows, [key]))))
+    return lambda rows: mean_cell(values(rows, [key])[:, 0], _score(key))
 
 
 def pooled_lineage(rows: Sequence[Row]) -> str:
@@ -102,8 +105,9 @@ def decisions(given: argparse.Namespace) -> Any:
         default = values(rows["default"], DECIDED)
         cells = {"default": [mean_of(key)(rows["default"]) for key in DECIDED]}
         for name in (*WITHOUT, *REPLACED):
-            ends = paired(values(rows[name], DECIDED), default)
-            cells[f"default minus without {name}"] = [signed(*(float(e[k]) for e in ends)) for k in range(len(DECIDED))]
+            less = default - values(rows[name], DECIDED)
+            pairs = zip(DECIDED, less.T, strict=True)
+            cells[f"default minus without {name}"] = [difference_cell(x, _score(key)) for key, x in pairs]
         title = f"{scene}: {heading(given, rows)}; paired differences"
         table(title, "", ["ids kept" if key == "ids" else key for key in DECIDED], cells)
     return found

@@ -21,7 +21,6 @@ from tracking.filters.person_streams import PersonStreams
 from tracking.papers.joint.config import SPEED_PRIOR, JointConfig
 from tracking.papers.joint.decentralised_filter import Nested, advance
 from tracking.papers.joint.distributions import BIRTHS, RESAMPLING, STATE, FrameModel, process_noise
-from tracking.stats import paired
 
 HISTORY = 6  # With 8 no figure changes.
 RATE = 0.1  # 1/s: of changes of Z.
@@ -210,7 +209,7 @@ def coupling(given: argparse.Namespace) -> None:
             errors = [error(places, x, mask) for places, _ in found]
             alone, filtered = (f"{np.nanmean(errors[k]):.1f}" for k in (0, 3))
             compared = ((0, 1), (0, 2), (3, 4), (3, 5))
-            deltas = [tables.signed(*map(float, paired(errors[a], errors[b]))) for a, b in compared]
+            deltas = [tables.difference_cell(errors[b] - errors[a], "RMSE_pos") for a, b in compared]
             cells[name] = [alone, *deltas[:2], filtered, *deltas[2:], " / ".join(losses)]
     for title, cells in rows.items():
         tables.table(f"{title}: {len(pairs)} pairs", "condition", COLUMNS, cells)

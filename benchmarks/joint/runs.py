@@ -16,7 +16,6 @@ from sim.types import Sequence as Recording
 from tracking.papers.joint.config import JointConfig
 from tracking.running.run import track
 from tracking.scoring import evaluate
-from tracking.stats import paired
 
 Row = dict[str, float]
 SHARES = ("1-FP", "1-FN", "GDSR", "MOTA")
@@ -83,5 +82,4 @@ def pooled(rows: Sequence[Row], end: str) -> list[str]:
 def difference(first: Sequence[Row], second: Sequence[Row], key: str) -> str:
     """Returns the cell of the paired difference of a score, first minus second."""
     a, b = (np.array([row[key] for row in rows]) for rows in (first, second))
-    both = np.isfinite(a) & np.isfinite(b)
-    return tables.signed(*map(float, paired(b[both], a[both])))
+    return tables.difference_cell(a - b, key)

@@ -19,7 +19,7 @@ from tracking.fitting.relational import LABELS
 from tracking.papers.relational.config import ParticleConfig
 from tracking.running.prepare import prepare
 from tracking.running.tracker_registry import find
-from tracking.stats import mean_interval, paired
+from tracking.stats import mean_interval
 
 FILTERS = ("particle", "relational")
 DIFFERENCE = "relational − particle"
@@ -88,7 +88,7 @@ def particles(given: argparse.Namespace) -> None:
             cells = []
             for preset in PRESETS:
                 found = {name: _errors_by_seed(name, count, preset, scenes, given) for name in FILTERS}
-                cells += [tables.interval(*map(float, mean_interval(values))) for values in found.values()]
+                cells += [tables.mean_cell(values, "RMSE_pos") for values in found.values()]
                 cells.append(_difference(found))
                 for name, values in found.items():
                     curves.setdefault(f"{name}, {preset}", []).append(np.array(mean_interval(values)))
@@ -108,12 +108,12 @@ def _errors_by_seed(name: str, count: int, preset: str, scenes: list[Sequence], 
 
 def _difference(values: dict[str, Any]) -> str:
     before, after = (np.array(values[name]) for name in FILTERS)
-    return tables.signed(*map(float, paired(before, after)))
+    return tables.difference_cell(after - before, "RMSE_pos")
 
 
 def _row(first: str, mean: Mapping[str, Array | list[float]]) -> None:
     values = {name: np.array(x) for name, x in mean.items()}
-    cells = [tables.interval(*map(float, mean_interval(values[name]))) for name in FILTERS]
+    cells = [tables.mean_cell(values[name], "RMSE_pos") for name in FILTERS]
     tables.row([first, *cells, _difference(values)])
 
 

@@ -19,7 +19,6 @@ from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import with_groups, without_groups
 from tracking.grouping.link_rule import LinkRule
 from tracking.running.prepare import prepare
-from tracking.stats import paired
 
 COLUMNS = ("HOTA", "IDF1", "group_F1_hull", "pairwise_F1")
 # The seed of a filter is that of the scene, and so much more for each further filter seed.
@@ -96,6 +95,4 @@ def title(given: argparse.Namespace, count: int) -> None:
 
 def differences(before: Array, after: Array) -> list[str]:
     """Returns the paired differences of each column over the sequences (N, C) in which both values are known."""
-    known = np.isfinite(before) & np.isfinite(after)
-    pairs = [paired(a[k], b[k]) for a, b, k in zip(before.T, after.T, known.T, strict=True)]
-    return [tables.signed(*map(float, p)) for p in pairs]
+    return [tables.difference_cell(column) for column in (after - before).T]

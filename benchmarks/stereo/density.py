@@ -22,7 +22,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.stereo.scenes import Row, entries, position_errors, recordings
-from benchmarks.support.tables import head, interval, row, signed
+from benchmarks.support.tables import difference_cell, head, mean_cell, row
 from scenarios.loading.resolve import Entry, load
 from sim.geometry.hull_kernels import convex_hull
 from sim.scene.camera import project
@@ -30,7 +30,6 @@ from sim.types import Camera, Tracks
 from sim.types import Sequence as Recording
 from tracking.running.run import track
 from tracking.scoring import evaluate
-from tracking.stats import mean_interval
 
 SCENE = "scenarios/suites/subtraction-stereo/crowded.toml"
 # Groups from each side; two fifths as many come towards the camera, at least one.
@@ -42,6 +41,8 @@ ROWS = ("stereo", "stereo, radius 0.8", "blob", "stereo, in the image", "group-p
 HALF = 0.85
 KEYS = {"group F1": "group_F1_hull", "1-FP": "group_1-FP", "1-FN": "group_1-FN", "MOTA": "group_MOTA",
         "ground, m": "ground", "found": "found"}  # fmt: skip
+
+ALIKE = {"ground": "RMSE_pos", "found": "HOTA"}  # scores of the catalogue with the same range
 
 
 def density(args: argparse.Namespace) -> dict[str, dict[str, list[Row]]]:
@@ -60,8 +61,8 @@ def density(args: argparse.Namespace) -> dict[str, dict[str, list[Row]]]:
         for name, rows in by.items():
             own = by[RIVALS.get(name, name)]
             less = [a["group_F1_hull"] - b["group_F1_hull"] for a, b in zip(own, rows, strict=True)]
-            cells = [interval(*_interval([r.get(key, np.nan) for r in rows])) for key in KEYS.values()]
-            difference = signed(*_interval(less)) if name in RIVALS else "–"
+            cells = [mean_cell([r.get(key, np.nan) for r in rows], ALIKE.get(key, key)) for key in KEYS.values()]
+            difference = difference_cell(less) if name in RIVALS else "–"
             row([scene, f"{np.mean(people):.1f}", str(len(rows)), name, *cells, difference])
     return made
 
@@ -108,8 +109,3 @@ def in_image(tracks: Tracks, camera: Camera) -> Tracks:
     return tracks.replace(
         plane="image", pos=pos, vel=np.zeros_like(pos), cov=np.zeros((len(pos), 4, 4)), groups=moved, events=events
     )
-
-
-def _interval(values: list[float]) -> tuple[float, float, float]:
-    mean, low, high = map(float, mean_interval(np.array(values)))
-    return mean, low, high

@@ -32,7 +32,7 @@ import numpy as np
 from benchmarks.stereo.kept_points import shared_points
 from benchmarks.support.in_memory import in_memory
 from benchmarks.support.replaced_code import Replacement, replaced_code
-from benchmarks.support.tables import interval, number, signed, table
+from benchmarks.support.tables import difference_cell, mean_cell, number, table
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import Entry, resolve
 from sim.sequence import simulate
@@ -42,7 +42,7 @@ from tracking.papers.stereo import space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
 from tracking.running.run import track
 from tracking.scoring import evaluate
-from tracking.stats import mean_interval
+from tracking.scoring.catalogue import CATALOGUE
 
 Row = dict[str, float]
 DEEPEST, NEAR = 8.0, 1.5  # m
@@ -204,7 +204,7 @@ def _switched_off(
 def _difference(made: Mapping[str, Mapping[str, list[Row]]], name: str, key: str) -> str:
     pairs = [pair for by in made.values() for pair in zip(by[name], by["default"], strict=True)]
     off = np.array([a.get(key, np.nan) - b.get(key, np.nan) for a, b in pairs])
-    return signed(*map(float, mean_interval(off)))
+    return difference_cell(off, key if key in CATALOGUE else "RMSE_pos")
 
 
 def _cells(scene: str, rows: list[Row]) -> list[str]:
@@ -215,6 +215,6 @@ def _cells(scene: str, rows: list[Row]) -> list[str]:
 
     names = ("ground", "offset", "seen side", "middle", "all depths")
     errors = [f"{mean(key, 'known')} ± {mean(f'{key} sd', 'known')}" for key in names]
-    f1 = interval(*map(float, mean_interval(np.array([r.get("group_F1_hull", np.nan) for r in rows]))))
+    f1 = mean_cell([r.get("group_F1_hull", np.nan) for r in rows])
     places = [mean("along", "known"), mean("found", "places")]
     return [PRINTED.get(scene, "–"), *errors, *places, f1, mean("merge_F1"), mean("extra")]

@@ -7,9 +7,12 @@ from math import sqrt
 
 import numpy as np
 
-from tracking.stats import LEVEL
+from sim.types import Array
+from tracking.scoring.catalogue import CATALOGUE
+from tracking.stats import LEVEL, score_interval
 
 EXACT = 1e-12  # a difference nearer to 0 is due to rounding
+INDICATIVE = ", indicative"  # follows intervals of fewer than 6 sequences
 NORMAL = 1.959963984540054  # a standard normal variable lies within +- NORMAL with probability LEVEL
 
 
@@ -48,6 +51,26 @@ def table(title: str, first: str, columns: Sequence[str], rows: Mapping[str, Seq
     if differences:
         chance = (1 - LEVEL) * len(differences)
         print(f"\n* a sure difference, in the direction of its sign; of {len(differences)} some {chance:.2g} by chance")
+
+
+def mean_cell(values: Sequence[float] | Array, score: str = "HOTA", digits: int = 3) -> str:
+    """Returns the mean of values (S,) of S sequences with its interval, cut at the range of a score of the catalogue;
+    with the word indicative if fewer than 6 values are known."""
+    mean, low, high, few = _ends(values, score, difference=False)
+    return interval(mean, low, high, digits) + INDICATIVE * few
+
+
+def difference_cell(values: Sequence[float] | Array, score: str = "HOTA") -> str:
+    """Returns the mean of differences (S,) of S sequences with its interval, cut at those that a score of the catalogue
+    can have; with the word indicative, and never sure, if fewer than 6 are known."""
+    mean, low, high, few = _ends(values, score, difference=True)
+    return signed(mean, low, high).removesuffix(" *") + INDICATIVE if few else signed(mean, low, high)
+
+
+def _ends(values: Sequence[float] | Array, score: str, difference: bool) -> tuple[float, float, float, bool]:
+    found = score_interval(CATALOGUE[score], np.asarray(values, float)[:, None], difference)
+    mean, low, high = (float(found[end][0]) for end in ("mean", "low", "high"))
+    return mean, low, high, bool(found["indicative"][0] and np.isfinite(low))
 
 
 def interval(mean: float, low: float, high: float, digits: int = 3) -> str:

@@ -176,8 +176,8 @@ READERS: dict[str, tuple[str, str, str, Callable[[Path, RecordingOptions], Seque
     "caviar": ("a CAVIAR recording", ON_LABELS, "its truth is in the image, without pictures", caviar.open_file),
     "video": ("a video without --boxes", "box_options", "it has no boxes", video.open_video),
     "text": ("a text", "background", "it has no pictures", mot_text.open_text),
-    "kitti": ("a text of KITTI", ON_LABELS, DRIVES, partial(people_texts.open_text, "kitti")),
-    **{k: (*TRAJECTORIES, partial(people_texts.open_text, k)) for k in people_texts.LAYOUTS if k != "kitti"},
+    "kitti": ("a text of KITTI", "camera background box_scale min_score", DRIVES, people_texts.open_kitti),
+    **{k: (*TRAJECTORIES, partial(people_texts.open_text, k)) for k in people_texts.LAYOUTS},
 }
 
 

@@ -184,6 +184,7 @@ class ScoreOptions(BoxOptions, words="score"):
     blocks: int = option("Intervals for a single recording, by N draws of blocks of frames.", 0, low=0, metavar="N")
     by: str | None = option(
         "The score that ranks. Default: objective, or what all runs have of it.", None, metavar="SCORE")
+    csv: Path | None = option("Write all scores, with mean, interval and pooled row.", None, metavar="FILE.csv")
     workers: int = PROCESSES()
 
 

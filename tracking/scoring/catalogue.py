@@ -33,9 +33,11 @@ class Score:
     meaning: str  # definition in words
     source: str = ""  # the paper that defines it, "" if flockscope does
 
-    def within(self, values: Array) -> Array:
-        """Returns the values, ends of an interval, as clipped to the range of possible values."""
-        return values.clip(self.low, self.high)
+    def within(self, values: Array, difference: bool = False) -> Array:
+        """Returns the values, ends of an interval, as clipped to the range of possible values. difference: True if they
+        are ends of an interval of differences."""
+        span = self.high - self.low
+        return values.clip(-span, span) if difference else values.clip(self.low, self.high)
 
 
 def _core(score: Score) -> Score:

@@ -111,12 +111,13 @@ def pooled(scores: Iterable[Scores]) -> dict[str, float]:
         The pooled scores in the order of the catalogue; {} if no sequence has scores of people.
     """
     known = [one for one in scores if one.hota is not None]
-    if not known:
+    sums = [one.hota for one in known if one.hota is not None]
+    if not sums:
         return {}
     found = {key: sum(one[key] for one in known) for key in COUNTS}
     hits, true, est, right = found["TP"], found["TP"] + found["FN"], found["TP"] + found["FP"], found["IDTP"]
     similar = sum(one["MOTP"] * one["TP"] for one in known)
-    found |= {key: float(value[0]) for key, value in hota_scores(np.sum([[one.hota for one in known]], axis=1)).items()}
+    found |= {key: float(value[0]) for key, value in hota_scores(np.sum(sums, axis=0)[None]).items()}
     ratios = {
         "MOTA": (hits - found["FP"] - found["IDSW"], true), "MOTP": (similar, hits),
         "IDF1": (2 * right, true + est), "IDP": (right, est), "IDR": (right, true),

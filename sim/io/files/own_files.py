@@ -85,11 +85,11 @@ def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
         return None
 
 
-def refuse_foreign_file(path: Path, marks: Marks | None = None) -> None:
+def refuse_foreign_file(path: Path, marks: Marks | None = None, option: str = "--out") -> None:
     """Raises InputError if something is at `path` that flockscope did not write. marks: as for `is_ours`."""
     if path.exists() and not is_ours(path, marks):
         got, expected = "a file that flockscope did not write", "its own file, or none"
-        raise InputError(file=path, got=got, expected=expected, remedy="move it away, or choose another --out")
+        raise InputError(file=path, got=got, expected=expected, remedy=f"move it away, or choose another {option}")
 
 
 def output_file(out: Path, suffix: str, option: str = "--out") -> Path:

@@ -8,13 +8,15 @@ These are positions on the ground in m.
 
 KITTI's labels, or results of a tracker, have 17 cells apart by blanks: frame (from 0), id, type, truncated, occluded,
 alpha, left, top, right, bottom in px, and the size, place and rotation of a body before a camera that drives; results
-have a score as the 18th. People are of the types in PEOPLE, and are read with their boxes; other types are left out.
+have a score as the 18th. People are of the type Pedestrian, and are read with their boxes. Labels that KITTI's own
+evaluation does not count are unscored: seated persons, people who are truncated or heavily occluded, regions DontCare.
 """
 
 from __future__ import annotations
 
 import math
 import re
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,9 +29,9 @@ from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_
 from sim.io.formats.biwi import frame_numbers
 from sim.io.formats.mot_table import reject_swapped, table_of_rows
 from sim.io.formats.mot_text import frame_rate, truth_of_table
-from sim.io.formats.options import RecordingOptions
+from sim.io.formats.options import Classes, RecordingOptions
 from sim.io.recorded_sequence import recorded_sequence
-from sim.types import Sequence, Truth
+from sim.types import Bools, Sequence, Truth, Unscored
 
 NDJSON = ".ndjson"
 ETH_FPS = 2.5
@@ -39,8 +41,13 @@ PEDPY = re.compile(r"#.*framerate|#\s*(id|persid)\s+(frame|fr)\b", re.IGNORECASE
 KITTI_FPS = 10.0
 KITTI_CELLS = (17, 18)
 KITTI_LAYOUT = "frame id type truncated occluded alpha left top right bottom …"
-PEOPLE = ("Pedestrian", "Person", "Person_sitting")
+PEDESTRIANS = ("pedestrian",)
+ALIKE = {"pedestrian": ("person", "person_sitting"), "car": ("van",)}  # by class, types that are its distractors
+REGION = "dontcare"
+MOST_TRUNCATED, MOST_OCCLUDED = 0, 2  # levels up to which a label is scored
+MIN_HEIGHT = 25.0  # px: tracks on nobody of at most this height are left out
 
+Words = np.ndarray[tuple[int], np.dtype[np.str_]]
 # rows with the columns of a MOTChallenge text, and the frames per second that the text states
 People = tuple[NumericTable, float | None]
 
@@ -66,15 +73,20 @@ def open_text(layout: str, path: Path, options: RecordingOptions) -> Sequence:
     if not len(rows.line):
         raise InputError(file=path, got="no row", expected="people with frame, id, x and y", remedy="restore it")
     rate = frame_rate(options.fps, stated, "trajectories", ETH_FPS)
+    return _sequence(path, rows, rate, int(rows.values[:, 0].max()), options, None)
+
+
+def _sequence(
+    path: Path, rows: NumericTable, rate: float, length: int, options: RecordingOptions, unscored: Unscored | None
+) -> Sequence:
     table = table_of_rows(rows, boxless=True)
     rows.reject(table.id < 0, "ids from 0", "correct the id")
     reject_swapped(rows)
-    length = int(table.frame.max())
 
     def truth() -> Truth:
-        return truth_of_table(table, path.stem, rate, length, options.scale)
+        return truth_of_table(table, path.stem, rate, length, options.scale).replace(unscored=unscored)
 
-    source = {"kind": "people text", "path": str(path)}
+    source = {"kind": "people text", "path": str(path), **options.box_options.given()}
     return recorded_sequence(source, path.stem, rate, length, load_truth=truth, px_per_m=options.scale)
 
 
@@ -140,18 +152,57 @@ def _bad(path: Path, number: int, got: object, expected: str) -> InputError:
     return InputError(file=path, place=f"line {number}", got=got, expected=expected, remedy=CORRECT)
 
 
-def _read_kitti(path: Path, fps: float | None) -> People:
+LAYOUTS = {"trajnet": _read_ndjson, "eth": _read_eth, "pedpy": _read_pedpy}
+
+
+def open_kitti(path: Path, options: RecordingOptions) -> Sequence:
+    """Returns a text of KITTI's labels as Sequence with truth, in which `Unscored` follows KITTI's evaluation.
+
+    The classes of `options.box_options`, by default pedestrian, are people.
+    """
+    classes = options.box_options.person_class or PEDESTRIANS
+    rows, kinds = _kitti_rows(path, classes)
+    named, (truncated, occluded) = np.isin(kinds, classes), rows.values[:, 6:].T.astype(np.int64)
+    people = named & (truncated <= MOST_TRUNCATED) & (occluded <= MOST_OCCLUDED)
+    alike = np.isin(kinds, [kind for each in classes for kind in ALIKE.get(each, ())])
+    distractor, region = (named | alike) & ~people, kinds == REGION
+    rows.reject(distractor & (rows.values[:, 1] < 0), "ids from 0", "correct the id")
+    order = np.flatnonzero(distractor | region)
+    order = order[np.argsort(rows.values[order, 0], kind="stable")]
+    frame = rows.values[:, 0].astype(np.int64)
+    unscored = Unscored(frame[order], rows.values[order, 2:6], distractor[order], region[order], MIN_HEIGHT)
+    rate = frame_rate(options.fps, KITTI_FPS)
+    return _sequence(path, _kept(rows, people), rate, int(frame.max()), options, unscored)
+
+
+def kitti_tracks(path: Path, person_class: Classes | None) -> NumericTable:
+    """Returns the rows of a text of tracks that are of these classes, by default pedestrians, as those of
+    MOTChallenge."""
+    classes = person_class or PEDESTRIANS
+    rows, kinds = _kitti_rows(path, classes)
+    return _kept(rows, np.isin(kinds, classes))
+
+
+def _kitti_rows(path: Path, classes: Classes) -> tuple[NumericTable, Words]:
+    """Returns rows frame (from 1), id, left, top, width, height, truncated, occluded, and the types in lower case.
+
+    Many recordings of KITTI have no pedestrians, or no cars: this gives a warning. Raises InputError if no row has one
+    of other classes.
+    """
     text = read_rows(path)
-    rows = text.numbers(KITTI_CELLS, layout=KITTI_LAYOUT, use=[0, 1, 6, 7, 8, 9])
-    kinds = np.array(text.words(2))
-    people = np.isin(kinds, PEOPLE)
-    if not people.any():
-        got = ", ".join(np.unique(kinds).tolist())
-        raise InputError(file=path, got=got, expected=" or ".join(PEOPLE), remedy="give labels of people")
-    rows = replace(rows, values=rows.values[people], line=rows.line[people])
+    rows = text.numbers(KITTI_CELLS, layout=KITTI_LAYOUT, use=[0, 1, 3, 4, 6, 7, 8, 9])
     rows.reject(rows.values[:, 0] < 0, "frames from 0", "correct the frame")
-    frame, id, corner, far = np.hsplit(rows.values, (1, 2, 4))
-    return replace(rows, values=np.hstack([frame + 1, id, corner, far - corner])), KITTI_FPS
+    frame, id, levels, corner, far = np.hsplit(rows.values, (1, 2, 4, 6))
+    rows = replace(rows, values=np.hstack([frame + 1, id, corner, far - corner, levels]))
+    rows.integers(0, "frame")
+    kinds = np.array([word.lower() for word in text.words(2)], np.str_)
+    if len(kinds) and not np.isin(kinds, classes).any():
+        found, wanted = ", ".join(np.unique(kinds).tolist()), " or ".join(classes)
+        if not {*classes} <= ALIKE.keys():
+            raise InputError(file=path, place="--class", got=found, expected=wanted, remedy="name some of these")
+        warnings.warn(f"{path}: no {wanted}, only {found} (--class names others)", stacklevel=4)
+    return rows, kinds
 
 
-LAYOUTS = {"trajnet": _read_ndjson, "eth": _read_eth, "pedpy": _read_pedpy, "kitti": _read_kitti}
+def _kept(rows: NumericTable, mask: Bools) -> NumericTable:
+    return replace(rows, values=rows.values[mask, :6], line=rows.line[mask])

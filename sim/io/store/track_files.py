@@ -225,7 +225,7 @@ def read_track_text(
     box_scale: factors of x and y that make the boxes pixels. A column of groups makes them the tracker's own.
     """
     if people_texts.layout_of(path) == "kitti":
-        table = table_of_rows(people_texts.LAYOUTS["kitti"](path, fps)[0], length, box_scale=box_scale)
+        table = table_of_rows(people_texts.kitti_tracks(path, person_class), length, box_scale=box_scale)
     else:
         table = read_table(path, length=length, boxless=True, box_scale=box_scale)
     require_pixels(table.rows, table.boxes())

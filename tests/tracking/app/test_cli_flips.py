@@ -428,6 +428,7 @@ ELSEWHERE = {
     ("generate", "workers"),  # the same bytes for any number: tests/sim/dataset/test_generate.py
     ("track", "workers"),  # as well: test_stored_tracks.py
     ("score", "workers"),
+    ("score", "csv"),  # tests/tracking/scoring/test_protocols.py
     ("generate", "cluster"),  # and on a cluster: tests/sim/dataset/test_generate_cluster.py
     ("kitti", "folder"),  # tests/sim/io/export/test_kitti.py
     ("demo", "quick"),  # the long one is for `make demo`

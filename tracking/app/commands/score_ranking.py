@@ -13,7 +13,19 @@ import numpy as np
 from scenarios.errors import counted, printable, shortened
 from sim.types import Sequence
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import GROUP_MATCH, LOWER, SIMILARITY, TABLES, arrow, chance, number, table
+from tracking.app.commands.score_tables import (
+    FEW,
+    GROUP_MATCH,
+    LOWER,
+    PEOPLE,
+    POOLED,
+    SIMILARITY,
+    TABLES,
+    arrow,
+    chance,
+    number,
+    table,
+)
 from tracking.comparison import ComparedRuns, ComparedSequence, joined
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import FEWEST, SURE, mean_of_known
@@ -59,7 +71,7 @@ def usual_key(comparison: ComparedRuns) -> str:
 
 
 def scoring_notes(sequences: list[Sequence], found: list[ComparedSequence]) -> list[str]:
-    """Returns notes on sparse labels and on intervals of a short recording."""
+    """Returns notes on sparse labels, on tracks left out by the labels, and on intervals of a short recording."""
     scores, notes = [one.scores[0] for one in found], list[str]()
     sparse = [one for one in scores if one.step != 1]
     if sparse:
@@ -67,6 +79,10 @@ def scoring_notes(sequences: list[Sequence], found: list[ComparedSequence]) -> l
         where = "" if len(scores) == 1 else f" of {len(sparse)} of {len(scores)} sequences"
         scored, length = (sum(getattr(s, name) for s in sparse) for name in ("frames", "length"))
         notes.append(f"labels{where} are sparse ({steps}): only annotated frames are scored, {scored} of {length}")
+    left = [sum(scores.left_out for scores in run) for run in zip(*(one.scores for one in found), strict=True)]
+    if any(left):
+        rules = "by the labels (on distractors, in ignored regions or too low)"
+        notes.append(f"{', '.join(map(str, left))} tracked boxes are left out {rules}")
     seconds = scores[0].length / sequences[0].fps
     if found[0].blocks is not None and seconds < SURE:
         notes.append(f"intervals are indicative under {SURE:g} s: the recording lasts {seconds:.4g} s")
@@ -76,24 +92,25 @@ def scoring_notes(sequences: list[Sequence], found: list[ComparedSequence]) -> l
 def differences(c: ComparedRuns, key: str, by: str) -> list[dict[str, Any]]:
     """Returns a dict for each pair of runs, in the order of the ranking by the score `by`: the difference in `key`.
 
-    "run" minus "minus" has the "mean", "low" and "high"; "sure" is "better" or "worse" if "run" surely is so, else
-    False.
+    "run" minus "minus" has the "mean", "low" and "high", and "indicative" (bool); "sure" is "better" or "worse" if
+    "run" surely is so, else False.
     """
     found, places = c.ranking(key), {k: place for place, k in enumerate(c.ranking(key).order.tolist())}
-    rows = []
+    rows, few = [], c.indicative(key)
     for one, other in combinations(c.ranking(by).order.tolist(), 2):
         i, j = places[one], places[other]
         sure = "better" if found.better[i, j] else "worse" if found.better[j, i] else False
         ends = {"mean": found.less, "low": found.less_low, "high": found.less_high}
-        values = {end: float(part[i, j]) for end, part in ends.items()}
-        rows.append({"run": c.runs[one], "minus": c.runs[other], **values, "sure": sure})
+        cut = CATALOGUE[key].within
+        values = {end: float(cut(part[i, j], difference=True)) for end, part in ends.items()}
+        rows.append({"run": c.runs[one], "minus": c.runs[other], **values, "sure": sure, "indicative": few})
     return rows
 
 
 def ranking_result(every: RankedRuns) -> CommandResult:
     """Returns the ranking as the result of `score`."""
-    c, own = every.comparison, ("run", "input", "first", "last", "mean", "low", "high")
-    parts = ("mean", "low", "high", "sure")
+    c, own = every.comparison, ("run", "input", "first", "last", "mean", "low", "high", "indicative")
+    parts, together = ("mean", "low", "high", "sure", "indicative"), c.pooled()
     by_score = {key: differences(c, key, every.key) for key in CATALOGUE}
     pairs = []
     for n, pair in enumerate(by_score[every.key]):
@@ -105,7 +122,10 @@ def ranking_result(every: RankedRuns) -> CommandResult:
     data = {
         "by": every.key, "similarity": c.similarity, "sequences": list(c.sequences),
         "ranking": [
-            {**{key: row[key] for key in own}, "scores": {key: row.get(key, math.nan) for key in CATALOGUE}}
+            {
+                **{key: row[key] for key in own}, "scores": {key: row.get(key, math.nan) for key in CATALOGUE},
+                "pooled": together[row["run"]],
+            }
             for row in every.table
         ],
         "differences": pairs, "scenarios": scenarios,
@@ -115,7 +135,7 @@ def ranking_result(every: RankedRuns) -> CommandResult:
         },
         "notes": every.notes,
     }  # fmt: skip
-    shown = [_ranking_table(every), *([scenario_table] if len(scenarios) > 1 else [])]
+    shown = [_ranking_table(every), *_pooled_table(every, together), *([scenario_table] if len(scenarios) > 1 else [])]
     if len(pairs) == 1:
         shown.append(_score_differences(every, {key: rows[0] for key, rows in by_score.items()}))
     elif pairs:
@@ -127,6 +147,8 @@ def ranking_result(every: RankedRuns) -> CommandResult:
 def _last_lines(every: RankedRuns) -> Iterable[str]:
     c = every.comparison
     yield from verdict(c, every.key)
+    if len(c.sequences) > 1 and any(row["indicative"] for row in every.table):
+        yield FEW
     yield from every.notes
     match = next(iter(c.scores.values()))[0].group_match
     yield f"people compared by {SIMILARITY[c.similarity]}, groups by {GROUP_MATCH[match]}"
@@ -148,6 +170,14 @@ def _ranking_table(every: RankedRuns) -> str:
         return table(f"{title}, input {inputs[0]}", ["rank", "run"], numbers, rows)
     foot = "runs that got different inputs: a rank compares trackers with their inputs"
     return table(f"{title}, {len(inputs)} different inputs", ["rank", "run"], numbers, rows, ["input"], foot)
+
+
+def _pooled_table(every: RankedRuns, together: Mapping[str, Mapping[str, float]]) -> Iterable[str]:
+    if len(every.comparison.sequences) == 1 or not any(together.values()):
+        return
+    keys = [key for key in PEOPLE if any(key in row for row in together.values())]
+    rows = [[name, *(number(key, together[name].get(key)) for key in keys)] for name in (r["run"] for r in every.table)]
+    yield table(POOLED, ["run"], list(map(arrow, keys)), rows)
 
 
 def shown_columns(table: list[dict[str, Any]], key: str) -> list[str]:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from io import StringIO
+
+import numpy as np
 
 from scenarios.errors import InputError, counted, printable
-from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.evaluation import Scores
-from tracking.stats import LEVEL
+from tracking.scoring.catalogue import ALL, CATALOGUE
+from tracking.scoring.evaluation import Scores, pooled
+from tracking.stats import FEWEST, LEVEL, score_interval
 
 # The keys that are shown where there is room for one line only.
 SHOWN = ("HOTA", "MOTA", "IDF1", "group_F1", "group_GDSR2", "group_MOTA", "pairwise_F1", "event_F1", "event_latency")
@@ -44,20 +48,65 @@ SURFACE = {"ground": "on the ground, m", "image": "in the image, px"}
 LOWER = "↓ lower is better"  # The meaning of the arrow in headings.
 
 Rows = Sequence[tuple[str, Scores]]  # Name and scores of each sequence; scores are nan where unknown.
-Means = dict[str, dict[str, float]]  # By key: "mean", and "low" and "high" of its 95 % interval; nan where unknown.
+# By key: "mean", and "low" and "high" of its 95 % interval; nan where unknown. "indicative" (bool): of few sequences.
+Means = dict[str, dict[str, float]]
+
+FEW = f"intervals of fewer than {FEWEST} sequences are indicative"
+POOLED = "pooled: all sequences as one, as TrackEval's COMBINED, without an interval"
+
+CSV_HEAD = b"run,row,sequence,"  # the first line of a table of scores begins so
 
 
-def tables(rows: Rows, given: Sequence[str], means: Means, notes: Sequence[str] = ()) -> str:
+def summary(scores: Iterable[Scores]) -> Means:
+    """Returns the mean over sequences of each score by key, with its 95 % interval, within the score's range."""
+    found = list(scores)
+    ends = {score.key: score_interval(score, np.array([[one[score.key]] for one in found])) for score in ALL}
+    return {key: {part: values.tolist()[0] for part, values in one.items()} for key, one in ends.items()}
+
+
+def csv_bytes(sequences: Sequence[str], runs: Mapping[str, Sequence[Scores | None]], averaged: bool = True) -> bytes:
+    """Returns a CSV table with a column for each score of the catalogue, empty where unknown. Its rows are, for each
+    run: the S sequences, the mean with the ends of its interval, and the pooled scores.
+
+    sequences: names (S). runs: by name, the scores on each sequence, None where a run has none. averaged: False leaves
+    mean and pooled scores out."""
+    rows: list[tuple[str, str, str, Mapping[str, float]]] = []
+    for run, scores in runs.items():
+        known = [one for one in scores if one is not None]
+        rows += [(run, "sequence", name, one) for name, one in zip(sequences, scores, strict=True) if one is not None]
+        if averaged:
+            means = summary(known)
+            rows += [(run, p, "", {key: one[p] for key, one in means.items()}) for p in ("mean", "low", "high")]
+            rows.append((run, "pooled", "", pooled(known)))
+    text = StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow([*CSV_HEAD.decode().strip(",").split(","), *CATALOGUE])
+    for run, row, name, by_key in rows:
+        values = (by_key.get(key, math.nan) for key in CATALOGUE)
+        table.writerow([run, row, name, *(f"{value:.17g}" if math.isfinite(value) else "" for value in values)])
+    return text.getvalue().encode()
+
+
+def tables(
+    rows: Rows, given: Sequence[str], means: Means, together: Mapping[str, float], notes: Sequence[str] = ()
+) -> str:
     """Returns text: a table for each family of scores with a known mean, then lines on detections, comparison and
-    notes. given: of each sequence the detections in words, "" if unknown; means: by key, the mean over sequences."""
+    notes. given: of each sequence the detections in words, "" if unknown; means: by key, the mean over sequences;
+    together: pooled scores by key."""
     detections = " and ".join(dict.fromkeys(printable(words) or "unknown (no run.json)" for words in given))
     people = _any_known(PEOPLE[1:], means)
     titles = TABLES if people else GROUP_TRACKER_TABLES
     known = {title: keys for title, keys in titles.items() if _any_known(keys, means)}
-    parts = [_family(title, keys, rows, means) for title, keys in known.items()]
+    parts = [_family(title, keys, rows, means, together) for title, keys in known.items()]
     lines = [LOWER, f"detections {detections}", *_comparison_lines(rows, people, "groups, strict" in known)]
     if len(rows) == 1 and math.isfinite(means["objective"]["low"]):
         lines.append("intervals by weights of blocks of frames")
+    shown = [key for keys in known.values() for key in keys if math.isfinite(means[key]["low"])]
+    few = [key for key in shown if means[key]["indicative"]]
+    if few and len(rows) > 1:
+        lines.append(FEW if few == shown else f"{FEW}: {' '.join(few)}")
+    if together and len(rows) > 1:
+        lines.append(POOLED)
     return "\n".join([*parts, *lines, *notes])
 
 
@@ -65,11 +114,13 @@ def _any_known(keys: Sequence[str], means: Means) -> bool:
     return any(math.isfinite(means[key]["mean"]) for key in keys)
 
 
-def _family(title: str, keys: tuple[str, ...], rows: Rows, means: Means) -> str:
+def _family(title: str, keys: tuple[str, ...], rows: Rows, means: Means, together: Mapping[str, float]) -> str:
     shown = [[name, *(number(key, scores[key]) for key in keys)] for name, scores in rows]
     if any(math.isfinite(means[key]["low"]) for key in keys):
         for name, part in (("mean", "mean"), ("95 % low", "low"), ("95 % high", "high"))[len(rows) == 1 :]:
             shown.append([name, *(number(key, means[key][part], mean=True) for key in keys)])
+    if len(rows) > 1 and not together.keys().isdisjoint(keys):
+        shown.append(["pooled", *(number(key, together.get(key)) for key in keys)])
     return table(title, ["sequence"], [_heading(key, rows) for key in keys], shown)
 
 

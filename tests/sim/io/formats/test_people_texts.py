@@ -36,6 +36,9 @@ KITTI = "".join(
         ("1 0 Pedestrian 0 1 -0.3 103.0 150.0 133.0 230.0", ""),
         ("1 2 Car 0 0 -0.3 296.7 161.7 455.2 292.3", ""),
         ("2 5 Person_sitting 0 2 -0.3 10.0 150.0 40.0 210.0", " 0.8"),
+        ("3 -1 DontCare -1 -1 -10 219.3 188.5 245.5 218.6", ""),
+        ("2 0 Pedestrian 1 0 -0.3 106.0 150.0 136.0 230.0", ""),
+        ("1 7 Pedestrian 0 3 -0.3 203.0 150.0 233.0 230.0", ""),
     ]
 )
 RATES = {"walk.ndjson": 2.5, "walk.txt": 2.5, "hall.txt": 16.0, "room.txt": 8.0}
@@ -61,10 +64,31 @@ def test_frames_positions_and_rate(tmp_path, name):
 def test_people_with_boxes(tmp_path):
     sequence = opened(tmp_path, "0012.txt", KITTI)
     truth = sequence.truth
-    assert (sequence.fps, sequence.length, sequence.has_detections) == (10.0, 3, False)
-    assert list(zip(truth.frame.tolist(), truth.id.tolist(), strict=True)) == [(1, 0), (2, 0), (3, 5)]
+    assert (sequence.fps, sequence.length, sequence.has_detections) == (10.0, 4, False)
+    assert list(zip(truth.frame.tolist(), truth.id.tolist(), strict=True)) == [(1, 0), (2, 0)]
     np.testing.assert_allclose(truth.box[0], [100, 150, 30.5, 80])
     assert truth.pos is None
+
+
+def test_labels_that_kitti_does_not_count_are_unscored(tmp_path):
+    """Regions, seated people, people outside the picture in part, and people who are hidden for the most part."""
+    unscored = opened(tmp_path, "0012.txt", KITTI).truth.unscored
+    assert unscored.frame.tolist() == [1, 2, 3, 3, 4]
+    assert unscored.region.tolist() == [True, False, False, False, True]
+    assert unscored.distractor.tolist() == [False, True, True, True, False]
+    np.testing.assert_allclose(unscored.box[[0, 2]], [[219.3, 188.5, 26.2, 30.1], [10, 150, 30, 60]])
+    assert unscored.min_height == 25
+
+
+def test_other_classes_are_named(tmp_path):
+    """Many recordings have no pedestrians. They are scored nevertheless, as tracks there are false."""
+    cars = opened(tmp_path, "0012.txt", KITTI, person_class="Car").truth
+    assert (cars.frame.tolist(), cars.id.tolist()) == ([2], [2])
+    with pytest.warns(UserWarning, match=r"no pedestrian, only car, dontcare, person_sitting \(--class names others\)"):
+        truth = opened(tmp_path, "0013.txt", KITTI.replace("Pedestrian", "Car")).truth
+    assert (len(truth.frame), truth.length) == (0, 4)
+    with pytest.raises(InputError, match=r"--class: got car, dontcare.*expected tram; name some of these"):
+        opened(tmp_path, "0014.txt", KITTI, person_class="tram")
 
 
 def test_the_rate_of_eth_is_assumed_with_a_warning(tmp_path):
@@ -116,9 +140,6 @@ BAD = {
     "KITTI, far away": ("a.txt", KITTI.replace("133.0", "1e9"), r"line 3: .* numbers within"),
     "KITTI, frame -1": ("a.txt", KITTI.replace("2 5 Person", "-1 5 Person"), "line 5: .* frames from 0"),
     "KITTI, id -1": ("a.txt", KITTI.replace("2 5 Person", "2 -1 Person"), "line 5: .* ids from 0"),
-    "KITTI, no people": (
-        "a.txt", KITTI.replace("Pedestrian", "Van").replace("Person_sitting", "Tram"), "Car, DontCare, Tram, Van"
-    ),
 }  # fmt: skip
 
 

@@ -108,7 +108,7 @@ def test_the_mean_has_every_key_and_an_interval(made: Path, one: Path, capsys) -
     assert mean["mean"] == pytest.approx((first + second) / 2)
     _, low, high = mean_interval(np.array([[first], [second]]))
     assert (mean["low"], mean["high"]) == (max(0.0, low[0]), min(1.0, high[0])), "within the score's range"
-    assert found["mean"]["cross_F1"] == {"mean": None, "low": None, "high": None}
+    assert found["mean"]["cross_F1"] == {"mean": None, "low": None, "high": None, "indicative": True}
     alone = answer(capsys, "score", one, made / "file")["mean"]["HOTA"]
     assert alone["low"] is alone["high"] is None
 
