@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.support.options import add_seeds, new_parser, seeds_text
-from benchmarks.support.tables import head, row
+from benchmarks.support.tables import INDICATIVE, head, row
 from sim.dataset.generate import generate
 from sim.workers.pool import WorkerOptions
 from tracking.app.command_options import ScoreOptions, TrackOptions
@@ -32,8 +32,9 @@ def print_ranking(title: str, options: ScoreOptions) -> None:
     head(["rank", "tracker", by, *keys])
     for one in rows:
         mean, low, high = (number(by, one[end], mean=True) for end in ("mean", "low", "high"))
+        ends = f"{mean} [{low}, {high}]" + INDICATIVE * one["indicative"]
         name = "*oracle*" if one["first"] is None else f"`{one['run']}`"
-        row([rank_words(one), name, f"{mean} [{low}, {high}]", *(number(k, one["scores"][k], mean=True) for k in keys)])
+        row([rank_words(one), name, ends, *(number(k, one["scores"][k], mean=True) for k in keys)])
 
 
 def main() -> None:

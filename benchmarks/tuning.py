@@ -116,8 +116,8 @@ def on_second_half(tracker: type, recording: Sequence, config: Config) -> list[t
         every = np.hstack([np.zeros((len(weights), first)), weights])
         return np.column_stack([default(every)[:, at], other(every)[:, at] - default(every)[:, at]])
 
-    ends = block_intervals(scores, truth.length - first, truth.fps, presence_in(truth))
-    return [tuple(map(float, x)) for x in zip(*ends, strict=True)]  # type: ignore[misc]
+    ends = np.array(block_intervals(scores, truth.length - first, truth.fps, presence_in(truth))).T
+    return [tuple(CATALOGUE[SCORE].within(x, difference=bool(k)).tolist()) for k, x in enumerate(ends)]
 
 
 def main() -> None:

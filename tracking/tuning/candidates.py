@@ -25,7 +25,8 @@ from scenarios.loading.toml_files import did_you_mean
 from sim.dataset.generate import LEFT_OUT
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source
-from tracking.stats import mean_of_known, paired
+from tracking.scoring.catalogue import CATALOGUE
+from tracking.stats import FEWEST, mean_of_known, paired
 
 if TYPE_CHECKING:
     import optuna
@@ -115,10 +116,16 @@ class Comparison:
         return "better" if (self.difference > 0) == self.higher else "worse"
 
     @property
+    def indicative(self) -> bool:
+        """True if the interval is only indicative: of fewer than 6 sequences."""
+        return self.sequences < FEWEST
+
+    @property
     def difference_words(self) -> str:
         """The difference and its interval as text; "(no interval)" stands for an interval with an unknown end."""
         known = math.isfinite(self.low) and math.isfinite(self.high)
-        return f"{self.difference:+.4f}" + (f" [{self.low:+.4f}, {self.high:+.4f}]" if known else " (no interval)")
+        ends = f" [{self.low:+.4f}, {self.high:+.4f}]" + ", indicative" * self.indicative if known else " (no interval)"
+        return f"{self.difference:+.4f}{ends}"
 
     def line(self) -> str:
         """Returns the comparison as one line: scenes, score, both means, difference, number of sequences, verdict."""
@@ -145,7 +152,9 @@ def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: 
     if not known.any():
         return None
     a, b = a[known][:, None], b[known][:, None]
-    difference, low, high = (float(end[0]) for end in paired(a, b))
+    ends = [float(end[0]) for end in paired(a, b)]
+    cut = CATALOGUE[goal.key].within(np.array(ends), difference=True).tolist() if goal.key in CATALOGUE else ends
+    difference, low, high = cut
     return Comparison(
         scenes, goal.key, goal.higher, float(a.mean()), float(b.mean()), difference, low, high, int(known.sum())
     )

@@ -201,7 +201,7 @@ class TuningResult:
                 goal.key: {"default": a, "tuned": b}
                 for goal, a, b in zip(plan.goals, *self.validation, strict=True)
             },
-            "comparisons": [{**asdict(c), "verdict": c.verdict} for c in self.comparisons],
+            "comparisons": [{**asdict(c), "indicative": c.indicative, "verdict": c.verdict} for c in self.comparisons],
             "candidates": [_candidate(c) for c in self.candidates],
             "front": [_candidate(c) for c in self.front],
             "importance": dict(self.importance),

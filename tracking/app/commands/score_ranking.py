@@ -147,8 +147,6 @@ def ranking_result(every: RankedRuns) -> CommandResult:
 def _last_lines(every: RankedRuns) -> Iterable[str]:
     c = every.comparison
     yield from verdict(c, every.key)
-    if len(c.sequences) > 1 and any(row["indicative"] for row in every.table):
-        yield FEW
     yield from every.notes
     match = next(iter(c.scores.values()))[0].group_match
     yield f"people compared by {SIMILARITY[c.similarity]}, groups by {GROUP_MATCH[match]}"
@@ -256,6 +254,8 @@ def verdict(comparison: ComparedRuns, key: str) -> list[str]:
         lines.append("runs with a common rank: no sure difference" if sure else "no run is surely better than another")
     if comparison.blocks is not None:
         lines.append("intervals by weights of blocks of frames")
+    elif len(comparison.sequences) > 1 and comparison.indicative(key):
+        lines.append(FEW)
     if len(pairs) > 1:
         lines.append(f"intervals of differences hold with 95 % for all {len(pairs)} pairs together")
     return lines

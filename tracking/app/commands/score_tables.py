@@ -66,7 +66,8 @@ def summary(scores: Iterable[Scores]) -> Means:
 
 def csv_bytes(sequences: Sequence[str], runs: Mapping[str, Sequence[Scores | None]], averaged: bool = True) -> bytes:
     """Returns a CSV table with a column for each score of the catalogue, empty where unknown. Its rows are, for each
-    run: the S sequences, the mean with the ends of its interval, and the pooled scores.
+    run: the S sequences, the mean, low and high end of its interval, whether that is indicative (1), and the pooled
+    scores.
 
     sequences: names (S). runs: by name, the scores on each sequence, None where a run has none. averaged: False leaves
     mean and pooled scores out."""
@@ -76,7 +77,7 @@ def csv_bytes(sequences: Sequence[str], runs: Mapping[str, Sequence[Scores | Non
         rows += [(run, "sequence", name, one) for name, one in zip(sequences, scores, strict=True) if one is not None]
         if averaged:
             means = summary(known)
-            rows += [(run, p, "", {key: one[p] for key, one in means.items()}) for p in ("mean", "low", "high")]
+            rows += [(run, part, "", {key: one[part] for key, one in means.items()}) for part in means["HOTA"]]
             rows.append((run, "pooled", "", pooled(known)))
     text = StringIO()
     table = csv.writer(text, lineterminator="\n")
