@@ -91,7 +91,7 @@ def particles(given: argparse.Namespace) -> None:
                 cells += [tables.mean_cell(values, "RMSE_pos") for values in found.values()]
                 cells.append(_difference(found))
                 for name, values in found.items():
-                    curves.setdefault(f"{name}, {preset}", []).append(np.array(mean_interval(values)))
+                    curves.setdefault(f"{name}, {preset}", []).append(np.maximum(mean_interval(values), 0.0))
             tables.row([str(count), *cells])
         shown = {name: tuple(np.array(values).T) for name, values in curves.items()}
         panels.append(chart.Panel(f"{entry.name}: error, m", given.counts, shown, "particles"))
@@ -164,7 +164,7 @@ def hidden(given: argparse.Namespace) -> None:
     for k, length in enumerate(LENGTHS):
         _row(f"{length:g}", {name: values[:, k] for name, values in found.items()})
     if given.chart:
-        shown = {name: mean_interval(values) for name, values in found.items()}
+        shown = {name: tuple(np.maximum(mean_interval(values), 0.0)) for name, values in found.items()}
         title = "error of a hidden partner, m"
         chart.lines([chart.Panel(title, LENGTHS, shown, "length of the occlusion, s", y_range=(0, 1.6))], given.chart)
 
