@@ -225,7 +225,8 @@ def _score_differences(every: RankedRuns, pair: Mapping[str, Mapping[str, Any]])
 def _difference_table(title: str, first: str, rows: Mapping[str, tuple[str, Mapping[str, Any]]], foot: str = "") -> str:
     cells = []
     for name, (key, d) in rows.items():
-        sure = f"surely {d['sure']}" if d["sure"] else ""  # of the run named first
+        few = "indicative" if d["indicative"] and math.isfinite(d["low"]) else ""
+        sure = f"surely {d['sure']}" if d["sure"] else few  # of the run named first
         cells.append([name, number(key, d["mean"], mean=True), interval(key, d), sure])
     return table(title, [first], ["difference", "95 % interval"], cells, [""], foot)
 
