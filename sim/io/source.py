@@ -57,7 +57,7 @@ def open_source(
         background: Frames for background models, "first:N" or "spread:N", or the path of a picture of the empty place,
             used together with spread:50; None: spread:50, or the stored empty frames.
         person_class: Classes of people in MOTChallenge texts that have classes, as 1, "1,2" or "person"; None: 1, or
-            "person" and "pedestrian" if they are words, with a warning about others.
+            "person" and "pedestrian" if they are words, with a warning about others. Of KITTI's labels "pedestrian".
         box_scale: Factor of the boxes of MOTChallenge texts that are not in pixels of the pictures, "X" or "X,Y".
         min_score: Detections of MOTChallenge texts with a lower score, as it stands there, are left out.
         boxes: File with the detections of one sequence, which the three options above then belong to: MOTChallenge
