@@ -49,8 +49,10 @@ Side = tuple[FrameRows, np.ndarray]
 
 
 def crowd(frames: int, people: int, r: np.random.Generator) -> tuple[Side, Side]:
-    """Returns true people and tracks: rows and positions (N, 2), m, of people who wander in 16 m x 10 m. Tracks miss one
-    person in ten, add 3 false ones per frame and change ids."""
+    """Returns true people and tracks: rows and positions (N, 2), m, of people who wander in 16 m x 10 m.
+
+    Tracks miss one person in ten, add 3 false ones per frame and change ids.
+    """
     place, velocity = r.uniform(0, (16, 10), (people, 2)), r.normal(0, 0.1, (people, 2))
     number, fresh = np.arange(people), people
     true, est = [], []
