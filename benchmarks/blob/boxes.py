@@ -24,7 +24,7 @@ import numpy as np
 from benchmarks.peers import synthetic
 from benchmarks.support import chart
 from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE
-from benchmarks.support.tables import difference_cell, head, row
+from benchmarks.support.tables import head, row, signed
 from scenarios import load
 from sim.io.source import open_source
 from sim.sequence import simulate
@@ -33,6 +33,7 @@ from sim.types import Sequence as Recording
 from tracking.papers.blob.config import BlobConfig
 from tracking.running.prepare import prepare
 from tracking.scoring import score_arrays
+from tracking.stats import mean_interval
 
 PEERS = {"SORT": "sort", "ByteTrack": "bytetrack", "OC-SORT": "ocsort"}
 RUNNER = Path(__file__).parents[1] / "peers" / "run_roboflow.py"
@@ -164,8 +165,9 @@ def occluded(run: PeerRun) -> None:
     found = all_scores(run.python, scenes)
     own = np.array([s["HOTA"] for s in found["`blob`"]])
     for name, each in found.items():
+        difference = (own - [s["HOTA"] for s in each])[:, None]
         cells = [f"{np.mean([s[key] for s in each]):.3f}" for key in SHOWN]
-        row([name, *cells, difference_cell(own - [s["HOTA"] for s in each])])
+        row([name, *cells, signed(*(float(end[0]) for end in mean_interval(difference)))])
 
 
 def rates(run: PeerRun) -> None:

@@ -17,10 +17,11 @@ import numpy as np
 
 from benchmarks.group_pda.runs import REPLACED, Row, TrackingJob, Variant, measure, trackers, with_points
 from benchmarks.support.options import seeds_text
-from benchmarks.support.tables import difference_cell, mean_cell, share, table
+from benchmarks.support.tables import mean_cell, share, signed, table
 from scenarios.loading.resolve import Entry, resolve
 from sim.types import Array
 from tracking.papers.group_pda.config import GroupPdaConfig
+from tracking.stats import paired
 
 SCENES = ("merge", "split", "cross", "queue", "side-by-side")
 DENSE = ("cross-dense", "pass-by-dense")  # Of the suite `standard`.
@@ -105,9 +106,8 @@ def decisions(given: argparse.Namespace) -> Any:
         default = values(rows["default"], DECIDED)
         cells = {"default": [mean_of(key)(rows["default"]) for key in DECIDED]}
         for name in (*WITHOUT, *REPLACED):
-            less = default - values(rows[name], DECIDED)
-            pairs = zip(DECIDED, less.T, strict=True)
-            cells[f"default minus without {name}"] = [difference_cell(x, _score(key)) for key, x in pairs]
+            ends = paired(values(rows[name], DECIDED), default)
+            cells[f"default minus without {name}"] = [signed(*(float(e[k]) for e in ends)) for k in range(len(DECIDED))]
         title = f"{scene}: {heading(given, rows)}; paired differences"
         table(title, "", ["ids kept" if key == "ids" else key for key in DECIDED], cells)
     return found
