@@ -272,7 +272,7 @@ class TuneCommandOptions(WorkerOptions, words="tune"):
     seed: int = tuned("seed")
 
 
-class ReplayCommandOptions(PictureOptions, words="replay", run="datasets:replay"):
+class ReplayCommandOptions(PictureOptions, RecordingOptions, words="replay", run="datasets:replay"):
     """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
 
     source: Path = SOURCE()
@@ -282,12 +282,11 @@ class ReplayCommandOptions(PictureOptions, words="replay", run="datasets:replay"
     seeds: str = SEEDS("Seeds of bodies, looks and sensor. For real recordings from 20000 on.", "20000")
     start: float = option("Second at which to begin.", 0.0, low=0.0, metavar="S")
     duration: float | None = option("Seconds to replay. Default: up to the end.", None, metavar="S")
-    fps: float | None = FPS()
     calibration: Path | None = option(
         "Calibration of a recording that has boxes only: camera.json or Tsai's XML.", None, metavar="FILE")
 
 
-class ViewOptions(RecordingOptions, words="view"):
+class ViewOptions(BoxOptions, words="view"):
     """Write a page that replays a sequence in the browser: truth, tracks, and pictures if it has any.
 
     For several sequences also a report on the tracks; two trackers on one sequence are shown beside each other."""
@@ -304,17 +303,16 @@ class ViewOptions(RecordingOptions, words="view"):
     workers: int = PROCESSES()
 
 
-class SheetOptions(Options, words="sheet", run="view:sheet"):
+class SheetOptions(BoxOptions, words="sheet", run="view:sheet"):
     """Write a contact sheet: several frames of a sequence in one picture, with the truth or, if given, the tracks."""
 
     source: Path = SOURCE()
     tracks: Path | None = TRACKS()
     out: Path = FILE("Picture to write; for several sequences, a folder.", metavar="FILE.png")
     frames: int = option("Number of frames to show.", 8, low=1, high=64)
-    fps: float | None = FPS()
 
 
-class OverlayOptions(RecordingOptions, words="overlay", run="view:overlay"):
+class OverlayOptions(BoxOptions, words="overlay", run="view:overlay"):
     """Write a video with boxes, ids, trails, groups and events drawn over the pictures."""
 
     source: Path = SOURCE()
@@ -354,12 +352,11 @@ class WebdatasetOptions(Options, words="export webdataset", run="export:export_w
     shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
 
 
-class TrajnetOptions(Options, words="export trajnet", run="export:export_trajnet"):
+class TrajnetOptions(RecordingOptions, words="export trajnet", run="export:export_trajnet"):
     """Write the positions of people, of tracks or of labels, as TrajNet++ (*.ndjson)."""
 
     source: Path = ARGUMENT("Output of `track` or `group`, or labelled people.", metavar="RUN|SOURCE")
     out: Path = OUT()
-    fps: float | None = FPS()
 
 
 class PedpyOptions(TrajnetOptions, words="export pedpy", run="export:export_pedpy"):

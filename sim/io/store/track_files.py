@@ -217,17 +217,19 @@ def upright_boxes(camera: Camera, pos: Array) -> Array:
 
 
 def read_track_text(
-    path: Path, fps: float, length: int | None, person_class: Classes | None = None, box_scale: BoxScale | None = None
-) -> list[Tracks]:
+    path: Path, fps: float, length: int | None, person_class: Classes | None = None, box_scale: BoxScale | None = None,
+    px_per_m: float | None = None,
+) -> list[Tracks]:  # fmt: skip
     """Returns the tracks of a text of MOTChallenge or KITTI, one Tracks per frame from 1 to `length`, sorted by id.
 
     length: None: to the last frame in the file. person_class: only rows of these classes are read; None: people.
-    box_scale: factors of x and y that make the boxes pixels. A column of groups makes them the tracker's own.
+    box_scale: factors of x and y that make the boxes pixels. px_per_m: pixels per metre of positions in px. A column of
+    groups makes them the tracker's own.
     """
     if people_texts.layout_of(path) == "kitti":
         table = table_of_rows(people_texts.LAYOUTS["kitti"](path, fps)[0], length, box_scale=box_scale)
     else:
-        table = read_table(path, length=length, boxless=True, box_scale=box_scale)
+        table = read_table(path, length=length, boxless=True, box_scale=box_scale, px_per_m=px_per_m)
     require_pixels(table.rows, table.boxes())
     if not len(table.frame):
         if length is None:
@@ -361,7 +363,7 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
 
 def read_checked_tracks(
     path: str | Path, *, fps: float | None = None, length: int | None = None, person_class: Classes | None = None,
-    box_scale: BoxScale | None = None,
+    box_scale: BoxScale | None = None, px_per_m: float | None = None,
 ) -> list[Tracks]:  # fmt: skip
     """Reads tracks as `read_tracks` does, but does not check the files of a run against their hashes."""
     path = Path(path)
@@ -373,7 +375,7 @@ def read_checked_tracks(
     if not text.is_file():
         got, expected = "no tracks", "tracks.parquet, tracks.txt or a MOTChallenge text"
         raise InputError(file=path, got=got, expected=expected, remedy="give the folder that `flockscope track` made")
-    found = read_track_text(text, 25.0 if fps is None else fps, length, person_class, box_scale)
+    found = read_track_text(text, 25.0 if fps is None else fps, length, person_class, box_scale, px_per_m)
     if not whole:
         return found
     groups = folder / "groups.csv"

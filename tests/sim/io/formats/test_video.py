@@ -60,7 +60,8 @@ def test_rotation_is_undone(tmp_path):
 
 
 ODD_NAMES = (
-    "12:30:05", "%03d", "-i", "~", "a#b?c=d&e", "zwei Wörter", "pipe:0", "concat:a|b", "file:x", "'quoted'", "back\\slash"
+    "12:30:05", "%03d", "-i", "~", "a#b?c=d&e", "zwei Wörter", "pipe:0", "concat:a|b", "file:x",
+    "'quoted'", "back\\slash",
 )  # fmt: skip
 
 
