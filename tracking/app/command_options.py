@@ -27,7 +27,7 @@ FPS = partial(option, "Frames per second of a recording, in place of its own. No
 PERSON_CLASS = partial(
     option, "Classes of people in texts, tables and COCO results. Default: 1, or person, pedestrian.", None,
     metavar="A,B,…", flag="--class")
-CAMERA = partial(option, "Calibration: camera.json, Tsai's XML, or OpenCV's YAML of a pair.", None, metavar="FILE")
+CAMERA = partial(option, "Calibration: camera.json, Tsai's XML, or OpenCV's or ROS's file.", None, metavar="FILE")
 SENSOR = partial(option, "Detector profile, as `fit sensor` writes it.", None, metavar="FILE.toml")
 WORKERS = partial(option, "Processes. On a cluster: the least number of tasks at a time.", 1, low=1)
 PROCESSES = partial(option, "Processes that share the sequences.", 1, low=1)
