@@ -105,10 +105,15 @@ class RecordingOptions(Options):
     px_per_m: float | None = option("Pixels per metre of a recording without a camera.", None)
 
 
-class BoxOptions(RecordingOptions):
-    """Options on how boxes are read from files."""
+class LabelOptions(RecordingOptions):
+    """Options on how labels of people are read from files."""
 
     person_class: str | None = PERSON_CLASS()
+
+
+class BoxOptions(LabelOptions):
+    """Options on how boxes are read from files."""
+
     box_scale: str | None = option(
         "Factor of the boxes in MOT texts, except labels, if they are not in pixels of the pictures.", None,
         metavar="X|X,Y")
@@ -272,7 +277,7 @@ class TuneCommandOptions(WorkerOptions, words="tune"):
     seed: int = tuned("seed")
 
 
-class ReplayCommandOptions(PictureOptions, RecordingOptions, words="replay", run="datasets:replay"):
+class ReplayCommandOptions(PictureOptions, LabelOptions, words="replay", run="datasets:replay"):
     """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
 
     source: Path = SOURCE()
@@ -352,7 +357,7 @@ class WebdatasetOptions(Options, words="export webdataset", run="export:export_w
     shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
 
 
-class TrajnetOptions(RecordingOptions, words="export trajnet", run="export:export_trajnet"):
+class TrajnetOptions(LabelOptions, words="export trajnet", run="export:export_trajnet"):
     """Write the positions of people, of tracks or of labels, as TrajNet++ (*.ndjson)."""
 
     source: Path = ARGUMENT("Output of `track` or `group`, or labelled people.", metavar="RUN|SOURCE")

@@ -82,7 +82,7 @@ def _of_runs(options: TrajnetOptions) -> list[Job]:
     found = find_tracks(options.source)
     for stored in found:
         stored.check()
-        refuse_options({"px_per_m": options.px_per_m}, "px_per_m", stored.folder, "a run", STATED)
+        refuse_options(vars(options), "px_per_m person_class", stored.folder, "a run", STATED)
         if not stored.info:
             got, expected = "tracks of another program", "what `flockscope track` or `group` wrote"
             raise InputError(file=stored.path, got=got, expected=expected, remedy="give the text itself")
@@ -90,7 +90,9 @@ def _of_runs(options: TrajnetOptions) -> list[Job]:
 
 
 def _of_sequences(options: TrajnetOptions) -> list[Job]:
-    sequences = open_source(options.source, fps=options.fps, px_per_m=options.px_per_m, images=False)
+    sequences = open_source(
+        options.source, fps=options.fps, px_per_m=options.px_per_m, person_class=options.person_class, images=False
+    )
     for sequence in sequences:
         if sequence.load_truth is None:
             file, expected = sequence.source.get("path", options.source), "a run, or people with ids"
