@@ -259,13 +259,13 @@ def read_track_text(
     cuts = np.searchsorted(frame, np.arange(1, count + 2)).tolist()
 
     @lru_cache(maxsize=1)  # most frames of sparse texts are empty: they share their arrays
-    def arrays(a: int, b: int) -> tuple[Any, ...]:
+    def tracks(a: int, b: int) -> Tracks:
         some = (id[a:b], group[a:b], pos[a:b], vel[a:b], np.full((b - a, 4, 4), np.nan))
         nobody = table.group is not None and (group[a:b] < 0).all()  # Of a frame with groups they follow from `group`.
-        return *some, None if box is None else box[a:b], score[a:b], Groups.none() if nobody else None
+        groups = Groups.none() if nobody else None
+        return Tracks(1, 0.0, plane, "person", *some, None if box is None else box[a:b], score[a:b], groups)
 
-    frames = enumerate(pairwise(cuts))
-    return [Tracks(k + 1, k / fps, plane, "person", *arrays(a, b)) for k, (a, b) in frames]
+    return [tracks(a, b).replace(index=k + 1, t=k / fps) for k, (a, b) in enumerate(pairwise(cuts))]
 
 
 def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:

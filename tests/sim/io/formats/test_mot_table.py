@@ -3,6 +3,8 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.io.source import open_source
+from sim.io.store.track_files import read_track_text
+from tracking.grouping.known_people import people_as_tracks
 
 
 def opened(tmp_path, text):
@@ -291,3 +293,24 @@ def test_a_box_and_a_position_with_its_unit(tmp_path, unit, pos):
     truth = opened(tmp_path, f"frame,id,x{unit},y{unit},left,top,width,height\n{rows}").truth
     assert truth.box.tolist() == [[100, 50, 20, 40], [104, 50, 20, 40]]
     assert (None if truth.pos is None else truth.pos.tolist()) == pos
+
+
+@pytest.mark.filterwarnings("ignore:.*people are in 2 of 5000 frames")
+def test_empty_frames_of_a_sparse_text_share_their_arrays(tmp_path):
+    """Of labels and of tracks: memory by rows, not by the greatest frame."""
+    (tmp_path / "a.csv").write_text("1,7,0,0\n5000,7,1,0\n")
+    labels = people_as_tracks(open_source(tmp_path / "a.csv", fps=25)[0].truth)
+    for found in (labels, read_track_text(tmp_path / "a.csv", 25, None)):
+        assert [t.index for t in found if len(t.id)] == [1, 5000]
+        assert [t.t for t in found] == pytest.approx(np.arange(5000) / 25)
+        assert len({id(getattr(t, name)) for t in found[1:-1] for name in ("id", "pos", "vel", "cov")}) == 4
+
+
+@pytest.mark.parametrize("frame", [1588765432123, 10**9])
+def test_times_as_frames_are_refused_with_the_name_that_reads_them(tmp_path, frame):
+    rows = [f"{frame + 100 * k},1,{10 + k},20,30,60,1\n" for k in range(20)]
+    with pytest.raises(InputError, match="frames from 1 to 1000000; .*name the column t in the first line, if it has"):
+        opened(tmp_path, "".join(rows))
+    with pytest.warns(UserWarning, match="are taken as ms"):
+        found = opened(tmp_path, "t,id,left,top,width,height,score\n" + "".join(rows))
+    assert found.length == 48  # 1.9 s at the 25 fps that are given
