@@ -95,6 +95,7 @@ class StoredTracks:
         tracks = read_checked_tracks(
             self.path, fps=sequence.fps, length=sequence.length, person_class=sequence.source.get("class"),
             box_scale=box_scale, px_per_m=sequence.px_per_m if sequence.px_per_m > 0 else None,
+            begin=sequence.source.get("begin", 0.0),
         )  # fmt: skip
         boxes = [t.box for t in tracks if t.box is not None and not self.info]
         size = sequence.image_size

@@ -193,7 +193,7 @@ SECONDS = "if the frames are times, name their column t in the first line; or nu
 EMPTY = 100  # A text with people in fewer than one of so many frames may have times for frames.
 
 EXPECTED = (
-    "a row per person and frame, with frame (or t in s, in sources and --boxes) and a box (x,y,w,h, "
+    "a row per person and frame, with frame (or t, but not in a folder) and a box (x,y,w,h, "
     "left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), or frame,id,x,y in m (x_cm,y_cm in cm; x_px,y_px with "
     "--px-per-m)"
 )

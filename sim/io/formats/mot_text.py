@@ -429,18 +429,22 @@ def rate_of_times(path: Path, seconds: Array, id: Array) -> float:
     return round(float(rate), 3)
 
 
+def frames_of_times(seconds: Array, begin: float, fps: float) -> Ints:
+    """Returns the nearest frames (N,) of times (N,); begin: time of frame 1. Both in s."""
+    return np.asarray(np.clip(np.round((seconds - begin) * fps) + 1, -LARGEST, LARGEST), np.int64)
+
+
 def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     """Returns a MOT text as Sequence without pictures: detections if every id is -1, else truth.
 
     `options.camera` becomes its camera, unchanged.
     """
-    of_boxes, fps = options.box_options, options.fps
+    of_boxes, fps, begin = options.box_options, options.fps, 0.0
 
     def frames_at(seconds: Array, id: Array) -> Ints:
-        nonlocal fps
-        fps = fps or rate_of_times(path, seconds, id)
-        frame = np.round((seconds - seconds.min(initial=np.inf)) * fps) + 1
-        return np.asarray(np.minimum(frame, LARGEST), np.int64)
+        nonlocal fps, begin
+        fps, begin = fps or rate_of_times(path, seconds, id), float(seconds.min(initial=np.inf))
+        return frames_of_times(seconds, begin, fps)
 
     table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at, px_per_m=options.px_per_m)
     rate = frame_rate(fps, None)
@@ -457,7 +461,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     else:
         options.reject(path, "a text of people with ids", "it is for detections", "min_score")
         more = {"load_truth": truth}
-    source = {"kind": "mot text", "path": str(path), **of_boxes.given()}
+    source = {"kind": "mot text", "path": str(path), "begin": begin, **of_boxes.given()}
     if table.rows.names:
         source["ids"] = dict(table.rows.names)
     return recorded_sequence(source, path.stem, rate, length, px_per_m=options.scale, camera=options.camera, **more)

@@ -4,6 +4,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.source import open_source
 from sim.io.store.track_files import read_track_text
+from tracking.app.stored_tracks import find_tracks
 from tracking.grouping.known_people import people_as_tracks
 
 
@@ -314,3 +315,27 @@ def test_times_as_frames_are_refused_with_the_name_that_reads_them(tmp_path, fra
     with pytest.warns(UserWarning, match="are taken as ms"):
         found = opened(tmp_path, "t,id,left,top,width,height,score\n" + "".join(rows))
     assert found.length == 51  # 2 s at the 25 fps that are given
+
+
+@pytest.mark.filterwarnings("ignore:.*are taken as")
+@pytest.mark.parametrize(("begin", "unit"), [(BEGIN, 1000), (BEGIN, 1), (0, 1)])
+def test_times_of_tracks_count_from_the_first_of_the_labels(tmp_path, begin, unit):
+    """The tracks begin in frame 3; of a source without times they count from 0."""
+
+    def time(k):
+        return round((begin + k / 10) * unit, 3)
+
+    (tmp_path / "a.csv").write_text(walk("timestamp,id,x,y", time))
+    tracks = [line for k, line in enumerate(walk("timestamp,id,x,y", time).splitlines(True)) if k == 0 or k > 4]
+    (tmp_path / "b.csv").write_text("".join(tracks))
+    (sequence,) = open_source(tmp_path / "a.csv")
+    (stored,) = find_tracks(tmp_path / "b.csv")
+    found = stored.read(sequence)
+    assert [t.index for t in found if len(t.id)] == list(range(3, 21))
+    truth = [truth_at.pos.tolist() for truth_at in map(sequence.truth.at, range(3, 21))]
+    assert [t.pos.tolist() for t in found if len(t.id)] == truth
+    if begin:
+        with pytest.raises(InputError, match="times: got 15887654.*give seconds since the first frame"):
+            read_track_text(tmp_path / "b.csv", 10, 20)
+    else:
+        assert [t.index for t in read_track_text(tmp_path / "b.csv", 10, 20) if len(t.id)] == list(range(3, 21))
