@@ -185,7 +185,7 @@ def _reader(path: Path) -> Callable[[Path], Camera]:
     if suffix in YAML:
         return read_opencv
     keys = {name for key, (_, others) in KEYS.items() for name in (key, *others)} - {"rotation", "position"}
-    document = parse_json(read_text(path, JSON_BYTES), path)
+    document = parse_json(read_text(path, JSON_BYTES), path, "give a camera.json")
     return read_opencv if isinstance(document, dict) and not keys.isdisjoint(document) else read_camera
 
 

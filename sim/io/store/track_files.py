@@ -231,19 +231,22 @@ def read_track_text(
     """Returns the tracks of a text of MOTChallenge or KITTI, one Tracks per frame from 1 to `length`, sorted by id.
 
     length: None: to the last frame in the file. person_class: only rows of these classes are read; None: people.
-    box_scale: factors of x and y that make the boxes pixels. px_per_m: pixels per metre of positions in px. begin: time of
-    frame 1, s, for a column of times. A column of groups makes them the tracker's own.
+    box_scale: factors of x and y that make the boxes pixels. px_per_m: pixels per metre of positions in px. begin: time
+    of frame 1, s, for a column of times. A column of groups makes them the tracker's own.
     """
 
     def frames_at(seconds: Array, _: Array) -> Ints:
         frame = frames_of_times(seconds, begin, fps)
-        if len(frame) and ((frame < 1) | (frame > (length or FRAMES))).mean() > 0.5:
+        early = frame < 1
+        if len(frame) and (early | (frame > (length or FRAMES))).mean() > 0.5:
             got, expected = (
-                f"{seconds.min():.15g} to {seconds.max():.15g} s",
-                f"times of its frames, from {begin:.15g} s",
+                "{:.15g} to {:.15g} s".format(*np.quantile(seconds, (0, 1))),
+                f"times from {begin:.15g} s on",
             )
             remedy = "give seconds since the first frame, or numbers of frames in a column frame"
             raise InputError(file=path, place="times", got=got, expected=expected, remedy=remedy)
+        if early.any():
+            warnings.warn(f"{path}: {early.sum()} rows before the first frame are left out", stacklevel=4)
         return np.maximum(frame, 0)
 
     if people_texts.layout_of(path) == "kitti":

@@ -335,7 +335,7 @@ def test_times_of_tracks_count_from_the_first_of_the_labels(tmp_path, begin, uni
     truth = [truth_at.pos.tolist() for truth_at in map(sequence.truth.at, range(3, 21))]
     assert [t.pos.tolist() for t in found if len(t.id)] == truth
     if begin:
-        with pytest.raises(InputError, match="times: got 15887654.*give seconds since the first frame"):
+        with pytest.raises(InputError, match=r"times: got 15887654.*give seconds since the first frame"):
             read_track_text(tmp_path / "b.csv", 10, 20)
     else:
         assert [t.index for t in read_track_text(tmp_path / "b.csv", 10, 20) if len(t.id)] == list(range(3, 21))
