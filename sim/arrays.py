@@ -7,7 +7,7 @@ finds ids that stand twice in a frame.
 from __future__ import annotations
 
 import re
-from dataclasses import fields, replace
+from dataclasses import fields
 from functools import cache
 from typing import Any, Self
 
@@ -29,7 +29,10 @@ class Frozen:
     """
 
     def __post_init__(self) -> None:
-        for name, kind, ragged in _array_fields(type(self)):  # type: ignore[arg-type]
+        self._settle(_array_fields(type(self)))  # type: ignore[arg-type]
+
+    def _settle(self, kinds: dict[str, tuple[np.dtype[Any], bool]]) -> None:
+        for name, (kind, ragged) in kinds.items():
             value = getattr(self, name)
             if ragged:
                 if value and isinstance(value[0], np.ndarray):
@@ -39,7 +42,14 @@ class Frozen:
 
     def replace(self, **changes: Any) -> Self:
         """Returns a copy with the given fields changed."""
-        return replace(self, **changes)  # type: ignore[type-var]
+        made, names, kinds = object.__new__(type(self)), _names(type(self)), _array_fields(type(self))  # type: ignore[arg-type]
+        for name in names:
+            object.__setattr__(made, name, changes[name] if name in changes else getattr(self, name))
+        if unknown := changes.keys() - {*names}:
+            raise TypeError(f"{type(self).__name__} has no field {', '.join(unknown)}")
+        # The other fields are settled: a long recording has a million frames.
+        made._settle({name: kinds[name] for name in changes if name in kinds})
+        return made
 
     def copy(self) -> Self:
         """Returns a copy that shares no array with this object; the arrays of the copy are read-only."""
@@ -54,13 +64,13 @@ KINDS["Image"] = np.dtype(np.uint8)
 
 
 @cache
-def _array_fields(kind: Any) -> tuple[tuple[str, np.dtype[Any], bool], ...]:
-    found = []
+def _array_fields(kind: Any) -> dict[str, tuple[np.dtype[Any], bool]]:
+    found = {}
     for f in fields(kind):
         declared = re.fullmatch(r"(tuple\[)?(Array|Ints|Bools|Image)\b.*", str(f.type))
         if declared:
-            found.append((f.name, KINDS[declared[2]], declared[1] is not None))
-    return tuple(found)
+            found[f.name] = KINDS[declared[2]], declared[1] is not None
+    return found
 
 
 def _settled(a: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:

@@ -166,6 +166,7 @@ def _generated(folder: Path, options: RecordingOptions) -> Sequence:
 
 
 IN_METRES, ON_LABELS = "it is in metres, without pictures", "camera background box_options"
+IN_IMAGE = "its truth is in the image, without pictures"
 TRAJECTORIES = ("a text of trajectories", f"px_per_m {ON_LABELS}", IN_METRES)
 DRIVES = "its camera drives, and it has labels of people only"
 # of each kind of source its name, the options without effect on it, why they have none, and the reader
@@ -173,7 +174,7 @@ READERS: dict[str, tuple[str, str, str, Callable[[Path, RecordingOptions], Seque
     "generated": ("a generated sequence", "fps px_per_m camera box_options", "it knows its own", _generated),
     "biwi": ("a BIWI recording", f"px_per_m {ON_LABELS}", IN_METRES, biwi.open_folder),
     "mot": ("a MOTChallenge folder", "", "", mot_folder.open_folder),
-    "caviar": ("a CAVIAR recording", ON_LABELS, "its truth is in the image, without pictures", caviar.open_file),
+    "caviar": ("a file of CVML", "background box_options", IN_IMAGE, caviar.open_file),
     "video": ("a video without --boxes", "box_options", "it has no boxes", video.open_video),
     "text": ("a text", "background", "it has no pictures", mot_text.open_text),
     "kitti": ("a text of KITTI", "camera background box_scale min_score", DRIVES, people_texts.open_kitti),

@@ -27,7 +27,7 @@ FPS = partial(option, "Frames per second of a recording, in place of its own. No
 PERSON_CLASS = partial(
     option, "Classes of people in texts, tables and COCO results. Default: 1, or person, pedestrian.", None,
     metavar="A,B,…", flag="--class")
-CAMERA = partial(option, "Calibration: camera.json, Tsai's XML, or OpenCV's YAML of a pair.", None, metavar="FILE")
+CAMERA = partial(option, "Calibration: camera.json, Tsai's XML, or OpenCV's or ROS's file.", None, metavar="FILE")
 SENSOR = partial(option, "Detector profile, as `fit sensor` writes it.", None, metavar="FILE.toml")
 WORKERS = partial(option, "Processes. On a cluster: the least number of tasks at a time.", 1, low=1)
 PROCESSES = partial(option, "Processes that share the sequences.", 1, low=1)
@@ -105,10 +105,15 @@ class RecordingOptions(Options):
     px_per_m: float | None = option("Pixels per metre of a recording without a camera.", None)
 
 
-class BoxOptions(RecordingOptions):
-    """Options on how boxes are read from files."""
+class LabelOptions(RecordingOptions):
+    """Options on how labels of people are read from files."""
 
     person_class: str | None = PERSON_CLASS()
+
+
+class BoxOptions(LabelOptions):
+    """Options on how boxes are read from files."""
+
     box_scale: str | None = option(
         "Factor of the boxes in MOT texts, except labels, if they are not in pixels of the pictures.", None,
         metavar="X|X,Y")
@@ -273,7 +278,7 @@ class TuneCommandOptions(WorkerOptions, words="tune"):
     seed: int = tuned("seed")
 
 
-class ReplayCommandOptions(PictureOptions, words="replay", run="datasets:replay"):
+class ReplayCommandOptions(PictureOptions, LabelOptions, words="replay", run="datasets:replay"):
     """Render recorded trajectories: real motion, simulated pictures and detections, exact labels."""
 
     source: Path = SOURCE()
@@ -283,12 +288,11 @@ class ReplayCommandOptions(PictureOptions, words="replay", run="datasets:replay"
     seeds: str = SEEDS("Seeds of bodies, looks and sensor. For real recordings from 20000 on.", "20000")
     start: float = option("Second at which to begin.", 0.0, low=0.0, metavar="S")
     duration: float | None = option("Seconds to replay. Default: up to the end.", None, metavar="S")
-    fps: float | None = FPS()
     calibration: Path | None = option(
         "Calibration of a recording that has boxes only: camera.json or Tsai's XML.", None, metavar="FILE")
 
 
-class ViewOptions(RecordingOptions, words="view"):
+class ViewOptions(BoxOptions, words="view"):
     """Write a page that replays a sequence in the browser: truth, tracks, and pictures if it has any.
 
     For several sequences also a report on the tracks; two trackers on one sequence are shown beside each other."""
@@ -305,17 +309,16 @@ class ViewOptions(RecordingOptions, words="view"):
     workers: int = PROCESSES()
 
 
-class SheetOptions(Options, words="sheet", run="view:sheet"):
+class SheetOptions(BoxOptions, words="sheet", run="view:sheet"):
     """Write a contact sheet: several frames of a sequence in one picture, with the truth or, if given, the tracks."""
 
     source: Path = SOURCE()
     tracks: Path | None = TRACKS()
     out: Path = FILE("Picture to write; for several sequences, a folder.", metavar="FILE.png")
     frames: int = option("Number of frames to show.", 8, low=1, high=64)
-    fps: float | None = FPS()
 
 
-class OverlayOptions(RecordingOptions, words="overlay", run="view:overlay"):
+class OverlayOptions(BoxOptions, words="overlay", run="view:overlay"):
     """Write a video with boxes, ids, trails, groups and events drawn over the pictures."""
 
     source: Path = SOURCE()
@@ -355,12 +358,11 @@ class WebdatasetOptions(Options, words="export webdataset", run="export:export_w
     shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
 
 
-class TrajnetOptions(Options, words="export trajnet", run="export:export_trajnet"):
+class TrajnetOptions(LabelOptions, words="export trajnet", run="export:export_trajnet"):
     """Write the positions of people, of tracks or of labels, as TrajNet++ (*.ndjson)."""
 
     source: Path = ARGUMENT("Output of `track` or `group`, or labelled people.", metavar="RUN|SOURCE")
     out: Path = OUT()
-    fps: float | None = FPS()
 
 
 class PedpyOptions(TrajnetOptions, words="export pedpy", run="export:export_pedpy"):

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scenarios.errors import InputError, shortened
 from sim.io.files.own_files import is_hidden, output_paths
+from sim.io.formats.mot_table import size_doubt
 from sim.io.formats.mot_text import frame_rate
 from sim.io.formats.options import BoxScale, refuse_options
 from sim.io.source import holds_sequences
@@ -90,8 +94,13 @@ class StoredTracks:
             raise InputError(file=seal, place="truth_hash", got=got, expected=expected, remedy=remedy)
         tracks = read_checked_tracks(
             self.path, fps=sequence.fps, length=sequence.length, person_class=sequence.source.get("class"),
-            box_scale=box_scale,
+            box_scale=box_scale, px_per_m=sequence.px_per_m if sequence.px_per_m > 0 else None,
+            begin=sequence.source.get("begin", 0.0),
         )  # fmt: skip
+        boxes = [t.box for t in tracks if t.box is not None and not self.info]
+        size = sequence.image_size
+        if boxes and size is not None and (doubt := size_doubt(np.concatenate(boxes), size)):
+            warnings.warn(f"{self.path}: {doubt}", stacklevel=2)
         return TrackingRun(tuple(tracks), self.info)
 
 

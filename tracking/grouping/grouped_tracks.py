@@ -65,7 +65,7 @@ def with_velocities(tracks: Sequence[Tracks], fps: float) -> Sequence[Tracks]:
     pos, vel = np.concatenate([t.pos for t in tracks]), np.concatenate([t.vel for t in tracks])
     vel = np.where(np.isnan(vel).any(axis=1)[:, None], chords(frame, id, pos, fps), vel)
     parts = np.split(vel, np.cumsum(count)[:-1])
-    return [t.replace(vel=part) for t, part in zip(tracks, parts, strict=True)]
+    return [t.replace(vel=part) if len(part) else t for t, part in zip(tracks, parts, strict=True)]
 
 
 def names_groups(tracks: Sequence[Tracks]) -> bool:
@@ -161,12 +161,15 @@ def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupE
     by_frame: dict[int, list[GroupEvent]] = {}
     for event in events:
         by_frame.setdefault(event.emitted or event.start, []).append(_with_track_ids(event, table))
-    out = []
+    out, nobody = [], Groups.none()
     for t in given:
-        r = slice(int(cuts[t.index - 1]), int(cuts[t.index]))
-        label = table.group[r][np.searchsorted(table.id[r], t.id)]
         new = tuple(sorted(by_frame.pop(t.index, ()), key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
-        out.append(t.replace(group=label, events=(*t.events, *new), derived=True))
+        if len(t.id):
+            r = slice(int(cuts[t.index - 1]), int(cuts[t.index]))
+            label = table.group[r][np.searchsorted(table.id[r], t.id)]
+            out.append(t.replace(group=label, events=(*t.events, *new), derived=True))
+        else:
+            out.append(t.replace(groups=t.groups or nobody, events=(*t.events, *new), derived=True))
     groups = groups_in_frames(out, table.scale)
     return [t.replace(groups=g) if t.groups is None else t for t, g in zip(out, groups, strict=True)]
 

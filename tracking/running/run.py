@@ -88,6 +88,7 @@ def _facts(
         "causal_from": begins,
         "frames": len(tracks),
         **({"box_scale": list(sequence.source["box_scale"])} if "box_scale" in sequence.source else {}),
+        **({"ids": sequence.source["ids"]} if "ids" in sequence.source else {}),
         "versions": installed(PACKAGES),
     }
 

@@ -35,6 +35,7 @@ class NumericTable:
     layout: str = ""  # what the columns must be, for the remedy of errors that most rows have
     unit: str = "line"  # what a row is in the file, for errors
     classes: tuple[str, ...] = ()  # words that the numbers from 0 in the column of classes stand for; (): none
+    names: tuple[tuple[int, str], ...] = ()  # number and word of ids that the file has in words; (): none
 
     def reject(self, wrong: Bools | np.bool_, expected: str, remedy: str, most: str | None = None) -> None:
         """Raises InputError about the first row where `wrong` (N,) is True. most: the remedy if most rows are wrong."""
@@ -67,7 +68,9 @@ class NumericTable:
             most = f"check that this text belongs to this recording, and its seqLength, or {count}"
             self.reject((frame == 0) & (frame.max(initial=0) >= length), span, count)
         self.reject(frame == 0, span, "add 1 to all frames, if the file counts them from 0")
-        self.reject((frame < 1) | (frame > (length or FRAMES)), span, remedy, most)
+        times = frame.max(initial=0) > FRAMES
+        remedy = "correct the frame, or name the column t in the first line, if it has times" if times else remedy
+        self.reject((frame < 1) | (frame > (length or FRAMES)), span, remedy, remedy if times else most)
         # Memory in proportion to the highest frame: frames are checked before.
         crowded = np.bincount(frame, minlength=1)[frame] > DETECTIONS
         self.reject(crowded, f"at most {DETECTIONS} {self.unit}s of one frame", "check that this is the right file")

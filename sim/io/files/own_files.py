@@ -103,10 +103,15 @@ def output_file(out: Path, suffix: str, option: str = "--out") -> Path:
     return out
 
 
+def media_url(path: Path) -> str:
+    """Returns the name by which libav opens a file, whatever its name: "12:30.mp4" alone would name a protocol."""
+    return f"file:{path.absolute()}"
+
+
 def _video(path: Path) -> bool:
     import av
 
-    with suppress(av.FFmpegError), av.open(str(path), metadata_errors="ignore") as container:
+    with suppress(av.FFmpegError), av.open(media_url(path), metadata_errors="ignore") as container:
         return container.metadata.get("comment") == GENERATOR
     return False
 

@@ -5,9 +5,10 @@ Rx of the angles rx, ry, rz (rad) and T = (tx, ty, tz). Ideal sensor position: (
 Distorted position Xd (2-vector, mm): Xd (1 + kappa1 |Xd|²) = ideal. Pixel: u = sx Xd_x/dpx + cx, v = Xd_y/dpy + cy,
 where dpx, dpy are the size of a sensor element in mm, sx a scale factor and (cx, cy) the image centre in px.
 
-*OpenCV's YAML* of a rectified pair (`cv2.FileStorage`, `cv2.stereoRectify`): image_width, image_height, px; P1 and
-P2, the 3 x 4 projections of the left and right camera, P2[0, 3] = -P2[0, 0] times the baseline in m; and, as OpenCV
-knows no world, rotation (3 x 3, world to rectified left camera) and position (3 numbers, of the left camera, m).
+*OpenCV's YAML, XML or JSON* (`cv2.FileStorage`) of a rectified pair (`cv2.stereoRectify`): image_width, image_height,
+px; P1 and P2, the 3 x 4 projections of the left and right camera, P2[0, 3] = -P2[0, 0] times the baseline in m. Or of
+one camera without distortion, as ROS's camera_info: its matrix K (camera_matrix) in place of P1 and P2. As neither
+knows a world, they need rotation (3 x 3, world to rectified left camera) and position (3 numbers, of that camera, m).
 
 Pixel coordinates of both begin at the middle of the first pixel, ours at its corner.
 """
@@ -15,20 +16,23 @@ Pixel coordinates of both begin at the middle of the first pixel, ours at its co
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.limits import COORDINATE, YAML_BYTES
-from scenarios.reading import require_regular
+from scenarios.limits import COORDINATE, JSON_BYTES, XML_BYTES, YAML_BYTES
+from scenarios.reading import parse_json, read_regular, require_regular
 from sim.io.files.numeric_text import bounded_number, read_text, xml_root
 from sim.io.store.camera_files import read_camera
 from sim.scene.camera import require_camera
 from sim.types import Array, Camera
 
 MM = 1000.0  # per m
+YAML = (".yml", ".yaml")
 PARTS = {
     "Geometry": ("width", "height", "dpx", "dpy"),
     "Intrinsic": ("focal", "kappa1", "cx", "cy", "sx"),
@@ -74,57 +78,82 @@ def _rotation(rx: float, ry: float, rz: float) -> Array:
 
 
 SAME = 1e-6  # relative difference allowed between P1 and the left part of P2
-KEYS: dict[str, tuple[int, ...]] = {
-    "image_width": (), "image_height": (), "P1": (3, 4), "P2": (3, 4), "rotation": (3, 3), "position": (3,)
+DISTORTION = (
+    "d", "distortion_coefficients", "distCoeffs", "dist_coeffs", "dist_coeff", "dist_coefs", "dist", "distortion",
+    "Distortion_Coefficients",
+)  # fmt: skip
+# of each key its shape, and the names that others give it
+KEYS: dict[str, tuple[tuple[int, ...], tuple[str, ...]]] = {
+    "image_width": ((), ("width",)), "image_height": ((), ("height",)),
+    "rotation": ((3, 3), ()), "position": ((3,), ()),
+    "P1": ((3, 4), ()), "P2": ((3, 4), ()), "K": ((3, 3), ("k", "camera_matrix", "cameraMatrix", "Camera_Matrix")),
+    "D": ((), DISTORTION),
 }  # fmt: skip
 
 
-def read_opencv_yaml(path: Path) -> Camera:
-    """Returns the left Camera, with its baseline, of a rectified pair in OpenCV's YAML `path`."""
+def read_opencv(path: Path) -> Camera:
+    """Returns the left Camera, with its baseline, of a rectified pair that OpenCV stored, or the one of a matrix K."""
     found = _opencv_numbers(path)
-    missing = [key for key in KEYS if key not in found]
+    one = "K" in found and "P1" not in found and "P2" not in found
+    wanted = ["image_width", "image_height", *(["K"] if one else ["P1", "P2"]), "rotation", "position"]
+    missing = [key for key in wanted if key not in found]
     if missing:
-        raise _wrong(path, ", ".join(missing), "nothing", f"the keys {', '.join(KEYS)}", "add them, or a camera.json")
-    for key, shape in KEYS.items():
-        if found[key].size != math.prod(shape) or not (np.abs(found[key]) <= COORDINATE).all():
-            raise _wrong(path, key, f"{found[key].size} numbers", f"{math.prod(shape)} within {COORDINATE:g}")
-    width, height, left, right, rotation, position = (found[key].reshape(shape) for key, shape in KEYS.items())
+        remedy = "add them (rotation: 3 × 3, world to camera; position: of the camera, m, z up), or give a camera.json"
+        raise _wrong(path, ", ".join(missing), "nothing", f"the keys {', '.join(wanted)}", remedy)
+    for key in wanted:
+        size = math.prod(KEYS[key][0])
+        if found[key].size != size or not (np.abs(found[key]) <= COORDINATE).all():
+            raise _wrong(path, key, f"{found[key].size} numbers", f"{size} within {COORDINATE:g}")
+    if one and found.get("D", np.zeros(1)).any():
+        remedy = "undistort the pictures (cv2.undistort), and give zeros"
+        raise _wrong(path, "D", "distortion", "a camera without, or the Tsai XML", remedy)
+    value = {key: found[key].reshape(KEYS[key][0]) for key in wanted}
+    left = value["K" if one else "P1"]
+    right = left if one else value["P2"]
     fx, fy = float(left[0, 0]), float(left[1, 1])
     apart = np.abs(left - right)
-    apart[0, 3] = 0
-    if not (fx > 0 and apart.max() <= SAME * fx and right[0, 3] < 0):
+    apart[0, -1] = 0
+    if not (fx > 0 and apart.max() <= SAME * fx and (one or right[0, 3] < 0)):
         raise _wrong(path, "P2", "another pair", "P1 and P2 equal but for P2[0, 3] < 0", "rectify the pair")
     camera = Camera(
-        kind="pinhole", image=(int(width), int(height)), focal_px=(fx, fy),
+        kind="pinhole", image=(int(value["image_width"]), int(value["image_height"])), focal_px=(fx, fy),
         # OpenCV's pixel coordinates begin at the centre of the first pixel, ours at its corner.
-        centre_px=(float(left[0, 2]) + 0.5, float(left[1, 2]) + 0.5), position=position, rotation=rotation,
-        baseline=float(-right[0, 3] / fx),
+        centre_px=(float(left[0, 2]) + 0.5, float(left[1, 2]) + 0.5), position=value["position"],
+        rotation=value["rotation"], baseline=0.0 if one else float(-right[0, 3] / fx),
     )  # fmt: skip
     return require_camera(camera, path)
 
 
 def _opencv_numbers(path: Path) -> dict[str, Array]:
-    """Returns the numbers (N,) under each of KEYS that the file has."""
+    """Returns the numbers (N,) under each of KEYS that the file has, in YAML, XML or JSON."""
     import cv2
 
     text = read_text(path, YAML_BYTES)
+    if path.suffix.lower() in YAML and not text.startswith("%YAML"):
+        text = f"%YAML:1.0\n---\n{text}"  # as ROS writes it
     found = {}
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-        for key in KEYS:
-            node = storage.getNode(key)
-            # The numbers of a matrix are read without its stated size, which may be as large as the memory.
-            items = node.getNode("data") if node.isMap() else node
-            numbers = [items.at(k) for k in range(items.size())] if items.isSeq() else [items]
-            if not node.empty():
-                found[key] = np.array([number.real() for number in numbers])
+        for key, (_, others) in KEYS.items():
+            node = next((node for name in (key, *others) if not (node := storage.getNode(name)).empty()), None)
+            if node is not None:
+                # The numbers of a matrix are read without its stated size, which may be as large as the memory.
+                found[key] = np.array(list(_numbers(node.getNode("data") if node.isMap() else node)))
     except (cv2.error, SystemError):
-        expected = "a file of cv2.FileStorage, which begins with %YAML"
-        raise InputError(file=path, got="no OpenCV YAML", expected=expected, remedy="check --camera") from None
+        expected = "a file of cv2.FileStorage in YAML, XML or JSON"
+        raise InputError(file=path, got="no OpenCV file", expected=expected, remedy="check --camera") from None
     finally:
         cv2.utils.logging.setLogLevel(level)
     return found
+
+
+def _numbers(node: Any) -> Iterator[float]:
+    if not node.isSeq():
+        yield node.real()
+        return
+    for k in range(node.size()):
+        yield from _numbers(node.at(k))
 
 
 PERSON, SMALLEST_PERSON = 1.7, 2.0  # a person's height, m, and the least px that it must have in the picture
@@ -133,10 +162,9 @@ SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios 
 
 
 def read_calibration(path: Path) -> Camera:
-    """Returns the camera of a calibration file: Tsai's .xml, OpenCV's .yml of a rectified pair, or camera.json."""
+    """Returns the camera of a calibration file: Tsai's XML, OpenCV's or ROS's YAML, XML or JSON, or camera.json."""
     require_regular(path, "check --camera: a camera.json, or Tsai's calibration as .xml")
-    readers = {".yml": read_opencv_yaml, ".yaml": read_opencv_yaml, ".xml": read_tsai}
-    camera = readers.get(path.suffix.lower(), read_camera)(path)
+    camera = _reader(path)(path)
     height = float(camera.position[2])
     # From so high, a person right below would be smaller than 2 px in any direction of view.
     person = camera.focal_px[1] * PERSON / height if camera.kind == "pinhole" else np.inf
@@ -148,6 +176,17 @@ def read_calibration(path: Path) -> Camera:
         remedy = "give T, and P2 made from it, in metres: divide by 1000 if they are in mm"
         raise _wrong(path, "baseline", f"{camera.baseline:g} m", f"metres, up to {widest:g} m at this height", remedy)
     return camera
+
+
+def _reader(path: Path) -> Callable[[Path], Camera]:
+    suffix = path.suffix.lower()
+    if suffix == ".xml":
+        return read_opencv if b"<opencv_storage" in read_regular(path, XML_BYTES)[:1000] else read_tsai
+    if suffix in YAML:
+        return read_opencv
+    keys = {name for key, (_, others) in KEYS.items() for name in (key, *others)} - {"rotation", "position"}
+    document = parse_json(read_text(path, JSON_BYTES), path, "give a camera.json")
+    return read_opencv if isinstance(document, dict) and not keys.isdisjoint(document) else read_camera
 
 
 def scaled_to_image(

@@ -98,7 +98,7 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     Its truth is in the image. `options.px_per_m` None: the scale of the truth is the median of the longer sides of all
     boxes / 1.7 m, that of the sequence the median of the first 100; `source["px_per_m_frames"]` is then the last frame
-    of these boxes.
+    of these boxes. `options.camera` is refused for CAVIAR's own recordings.
     """
     root, px_per_m = read_xml(path), options.px_per_m
     table, length = people_of(path, root)
@@ -107,6 +107,8 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     inside = bool(((centre >= 0) & (centre <= IMAGE_SIZE)).all())
     own = inside and root.find("frame/objectlist/object/hypothesislist") is not None
     rate = options.fps or FPS
+    if own:
+        options.reject(path, "a CAVIAR recording", "its boxes do not show where people stand", "camera")
     if options.fps is None and not own:
         got, expected = "labels without frame rate, not of CAVIAR's recordings", "the frames per second of the video"
         raise InputError(file=path, place="--fps", got=got, expected=expected, remedy="give --fps")
@@ -121,7 +123,9 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     source = {"kind": "caviar", "path": str(path), **({"px_per_m_frames": learned} if learned else {})}
     size = IMAGE_SIZE if own else None
-    return recorded_sequence(source, name, rate, length, load_truth=truth, px_per_m=scale, image_size=size)
+    return recorded_sequence(
+        source, name, rate, length, load_truth=truth, px_per_m=scale, image_size=size, camera=options.camera
+    )
 
 
 def is_caviar(path: Path) -> bool:

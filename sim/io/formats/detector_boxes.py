@@ -41,7 +41,7 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
         table = table_of_rows(_coco_results(path), box_scale=options.box_scale)
     else:
         frames_at = partial(_frames_at, path, sequence)
-        table = read_table(path, boxless=True, box_scale=options.box_scale, frames_at=frames_at)
+        table = read_table(path, boxless=True, box_scale=options.box_scale, frames_at=frames_at, px_per_m=1.0)
     mot_text.require_classes(table, options.person_class)
     found = mot_text.detections_of_table(table, options)
     if not len(found.frame):

@@ -119,6 +119,8 @@ def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: flo
 
 def scale_groups(groups: Groups, factor: float) -> Groups:
     """Returns groups with positions, velocities and hulls multiplied by `factor`, and extents by its square."""
+    if factor == 1 or not len(groups.id):
+        return groups
     hull, extent = tuple(h * factor for h in groups.hull), groups.extent * factor**2
     return groups.replace(pos=groups.pos * factor, vel=groups.vel * factor, extent=extent, hull=hull)
 

@@ -77,7 +77,9 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found, of_boxes = None, options.box_options
     if is_present(det):
-        table = read_table(det, length=info.length, boxless=True, box_scale=of_boxes.box_scale)
+        table = read_table(
+            det, length=info.length, boxless=True, box_scale=of_boxes.box_scale, px_per_m=options.px_per_m
+        )
         if not is_present(gt):  # else --class may be of the labels
             mot_text.require_classes(table, of_boxes.person_class)
         found = mot_text.detections_of_table(table, of_boxes)
@@ -119,7 +121,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         return pictures.read(wanted, seen or pictures.first_size())
 
     def truth() -> Truth:
-        table = read_table(gt, length=length, boxless=True)
+        table = read_table(gt, length=length, boxless=True, px_per_m=options.px_per_m)
         return mot_text.truth_of_table(table, info.name, rate, length, options.scale, of_boxes.person_class)
 
     more: dict[str, Any] = {} if choice is None else {"background": str(choice)}
@@ -149,6 +151,10 @@ def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
     return find_pictures(path / info.image_dir, info.length, (lambda: _labelled_frames(path)) if texts else None)
 
 
+def _frames(text: Path) -> Ints:
+    return read_table(text, boxless=True, px_per_m=1.0).frame
+
+
 def _labelled_frames(path: Path) -> Ints:
     texts = filter(is_present, (path / "det" / "det.txt", path / "gt" / "gt.txt"))
-    return np.unique(np.concatenate([np.zeros(0, np.int64), *(read_table(text, boxless=True).frame for text in texts)]))
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *(_frames(text) for text in texts)]))

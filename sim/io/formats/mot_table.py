@@ -24,6 +24,7 @@ from scenarios.errors import InputError
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, NAME_THEM, NumericTable, TextRows, is_number_text, read_rows
 from sim.io.formats.options import BoxScale
+from sim.io.formats.worded_cells import TIME_UNITS, are_numbers, in_seconds, instants, numbered_ids
 from sim.types import LENGTH_UNITS, Array, Bools, Ints
 
 ENOUGH = 10  # rows that are needed to judge by how their columns vary
@@ -142,8 +143,13 @@ Column = np.ndarray[tuple[int], np.dtype[np.float64]]
 # meaning of a column, and the names it may have
 NAMES = {
     "frame": ("frame", "frame_id", "frameid", "frame_number", "frame_num", "fr", "frame_index", "frame_idx"),
-    "time": ("t", "t_s", "t_ms", "time", "time_s", "time_ms", "timestamp", "timestamp_s", "timestamp_ms"),
-    "id": ("id", "track_id", "trackid", "tracker_id", "person_id", "ped_id", "target_id", "object_id", "agent_id"),
+    "time": tuple(
+        name + unit for name in ("t", "time", "timestamp", "datetime", "timestep_time")
+        for unit in ("", *(f"_{unit}" for unit in TIME_UNITS))
+    ),
+    "id": (
+        "id", "track_id", "trackid", "track", "tracker_id", "person_id", "ped_id", "target_id", "object_id", "agent_id"
+    ),
     "score": ("score", "conf", "confidence"),
     "class": ("class", "class_id", "cls", "category", "category_id", "object_category"),
     "left": ("left", "bb_left", "box_left_px", "xmin", "x_min", "x1"),
@@ -152,20 +158,26 @@ NAMES = {
     "bottom": ("bottom", "ymax", "y_max", "y2"),
     "width": ("width", "w", "bb_width", "box_width_px"),
     "height": ("height", "h", "bb_height", "box_height_px"),
-    "cx": ("cx", "xc", "x_center", "center_x"),
-    "cy": ("cy", "yc", "y_center", "center_y"),
+    "cx": ("cx", "xc", "x_center", "center_x", "xcenter"),
+    "cy": ("cy", "yc", "y_center", "center_y", "ycenter"),
     "group": ("group", "group_id", "groupid"),
-    "x": ("x", "pos_x", *(f"x_{unit}" for unit in LENGTH_UNITS)),
-    "y": ("y", "pos_y", *(f"y_{unit}" for unit in LENGTH_UNITS)),
-}
+    "lost": ("lost",),
+    "x": ("x", "pos_x", "person_x", "x_px", *(f"x_{unit}" for unit in LENGTH_UNITS)),
+    "y": ("y", "pos_y", "person_y", "y_px", *(f"y_{unit}" for unit in LENGTH_UNITS)),
+}  # fmt: skip
 
 # columns of which a text has a box, the first four that it has all of
+CORNERS = ("x", "y", "right", "bottom")
 BOXES = (
     ("left", "top", "width", "height"), ("left", "top", "right", "bottom"), ("cx", "cy", "width", "height"),
-    ("x", "y", "width", "height"),
+    ("x", "y", "width", "height"), CORNERS,
 )  # fmt: skip
+PLACES = (("x", "y"), ("cx", "cy"))  # columns of which a text without a box has a position
 
 MEANINGS = {name: meaning for meaning, names in NAMES.items() for name in names}
+
+# The columns of annotations of Stanford Drone, which have no line of names, but a label in quotes at the end.
+STANFORD = "track_id xmin ymin xmax ymax frame lost occluded generated label"
 
 # further names of a column of classes in words, if PEOPLE are among these: it may hold anything else
 WORD_NAMES = ("label", "name", "class_name")
@@ -174,11 +186,16 @@ PEOPLE = ("person", "pedestrian")  # words for the class of people
 
 FramesAt = Callable[[Column, Column], Ints]  # frames (N,) from 1 of times (N,), s, and ids (N,); 0: of no frame
 
-SECONDS = "if the frames are times in s, write numbers of frames, from 1: time × frames per second + 1"
+NUMBER_THEM = "write numbers of frames in a column frame: (time - time of frame 1) × frames per second + 1, times in s"
+
+SECONDS = "if the frames are times, name their column t in the first line; or number frames from 1"
+
+EMPTY = 100  # A text with people in fewer than one of so many frames may have times for frames.
 
 EXPECTED = (
-    "frame (or t in s, in sources and --boxes) and a box (x,y,w,h, left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), "
-    "or frame,id,x,y in m (x_cm,y_cm in cm)"
+    "a row per person and frame, with frame (or t, but not in a folder) and a box (x,y,w,h, "
+    "left,top,width,height, x1,y1,x2,y2 or cx,cy,w,h), or frame,id,x,y in m (x_cm,y_cm in cm; x_px,y_px with "
+    "--px-per-m)"
 )
 
 
@@ -187,45 +204,40 @@ def column_names(text: TextRows) -> list[str] | None:
 
     Units are parts of names: `x [m]` and `x/m` are `x_m`.
     """
-    row = next(text.cells(), [])
+    row = [re.sub("[µμ]s", "us", cell) for cell in next(text.cells(), [])]
     cells = [cell if is_number_text(cell) else re.sub(r"\W+", "_", cell).strip("_").lower() for cell in row]
     return cells if any(cells) and not any(map(is_number_text, cells)) else None
 
 
-def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> tuple[NumericTable, Ints | None]:
-    """Reads a text with named columns as 8 or 10 columns of a MOTChallenge text, or as 4: frame, id, x, y in m.
+def read_named(
+    text: TextRows, names: list[str], frames_at: FramesAt | None, px_per_m: float | None = None
+) -> tuple[NumericTable, Ints | None]:
+    """Reads a text with named columns as 8 or 10 columns of a MOTChallenge text, or as 4 or 5 of positions.
 
-    frames_at: a function that gives the frames (0: none) of times (s), for a file with a column of times in place of
-    frames; rows without frame are left out. None: times are not read. Returns the rows, and the labels of a column
-    `group`, (N,), -1 for alone; None without that column.
+    Columns of positions are frame, id, x, y in m, and the class if there is one. frames_at: a function that gives the
+    frames (0: none) of times (s), for a file with a column of times in place of frames; rows without frame are left
+    out. None: times are not read. px_per_m: pixels per metre of x_px, y_px; None: unknown. Returns the rows, and the
+    labels of a column `group`, (N,), -1 for alone; None without that column.
     """
-    found: dict[str, int] = {}
     word_column, words = _words_for_classes(text, names)
-    for k, name in enumerate(names):
-        meaning = MEANINGS.get(name)
-        if meaning == "time" and (frames_at is None or not set(NAMES["frame"]).isdisjoint(names)):
-            continue
-        if meaning in found:
-            _refuse(text, names)
-        if meaning is not None and not (words and meaning == "class"):
-            found[meaning] = k
-    if found.keys().isdisjoint(("frame", "time")):
-        _refuse(text, names, NAME_THEM if set(NAMES["time"]).isdisjoint(names) else SECONDS)
-    rows = text.numbers((len(names),), first=1, layout="those that the first line names", use=list(found.values()))
-    column: dict[str, Column] = dict(zip(found, rows.values.T, strict=False))
+    found = _meanings(text, names, times=frames_at is not None, classes=not words)
+    rows, column, is_instant = _columns(text, names, found)
     if words:
         classes, code = np.unique(words, return_inverse=True)
         rows, column["class"] = replace(rows, classes=tuple(classes.tolist())), code.astype(float)
+    if "lost" in column:
+        rows, column = _without_lost(rows, column)
     if "time" in column and frames_at is not None:
-        unit = 0.001 if names[found["time"]].endswith("_ms") else 1.0  # s
-        seconds = column.pop("time") * unit
-        column["frame"] = frames_at(seconds, column.get("id", np.zeros_like(seconds))).astype(float)
-        seen = column["frame"] > 0
-        rows, column = replace(rows, line=rows.line[seen]), {name: v[seen] for name, v in column.items()}
-    columns = _in_order(column, {axis: names[found[axis]].partition("_")[2] for axis in "xy" if axis in column})
+        seconds, id = column.pop("time"), column.get("id", np.zeros(len(rows.line)))
+        seconds = seconds if is_instant else in_seconds(text.file, names[found["time"]], seconds, id)
+        column["frame"] = frames_at(seconds, id).astype(float)
+        rows, column = _kept(rows, column, column["frame"] > 0)
+    units = {axis: names[found[axis]].partition("_")[2] for axis in "xy" if axis in column}
+    columns, used = _in_order(text, column, units, px_per_m)
     if columns is None:
         _refuse(text, names)
-    unused = [name for k, name in enumerate(names) if name and k not in (*found.values(), word_column)]
+    read = {k for meaning, k in found.items() if meaning in used} | {word_column}
+    unused = [name for k, name in enumerate(names) if name and k not in read]
     if unused:
         warnings.warn(f"{text.file}: line {text.line[0]}: columns that are not used: {', '.join(unused)}", stacklevel=4)
     if column["frame"].min(initial=1) == 0:
@@ -233,6 +245,50 @@ def read_named(text: TextRows, names: list[str], frames_at: FramesAt | None) -> 
         warnings.warn(f"{text.file}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
     rows = replace(rows, values=np.stack(columns, axis=1))
     return rows, replace(rows, values=column["group"][:, None]).integers(0, "group") if "group" in column else None
+
+
+def _meanings(text: TextRows, names: list[str], times: bool, classes: bool) -> dict[str, int]:
+    """Returns the column of each meaning. times, classes: whether columns of times and of classes are read."""
+    found: dict[str, int] = {}
+    for k, name in enumerate(names):
+        meaning = MEANINGS.get(name)
+        if meaning == "time" and (not times or not set(NAMES["frame"]).isdisjoint(names)):
+            continue
+        if meaning in found:
+            _refuse(text, names, f"{names[found[meaning]]} and {name} mean the same: give one of them another name")
+        if meaning is not None and (classes or meaning != "class"):
+            found[meaning] = k
+    if found.keys().isdisjoint(("frame", "time")):
+        _refuse(text, names, NAME_THEM if set(NAMES["time"]).isdisjoint(names) else NUMBER_THEM)
+    return found
+
+
+def _columns(text: TextRows, names: list[str], found: dict[str, int]) -> tuple[NumericTable, dict[str, Column], bool]:
+    """Returns the rows, their columns by meaning, and True if times are dates, in s. Words of ids are numbered."""
+    cells = {meaning: text.words(found[meaning], first=1) for meaning in ("id", "time") if meaning in found}
+    worded = {meaning: each for meaning, each in cells.items() if not are_numbers(each)}
+    numeric = {meaning: k for meaning, k in found.items() if meaning not in worded}
+    layout = "those that the first line names"
+    rows = text.numbers((len(names),), first=1, layout=layout, use=list(numeric.values()))
+    column: dict[str, Column] = dict(zip(numeric, rows.values.T, strict=False))
+    if "id" in worded:
+        column["id"], known = numbered_ids(rows, worded["id"])
+        rows = replace(rows, names=known)
+    if "time" in worded:
+        column["time"] = instants(rows, worded["time"])
+    return rows, column, "time" in worded
+
+
+def _without_lost(rows: NumericTable, column: dict[str, Column]) -> tuple[NumericTable, dict[str, Column]]:
+    lost = column["lost"] != 0
+    if lost.any():
+        said = f"{lost.sum()} of {len(lost)} rows are lost people, whom nobody saw, and are left out"
+        warnings.warn(f"{rows.file}: column lost: {said}", stacklevel=5)
+    return _kept(rows, column, ~lost)
+
+
+def _kept(rows: NumericTable, column: dict[str, Column], keep: Bools) -> tuple[NumericTable, dict[str, Column]]:
+    return replace(rows, line=rows.line[keep]), {name: values[keep] for name, values in column.items()}
 
 
 def _words_for_classes(text: TextRows, names: list[str]) -> tuple[int, list[str]]:
@@ -245,20 +301,28 @@ def _words_for_classes(text: TextRows, names: list[str]) -> tuple[int, list[str]
     return -1, []
 
 
-def _in_order(column: dict[str, Column], units: dict[str, str]) -> list[Column] | None:
-    """Returns the columns of a MOTChallenge text, or frame, id, x, y in m; None if there is no box and no position."""
-    frame, have = column["frame"], column.keys()
+def _in_order(
+    text: TextRows, column: dict[str, Column], units: dict[str, str], px_per_m: float | None
+) -> tuple[list[Column] | None, set[str]]:
+    """Returns the columns of a MOTChallenge text, or of positions in m, and the meanings of the columns that are used.
+
+    None without a box and a position. units: of x and y, as their names say.
+    """
+    frame, have = column["frame"], {*column}
+    used = have & {"frame", "id", "group", "lost"} | {"time"}
     column = {
         "id": np.full_like(frame, -1.0),
         "class": np.full_like(frame, -1.0),
         "score": np.ones_like(frame),
     } | column
-    ground = [column[axis] * LENGTH_UNITS.get(unit, 1.0) for axis, unit in units.items()]
-    if have >= {"id", "x", "y"} and not have & {"width", "height", "left", "cx"}:
-        return [frame, column["id"], *ground]
-    form = next((form for form in BOXES if have >= {*form}), None)
+    form = next((form for form in BOXES if have >= {*form} and (form != CORNERS or _are_corners(column))), None)
+    place = next((place for place in PLACES if have >= {"id", *place}), None)
+    if form is None and place is not None:
+        ground = [column[axis] * _metres(text, units.get(axis, ""), px_per_m) for axis in place]
+        kinds = [column["class"]] if "class" in have else []
+        return [frame, column["id"], *ground, *kinds], used | {*place, "class"}
     if form is None:
-        return None
+        return None, used
     left, top, w, h = (column[name] for name in form)
     if "right" in form:
         w, h = w - left, h - top
@@ -266,8 +330,27 @@ def _in_order(column: dict[str, Column], units: dict[str, str]) -> list[Column] 
         left, top = left - w / 2, top - h / 2
     known = len(units) == 2 and {*units.values()} <= LENGTH_UNITS.keys()
     metres = form == BOXES[0] and "id" in have and "class" not in have and known
+    ground = [column[axis] * LENGTH_UNITS[units[axis]] for axis in "xy"] if metres else []
     last = [*ground, np.zeros_like(frame)] if metres else [column["class"]]
-    return [frame, column["id"], left, top, w, h, column["score"], *last]
+    used |= {"score", "class", *form, *("xy" if metres else "")}
+    return [frame, column["id"], left, top, w, h, column["score"], *last], used
+
+
+def _are_corners(column: dict[str, Column]) -> bool:
+    """Returns True if x, y, x2, y2 can be corners of people's boxes, and no two positions."""
+    width, height = column["right"] - column["x"], column["bottom"] - column["y"]
+    return bool((width > 0).all() and (height > 0).all() and np.median(height) > LOWEST)
+
+
+def _metres(text: TextRows, unit: str, px_per_m: float | None) -> float:
+    if unit != "px":
+        return LENGTH_UNITS.get(unit, 1.0)
+    if px_per_m is None:
+        raise InputError(
+            file=text.file, place="columns x_px, y_px", got="pixels, without a scale", expected="metres, or a scale",
+            remedy="add --px-per-m, the pixels per metre",
+        )  # fmt: skip
+    return 1 / px_per_m
 
 
 def _refuse(text: TextRows, names: list[str], remedy: str = NAME_THEM) -> NoReturn:
@@ -275,7 +358,7 @@ def _refuse(text: TextRows, names: list[str], remedy: str = NAME_THEM) -> NoRetu
     raise InputError(file=text.file, place=f"line {text.line[0]}", got=got, expected=EXPECTED, remedy=remedy)
 
 
-GROUND_COLUMNS = 4  # columns of a text of ground positions alone: frame, id, x, y
+GROUND_COLUMNS = 4  # columns of a text of ground positions alone: frame, id, x, y; a fifth is the class
 
 # what the columns of a text without names must be, and what to do
 LAYOUT = "frame,id,left,top,width,height,… or frame,id,x,y: name the columns in the first line, if they are others"
@@ -294,8 +377,8 @@ class MotTable:
 
     @property
     def on_ground(self) -> bool:
-        """True if the text has ground positions and no boxes: 4 columns."""
-        return bool(self.rows.values.shape[1] == GROUND_COLUMNS)
+        """True if the text has ground positions and no boxes: 4 columns, or 5 with the class."""
+        return bool(self.rows.values.shape[1] <= GROUND_COLUMNS + 1)
 
     def scores(self) -> Array:
         """Returns column 7 (N,), a confidence or flag; ones if there is no such column."""
@@ -312,17 +395,20 @@ class MotTable:
 
 def read_table(
     path: Path, *, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None,
-    frames_at: FramesAt | None = None,
+    frames_at: FramesAt | None = None, px_per_m: float | None = None,
 ) -> MotTable:  # fmt: skip
     """Returns the MotTable of a MOTChallenge text of 6 to 10 columns, or of 4: frame, id, x, y in m.
 
     length: the last frame allowed. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors that make the
-    boxes pixels. frames_at: as `read_named` takes it. Rows stay in the order of the file.
+    boxes pixels. frames_at, px_per_m: as `read_named` takes them. Rows stay in the order of the file.
     """
     text = read_rows(path, heading=True)
+    first = next(text.cells(), [])
+    if len(first) == len(STANFORD.split()) and first[-1].startswith('"') and is_number_text(first[0]):
+        text = TextRows(path, (STANFORD, *text.text), np.insert(text.line, 0, 0))
     named = column_names(text)
     if named is not None:
-        rows, group = read_named(text, named, frames_at)
+        rows, group = read_named(text, named, frames_at, px_per_m)
         return table_of_rows(rows, length, boxless, box_scale, group)
     rows = text.numbers((GROUND_COLUMNS, *range(6, 11)), layout=LAYOUT)
     reject_missing_ids(rows)
@@ -337,9 +423,9 @@ def table_of_rows(
     """Returns the MotTable of rows in the columns of a MOTChallenge text. Arguments as for `read_table`."""
     frame, id, count = rows.integers(0, "frame", SECONDS), rows.integers(1, "id"), len(rows.line)
     box, rest = rows.values[:, 2:6], rows.values[:, 6:]
-    if rows.values.shape[1] == GROUND_COLUMNS:
+    if rows.values.shape[1] <= GROUND_COLUMNS + 1:
         # A text of positions: no box, confidence 1, z = 0.
-        box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:], np.zeros(count)]
+        box, rest = np.full((count, 4), -1.0), np.c_[np.ones(count), rows.values[:, 2:4], np.zeros(count)]
     if group is not None:
         rows.reject(group < -1, "groups from 0, or -1 for alone", "correct the group")
         alone = not repeated_ids(frame[group >= 0], group[group >= 0]).any()
@@ -348,6 +434,10 @@ def table_of_rows(
             warnings.warn(f"{rows.file}: column group: {who}. Leave an unused column out", stacklevel=4)
     table = MotTable(rows, frame, id, box, rest, group)
     rows.require_bounds(frame, length)
+    last, seen = int(frame.max(initial=0)), len(np.unique(frame))
+    if last >= EMPTY * max(seen, ENOUGH):
+        said = f"people are in {seen} of {last} frames, the last in {rows.unit} {rows.line[frame.argmax()]}"
+        warnings.warn(f"{rows.file}: {said}: number frames 1, 2, 3, …; {SECONDS}", stacklevel=4)
     flat, boxed = (table.box[:, 2:] <= 0).any(axis=1), ~table.without_box()
     rows.reject(flat & boxed if boxless else flat, "boxes with width and height above 0", CORRECT)
     if box_scale is not None:

@@ -30,8 +30,9 @@ from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import LARGEST
 from sim.io.formats.biwi import labels_of
 from sim.io.formats.labelled_truth import centres, differentiate, warn_of_places, with_labels
-from sim.io.formats.mot_table import PEOPLE, MotTable, corner_doubt, read_table, require_pixels
+from sim.io.formats.mot_table import GROUND_COLUMNS, PEOPLE, MotTable, corner_doubt, read_table, require_pixels
 from sim.io.formats.options import NO_OPTIONS, RATES, BoxOptions, Classes, RecordingOptions
+from sim.io.formats.worded_cells import usual_step
 from sim.io.recorded_sequence import recorded_sequence
 from sim.scene.camera import scale_of_all_boxes
 from sim.types import Array, Bools, Detections, Ints, Plane, Sequence, Truth, Unscored
@@ -231,7 +232,11 @@ def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bool
 
 def classes_of(table: MotTable, named: bool) -> Array | None:
     """Returns column 8 (N,) if it holds classes, else None. named: True if the user gave --class."""
-    if table.rest.shape[1] < 2 or table.on_ground or (table.rest[:, 1] == -1).all():
+    if table.on_ground:
+        return table.rows.values[:, 4] if table.rows.values.shape[1] > GROUND_COLUMNS else None
+    if table.rest.shape[1] == 1:
+        _reject_categories(table)
+    if table.rest.shape[1] < 2 or (table.rest[:, 1] == -1).all():
         return None
     column = table.rest[:, 1]
     if table.rest.shape[1] < 4:
@@ -240,6 +245,20 @@ def classes_of(table: MotTable, named: bool) -> Array | None:
     whole = (column >= 0).all() and (column == np.round(column)).all()
     # If columns 8 to 10 are no metres, column 8 may be a category, as in VisDrone.
     return column if whole and (named or (table.rest[:, 3] == -1).all() or _one_for_each(table, column)) else None
+
+
+def _reject_categories(table: MotTable) -> None:
+    """Raises InputError if column 7 of 7 seems to hold classes: a few whole numbers, one for each id."""
+    column, id = table.rest[:, 0], table.id
+    values = np.unique(column)
+    few = 2 <= len(values) <= SHOWN and ENOUGH * len(values) <= len(column) and (values == np.round(values)).all()
+    one = (id < 0).all() or len(np.unique(np.c_[id, column], axis=0)) == len(np.unique(id))
+    if few and one and values[0] >= 0 and 2 <= values[-1] <= LAST_CLASS:
+        raise InputError(
+            file=table.rows.file, place="column 7", got=f"{', '.join(f'{v:g}' for v in values)}, as classes have",
+            expected="a confidence, or a flag 0 or 1", remedy="name the columns in the first line: "
+            "frame,id,left,top,width,height,class (…,score if it is one)",
+        )  # fmt: skip
 
 
 def _one_for_each(table: MotTable, column: Array) -> bool:
@@ -401,13 +420,18 @@ def frame_rate(given: float | None, found: float | None, what: str = "MOTChallen
 
 def rate_of_times(path: Path, seconds: Array, id: Array) -> float:
     """Returns the frames per second at which times (N,) of one id (N,) follow each other, where none is missing."""
-    id, seconds = np.unique(np.column_stack([id, seconds]), axis=0).T
-    step = np.diff(seconds)[np.diff(id) == 0]
-    rate = 1 / step[step < 1.5 * np.median(step)].mean() if len(step) else 1.0
+    step = usual_step(seconds, id)
+    rate = 1 / step if step else 1.0
     if not RATES[0] <= rate <= RATES[1]:
         got, expected = f"{rate:.3g} per second", "{:g} to {:g} times per second".format(*RATES)
-        raise InputError(file=path, place="times", got=got, expected=expected, remedy="give --fps, and times in s")
+        remedy = "correct the unit in the name of the column (t_s, t_ms, t_us, t_ns), or give --fps"
+        raise InputError(file=path, place="times", got=got, expected=expected, remedy=remedy)
     return round(float(rate), 3)
+
+
+def frames_of_times(seconds: Array, begin: float, fps: float) -> Ints:
+    """Returns the nearest frames (N,) of times (N,); begin: time of frame 1. Both in s."""
+    return np.asarray(np.clip(np.round((seconds - begin) * fps) + 1, -LARGEST, LARGEST), np.int64)
 
 
 def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
@@ -415,15 +439,14 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     `options.camera` becomes its camera, unchanged.
     """
-    of_boxes, fps = options.box_options, options.fps
+    of_boxes, fps, begin = options.box_options, options.fps, 0.0
 
     def frames_at(seconds: Array, id: Array) -> Ints:
-        nonlocal fps
-        fps = fps or rate_of_times(path, seconds, id)
-        frame = np.round((seconds - seconds.min(initial=np.inf)) * fps) + 1
-        return np.asarray(np.minimum(frame, LARGEST), np.int64)
+        nonlocal fps, begin
+        fps, begin = fps or rate_of_times(path, seconds, id), float(seconds.min(initial=np.inf))
+        return frames_of_times(seconds, begin, fps)
 
-    table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at)
+    table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at, px_per_m=options.px_per_m)
     rate = frame_rate(fps, None)
     if not len(table.frame):
         raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
@@ -438,5 +461,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     else:
         options.reject(path, "a text of people with ids", "it is for detections", "min_score")
         more = {"load_truth": truth}
-    source = {"kind": "mot text", "path": str(path), **of_boxes.given()}
+    source = {"kind": "mot text", "path": str(path), "begin": begin, **of_boxes.given()}
+    if table.rows.names:
+        source["ids"] = dict(table.rows.names)
     return recorded_sequence(source, path.stem, rate, length, px_per_m=options.scale, camera=options.camera, **more)

@@ -25,9 +25,10 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, is_number
 from scenarios.reading import parse_json
+from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, LARGEST, NumericTable, number_or_nan, read_rows, read_text, rows_among
 from sim.io.formats.biwi import frame_numbers
-from sim.io.formats.mot_table import reject_swapped, table_of_rows
+from sim.io.formats.mot_table import SECONDS, reject_swapped, table_of_rows
 from sim.io.formats.mot_text import frame_rate, truth_of_table
 from sim.io.formats.options import Classes, RecordingOptions
 from sim.io.recorded_sequence import recorded_sequence
@@ -35,6 +36,7 @@ from sim.types import Bools, Sequence, Truth, Unscored
 
 NDJSON = ".ndjson"
 ETH_FPS = 2.5
+STEPS = (4, 24)  # least and greatest number of video frames from label to label at ETH_FPS, of 10 to 60 per second
 FRAMERATE = re.compile(r"framerate[^\w+-]*([-+]?\d[\d.]*(?:,\d+)?)", re.IGNORECASE)
 PEDPY = re.compile(r"#.*framerate|#\s*(id|persid)\s+(frame|fr)\b", re.IGNORECASE)
 
@@ -90,14 +92,29 @@ def _sequence(
     return recorded_sequence(source, path.stem, rate, length, load_truth=truth, px_per_m=options.scale)
 
 
-def _counted(rows: NumericTable) -> NumericTable:
-    """Returns rows `frame, id, x, y` with the frames of a video counted from 1."""
-    frame = frame_numbers(rows.integers(0, "frame"), rows.integers(1, "id"))
-    return replace(rows, values=np.column_stack([frame, rows.values[:, 1:]]))
+def _counted(rows: NumericTable, fps: float | None) -> NumericTable:
+    """Returns rows `frame, id, x, y` with the frames of a video counted from 1. fps: None if nothing states it."""
+    first = np.sort(np.unique(rows.values, axis=0, return_index=True)[1])
+    if len(first) < len(rows.line):
+        said = f"{len(rows.line) - len(first)} rows stand there twice, as in scenes that overlap; each is read once"
+        warnings.warn(f"{rows.file}: {said}", stacklevel=4)
+        rows = replace(rows, values=rows.values[first], line=rows.line[first])
+    raw, id = rows.integers(0, "frame", SECONDS), rows.integers(1, "id")
+    scenes = "if these are scenes with frames or ids of their own, write each into a file of its own"
+    rows.reject(repeated_ids(raw, id), "each id once in a frame", scenes, scenes)
+    steps = np.diff(np.unique(raw))
+    step = int(np.median(steps)) if len(steps) else STEPS[0]
+    if fps is None and not STEPS[0] <= step <= STEPS[1]:
+        expected = "steps of {} to {}, as of a video of which {:g} frames per second are labelled".format(
+            *STEPS, ETH_FPS
+        )
+        got, remedy = f"frames in steps of {step}", "give --fps, rows of a person per second"
+        raise InputError(file=rows.file, place="--fps", got=got, expected=expected, remedy=remedy)
+    return replace(rows, values=np.column_stack([frame_numbers(raw, id), rows.values[:, 1:]]))
 
 
 def _read_eth(path: Path, fps: float | None) -> People:
-    return _counted(read_rows(path).numbers((4,), layout="frame id x y")), None
+    return _counted(read_rows(path).numbers((4,), layout="frame id x y"), fps), None
 
 
 def _read_pedpy(path: Path, fps: float | None) -> People:
@@ -133,8 +150,8 @@ def _read_ndjson(path: Path, fps: float | None) -> People:
             case _:
                 expected = '{"track": {"f", "p", "x", "y"}} of numbers, or {"scene": {…, "fps"}}'
                 raise _bad(path, number, line.strip()[:80], expected)
-    values = np.array(rows, np.float64).reshape(-1, 4)
-    return _counted(NumericTable(path, values, np.array(kept, np.int64), "f, p, x, y")), next(iter(rates), None)
+    values, stated = np.array(rows, np.float64).reshape(-1, 4), next(iter(rates), None)
+    return _counted(NumericTable(path, values, np.array(kept, np.int64), "f, p, x, y"), fps or stated), stated
 
 
 def _is_place(value: object) -> bool:

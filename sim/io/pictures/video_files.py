@@ -24,6 +24,7 @@ import numpy as np
 from scenarios.errors import InputError, WorkError
 from scenarios.limits import FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.reading import require_regular
+from sim.io.files.own_files import media_url
 from sim.io.pictures.picture_folder import require_size
 from sim.types import Array, Image
 
@@ -40,10 +41,11 @@ class PacketIndex:
 
     # when each packet is shown, in units of time_base (a fraction of a second), None if unknown
     stamps: tuple[int | None, ...]
-    keys: tuple[bool, ...]  # True where a group of packets begins that can be decoded by itself
+    # which group of packets that can be decoded by itself each is of, from 1, as all packets of the stream are counted
+    group: tuple[int, ...]
     time_base: Fraction
     rate: float  # frames per second;
-    promised: int  # number of frames; these two by the header, 0 if missing
+    promised: int  # number of frames shown; these two by the header, 0 if missing
     broken: str  # why reading stopped before the end of the file, "" if it did not
     reorders: bool  # True if packets may be stored in another order than they are shown
     aspect: Fraction = Fraction(1)  # width / height of a stored pixel, 1 if unknown
@@ -66,8 +68,9 @@ class PacketIndex:
         ranks = self.ranks()
         if ranks is None:
             return None
-        group = np.cumsum(self.keys).tolist()
-        return {g for g, stamp in zip(group, self.stamps, strict=True) if stamp is not None and ranks[stamp] in wanted}
+        return {
+            g for g, stamp in zip(self.group, self.stamps, strict=True) if stamp is not None and ranks[stamp] in wanted
+        }
 
 
 @contextmanager
@@ -77,7 +80,7 @@ def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
 
     size = require_regular(path)
     try:
-        container = av.open(str(path), metadata_errors="ignore")
+        container = av.open(media_url(path), metadata_errors="ignore")
     except (av.FFmpegError, OSError, ValueError) as error:
         got = "an empty file" if size == 0 else f"no readable video ({_reason(error)})"
         raise InputError(file=path, got=got, expected="a whole video file", remedy=REMEDY) from None
@@ -104,22 +107,24 @@ def index_packets(path: Path) -> PacketIndex:
     """Returns the packet index of a video without decoding it; of a damaged one, up to the damage."""
     import av
 
-    found, broken = [], ""
+    found, broken, group, hidden = [], "", 0, 0
     with open_stream(path) as (container, stream):
         context = stream.codec_context
         vp8 = context.name == "vp8"
         try:
             for p in container.demux(stream):
+                group += p.is_keyframe
+                hidden += p.is_discard  # as of the frames before a cut, which only an edit list leaves out
                 if p.size and not p.is_discard and (not vp8 or bytes(p)[0] & SHOWN):
-                    found.append((p.pts, bool(p.is_keyframe)))
+                    found.append((p.pts, group))
                 if len(found) > FRAMES:
                     got, expected = f"more than {FRAMES} frames", f"at most {FRAMES}"
                     raise InputError(file=path, got=got, expected=expected, remedy="cut the video")
         except av.FFmpegError as error:
             broken = _reason(error)
         return PacketIndex(
-            tuple(pts for pts, _ in found), tuple(key for _, key in found), stream.time_base or Fraction(1, 1000),
-            float(stream.average_rate or 0), int(stream.frames), broken,
+            tuple(pts for pts, _ in found), tuple(group for _, group in found), stream.time_base or Fraction(1, 1000),
+            float(stream.average_rate or 0), max(int(stream.frames) - hidden, 0), broken,
             bool(context.has_b_frames), _aspect(stream),
         )  # fmt: skip
 
@@ -215,14 +220,14 @@ def write_video(
         got, remedy = "pictures of {}×{} px".format(*size), "take --images jpg or png, or another camera.image"
         raise InputError(place="--images mp4", got=got, expected="an even width and height", remedy=remedy)
     path.write_bytes(b"")  # libav makes no file without pictures
-    with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
+    with av.open(media_url(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
         if comment:
             container.metadata["comment"] = comment
         made = VideoWriter(path, container, size, fps, quality)
         yield made
         container.mux(made.stream.encode(None))
     written = 0
-    with suppress(av.FFmpegError, IndexError), av.open(str(path)) as container:
+    with suppress(av.FFmpegError, IndexError), av.open(media_url(path)) as container:
         written = sum(packet.size > 0 and not packet.is_corrupt for packet in container.demux(video=0))
     if made.count and written != made.count:
         got = f"{written} of {made.count} pictures in the finished video"

@@ -21,6 +21,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from scenarios.errors import InputError
+from scenarios.limits import FRAMES
 from sim.arrays import repeated_ids
 from sim.io.files import tables
 from sim.io.files.atomic import lock_folder, replace_sealed
@@ -28,7 +29,14 @@ from sim.io.files.tables import AXES, BOX, Count, Rate, along, table_bytes, unit
 from sim.io.formats import people_texts
 from sim.io.formats.labelled_truth import centres, chords
 from sim.io.formats.mot_table import read_table, require_pixels, table_of_rows
-from sim.io.formats.mot_text import ground_positions, of_class, reject_duplicate_ids, require_metres, unit_scores
+from sim.io.formats.mot_text import (
+    frames_of_times,
+    ground_positions,
+    of_class,
+    reject_duplicate_ids,
+    require_metres,
+    unit_scores,
+)  # fmt: skip
 from sim.io.formats.options import BoxScale, Classes
 from sim.io.store import group_files
 from sim.io.store.seal import EXACT, NAMES, PAIRS, RUN, WHOLE, check_run, reject_foreign, run_folder, sealed_run
@@ -217,17 +225,36 @@ def upright_boxes(camera: Camera, pos: Array) -> Array:
 
 
 def read_track_text(
-    path: Path, fps: float, length: int | None, person_class: Classes | None = None, box_scale: BoxScale | None = None
-) -> list[Tracks]:
+    path: Path, fps: float, length: int | None, person_class: Classes | None = None, box_scale: BoxScale | None = None,
+    px_per_m: float | None = None, begin: float = 0.0,
+) -> list[Tracks]:  # fmt: skip
     """Returns the tracks of a text of MOTChallenge or KITTI, one Tracks per frame from 1 to `length`, sorted by id.
 
     length: None: to the last frame in the file. person_class: only rows of these classes are read; None: people.
-    box_scale: factors of x and y that make the boxes pixels. A column of groups makes them the tracker's own.
+    box_scale: factors of x and y that make the boxes pixels. px_per_m: pixels per metre of positions in px. begin: time
+    of frame 1, s, for a column of times. A column of groups makes them the tracker's own.
     """
+
+    def frames_at(seconds: Array, _: Array) -> Ints:
+        frame = frames_of_times(seconds, begin, fps)
+        early = frame < 1
+        if len(frame) and (early | (frame > (length or FRAMES))).mean() > 0.5:
+            got, expected = (
+                "{:.15g} to {:.15g} s".format(*np.quantile(seconds, (0, 1))),
+                f"times from {begin:.15g} s on",
+            )
+            remedy = "give seconds since the first frame, or numbers of frames in a column frame"
+            raise InputError(file=path, place="times", got=got, expected=expected, remedy=remedy)
+        if early.any():
+            warnings.warn(f"{path}: {early.sum()} rows before the first frame are left out", stacklevel=4)
+        return np.maximum(frame, 0)
+
     if people_texts.layout_of(path) == "kitti":
         table = table_of_rows(people_texts.kitti_tracks(path, person_class), length, box_scale=box_scale)
     else:
-        table = read_table(path, length=length, boxless=True, box_scale=box_scale)
+        table = read_table(
+            path, length=length, boxless=True, box_scale=box_scale, frames_at=frames_at, px_per_m=px_per_m
+        )
     require_pixels(table.rows, table.boxes())
     if not len(table.frame):
         if length is None:
@@ -257,13 +284,13 @@ def read_track_text(
     cuts = np.searchsorted(frame, np.arange(1, count + 2)).tolist()
 
     @lru_cache(maxsize=1)  # most frames of sparse texts are empty: they share their arrays
-    def arrays(a: int, b: int) -> tuple[Any, ...]:
+    def tracks(a: int, b: int) -> Tracks:
         some = (id[a:b], group[a:b], pos[a:b], vel[a:b], np.full((b - a, 4, 4), np.nan))
         nobody = table.group is not None and (group[a:b] < 0).all()  # Of a frame with groups they follow from `group`.
-        return *some, None if box is None else box[a:b], score[a:b], Groups.none() if nobody else None
+        groups = Groups.none() if nobody else None
+        return Tracks(1, 0.0, plane, "person", *some, None if box is None else box[a:b], score[a:b], groups)
 
-    frames = enumerate(pairwise(cuts))
-    return [Tracks(k + 1, k / fps, plane, "person", *arrays(a, b)) for k, (a, b) in frames]
+    return [tracks(a, b).replace(index=k + 1, t=k / fps) for k, (a, b) in enumerate(pairwise(cuts))]
 
 
 def with_groups(found: list[Tracks], path: Path) -> list[Tracks]:
@@ -361,7 +388,7 @@ def read_tracks(path: str | Path, *, fps: float | None = None, length: int | Non
 
 def read_checked_tracks(
     path: str | Path, *, fps: float | None = None, length: int | None = None, person_class: Classes | None = None,
-    box_scale: BoxScale | None = None,
+    box_scale: BoxScale | None = None, px_per_m: float | None = None, begin: float = 0.0,
 ) -> list[Tracks]:  # fmt: skip
     """Reads tracks as `read_tracks` does, but does not check the files of a run against their hashes."""
     path = Path(path)
@@ -373,7 +400,7 @@ def read_checked_tracks(
     if not text.is_file():
         got, expected = "no tracks", "tracks.parquet, tracks.txt or a MOTChallenge text"
         raise InputError(file=path, got=got, expected=expected, remedy="give the folder that `flockscope track` made")
-    found = read_track_text(text, 25.0 if fps is None else fps, length, person_class, box_scale)
+    found = read_track_text(text, 25.0 if fps is None else fps, length, person_class, box_scale, px_per_m, begin)
     if not whole:
         return found
     groups = folder / "groups.csv"

@@ -344,6 +344,7 @@ def made(tmp_path_factory) -> Path:
     (folder / "pair.txt").write_text("\n".join([*pair, ""]))
     bare = [f"{k},1,-1,-1,-1,-1,1,{5 + 0.2 * k},4,0" for k in range(1, 16)]
     (folder / "bare.txt").write_text("\n".join([*bare, ""]))
+    (folder / "px.csv").write_text("frame,id,x_px,y_px\n1,1,40,80\n2,1,42,80\n")
     (folder / "params.toml").write_text("[params]\nmanagement = 'rho'\nconfirm_ratio = 1.9\n")
     return folder
 
@@ -386,16 +387,19 @@ FLIPS = {
     f"view {ONE} --out {{1}}/page.html": {"source": ("40000", "40001"), "tracks": "{0}/tracks"},
     "view {0}/mot --out {1}/page.html": {"fps": "--fps 5"},
     TEXT: {"px_per_m": "--px-per-m 20"},
+    "view {0}/mot {0}/pair.txt --fps 5 --out {1}/page.html": {"box_scale": "--box-scale 2"},
     "view {0}/mot {0}/mot-tracks --fps 5 --out {1}/page.html": {"camera": "--camera {0}/camera.json"},
     f"view {SEEN} --out {{1}}/page.html": {"video": "--video beside"},
     OVERLAY: {
         "source": ("left.mp4", "background.mp4"), "tracks": ("pair", "bare"), "fps": "--fps 7",
-        "px_per_m": "--px-per-m 40",
+        "px_per_m": "--px-per-m 40", "box_scale": "--box-scale 2",
     },
     OVERLAY.replace("/left.mp4", ""): {"truth": "--truth over"},
     OVERLAY.replace("pair", "bare"): {"camera": f"--camera {SEEN}/camera.json"},
     f"sheet {ONE} --out {{1}}/sheet.png": {"source": ("40000", "40001"), "frames": "--frames 4"},
-    f"sheet {SEEN}/left.mp4 {{0}}/pair.txt --out {{1}}/sheet.png": {"tracks": ("pair", "bare")},
+    f"sheet {SEEN}/left.mp4 {{0}}/pair.txt --out {{1}}/sheet.png": {
+        "tracks": ("pair", "bare"), "px_per_m": "--px-per-m 40", "box_scale": "--box-scale 2",
+    },
     f"sheet {SEEN}/left.mp4 --out {{1}}/sheet.png": {"fps": "--fps 7"},
     "validate {0}/data": {"folder": ("data", "tracks")},
     "export webdataset {0}/data --out {1}": {
@@ -413,6 +417,10 @@ FLIPS = {
         f"export {form} {{0}}/{source} --out {{1}}": flip
         for form in ("trajnet", "pedpy")
         for source, flip in {"data": {"source": ("data", "tracks")}, "mot": {"fps": "--fps 5"}}.items()
+    },
+    **{
+        f"export {form} {{0}}/px.csv --fps 5 --px-per-m 20 --out {{1}}": {"px_per_m": ("-m 20", "-m 40")}
+        for form in ("csv", "parquet", "trajnet", "pedpy")
     },
     "export coco {0}/data --out {1}/c.json": {"folder": ("data", "mot")},
 }  # fmt: skip
@@ -439,7 +447,9 @@ ELSEWHERE = {
     ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("view", "by"),  # report/test_in_browser.py
     ("view", "workers"),
-    *((command, "person_class") for command in ("coco", "score", "track")),  # tests/sim/io/formats/test_mot_people.py
+    # tests/sim/io/formats/test_mot_people.py
+    *((name, "person_class") for name in ("coco", "score", "track", "view", "sheet", "overlay")),
+    *((name, "person_class") for name in ("csv", "parquet", "trajnet", "pedpy")),
     *((command, "box_scale") for command in ("score", "track")),  # tests/sim/io/formats/test_box_columns.py
 }
 # Commands whose options are tested one by one in commands/, ../stress, ../errors, and test_*.py here.

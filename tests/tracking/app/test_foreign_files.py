@@ -88,3 +88,24 @@ def test_a_report_on_several_runs_leaves_what_it_does_not_write(data: Path, tmp_
         (tmp_path / name).write_text("1,1,10,10,20,40,1,1,1\n2,1,12,10,20,40,1,1,1\n")
     assert run(["view", str(data / "two"), *(str(tmp_path / run) for run in "ab"), "--out", str(tmp_path / "out")]) == 0
     assert (tmp_path / "out" / "walk.html").read_text().startswith("1,1")
+
+
+@pytest.mark.parametrize(("command", "suffix"), [("overlay", "mp4"), ("sheet", "png"), ("view", "html")])
+def test_tracks_of_another_picture_size(
+    command: str, suffix: str, data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Boxes in pictures of twice the size are warned of; with --box-scale the file is that of the boxes themselves."""
+    for name, scale in (("own", 1), ("other", 2)):
+        rows = [f"{f},1,{60 * scale},{20 * scale},{10 * scale},{24 * scale},1\n" for f in (1, 2)]
+        (tmp_path / f"{name}.txt").write_text("".join(rows))
+
+    def made(tracks: str, *more: str) -> bytes:
+        out = tmp_path / f"a.{suffix}"
+        assert run([command, str(data / "two/walk"), str(tmp_path / f"{tracks}.txt"), *more, "--out", str(out)]) == 0
+        return out.read_bytes()
+
+    expected = made("own")
+    assert "boxes lie beyond" not in capsys.readouterr().err
+    assert made("other") != expected
+    assert "100% of the boxes lie beyond the pictures of 96 × 64" in capsys.readouterr().err
+    assert made("other", "--box-scale", "0.5") == expected

@@ -62,7 +62,9 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
         raise InputError(place="--duration", got=options.duration, expected="seconds above 0", remedy="correct it")
     settings = option_parsing.scenario_settings(options.settings)
     view = load_observation(options.camera, [*option_parsing.sensor_settings(options.sensor), *settings])
-    recordings = open_source(options.source, fps=options.fps, images=False)
+    recordings = open_source(
+        options.source, fps=options.fps, px_per_m=options.px_per_m, person_class=options.person_class, images=False
+    )
     cut = Cut(options.start, options.duration)
     with ProgressMeter("replay") as meter:
         folders = store_replays(

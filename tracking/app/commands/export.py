@@ -9,6 +9,7 @@ from functools import partial
 
 from scenarios.errors import InputError, counted
 from sim.io.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
+from sim.io.formats.options import refuse_options
 from sim.io.source import open_source
 from sim.io.store.seal import reject_sealed
 from sim.io.store.track_files import read_checked_tracks
@@ -16,7 +17,7 @@ from sim.types import Sequence
 from tracking.app.command_options import CocoOptions, CsvOptions, KittiOptions, TrajnetOptions, WebdatasetOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
-from tracking.app.stored_tracks import StoredTracks, find_tracks, holds_tracks, run_folders
+from tracking.app.stored_tracks import STATED, StoredTracks, find_tracks, holds_tracks, run_folders
 
 
 def export_coco(options: CocoOptions) -> CommandResult:
@@ -81,6 +82,7 @@ def _of_runs(options: TrajnetOptions) -> list[Job]:
     found = find_tracks(options.source)
     for stored in found:
         stored.check()
+        refuse_options(vars(options), "px_per_m person_class", stored.folder, "a run", STATED)
         if not stored.info:
             got, expected = "tracks of another program", "what `flockscope track` or `group` wrote"
             raise InputError(file=stored.path, got=got, expected=expected, remedy="give the text itself")
@@ -88,7 +90,9 @@ def _of_runs(options: TrajnetOptions) -> list[Job]:
 
 
 def _of_sequences(options: TrajnetOptions) -> list[Job]:
-    sequences = open_source(options.source, fps=options.fps, images=False)
+    sequences = open_source(
+        options.source, fps=options.fps, px_per_m=options.px_per_m, person_class=options.person_class, images=False
+    )
     for sequence in sequences:
         if sequence.load_truth is None:
             file, expected = sequence.source.get("path", options.source), "a run, or people with ids"

@@ -61,12 +61,16 @@ def scoring_jobs(
         else [stored for _, stored in match_tracks(sequences, find_tracks(Path(text)))]
         for text in texts
     ]
-    given = [source for run in runs for source in run]
-    if box_scale is not None and all(isinstance(source, str) or source.info for source in given):
-        got, expected = "runs of `flockscope track`", "a text of another program"
-        raise InputError(place="--box-scale", got=got, expected=expected, remedy="give it to `flockscope track`")
-    factors = None if box_scale is None else parse_box_scale(box_scale)
+    factors = scale_of_texts([source for run in runs for source in run], box_scale)
     return [ScoringJob(tuple(run[k] for run in runs), box_scale=factors, **how) for k in range(len(sequences))]
+
+
+def scale_of_texts(given: Iterable[Source], box_scale: str | None) -> BoxScale | None:
+    """Returns the factors of boxes in the text of --box-scale; raises InputError if no given source is a text."""
+    if box_scale is not None and all(isinstance(source, str) or source.info for source in given):
+        got, expected = "no tracks of another program", "a text of tracks"
+        raise InputError(place="--box-scale", got=got, expected=expected, remedy="give it to `flockscope track`")
+    return None if box_scale is None else parse_box_scale(box_scale)
 
 
 def score_sequence(sequence: Sequence, job: ScoringJob) -> ComparedSequence:

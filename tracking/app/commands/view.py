@@ -13,7 +13,7 @@ from sim.types import Sequence
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import checked_key
-from tracking.app.commands.scored_sequence import read_runs, run_names, scoring_jobs
+from tracking.app.commands.scored_sequence import read_runs, run_names, scale_of_texts, scoring_jobs
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import find_tracks, match_tracks
@@ -33,7 +33,7 @@ def view(options: ViewOptions) -> CommandResult:
     """Writes a replay page for each sequence, with its tracks if they are given, and a report on several sequences."""
     if options.by is not None:
         checked_key(options.by)
-    sequences = source_of(options, options.source, images=True).open()
+    sequences = source_of(options, options.source, images=True, without="box_scale").open()
     names = run_names(options.tracks)
     if len(sequences) == 1:
         if len(names) > 2:
@@ -62,7 +62,9 @@ def _pages(
     from tracking.app.report.moments import shown_errors
 
     words = [*names] if len(names) > 1 else [""] * len(names)
-    jobs = dict(zip((s.name for s in sequences), scoring_jobs(names.values(), sequences), strict=True))
+    jobs = dict(
+        zip((s.name for s in sequences), scoring_jobs(names.values(), sequences, options.box_scale), strict=True)
+    )
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
         given = read_runs(sequence, jobs[sequence.name])
@@ -81,7 +83,8 @@ def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str,
     check_packages()
     refuse_foreign_file(options.out / INDEX)
     index, pages = options.out / INDEX, CommandResult({"files": []})
-    found = judged_runs(names, sequences, source_of(options, options.source), options.workers)
+    source = source_of(options, options.source, without="box_scale")
+    found = judged_runs(names, sequences, source, options.workers, options.box_scale)
     if len(names) == 1:
         known = {sequence.name: one.errors[0] for sequence, one in zip(sequences, found, strict=True)}
         pages = _pages(options, sequences, names, known)
@@ -94,8 +97,8 @@ def sheet(options: SheetOptions) -> CommandResult:
     """Writes a contact sheet, several frames in one PNG, for each sequence. The result's data: "files", their paths."""
     from tracking.app.pictures.contact_sheet import write_sheet
 
-    sequences = source_of(options, options.source, images=True).open()
-    read = _reader(sequences, options.tracks)
+    sequences = source_of(options, options.source, images=True, without="box_scale").open()
+    read = _reader(sequences, options.tracks, options.box_scale)
 
     def write(sequence: Sequence, path: Path, _: Step) -> None:
         write_sheet(sequence, path, options.frames, read(sequence))
@@ -107,8 +110,8 @@ def overlay(options: OverlayOptions) -> CommandResult:
     """Writes a video for each sequence with tracks, truth or both drawn over its pictures."""
     from tracking.app.pictures.overlay import write_overlay
 
-    sequences = source_of(options, options.source, images=True).open()
-    read = _reader(sequences, options.tracks)
+    sequences = source_of(options, options.source, images=True, without="box_scale").open()
+    read = _reader(sequences, options.tracks, options.box_scale)
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
         write_overlay(sequence, read(sequence), path, options.truth, step)
@@ -116,12 +119,15 @@ def overlay(options: OverlayOptions) -> CommandResult:
     return _write_each("overlay", sequences, options.out, ".mp4", write)
 
 
-def _reader(sequences: list[Sequence], tracks: Path | None) -> Callable[[Sequence], TrackingRun | None]:
-    """Returns a function that reads the tracks of a sequence; None without tracks."""
+def _reader(
+    sequences: list[Sequence], tracks: Path | None, box_scale: str | None
+) -> Callable[[Sequence], TrackingRun | None]:
+    """Returns a function that reads the tracks of a sequence; None without tracks. box_scale: that of their texts."""
     stored = {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
+    factors = scale_of_texts(stored.values(), box_scale)
 
     def read(sequence: Sequence) -> TrackingRun | None:
-        return stored[sequence.name].read(sequence) if stored else None
+        return stored[sequence.name].read(sequence, factors) if stored else None
 
     return read
 

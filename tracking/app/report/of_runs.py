@@ -30,11 +30,11 @@ class JudgedRuns:
 
 
 def judged_runs(
-    names: Mapping[str, str], sequences: list[Sequence], source: OpenedAs, workers: int
+    names: Mapping[str, str], sequences: list[Sequence], source: OpenedAs, workers: int, box_scale: str | None = None
 ) -> list[JudgedRuns]:
     """Returns for each sequence the scores and errors of all runs. names: by the run's name, the text of the command
-    line that names stored tracks or a tracker class."""
-    jobs = scoring_jobs(names.values(), sequences, oracles=True)
+    line that names stored tracks or a tracker class. box_scale: the text of --box-scale."""
+    jobs = scoring_jobs(names.values(), sequences, box_scale, oracles=True)
     return list(over_sequences("report", _judge, sequences, jobs, source, workers))
 
 

@@ -1,10 +1,11 @@
 import json
 
+import cv2
 import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.formats.calibration import read_tsai, scaled_to_image
+from sim.io.formats.calibration import read_calibration, read_tsai, scaled_to_image
 from sim.io.source import open_source
 from sim.io.store.camera_files import camera_document, read_camera
 from sim.scene.camera import project
@@ -79,3 +80,91 @@ def test_a_broken_calibration_is_one_line(tmp_path, old, new, place):
         open_source(tmp_path, camera=tmp_path / "c.xml")
     with pytest.raises(InputError, match="No such file"):
         open_source(tmp_path, camera=tmp_path / "none.xml")
+
+
+ROTATION, POSITION = [[1.0, 0, 0], [0, -0.6, -0.8], [0, 0.8, -0.6]], [1.0, 2, 5]
+P1 = [[520.0, 0, 319.5, 0], [0, 510, 239.5, 0], [0, 0, 1, 0]]
+P2 = [[520.0, 0, 319.5, -62.4], [0, 510, 239.5, 0], [0, 0, 1, 0]]
+K = [520.0, 0, 319.5, 0, 510, 239.5, 0, 0, 1]
+ROS = """image_width: 640
+image_height: 480
+camera_name: narrow
+camera_matrix:
+  rows: 3
+  cols: 3
+  data: [520.0, 0, 319.5, 0, 510, 239.5, 0, 0, 1]
+distortion_model: plumb_bob
+distortion_coefficients:
+  rows: 1
+  cols: 5
+  data: [0, 0, 0, 0, {}]
+"""
+POSE = {"rotation": ROTATION, "position": POSITION}
+SIZE = {"image_width": 640, "image_height": 480}
+
+
+def stored(path, values):
+    """What cv2.FileStorage writes, in the format of the suffix."""
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    for key, value in values.items():
+        storage.write(key, np.array(value, float) if isinstance(value, list) else value)
+    storage.release()
+    return path
+
+
+def ros_yaml(path):
+    path.write_text(ROS.format(0) + f"rotation: {np.ravel(ROTATION).tolist()}\nposition: {POSITION}\n")
+    return path
+
+
+def as_json(values):
+    def write(path):
+        path.write_text(json.dumps(values))
+        return path
+
+    return write
+
+
+FORMS = {
+    "pair.yml": lambda path: stored(path, {**SIZE, "P1": P1, "P2": P2, **POSE}),
+    "pair.xml": lambda path: stored(path, {**SIZE, "P1": P1, "P2": P2, **POSE}),
+    "pair.json": lambda path: stored(path, {**SIZE, "P1": P1, "P2": P2, **POSE}),
+    "plain.json": as_json({**SIZE, "P1": P1, "P2": P2, **POSE}),
+    "ros.json": as_json({"width": 640, "height": 480, "K": K, "D": [0, 0, 0, 0, 0], **POSE}),
+    "ros2.json": as_json({"width": 640, "height": 480, "k": K, "d": [], **POSE}),
+    "ros.yaml": ros_yaml,
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_calibrations_of_opencv_and_ros(tmp_path, name):
+    """Compared with cv2.projectPoints, whose pixel (0, 0) is the middle of the first one."""
+    camera = read_calibration(FORMS[name](tmp_path / name))
+    points = np.array([[1.0, 8, 0], [0, 10, 1.7], [3, 12, 0.5]])
+    shift = -np.array(ROTATION) @ POSITION
+    expected, _ = cv2.projectPoints(points, cv2.Rodrigues(np.array(ROTATION))[0], shift, np.reshape(K, (3, 3)), None)
+    assert project(camera, points)[0] == pytest.approx(expected[:, 0] + 0.5)
+    assert camera.image == (640, 480)
+    assert camera.baseline == pytest.approx(0.12 if "P" in (tmp_path / name).read_text() else 0)
+
+
+BARE = {
+    "ros.json": {"K": K, "D": [0, 0, 0, 0, 0], "width": 640, "height": 480},
+    "pair.json": {**SIZE, "P1": P1, "P2": P2},
+    "opencv.json": {"camera_matrix": [K[:3], K[3:6], K[6:]], "dist_coeff": [[0.0, 0, 0, 0, 0]], **SIZE},
+}
+
+
+@pytest.mark.parametrize("name", BARE)
+def test_a_calibration_without_a_place_names_the_keys_to_add(tmp_path, name):
+    with pytest.raises(InputError, match=r"rotation, position: got nothing; .*; add them \(rotation: 3 × 3, world to"):
+        read_calibration(as_json(BARE[name])(tmp_path / name))
+    assert read_calibration(as_json({**BARE[name], **POSE})(tmp_path / name)).focal_px == (520, 510)
+
+
+def test_a_distorted_camera_is_refused(tmp_path):
+    (tmp_path / "a.yaml").write_text(
+        ROS.format(0.1) + f"rotation: {np.ravel(ROTATION).tolist()}\nposition: {POSITION}\n"
+    )
+    with pytest.raises(InputError, match=r"D: got distortion; .*undistort the pictures"):
+        read_calibration(tmp_path / "a.yaml")

@@ -96,8 +96,11 @@ def test_times_of_no_frame_are_left_out(tmp_path, plain):
     with pytest.warns(UserWarning, match="3 of 12 boxes have times of no frame, or of one that has nearer"):
         found = with_boxes(plain, timed(tmp_path / "det.csv", times))
     assert [len(frame.detections.box) for frame in found] == [0, *[1] * 9, 0, 0]
+    with pytest.warns(UserWarning, match="are taken as ms"):
+        found = with_boxes(plain, timed(tmp_path / "det.csv", np.arange(12) * 1000 * step))
+    assert [len(frame.detections.box) for frame in found] == [1] * 12
     with pytest.raises(InputError, match=r"\d+ of 12 boxes have times of no frame.* expected times of 12 frames"):
-        with_boxes(plain, timed(tmp_path / "det.csv", np.arange(12) * 1000 * step))  # milliseconds
+        with_boxes(plain, timed(tmp_path / "det.csv", 1e9 + np.arange(12) * step))  # of the clock
 
 
 def test_of_more_pictures_than_frames_the_nearest_count(tmp_path, plain):

@@ -96,7 +96,7 @@ BAD_ROWS = [
     (GOOD + "2,1,0,0,5,5,1,1,1.5\n", 2, "visibility"), ("1,2,3\n", 1, "columns"),
     (GOOD + "1,2,1e200,0,5,5,1,1,1\n", 2, "within 1e"), (GOOD + "1,1.5,0,0,5,5,1,1,1\n", 2, "whole number"),
     (GOOD + "1,1_0,0,0,5,5,1,1,1\n", 2, "'1_0'"), (GOOD + "1,²,0,0,5,5,1,1,1\n", 2, "'²'"),
-    ("time,id,x,y\n1,1,2,3\n", 1, "got columns time,id,x,y; .*time × frames per second"),
+    ("time,id,x,y\n1,1,2,3\n", 1, "got columns time,id,x,y; .*time of frame 1. × frames per second"),
 ]  # fmt: skip
 
 

@@ -216,3 +216,47 @@ def test_a_file_of_group_labels(tmp_path):
     (tmp_path / "walk.groups.txt").write_text("1 two\n")
     with pytest.raises(InputError, match=r"walk\.groups\.txt: line 1: got 1 two; expected ids of people"):
         open_source(tmp_path / "walk.txt", fps=5)[0].truth  # noqa: B018
+
+
+def steps(step):
+    """Two people who walk at 1.2 m/s, 10 rows each, at 10 per s."""
+    return "".join(f"{step * k}\t{id}\t{0.12 * k:.2f}\t{id}.0\n" for k in range(10) for id in (1, 2))
+
+
+def test_steps_of_other_videos_need_a_rate(tmp_path):
+    """Frames 0, 1, 2, … at 10 per s are no labels at 2.5 per s; in steps of 10 they may be."""
+    (tmp_path / "walk.txt").write_text(steps(1))
+    with pytest.raises(InputError, match=r"got frames in steps of 1; .*give --fps, rows of a person per second"):
+        open_source(tmp_path / "walk.txt")
+    truth = open_source(tmp_path / "walk.txt", fps=10)[0].truth
+    assert np.hypot(*truth.vel.T) == pytest.approx(1.2)
+    (tmp_path / "walk.txt").write_text(steps(10))
+    with pytest.warns(UserWarning, match=r"taken at 2\.5 fps"):
+        open_source(tmp_path / "walk.txt")
+
+
+TRACK = '{{"track": {{"f": {0}, "p": {1}, "x": {2:.1f}, "y": {1}}}}}\n'
+SCENE = '{{"scene": {{"id": {0}, "p": 1, "s": {1}, "e": {2}, "fps": 2.5}}}}\n'
+
+
+@pytest.mark.parametrize("kind", ["ndjson", "txt"])
+def test_scenes_that_overlap_are_read_once(tmp_path, kind):
+    """Snippets of 6 frames, each 3 later; then scenes with frames and ids of their own, which are apart in files."""
+
+    def scene(number, first, shift=0.0):
+        head, row = (SCENE, TRACK) if kind == "ndjson" else ("", "{0} {1} {2:.1f} {1}\n")
+        body = [row.format(10 * k, id, k / 10 + shift) for k in range(first, first + 6) for id in (1, 2)]
+        return head.format(number, 10 * first, 10 * first + 50) + "".join(body)
+
+    path = tmp_path / f"walk.{kind}"
+    path.write_text(scene(0, 0) + scene(1, 3))
+    with pytest.warns(UserWarning, match="6 rows stand there twice"):
+        truth = open_source(path, fps=2.5)[0].truth
+    assert truth.frame.tolist() == [k + 1 for k in range(9) for _ in range(2)]
+    assert truth.pos[:, 0] == pytest.approx((truth.frame - 1) / 10)
+    path.write_text(scene(0, 0) + scene(1, 0, shift=50))
+    with pytest.raises(InputError, match="write each into a file of its own"):
+        open_source(path, fps=2.5)
+    for number, shift in enumerate((0, 50)):
+        path.write_text(scene(number, 0, shift))
+        assert len(open_source(path, fps=2.5)[0].truth.frame) == 12

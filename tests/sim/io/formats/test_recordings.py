@@ -4,7 +4,10 @@ import pytest
 from scenarios.errors import InputError
 from sim.io.formats import biwi
 from sim.io.source import open_source
+from sim.types import Camera
+from tracking import group
 
+LOOKS_DOWN = np.array([[1.0, 0, 0], [0, -0.6, -0.8], [0, 0.8, -0.6]])
 ROW = "{} {} {} 0 {} 2.5 0 0.0\n"
 
 
@@ -101,6 +104,23 @@ def xml(tmp_path, *frames, tag="dataset"):
     path = tmp_path / "clip.xml"
     path.write_text(f'<?xml version="1.0" encoding="UTF-8"?><{tag} name="clip">{body}</{tag}>')
     return path
+
+
+def test_a_calibration_puts_cvml_on_the_ground(tmp_path):
+    """Labels of others, as Milan's of PETS 2009: as the same boxes in a MOT text. CAVIAR's own show no feet."""
+    camera = Camera("pinhole", (96, 64), (90.0, 90.0), (48.0, 32.0), np.array([0.0, 0, 3]), LOOKS_DOWN)
+    box = [(k, id, 20 + k + 9 * id, 20, 6, 18) for k in range(4) for id in (1, 2)]
+    row = '<object id="{}"><box h="{}" w="{}" xc="{}" yc="{}"/></object>'
+    frames = [([row.format(i, h, w, x + w / 2, y + h / 2) for f, i, x, y, w, h in box if f == k], []) for k in range(4)]
+    (tmp_path / "a.txt").write_text("".join(f"{f + 1},{i},{x},{y},{w},{h},1\n" for f, i, x, y, w, h in box))
+    found = [open_source(path, fps=5, camera=camera)[0] for path in (xml(tmp_path, *frames), tmp_path / "a.txt")]
+    runs = [group(each) for each in found]
+    assert [t.plane for t in runs[0]] == ["ground"] * 4
+    for cvml, mot in zip(*runs, strict=True):
+        assert cvml.pos.tolist() == mot.pos.tolist()
+    own = xml(tmp_path, ([OBJECT.format(0, 10)], [GROUP.format(1, "0")]))
+    with pytest.raises(InputError, match="got --camera; expected none for a CAVIAR recording"):
+        open_source(own, camera=camera)
 
 
 def test_meet_walk_together_truth(shared_data):

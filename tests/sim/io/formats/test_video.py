@@ -1,5 +1,6 @@
 import warnings
 from fractions import Fraction
+from pathlib import Path
 
 import av
 import cv2
@@ -7,6 +8,8 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
+from sim.io.files.own_files import GENERATOR, is_ours
+from sim.io.pictures import video_files
 from sim.io.source import open_source
 from sim.types import Camera
 from tests.small_videos import SIZE, cut, damage, disc, picture, write_jpegs, write_video
@@ -54,6 +57,49 @@ def test_rotation_is_undone(tmp_path):
         off = np.abs(next(iter(sequence)).image.astype(int) - other).mean()
         assert off < 2, "OpenCV's reader is a grey level darker"
         assert np.abs(next(iter(sequence)).image[::-1, ::-1].astype(int) - other).mean() > 5
+
+
+ODD_NAMES = (
+    "12:30:05", "%03d", "-i", "~", "a#b?c=d&e", "zwei Wörter", "pipe:0", "concat:a|b", "file:x",
+    "'quoted'", "back\\slash",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ODD_NAMES)
+def test_a_video_may_have_any_name(tmp_path, monkeypatch, name):
+    """Relative, as it is given where it lies, and also as the video that is written."""
+    source = write_video(tmp_path / "a.mp4", [picture(k) for k in range(2, 6)])
+    monkeypatch.chdir(tmp_path)
+    source.rename(f"{name}.mp4")
+    sequence = one(f"{name}.mp4")
+    assert (sequence.name, sequence.length, len(list(sequence))) == (name, 4, 4)
+    with video_files.write_video(Path(f"{name}.out.mp4"), SIZE, 10, comment=GENERATOR) as video:
+        video.add(picture(2))
+    assert is_ours(Path(f"{name}.out.mp4"))
+
+
+def test_frames_before_a_cut_without_decoding(tmp_path):
+    """A cut by stream copy keeps the packets from the key frame before it, which the edit list leaves out."""
+    whole = write_video(tmp_path / "whole.mp4", [picture(k) for k in range(1, 41)], options={"g": "10", "bf": "0"})
+    with av.open(str(whole)) as source, av.open(
+        str(tmp_path / "cut.mp4"), "w", options={"avoid_negative_ts": "disabled"}
+    ) as cut_out:  # fmt: skip
+        stream = cut_out.add_stream_from_template(source.streams.video[0])
+        for packet in source.demux(video=0):
+            if packet.size:
+                shift = round(0.7 / packet.time_base)  # frames 1 to 7 lie before 0
+                packet.pts, packet.dts, packet.stream = packet.pts - shift, packet.dts - shift, stream
+                cut_out.mux(packet)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sequence = one(tmp_path / "cut.mp4")
+    assert sequence.length == 33
+    seen = [round(disc(frame.image) / 4) for frame in sequence]
+    assert seen[:12] == list(range(8, 20))
+    wanted = [1, 3, 4, 14, 33]
+    index = video_files.index_packets(tmp_path / "cut.mp4")
+    found = dict(video_files.decode_frames(tmp_path / "cut.mp4", index, wanted))
+    assert [(k, round(disc(found[k]) / 4)) for k in found] == [(k, seen[k - 1]) for k in wanted]
 
 
 WRONG_RATES = [
