@@ -13,7 +13,10 @@ from benchmarks.group_pda import scenes
 from benchmarks.joint import runs, table2
 from tests import hand_made
 
-ROW = {"MSE": 25.0, **{f"group_{key}": 1.0 for key in ("TP", "FN", "FP", "IDSW", "GDSR", "MOTP", "MOTA", "1-FN", "1-FP")}}
+ROW = {
+    "MSE": 25.0,
+    **{f"group_{key}": 1.0 for key in ("TP", "FN", "FP", "IDSW", "GDSR", "MOTP", "MOTA", "1-FN", "1-FP")},
+}
 
 
 def given(data: Path) -> argparse.Namespace:
@@ -50,5 +53,5 @@ def test_errors_are_mean_squares_in_px(monkeypatch):
 
 
 def test_differences_are_first_minus_second():
-    better, worse = ({key: value for key in scenes.DECIDED} | {"pairs": 1, "kept": value} for value in (1.0, 0.25))
+    better, worse = (dict.fromkeys(scenes.DECIDED, value) | {"pairs": 1, "kept": value} for value in (1.0, 0.25))
     assert scenes.differences([better] * 6, [worse] * 6) == ["+0.750 [+0.750, +0.750] *"] * len(scenes.DECIDED)
