@@ -12,21 +12,20 @@ from unittest.mock import patch
 import numpy as np
 
 import tracking
-from benchmarks.relational.errors import FPS, HIDDEN, LENGTHS, errors, hidden_partner
+from benchmarks.relational.errors import HIDDEN, LENGTHS, errors, hidden_partner
 from benchmarks.relational.groups import COLUMNS, differences, sequences, title, tracked
 from benchmarks.support import tables
 from sim.types import Array, Ints, Sequence
 from tracking.grouping.belief import default_belief
 from tracking.grouping.grouped_tracks import with_groups, without_groups
 from tracking.papers.relational import sensor, tracker, transition_kernels
-from tracking.papers.relational.config import RelationalConfig
 
 # Settings of the ablation beside the defaults. With relation_bias 40 partners count fully; detect_prob 1 and
 # clutter_density 0 are the paper's sensor and weights. Capitals: of SWITCHES.
 DEPARTURES = (
     "relation_evidence=state", "coupling_time=0", "common_noise=0", "relation_bias=40", "NO_SPREAD", "NO_FACTORS",
-    "NO_OCCLUDERS", "MISSED_AS_SEEN", "detect_prob=1 clutter_density=0", "outlier_share=0", "hidden_time=2",
-    "noise_scale=1", "clutter_density=0.02",
+    "NO_OCCLUDERS", "detect_prob=1 clutter_density=0", "outlier_share=0", "hidden_time=2", "noise_scale=1",
+    "clutter_density=0.02",
 )  # fmt: skip
 # Walks of the table of a hidden partner.
 PARTNERS = 40
@@ -37,14 +36,11 @@ def _no_spread(pos: Array, vel: Array, pairs: Ints) -> Array:
     return np.zeros(pairs.shape)
 
 
-# Departures without a parameter: a missed person has no factors of partners; nobody is behind other people; missed
-# people approach the mean velocity as measured people do; the filter's scatter is not taken off distances of partners.
+# Departures without a parameter: a missed person has no factors of partners; nobody is behind other people; the
+# filter's scatter is not taken off distances of partners.
 SWITCHES: dict[str, Any] = {
     "NO_FACTORS": lambda: patch.object(sensor, "add_partner_factors", lambda *arguments: None),
     "NO_OCCLUDERS": lambda: patch.object(tracker, "BODY_RADIUS", 0.0),
-    "MISSED_AS_SEEN": lambda: patch.object(
-        tracker, "MISSED_FOLLOW", -np.expm1(-1 / FPS / RelationalConfig().coupling_time)
-    ),
     "NO_SPREAD": lambda: patch.object(transition_kernels, "pair_spread", _no_spread),
 }
 

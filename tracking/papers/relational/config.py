@@ -90,8 +90,7 @@ class RelationalConfig(ParticleConfig):
 
     # fmt: off
     coupling_time: float = param(0.15, (0.0, 10.0), "s",
-        "time in which measured people approach the mean velocity of those they walk with (ours); 0: they, as missed "
-        "people, have it (sec. 3.2)")
+        "time in which people who walk together approach their mean velocity (ours); 0: they have it (sec. 3.2)")
     common_noise: float = param(0.8, (0.0, 1.0), "share",
         "of the velocity noise's variance, common to people who walk together (ours); 0: none (sec. 3.2)")
     relation_evidence: str = param("belief", ("belief", "state"), "",

@@ -38,9 +38,9 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
   Paper: the particle's new state (eq. 7); the posterior. Why: the belief looks back for seconds.
 - unreported people: without a track in the belief's last step, relations stay as they are (`relation_evidence`). Paper:
   forecast. Why: no belief about them.
-- coupling: approached within `coupling_time`, by missed people at once; partners weighted by existence and, with the
-  belief (`relation_evidence`), by g(l) of their state, less the filter's unweighted scatter. Paper: the group's mean
-  velocity. Why: members differ, which measurements tell.
+- coupling: approached within `coupling_time`; partners weighted by existence and, with the belief
+  (`relation_evidence`), by g(l) of their state, less the filter's unweighted scatter. Paper: the group's mean velocity.
+  Why: members differ.
 - noise: a shared part (`common_noise`). Paper: independent. Why: a hidden member turns, too.
 - people*: slots common to all particles. Paper: each particle has a number of people. Why: few particles would have
   each newcomer.
@@ -115,7 +115,6 @@ BIRTH_DOUBT = 0.5
 LEAST_EXISTENCE = 0.02  # A person whose existence is less probable is removed (ours).
 # m: half the width of a body that hides others from a known camera (ours); not with the paper's sensor.
 BODY_RADIUS = 0.25
-MISSED_FOLLOW = 1.0  # Share of the difference to its group's mean velocity that a missed member loses in a step (ours).
 SPEED_PRIOR = 1.3  # m/s: standard deviation of a new person's velocity, per axis, that of walking people.
 # What random numbers are drawn for. Relations have streams of their own, so that they change no other draw.
 MOTION, BIRTHS, RESAMPLING, SPREAD, RELATIONS, JOINING, COUPLING = range(7)
@@ -200,10 +199,10 @@ class Particle(PointTracker):
     def _forecast(self) -> None:
         p, c = self.particles, self.config
         noise = self.streams.normals(MOTION, self.slots.key, p.count, 2)
-        shared, follow, common, alike, spread = self._coupling()
+        shared, coupling, alike, spread = self._coupling()
         table = c.speed_table(self.dt)
         transition_kernels.move(
-            p.pos, p.vel, p.exist, p.pairs, p.related, noise, shared, table, follow, common, alike, spread, self.dt
+            p.pos, p.vel, p.exist, p.pairs, p.related, noise, shared, table, coupling, alike, spread, self.dt
         )
         camera = self.context.camera if self.plane == "ground" else None
         self.hidden = hidden_share(p.pos, p.weights, camera, self.context.scene)
@@ -217,8 +216,8 @@ class Particle(PointTracker):
         camera = self.context.camera if self.plane == "ground" else None
         return camera.position[:2] if camera is not None and camera.kind == "pinhole" else np.full(2, np.nan)
 
-    def _coupling(self) -> tuple[Array, Array, float, Array, Array]:
-        return np.zeros(self.particles.pos.shape), np.zeros(self.particles.people), 0.0, np.zeros(4), np.zeros((0, 2))
+    def _coupling(self) -> tuple[Array, Array, Array, Array]:
+        return np.zeros(self.particles.pos.shape), np.zeros(2), np.zeros(4), np.zeros((0, 2))
 
     def _relate(self) -> None: ...
 
@@ -318,14 +317,15 @@ class Relational(Particle):
         new = -np.expm1(-c.relation_rate * self.dt)
         return np.array([new, c.relation_bias, c.relation_distance, c.relation_velocity])
 
-    def _coupling(self) -> tuple[Array, Array, float, Array, Array]:
-        p, time, common = self.particles, self.config.coupling_time, self.config.common_noise
-        follow = np.where(self.slots.seen, 1.0 if time == 0 else -math.expm1(-self.dt / time), MISSED_FOLLOW)
+    def _coupling(self) -> tuple[Array, Array, Array, Array]:
+        p, time = self.particles, self.config.coupling_time
+        follow = 1.0 if time == 0 else -math.expm1(-self.dt / time)
+        coupling = np.array([follow, self.config.common_noise])
         shared = self.streams.normals(COUPLING, self.slots.key, p.count, 2)
         p.drop_strangers()
         if self.belief is None:
-            return shared, follow, common, ALWAYS, np.zeros(p.pairs.shape)
-        return shared, follow, common, self._rules, transition_kernels.pair_spread(p.pos, p.vel, p.pairs)
+            return shared, coupling, ALWAYS, np.zeros(p.pairs.shape)
+        return shared, coupling, self._rules, transition_kernels.pair_spread(p.pos, p.vel, p.pairs)
 
     def _relate(self) -> None:
         p, rules = self.particles, self._rules

@@ -16,6 +16,9 @@ from sim.types import Array, Bools, Ints
 # Columns of a speed table (5, 3): upper end of a row's speeds, mean loss of speed in a step and standard deviation of
 # the velocity after it, per axis; all in m/s.
 SPEED, DRIFT, SPREAD = range(3)
+# Slots of `coupling` (2,): share of the difference to the mean velocity of a group that a member loses in a step, and
+# share of the variance of a member's noise that the group has in common; the paper: 1 and 0.
+FOLLOW, COMMON = range(2)
 # Slots of `rules` (4,): weight that the old relation loses in a step, 1 - exp(-rate dt); log odds of walking together
 # at the same place, their loss per m of distance and per m/s of velocity difference.
 RATE, BIAS, DISTANCE, VELOCITY = range(4)
@@ -36,23 +39,21 @@ _belonging = njit(cache=True)(belonging)
 @njit(cache=True)
 def move(
     pos: Array, vel: Array, exist: Array, pairs: Ints, related: Bools, noise: Array, shared: Array, table: Array,
-    follow: Array, common: float, alike: Array, spread: Array, dt: float,
+    coupling: Array, alike: Array, spread: Array, dt: float,
 ) -> None:  # fmt: skip
     """Move everybody by a step of dt s: p(s^a_t | s^a_t-1, s^r_t-1), eq. 8 and sec. 3.2; pos and vel are changed.
 
     pos (P, K, 2), m; vel (P, K, 2), m/s; exist (P, K): probability of existence; pairs (N, 2), related (N,
-    P): old relations; noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; follow
-    (K,): share of the difference to the group's mean velocity that a member loses in the step; common: share of the
-    variance of a member's noise that the group has in common; alike (4,): rules by which a partner counts; spread (N,
-    2): of `pair_spread`.
+    P): old relations; noise, shared (P, K, 2): standard normals; table (5, 3): the speed table of the step; coupling
+    (2,); alike (4,): rules by which a partner counts; spread (N, 2): of `pair_spread`.
 
     v_i = u - B u / |u| + C e_i, x_i = x_i + v_i dt, with B, C of the table's row for |u| (Table 3). For a person alone
     u = v_i and e_i = noise. A partner j who walks together with i counts with w_j = `belonging` by `alike` at their old
     distance and velocity difference, of whose squares `spread` is taken off, down to 0; the person itself with w_i = 1.
-    With m the mean velocity of all these, weighted by w and existence, and c = common max_j w_j:
-    u = v_i + follow_i (m - v_i), e_i = sqrt(1 - c) noise + sqrt(c) s_i and s_i = sum w shared / sqrt(sum w^2). The
-    weights, follow and common are ours; the paper: BIAS inf, so that w = 1, follow 1 and common 0, so that u = m and
-    e_i = noise. If a group's pairs are not all related, m is not yet the group's mean velocity.
+    With m the mean velocity of all these, weighted by w and existence, and c = COMMON max_j w_j: u = v_i + FOLLOW (m -
+    v_i), e_i = sqrt(1 - c) noise + sqrt(c) s_i and s_i = sum w shared / sqrt(sum w^2). The weights, FOLLOW and COMMON
+    are ours; the paper: BIAS inf, so that w = 1, FOLLOW 1 and COMMON 0, so that u = m and e_i = noise. If a group's
+    pairs are not all related, m is not yet the group's mean velocity.
     """
     particles, n, _ = pos.shape
     sums = np.empty((n, 7))
@@ -80,11 +81,11 @@ def move(
             x, y, ex, ey = vel[p, i, 0], vel[p, i, 1], noise[p, i, 0], noise[p, i, 1]
             weight, square, most = sums[i, 2], sums[i, 5], sums[i, 6]
             if most > 0:
-                own, part = math.sqrt(1.0 - most * common), math.sqrt(most * common / square)
+                own, part = math.sqrt(1.0 - most * coupling[COMMON]), math.sqrt(most * coupling[COMMON] / square)
                 ex, ey = own * ex + part * sums[i, 3], own * ey + part * sums[i, 4]
             if most > 0 and weight > 0:
-                x += follow[i] * (sums[i, 0] / weight - x)
-                y += follow[i] * (sums[i, 1] / weight - y)
+                x += coupling[FOLLOW] * (sums[i, 0] / weight - x)
+                y += coupling[FOLLOW] * (sums[i, 1] / weight - y)
             speed = math.sqrt(x * x + y * y)
             row = 0
             while speed > table[row, SPEED]:
