@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ import pytest
 from benchmarks.group_pda import scenes
 from benchmarks.joint import runs, table2
 from tests import hand_made
+from tests.processes import python
 
 ROW = {
     "MSE": 25.0,
@@ -40,6 +42,13 @@ def test_table_2_is_made_without_recordings(tmp_path, monkeypatch, capsys):
     assert "Table 2: " in printed
     assert "| 25.0 (0.0) |" in printed
     assert "Table 3b" not in printed
+
+
+@pytest.mark.parametrize("words", ["relational recordings", "belief recordings"])
+def test_missing_recordings_are_one_line(tmp_path, words):
+    done = python("-m", "benchmarks", *words.split(), "--data", tmp_path)
+    assert done.returncode == 2
+    assert re.fullmatch(rf"{tmp_path}/biwi/seq_hotel: got nothing there; .*\n", done.stderr)
 
 
 def test_errors_are_mean_squares_in_px(monkeypatch):
