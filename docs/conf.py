@@ -234,6 +234,12 @@ def method(module: str) -> str:
     return inspect.cleandoc(import_module(module).__doc__ or "").partition("\n\n")[2]
 
 
+def preset(name: str) -> str:
+    """Returns the file of a preset, PRESET/TRACKER."""
+    text = (ROOT / "tracking" / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    return f"```toml\n{text}```"
+
+
 def changelog() -> str:
     """Returns the CHANGELOG without its title."""
     return _of_the_root("CHANGELOG.md")
@@ -267,6 +273,7 @@ PARTS: dict[str, Callable[..., str]] = {
         parameters,
         constants,
         method,
+        preset,
         changelog,
         contributing,
     )

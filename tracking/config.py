@@ -180,8 +180,8 @@ class Config:
     def load(cls, source: str | Path) -> Self:
         """Returns the preset of the name `source` if the tracker has one, else the config in the TOML file `source`.
 
-        The preset "paper" turns off every departure from the tracker's paper. To load a file whose name is that of a
-        preset, give it with a folder, such as ./paper."""
+        The preset "paper" turns off the departures from the tracker's paper that have a parameter. To load a file whose
+        name is that of a preset, give it with a folder, such as ./paper."""
         return cls.from_toml(file_of(cls.tracker, source))
 
     def with_set(self, *assignments: str) -> Self:

@@ -2,8 +2,9 @@
 
     python -m benchmarks.group_pda MODE [--seeds a:b] [--detections file|truth|image] [--only A,B] [--json FILE] …
 
-scenarios    merging, splitting, crossing, queueing, side by side: lineage, ids, group scores; beside the paper's
-             ablation and the rule and the belief over `blob`
+scenarios    merging, splitting, crossing, queueing, side by side: lineage, ids, group scores; beside the preset and
+             the rule and the belief over `blob`
+ablation     the paper's ablation (sec. 5.2.1) of its preset, from pixels and from points: paired differences
 decisions    each decision of the tracker switched off: paired differences
 
 The docstring of scenes.py says what the columns mean. Detections "file" and "truth" are points, "image" the tracker's
@@ -24,6 +25,7 @@ from benchmarks.support.options import add_seeds, new_parser, one_thread, seeds_
 
 MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
     "scenarios": scenes.scenarios,
+    "ablation": scenes.ablation,
     "decisions": scenes.decisions,
 }
 
@@ -37,7 +39,7 @@ def main() -> None:
     parser.add_argument("--set", nargs="+", default=[], metavar="KEY=VALUE", help="keys of scenes and suites")
     parser.add_argument("--only", help="scenes, separated by commas")
     parser.add_argument("--each", action="store_true", help="decisions: scene by scene, too")
-    parser.add_argument("--alone", action="store_true", help="scenarios: without the ablation and the baseline")
+    parser.add_argument("--alone", action="store_true", help="scenarios: without the preset and the baseline")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--tracker", default="group-pda", help="another tracker with the same parameters")
     parser.add_argument("--json", type=Path, help="writes what was measured, sequence by sequence")

@@ -67,20 +67,14 @@ class TrackingJob:
 
 
 def trackers(name: str, mode: DetectionMode) -> tuple[Variant, ...]:
-    """Returns the tracker, its preset "paper", its paper's ablation, and the baselines: rule and belief over `blob`."""
+    """Returns the tracker, its preset "paper", and the baselines: rule and belief over `blob`."""
     ground = ", on the ground" if mode == "image" else ""
     blob = [
         Variant(f"blob + {grouping}{place}", "blob", grouping=grouping, in_image=in_image)
         for grouping in ("rule", "belief")
         for place, in_image in ([("", True), (ground, False)] if ground else [("", False)])
     ]
-    paper = GroupPdaConfig.load("paper").as_dict()
-    ours = (
-        Variant(name, name),
-        Variant("preset paper", name, paper),
-        Variant('preset paper, association="none"', name, {**paper, "association": "none"}),
-    )
-    return (*ours, *blob)
+    return (Variant(name, name), Variant("preset paper", name, GroupPdaConfig.load("paper").as_dict()), *blob)
 
 
 def with_points(entry: Entry, points: str | None) -> Entry:

@@ -1,8 +1,9 @@
 """Modes of `benchmarks.group_pda`: tables over scenes and suites.
 
-scenarios: scene by scene, the tracker beside its paper's ablation and the rule and the belief over `blob`. Lineage:
+scenarios: scene by scene, the tracker beside its preset and the rule and the belief over `blob`. Lineage:
 share of true merges and splits that are reported with the right parents and children. Ids kept: share of encounters of
 two groups after which both have the id that they had before.
+ablation: the preset with and without the association of sec. 5.2.1, by input, paired.
 decisions: the tracker minus the tracker without one of its decisions, paired, all scenes together (--each: scene by
 scene, too); * if 0 lies outside the interval; of IDSW less is better.
 """
@@ -19,13 +20,20 @@ from benchmarks.group_pda.runs import REPLACED, Row, TrackingJob, Variant, measu
 from benchmarks.support.options import seeds_text
 from benchmarks.support.tables import mean_cell, share, signed, table
 from scenarios.loading.resolve import Entry, resolve
-from sim.types import Array
+from sim.types import Array, DetectionMode
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.stats import paired
 
 SCENES = ("merge", "split", "cross", "queue", "side-by-side")
 DENSE = ("cross-dense", "pass-by-dense")  # Of the suite `standard`.
 ABLATED = ("merge", "split", "cross", "cross-same-speed", "pass-by", "queue", "party", *DENSE)
+ENCOUNTERS = ("merge", "split", "cross")
+# Inputs of the ablation. Sec. 4.1 excludes misses and false alarms, which the points of a detector have.
+INPUTS: Mapping[DetectionMode, str] = {
+    "image": "pixels",
+    "truth": "points, nobody missed",
+    "file": "points of a detector",
+}
 HEADLINE = ("merge_TP", "merge_FN", "split_TP", "split_FN")
 Column = Callable[[Sequence[Row]], str]
 WITHOUT: Mapping[str, Mapping[str, object]] = {
@@ -35,6 +43,7 @@ WITHOUT: Mapping[str, Mapping[str, object]] = {
     "all that is ours: preset paper": GroupPdaConfig.load("paper").as_dict(),
 }
 DECIDED = ("lineage_accuracy", "ids", "group_F1_hull", "group_MOTA", "event_F1", "group_IDSW")
+DECIDED_COLUMNS = ["ids kept" if key == "ids" else key for key in DECIDED]
 
 
 def values(rows: Sequence[Row], keys: Sequence[str]) -> Array:
@@ -103,14 +112,43 @@ def decisions(given: argparse.Namespace) -> Any:
     found = gathered(entries + dense, given, variants)
     pooled = {v.name: [row for rows in found.values() for row in rows[v.name]] for v in variants}
     for scene, rows in {"all": pooled, **(found if given.each else {})}.items():
-        default = values(rows["default"], DECIDED)
-        cells = {"default": [mean_of(key)(rows["default"]) for key in DECIDED]}
+        cells = {"default": means(rows["default"])}
         for name in (*WITHOUT, *REPLACED):
-            ends = paired(values(rows[name], DECIDED), default)
-            cells[f"default minus without {name}"] = [signed(*(float(e[k]) for e in ends)) for k in range(len(DECIDED))]
-        title = f"{scene}: {heading(given, rows)}; paired differences"
-        table(title, "", ["ids kept" if key == "ids" else key for key in DECIDED], cells)
+            cells[f"default minus without {name}"] = differences(rows["default"], rows[name])
+        table(f"{scene}: {heading(given, rows)}; paired differences", "", DECIDED_COLUMNS, cells)
     return found
+
+
+def ablation(given: argparse.Namespace) -> Any:
+    """Prints a table for each input and returns the rows by input, scene and variant."""
+    preset = GroupPdaConfig.load("paper").as_dict()
+    variants = (
+        Variant("preset", given.tracker, preset),
+        Variant("all points of the region", given.tracker, {**preset, "association": "none"}),
+    )
+    entries = [entry for name in ENCOUNTERS for entry in resolve(name, given.set)]
+    found = {}
+    for mode, title in INPUTS.items():
+        own = argparse.Namespace(**{**vars(given), "detections": mode})
+        found[mode] = gathered(entries, own, variants)
+        cells = {}
+        for scene, rows in found[mode].items():
+            cells |= {f"{scene}: {name}": means(some) for name, some in rows.items()}
+            cells[f"{scene}: difference"] = differences(*rows.values())
+        rows = next(iter(found[mode].values()))
+        table(f"From {title}, of each scene: {heading(own, rows)}", "", DECIDED_COLUMNS, cells)
+    return found
+
+
+def means(rows: Sequence[Row]) -> list[str]:
+    """Returns cells of the means of the scores DECIDED."""
+    return [mean_of(key)(rows) for key in DECIDED]
+
+
+def differences(first: Sequence[Row], second: Sequence[Row]) -> list[str]:
+    """Returns cells of the paired differences of the scores DECIDED, first minus second."""
+    ends = paired(values(second, DECIDED), values(first, DECIDED))
+    return [signed(*(float(e[k]) for e in ends)) for k in range(len(DECIDED))]
 
 
 def gathered(

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from benchmarks.joint.runs import sequences
+from benchmarks.joint.table2 import NUMBERS
 from benchmarks.support import tables
 from sim.rng import rng
 from sim.types import Array, Bools, Ints, Truth
@@ -134,6 +135,12 @@ def particles(y: Array, config: JointConfig, dt: float, belief: Array, seed: int
     return np.array(places), np.array(together)
 
 
+def all_particles(y: Array, config: JointConfig, dt: float, belief: Array, seed: int) -> tuple[Array, ...]:
+    """Returns means of the places (T, S, 2, 2) and p(Z = 1) (T, S) of all sequences, each with a seed of its own."""
+    runs = [particles(y[:, s], config, dt, belief[:, s], seed + s) for s in range(y.shape[1])]
+    return tuple(np.stack(one, axis=1) for one in zip(*runs, strict=True))
+
+
 def longest_pair(truth: Truth) -> tuple[Array, Ints]:
     """Returns places (T, 2, 2) and Z (T,) of the two people who are together longest, from their first common frame on;
     nan where a person is absent, as in the last frames."""
@@ -202,8 +209,7 @@ def coupling(given: argparse.Namespace) -> None:
         found: list[tuple[Array, ...]] = [exact(y, config, dt, known) for known in (np.zeros_like(z), z, None)]
         for variant, sure in (("VAR1", 0), ("missed", SURE), ("full", 0)):
             own, belief = replace(config, variant=variant), sure * (2 * z - 1)
-            runs = [particles(y[:, s], own, dt, belief[:, s], given.filter_seeds.start + s) for s in range(len(pairs))]
-            found.append(tuple(np.stack(one, axis=1) for one in zip(*runs, strict=True)))
+            found.append(all_particles(y, own, dt, belief, given.filter_seeds.start))
         losses = [log_loss(p, z) for p in (np.full(z.shape, z.mean()), found[2][1], found[5][1])]
         for cells, mask in zip(rows.values(), masks, strict=True):
             errors = [error(places, x, mask) for places, _ in found]
@@ -213,3 +219,25 @@ def coupling(given: argparse.Namespace) -> None:
             cells[name] = [alone, *deltas[:2], filtered, *deltas[2:], " / ".join(losses)]
     for title, cells in rows.items():
         tables.table(f"{title}: {len(pairs)} pairs", "condition", COLUMNS, cells)
+
+
+def by_number(given: argparse.Namespace) -> None:
+    """Prints root mean square errors of two people, cm, by Algorithm 1 with one weight for a particle, by the number of
+    particles, and by the exact posterior: VAR1, full, and their difference, paired over sequences."""
+    made = list(sequences(given.seeds))
+    dt, c, draws = 1 / made[0].fps, Condition(), rng(given.seeds.start, "label", 3)
+    config = JointConfig(algorithm="paper").with_set(*given.set)
+    x, z = (np.stack(one, axis=1) for one in zip(*(longest_pair(s.truth) for s in made if s.truth), strict=True))
+    y, *masks = measured(x, config, dt, c, draws)
+    found = {}
+    for n in NUMBERS:
+        own = [replace(config, variant=variant, particles=n) for variant in ("VAR1", "full")]
+        found[f"N_x {n}"] = [all_particles(y, one, dt, np.zeros(z.shape), given.filter_seeds.start)[0] for one in own]
+    found["exact"] = [exact(y, config, dt, known)[0] for known in (np.zeros_like(z), None)]
+    cells: dict[str, list[str]] = {name: [] for name in found}
+    for (name, both), mask in ((one, mask) for mask in masks for one in found.items()):
+        alone, full = (error(places, x, mask) for places in both)
+        means = (tables.number(float(np.nanmean(one)), 1) for one in (alone, full))
+        cells[name] += [*means, tables.signed(*map(float, paired(alone, full)))]
+    columns = [f"{who}: {what}" for who in ("seen", "hidden") for what in ("VAR1, cm", "full, cm", "full − VAR1")]
+    tables.table(f"Two people, seen and in the last frame of a gap: {x.shape[1]} pairs", "filter", columns, cells)

@@ -32,11 +32,12 @@ class Variant:
 
 
 def measured(sequence: Recording, variant: Variant, seeds: Iterable[int], settings: Sequence[str] = ()) -> list[Row]:
-    """Returns the scores of a variant for each filter seed."""
+    """Returns the scores of a variant for each filter seed, and `MSE`, the mean square error of positions, px^2."""
     params, rows = JointConfig.from_dict(dict(variant.params)).with_set(*settings), []
     for seed in seeds:
         run = track("joint", sequence, params=params, detections=variant.detections, seed=seed)
-        rows.append(evaluate(sequence.truth, run))
+        found = evaluate(sequence.truth, run)
+        rows.append({**found, "MSE": (PX_PER_M * found["RMSE_pos"]) ** 2})
     return rows
 
 

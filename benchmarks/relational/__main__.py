@@ -7,7 +7,7 @@ particles    the paper's Figs 7 and 8: errors of both filters, from the preset p
              and feet are displaced by partial occlusion; intervals are over the filter seeds; --chart FILE.svg
 hidden       error of one of two people who walk together while nobody sees this one, against the length of the
              occlusion; --chart FILE.svg
-recordings   error of one member of each labelled group in three recordings (--recordings) who is not detected for 2 s
+recordings   error of one member of each labelled group in three recordings (--data) who is not detected for 2 s
              in every 6 s; positions err by 0.1 m
 groups       scores of people, groups and events on a suite, beside `blob`; groupings of the same tracks
 ablation     errors, HOTA, IDF1, group and pairwise F1 on a suite, and the error of a hidden partner, without each
@@ -24,7 +24,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from benchmarks.relational import ablation, errors, groups
-from benchmarks.support.options import add_seeds, new_parser, one_thread
+from benchmarks.support.options import add_data, add_seeds, new_parser, one_thread
 
 
 def main() -> None:
@@ -42,7 +42,7 @@ def main() -> None:
     parser.add_argument("--suite", default="standard", help="of modes groups and ablation")
     parser.add_argument("--entry", metavar="NAME", help="only these entries of the suite, a comma between them")
     parser.add_argument("--only", metavar="SETTING,…", help="mode ablation: these settings beside the defaults")
-    parser.add_argument("--recordings", type=Path, metavar="FOLDER", help="labelled recordings are there")
+    add_data(parser)
     parser.add_argument("--chart", type=Path, metavar="FILE.svg", help="modes particles and hidden: draw them")
     given = parser.parse_args()
     modes[given.mode](given)

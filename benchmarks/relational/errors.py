@@ -192,7 +192,7 @@ def recordings(given: argparse.Namespace) -> None:
     """Prints a table: rows are recordings, columns the errors of both filters in hidden and in other rows."""
     tables.head(["recording", "people", *FILTERS, DIFFERENCE])
     for label, path in (("seq_hotel", HOTEL), ("zara01", ZARA), ("Meet_WalkTogether1", WALK_TOGETHER)):
-        (q,) = open_source(given.recordings / path)
+        (q,) = open_source(given.data / path)
         found: dict[str, dict[str, list[float]]] = {
             kind: {name: [] for name in FILTERS} for kind in ("hidden", "others")
         }

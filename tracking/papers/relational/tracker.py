@@ -58,8 +58,9 @@ Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_dis
 - sums*: exact up to a size, then belief propagation; in the preset each set of people and detections that are linked by
   reach in some particle is mapped by itself, without pairs that are negligible beside the best mapping, else only pairs
   in reach and not improbable. Paper: all mappings. Why: exponential cost; nobody becomes a newcomer far away.
-- pixels*: blobs of a background that adapts (`background`; not in the preset); large ones are divided by k-means, small
-  ones left out. In the image*: centres of boxes, at one scale. Paper: feet of boxes on the ground. Why: no calibration.
+- background: adapts, from pixels (`background`). Paper: none. Why: light changes.
+- pixels*: blobs; large ones are divided by k-means, small ones left out. In the image*: centres of boxes, at one scale.
+  Paper: feet of boxes on the ground. Why: no calibration.
 - boxes*: reported in the image, with sizes that follow the measured ones. Paper: none. Why: they are shown and scored.
 - frames without measurement*: forecast alone; the window of deaths stands still. Paper: each frame is measured. Why:
   nobody could be seen.
