@@ -3,12 +3,12 @@
     python -m benchmarks.fit_sensor [--data FOLDER] [--draws 20] [--json FILE]
 
 First tables: the profiles' errors of boxes, mean and standard deviation, and scores beside the default. Then, for each
-recording with gt and det (PETS09-S2L1-first200, TUD-Campus), on the second half: `measured` is the real detector; the other
-columns are mean and 5 to 95 % of --draws simulated detectors on the same people, with the profile fitted on the first
-half (`held out`), on the whole recording (`same`), on the other recording (`other`), and without a profile (`default`,
-[sensor] of a scenario without keys). `outside` counts the rows whose measured value lies outside these 5 to 95 %. Last
-table: the profiles of the whole recordings on simulated scenes, overlap of boxes and distance of points on the ground
-from the true position, m.
+recording with gt and det (PETS09-S2L1-first200, TUD-Campus), on the second half: `measured` is the real detector; the
+other columns are mean and 5 to 95 % of --draws simulated detectors on the same people, with the profile fitted on the
+first half (`held out`), on the whole recording (`same`), on the other recording (`other`), and without a profile
+(`default`, [sensor] of a scenario without keys). `outside` counts the rows whose measured value lies outside these 5 to
+95 %. Last table: the profiles of the whole recordings on simulated scenes, overlap of boxes and distance of points on
+the ground from the true position, m.
 """
 
 from __future__ import annotations

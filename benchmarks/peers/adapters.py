@@ -124,18 +124,26 @@ class BotSortConfig(Config):
 
 
 class Sort(Roboflow):
+    """SORT (Bewley et al. 2016)."""
+
     kind, config_class = "SORTTracker", SortConfig
 
 
 class ByteTrack(Roboflow):
+    """ByteTrack (Zhang et al. 2022)."""
+
     kind, config_class = "ByteTrackTracker", ByteTrackConfig
 
 
 class OcSort(Roboflow):
+    """OC-SORT (Cao et al. 2023)."""
+
     kind, config_class = "OCSORTTracker", OcSortConfig
 
 
 class BotSort(Roboflow):
+    """BoT-SORT (Aharon et al. 2022) without appearance and camera motion."""
+
     kind, config_class, fixed = "BoTSORTTracker", BotSortConfig, {"enable_cmc": False}
 
 
