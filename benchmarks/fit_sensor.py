@@ -2,13 +2,13 @@
 
     python -m benchmarks.fit_sensor [--data FOLDER] [--draws 20] [--json FILE]
 
-First table: the profiles' errors of boxes, mean and standard deviation, beside the default. Then, for each recording
-with gt and det (PETS09-S2L1-first200, TUD-Campus), on the second half: `measured` is the real detector; the other
-columns are mean and 5 to 95 % of --draws simulated detectors on the same people, with the profile fitted on the first
-half (`held out`), on the whole recording (`same`), on the other recording (`other`), and without a profile (`default`,
-[sensor] of a scenario without keys). `outside` counts the rows whose measured value lies outside these 5 to 95 %. Last
-table: the profiles of the whole recordings on simulated scenes, overlap of boxes and distance of points on the ground
-from the true position, m.
+First tables: the profiles' errors of boxes, mean and standard deviation, and scores beside the default. Then, for each
+recording with gt and det (PETS09-S2L1-first200, TUD-Campus), on the second half: `measured` is the real detector; the
+other columns are mean and 5 to 95 % of --draws simulated detectors on the same people, with the profile fitted on the
+first half (`held out`), on the whole recording (`same`), on the other recording (`other`), and without a profile
+(`default`, [sensor] of a scenario without keys). `outside` counts the rows whose measured value lies outside these 5 to
+95 %. Last table: the profiles of the whole recordings on simulated scenes, overlap of boxes and distance of points on
+the ground from the true position, m.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE, add_data, new_
 from benchmarks.support.tables import table
 from scenarios.loading.resolve import load
 from scenarios.schema.sensor import Sensor
+from sim.detector.draws import false_scores, true_scores
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth
@@ -96,7 +97,10 @@ def print_scenes(fitted: dict[str, Sensor]) -> None:
 
 
 def print_profiles(fitted: dict[str, Sensor]) -> None:
-    """Prints the errors of boxes of each profile and of the default: mean ± standard deviation."""
+    """Prints the errors of boxes of each profile and of the default, mean ± standard deviation, and their scores.
+
+    The default's scores of true boxes are those of people in full view.
+    """
     columns = ("across", "foot", "top", "width")
     rows = {}
     for name, sensor in {**fitted, "default": Sensor()}.items():
@@ -104,6 +108,13 @@ def print_profiles(fitted: dict[str, Sensor]) -> None:
         rows[name] = [f"{m:.3f} ± {sd:.3f}" for m, sd in (getattr(noise, key) for key in columns)]
         rows[name] += [f"{noise.occluded:g}", f"{noise.tails:g}"]
     table("Errors of boxes in box heights; width: its logarithm", "profile", [*columns, "occluded", "tails"], rows)
+    u = np.linspace(0.0, 1.0, 1001)
+    scores, shares = {}, (0.05, 0.2, 0.5, 0.8)
+    for name, sensor in {**fitted, "default": Sensor()}.items():
+        true, false = true_scores(u, np.ones(len(u)), sensor), false_scores(u, sensor)
+        scores[name] = [" / ".join(f"{q:.2f}" for q in np.quantile(s, shares)) for s in (true, false)]
+        scores[name].insert(1, f"{np.mean(true > 0.8):.0%}")
+    table("Scores: 5, 20, 50 and 80 % quantiles", "profile", ["true boxes", "above 0.8", "false alarms"], scores)
 
 
 def main() -> None:

@@ -88,4 +88,4 @@ def differences(made: Sequence[list[Scene]], base: Sequence[np.ndarray], change:
 
 def hota(scenes: list[Scene], change: dict[str, object]) -> np.ndarray:
     """Returns HOTA of each scene."""
-    return np.array([scores(s, track_blob(s.sequence, change, checked=False)[0])["HOTA"] for s in scenes])
+    return np.array([scores(s, track_blob(s.sequence, change))["HOTA"] for s in scenes])

@@ -25,6 +25,7 @@ from typer.core import TyperCommand
 from scenarios.errors import FlockscopeError, InputError, WorkError, printable, shortened
 from tracking.app import command_result
 from tracking.app.command_result import INTERRUPTED, CommandResult, print_error, print_interrupted
+from tracking.app.installed_versions import check_installed
 from tracking.app.option_parsing import check_output_folder
 from tracking.keyword_options import signature_parameter
 from tracking.running.user_code import recorded_interrupts
@@ -45,6 +46,7 @@ def add_command(app: typer.Typer, name: str, options: type, target: str) -> None
 
     def command(**values: Any) -> CommandResult:
         del values["json"]
+        check_installed()
         module, _, function = target.partition(":")
         result: CommandResult = getattr(import_module(f"{__package__}.commands.{module}"), function)(options(**values))
         return result

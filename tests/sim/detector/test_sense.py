@@ -218,7 +218,9 @@ def test_false_alarms_look_like_people(camera: Any) -> None:
     assert (box[:, 2:] > 0).all()
     across = (box[:, 0] + box[:, 2] / 2) / 640
     assert np.histogram(across, 4, (0, 1))[0] == pytest.approx(np.full(4, len(box) / 4), rel=0.2)
-    assert score.mean() < 0.3
+    assert score.mean() == pytest.approx(0.525, abs=0.03)
+    assert (score >= 0.1).all()
+    assert (score <= 0.95).all()
     assert len(np.unique(box, axis=0)) == len(box)
     clipped = everything(
         sense(truth, perfect(detect_prob=0.0, clutter_rate=4.0, box="visible"), 1, camera, SIZE), "box"

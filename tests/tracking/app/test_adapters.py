@@ -1,7 +1,8 @@
-"""The classes of the guide "Trackers of other libraries", around stand-ins of these libraries.
+"""The classes of the guide "Trackers of other libraries", around stand-ins of these libraries, or the libraries.
 
-The libraries are not installed here. The stand-ins have the same modules, classes and fields, as their documentation
-describes them, and answer with what is written below, in the libraries' own formats.
+The stand-ins have the same modules, classes and fields, as their documentation describes them, and answer with what is
+written below, in the libraries' own formats. Tests of the libraries themselves are skipped where these are absent;
+`python -m benchmarks peers` installs them into folders, which PYTHONPATH may name.
 """
 
 from __future__ import annotations
@@ -15,9 +16,14 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks.peers.__main__ import BOXES
+from benchmarks.peers.adapters import PEERS
+from scenarios import load
+from sim.sequence import simulate
 from sim.types import Detections, Frame, Sequence, Tracks
 from tests.tracking.app.test_guides import BLOCK, GUIDES, SAVED, follow
 from tracking.running.run import track
+from tracking.scoring import evaluate
 
 FPS = 5.0
 # frame: (id, left, top, right, bottom, confidence); person 2 is confirmed in frame 2, person 1 is lost in frame 3
@@ -130,7 +136,7 @@ STONE_SOUP = {
 
 
 @pytest.fixture
-def adapters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def adapters(guide_files: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """The guide's files in an empty folder, and the stand-ins as modules."""
 
     def module(name: str, **content) -> None:
@@ -145,6 +151,11 @@ def adapters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for path, names in STONE_SOUP.items():
         module(f"stonesoup.{path}", **dict.fromkeys(names, Part))
     module("stonesoup.tracker.simple", MultiTargetTracker=MultiTargetTracker)
+
+
+@pytest.fixture
+def guide_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The guide's files in an empty folder, where Python finds them."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
     monkeypatch.delitem(sys.modules, "others", raising=False)
@@ -202,3 +213,37 @@ def test_points_of_stone_soup(adapters: None) -> None:
 @pytest.mark.slow
 def test_the_guide(adapters: None, capsys: pytest.CaptureFixture[str]) -> None:
     follow("adapters", False, capsys)
+
+
+GUIDE = [
+    ("trackers", "roboflow_adapter.py:Roboflow"), ("boxmot", "boxmot_adapter.py:BoxMot"),
+    ("norfair", "norfair_adapter.py:Norfair"), ("stonesoup", "stonesoup_adapter.py:StoneSoup"),
+]  # fmt: skip
+
+
+def walkers() -> Sequence:
+    """Five people who walk apart from each other, each detected in every frame by a box with small errors."""
+    settings = ["camera.fps=10", "sensor.detect_prob=1", "sensor.small_px=0", "sensor.clutter_rate=0"]
+    return simulate(load("side-by-side", set=settings), 40_000, streams=())
+
+
+@pytest.mark.parametrize(("library", "name"), GUIDE)
+@pytest.mark.filterwarnings("ignore")
+def test_the_guide_with_the_libraries_themselves(library: str, name: str, guide_files: None) -> None:
+    pytest.importorskip(library)
+    sequence = walkers()
+    assert evaluate(sequence.truth, track(name, sequence, detections="file"))["IDF1"] > 0.8
+
+
+@pytest.mark.parametrize("name", PEERS)
+@pytest.mark.filterwarnings("ignore")
+def test_adapters_of_the_benchmark(name: str) -> None:
+    library, kind = PEERS[name]
+    pytest.importorskip({"roboflow": "trackers"}.get(library, library))
+    sequence = walkers()
+    found = list(track(kind, sequence, detections="file"))
+    assert evaluate(sequence.truth, found, similarity="boxes")["IDF1"] > 0.8
+    given = [frame.detections.box for frame in sequence.without_pictures()]
+    off = [np.abs(t.box[:, None] - box[None]).max(2).min(1) for t, box in zip(found, given, strict=True) if len(t.box)]
+    # what the benchmark's column `boxes` says
+    assert (np.concatenate(off).max() < 1e-4) == (name not in BOXES)

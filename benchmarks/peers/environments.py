@@ -1,0 +1,45 @@
+"""The libraries of the peers, each in a folder of its own, installed without their dependencies.
+
+norfair asks for numpy 1, filterpy 1 and rich 14, with which flockscope does not work, but runs with those of
+flockscope. So nothing that flockscope needs is installed twice, and all trackers run on the same numpy.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from importlib.metadata import distributions
+from pathlib import Path
+
+# What each library imports beside flockscope's own packages; the first is the library.
+PACKAGES = {
+    "roboflow": ("trackers", "supervision", "pydeprecate", "pyyaml", "defusedxml", "tqdm", "requests", "urllib3",
+                 "idna", "certifi", "charset-normalizer"),
+    "norfair": ("norfair",),
+    "stonesoup": ("stonesoup", "ordered-set", "rtree", "ruamel.yaml", "pymap3d", "utm"),
+}  # fmt: skip
+DEFAULT = Path.home() / ".cache" / "flockscope" / "peers"
+
+
+def make_environments(folder: Path) -> dict[str, str]:
+    """Installs what is not there yet and puts it at the end of the search path of modules.
+
+    Returns the name and version of each library; its reason, from pip, if it cannot be installed.
+    """
+    found = {}
+    for library, packages in PACKAGES.items():
+        place = folder / library
+        if not place.is_dir():
+            made = folder / f"{library}.unfinished"
+            shutil.rmtree(made, ignore_errors=True)
+            line = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", str(made), *packages]
+            run = subprocess.run(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False)
+            if run.returncode:
+                found[library] = f"left out: {(run.stderr.strip().splitlines() or ['pip failed'])[-1]}"
+                continue
+            made.rename(place)
+        sys.path.append(str(place))
+        versions = {one.name.lower(): one.version for one in distributions(path=[str(place)])}
+        found[library] = f"{packages[0]} {versions[packages[0]]}"
+    return found
