@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from collections.abc import Sequence as SequenceOf
 from typing import Any
 
@@ -15,7 +16,6 @@ from bokeh.resources import Resources
 
 from tracking.app.report.content import Curves, Json, Report
 from tracking.errors.found import CauseRow
-from tracking.scoring.catalogue import CATALOGUE
 
 # Their contrast to both backgrounds is 3 : 1 or more.
 COLOURS = ("#2f81d8", "#d9730d", "#1a9e6c", "#c2478f", "#8a63d2", "#a08000", "#d6453d", "#3d8ea3", "#6b7a2f", "#8b6f5c")
@@ -34,7 +34,8 @@ def charts(report: Report) -> Json:
     """Returns the charts of a report as JSON for Bokeh, by the id of the HTML element that each fills."""
     found: dict[str, Any] = {}
     if report.curves:
-        found["chart-curves"] = _curves(report.curves, report.by)
+        found["chart-shares"] = _curves(report.curves, report.curves.shares, f"share of the oracle's {report.by}")
+        found["chart-curves"] = _curves(report.curves, report.curves.curves, report.by)
     if report.causes:
         found["chart-causes"] = _causes(report.causes)
     return {name: json_item(model, ID(name)) for name, model in found.items()}
@@ -53,13 +54,13 @@ def colour(k: int) -> str:
     return COLOURS[k % len(COLOURS)]
 
 
-def _curves(curves: Curves, by: str) -> Any:
+def _curves(curves: Curves, shown: Mapping[str, Json], by: str) -> Any:
     plot = _figure(380, x_axis_label=f"{curves.axis}: {curves.about}" if curves.about else curves.axis, y_axis_label=by)
     plot.x_range.start, plot.x_range.end = first, last = curves.values[0], curves.values[-1]
     plot.x_range.flipped = first > last
     items, order = [], np.argsort(curves.values)
-    for k, (name, one) in enumerate(curves.curves.items()):
-        data = {key: CATALOGUE[by].within(np.array(one[key], float)) for key in ("mean", "low", "high")}
+    for k, (name, one) in enumerate(shown.items()):
+        data = {key: np.array(one[key], float) for key in ("mean", "low", "high")}
         source, look = ColumnDataSource({"x": curves.values, **data}), {"color": colour(k)}
         band = plot.varea("x", "low", "high", source=source, fill_alpha=0.14, **look)
         line = plot.line("x", "mean", source=source, line_width=2.4, line_dash=DASHES[k % len(DASHES)], **look)

@@ -32,7 +32,7 @@ def full(name: str) -> content.Report:
     maps = [content.heat_map(name, zip([name] * 3, [name, name, "b"], runs, strict=True)) for _ in range(2)]
     return content.Report(
         name, name, "HOTA", rows, [name], maps[0],
-        content.Curves(name, name, [1, 0.8, 0.4], {name: curve}, [name]), maps[1:],
+        content.Curves(name, name, [1, 0.8, 0.4], {name: curve}, {name: curve}, [name]), maps[1:], [name],
         [(name, CauseRow(name, name, 2, 1.5, {"HOTA": 0.1, "group_F1": 0.2}))], name,
         [content.Moment(runs[0], 1.0, name, name, json.dumps({"name": "x"}))],
         [dict.fromkeys(("tracker", "scenario", "seed", "failed", "settings", "traceback"), name)],
@@ -45,7 +45,7 @@ def test_all_parts_stand_in_the_page() -> None:
     parts = ("ranking", "scenes", "curves", "matrices", "moments", "causes", "sequences", "failures")
     assert [id for id in parts if f'<section id="{id}">' in page] == list(parts)
     charts = json.loads(re.findall(r'id="charts">(.*?)</script>', page, re.DOTALL)[0])
-    assert list(charts) == ["chart-curves", "chart-causes"]
+    assert list(charts) == ["chart-shares", "chart-curves", "chart-causes"]
     assert all(f'id="{id}"' in page for id in charts)
     assert "no scene, blob" in page, "an empty cell says why"
     assert page.count("56 %<small>0.500") == 2, "means, as a share of the oracle's 0.9"
