@@ -22,8 +22,8 @@ def scene(tmp_path: Path, monkeypatch) -> str:
     return Path(write_scenes(tmp_path)[0]).name
 
 
-def stress(scene: str, *more: str) -> int:
-    options = ["--suite", scene, "--seeds", "0:2", "--start", "2", "--by", "HOTA", "--out", "o"]
+def stress(scene: str, *more: str, seeds: str = "0:2") -> int:
+    options = ["--suite", scene, "--seeds", seeds, "--start", "2", "--by", "HOTA", "--out", "o"]
     return run(["stress", FAKE, *options, *more])
 
 
@@ -67,7 +67,7 @@ def test_two_axes_make_a_matrix(scene: str, capsys) -> None:
 
 
 def test_one_axis_is_told_by_both_measures(scene: str, capsys) -> None:
-    assert stress(scene, "--vary", "detection=1.0:0.4", "--seeds", "0:8", "--episodes", "40") == 0
+    assert stress(scene, "--vary", "detection=1.0:0.4", "--episodes", "40", seeds="0:8") == 0
     text = capsys.readouterr().out
     data = json.loads(Path("o/stress.json").read_text())
     tracker, oracle = data["curves"][FAKE], data["curves"]["oracle"]
@@ -88,7 +88,7 @@ def test_one_axis_is_told_by_both_measures(scene: str, capsys) -> None:
 
 
 def test_a_budget_of_one_round_is_said(scene: str, capsys) -> None:
-    assert stress(scene, "--vary", "detection=1.0:0.4", "--seeds", "0:8", "--episodes", "5") == 0
+    assert stress(scene, "--vary", "detection=1.0:0.4", "--episodes", "5", seeds="0:8") == 0
     text = capsys.readouterr().out
     assert "the budget ended in the first round: wide intervals need more --episodes or --minutes" in text
     assert "fewer than 6 scenes: intervals are indicative" in text

@@ -39,7 +39,8 @@ def stress(options: StressOptions) -> CommandResult:
     from tracking.app.report.page import check_packages, write_report
 
     check_packages()
-    trackers = {name: contender(name, options.step_timeout) for name in dict.fromkeys(options.trackers)}
+    named = option_parsing.labelled(options.trackers)
+    trackers = {name: contender(text, options.step_timeout) for name, text in named.items()}
     detects = all({"boxes", "points"} & {*tracker.needs} for tracker in trackers.values())
     plan = _plan(options, options.detections or ("file" if detects else "image"))
     refuse_foreign_file(options.out / REPORT)
