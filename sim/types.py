@@ -383,8 +383,8 @@ class Truth(Frozen):
     groups_px: T Groups, on the ground (m) and in the image (px). labelled (T,): True for frames with group labels.
     events, near (strangers who walk like a group): measured from the motion. orders: of the script, () without.
     px_per_m: image scale, nan if unknown. fps: frames/s. unscored: labelled rows that are not scored; None without such
-    labels. camera, scene: of the sequence, by which boxes are compared on the ground. never_arrive: groups of a
-    simulated crowd that do not reach their goal. Fields that may be None are None if unknown."""
+    labels. camera, scene: of the sequence, by which boxes are compared on the ground. Fields that may be None are None
+    if unknown."""
 
     name: str
     fps: float
@@ -411,7 +411,6 @@ class Truth(Frozen):
     unscored: Unscored | None = None
     camera: Camera | None = None
     scene: Scene | None = None
-    never_arrive: tuple[NeverArrives, ...] = ()
 
     def rows(self, index: int) -> slice:
         """Returns the slice of the rows of frame `index` (from 1)."""
@@ -442,7 +441,8 @@ class Sequence:
     Fields that load are functions, or None if there is nothing to load: load_truth() gives the Truth; load_background()
     pictures (K, H, W, 3) of a scene to train a background model; load_people() the person ids of each group that the
     script names; load_pixels(index) the PixelTruth of frame `index`; load_light() the factor of brightness of each
-    frame, (length,), without clouds. source: where it comes from ("kind", "path", "seed", …)."""
+    frame, (length,), without clouds. source: where it comes from ("kind", "path", "seed", …). never_arrive: groups of a
+    simulated crowd that do not reach their goal."""
 
     name: str
     fps: float
@@ -462,6 +462,7 @@ class Sequence:
     bare: Callable[[], Iterator[Frame]] | None = None
     load_pixels: Callable[[int], PixelTruth] | None = None
     load_light: Callable[[], Array] | None = None
+    never_arrive: tuple[NeverArrives, ...] = ()
 
     def __iter__(self) -> Iterator[Frame]:
         return self.frames()

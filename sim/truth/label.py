@@ -73,7 +73,7 @@ def bodies(motion: Motion, camera: Camera | None, people: RecordedBodies | None 
         px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera), frame=people.frame, id=people.id,
         group=np.full(len(p), -1, np.int64), pos=motion.pos[t, p], vel=motion.vel[t, p],
         box=box, visibility=visibility, z=people.pos3[:, 2], heading=motion.heading[t, p], height=motion.height[p],
-        truncation=truncation, visible_box=visible_box, orders=motion.orders, never_arrive=motion.never_arrive,
+        truncation=truncation, visible_box=visible_box, orders=motion.orders,
     )  # fmt: skip
 
 

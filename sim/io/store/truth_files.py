@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
@@ -51,8 +50,6 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
         files["gt/groups.csv"] = group_files.groups_csv(truth.groups, truth.groups_px)
     if truth.events is not None:
         files["gt/events.json"] = tables.json_list("events", map(tables.plain, truth.events))
-    if truth.never_arrive:
-        files[group_files.NEVER_ARRIVES] = tables.json_list("groups", map(asdict, truth.never_arrive))
     if truth.near is not None:
         rows = zip(truth.near.start, truth.near.end, truth.near.a, truth.near.b, strict=True)
         lines = [group_files.NEAR_COLUMNS, *(",".join(map(str, row)) for row in rows)]
@@ -147,7 +144,7 @@ def read_truth(folder: Path) -> Truth:
         labelled=None if facts.labelled is None else _flags(table, facts.labelled, length),
         events=None if events is None else tuple(e for e, _ in events),
         near=group_files.read_near(gt / "near.csv") if is_present(gt / "near.csv") else None,
-        orders=group_files.read_script(gt / "script.json"), never_arrive=group_files.read_never_arrives(folder),
+        orders=group_files.read_script(gt / "script.json"),
     )  # fmt: skip
 
 

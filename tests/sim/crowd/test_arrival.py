@@ -12,7 +12,7 @@ from scenarios.loading.resolve import load
 from sim.crowd.arrival import has_way, stands
 from sim.crowd.navigation import scene_of
 from sim.crowd.world import run as simulated
-from sim.io.store.truth_files import read_truth
+from sim.io.store.group_files import read_never_arrives
 from tracking.app.cli import run
 
 SCENE = """
@@ -116,7 +116,7 @@ def test_generate_and_validate_say_it_and_the_remedy_helps(tmp_path: Path, capsy
     problems = json.loads(capsys.readouterr().out)["problems"]
     assert [p["got"].split(":")[0] for p in problems] == ["group a never arrives"] * 2
     folder = next(Path(tmp_path, "bad").glob("*/s-s00000"))
-    (read,) = read_truth(folder).never_arrive
+    (read,) = read_never_arrives(folder)
     assert read == simulated(load(bad), 0).never_arrive[0]
     good = scene(tmp_path, CLOSED, door(1.0), duration=12.0)
     assert run([*made, f"{tmp_path}/good", str(good)]) == 0

@@ -65,7 +65,7 @@ def report_html(report: Report) -> str:
     return str(found)
 
 
-def _title(text: str) -> str:
+def _breaking(text: str) -> str:
     """Returns text as HTML that breaks after the separators of paths and names, not inside words."""
     from markupsafe import Markup, escape
 
@@ -78,5 +78,5 @@ def _environment() -> Environment:
     made = Environment(loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined)
     made.globals["nan"] = math.nan
     made.filters["score"] = lambda value: number("HOTA", value)
-    made.filters["title"] = _title
+    made.filters["breaking"] = _breaking
     return made
