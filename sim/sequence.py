@@ -144,5 +144,5 @@ def observe(
         image_size=camera.image, camera=camera, scene=motion.scene, px_per_m=px_per_m_at_centre(camera),
         has_images=left, has_right=right, has_detections=True, load_people=named, source=source, bare=bare,
         load_background=None if renderer is None else background, load_pixels=None if renderer is None else pixels,
-        load_light=light,
+        load_light=light, never_arrive=motion.never_arrive,
     )  # fmt: skip

@@ -234,6 +234,28 @@ class Order:
     event: int | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class NeverArrives:
+    """A group of a simulated crowd that does not reach its goal, as in gt/never_arrives.json. group: its name in the
+    script. people: ids of its members. pos, goal: their mean place at the end, and the point that they do not reach, x,
+    y in m. no_way: True if walls and pillars leave a body no way; False if the group stood in the last 10 s. obstacle:
+    in words, what is in the straight way."""
+
+    group: str
+    people: tuple[int, ...]
+    pos: tuple[float, float]
+    goal: tuple[float, float]
+    no_way: bool
+    obstacle: str
+
+    @property
+    def words(self) -> str:
+        """The finding in one line."""
+        ways = {True: "a body of 0.4 m has no way", False: "it stood to the end on the way"}
+        places = f"from {list(self.pos)} to its goal {list(self.goal)}"
+        return f"group {self.group} never arrives: {ways[self.no_way]} {places}; in the way: {self.obstacle}"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class States(Frozen):
     """The states of a crowd from which groups and events are measured: C ticks at `rate` per s from t = 0, P people.
@@ -256,7 +278,7 @@ class Motion(Frozen):
     (T, P): rad; nan while absent. present (T, P): True while in the scene. intent (T, P): number of the group that the
     script assigns the person to (a number of its own for a person alone, -1 while absent). height, width, depth (P,):
     of the body, m. free_speed (P,): walking speed alone, m/s. orders: of the script. measured: states from which the
-    truth is measured; None: the frames themselves."""
+    truth is measured; None: the frames themselves. never_arrive: groups that do not reach their goal."""
 
     name: str
     seed: int
@@ -274,6 +296,7 @@ class Motion(Frozen):
     scene: Scene
     orders: tuple[Order, ...] = ()
     measured: States | None = None
+    never_arrive: tuple[NeverArrives, ...] = ()
 
     def states(self) -> States:
         """Returns the states from which the truth is measured."""
@@ -422,7 +445,8 @@ class Sequence:
     Fields that load are functions, or None if there is nothing to load: load_truth() gives the Truth; load_background()
     pictures (K, H, W, 3) of a scene to train a background model; load_people() the person ids of each group that the
     script names; load_pixels(index) the PixelTruth of frame `index`; load_light() the factor of brightness of each
-    frame, (length,), without clouds. source: where it comes from ("kind", "path", "seed", …)."""
+    frame, (length,), without clouds. source: where it comes from ("kind", "path", "seed", …). never_arrive: groups of a
+    simulated crowd that do not reach their goal."""
 
     name: str
     fps: float
@@ -442,6 +466,7 @@ class Sequence:
     bare: Callable[[], Iterator[Frame]] | None = None
     load_pixels: Callable[[int], PixelTruth] | None = None
     load_light: Callable[[], Array] | None = None
+    never_arrive: tuple[NeverArrives, ...] = ()
 
     def __iter__(self) -> Iterator[Frame]:
         return self.frames()

@@ -107,6 +107,15 @@ class GroupState:
         way[-1] = (way[-1][0], END)
         self.write_way(g, way, finish, speed, start)
 
+    def ahead(self, g: int) -> list[Array]:
+        """Returns the points (2,) m that a group has yet to pass, without doors and the end of its way."""
+        current, count = int(self.arrays.current[g]), int(self.arrays.length[g])
+        return [self.arrays.route[g, k] for k in range(current, count) if self.arrays.kind[g, k] == PASS]
+
+    def gathers(self, g: int) -> bool:
+        """Returns True if the group waits for others at the first point of its way."""
+        return bool(self.arrays.kind[g, self.arrays.current[g]] == GATHER)
+
     def write_way(self, g: int, way: list[tuple[Array, int]], finish: str, speed: float, start: Array) -> None:
         """Overwrites the waypoints, speed (m/s) and finish of group g; the group starts anew at the first waypoint.
 

@@ -39,13 +39,15 @@ class Stops:
     """The stops of the groups of one running simulation; an order of the script ends the stops of its groups.
 
     State: visits: the stops of each group that has stops left, by group index; stray: the time (s) at which a member
-    who stays behind at a stop walks on, by column (person id - 1).
+    who stays behind at a stop walks on, by column (person id - 1); left: the time (s) at which a group, or a member who
+    stayed behind, last walked on from a stop, by group index.
     """
 
     def __init__(self, entering: Sequence[EnteringGroup], groups: GroupState, scene: Scene) -> None:
         self.groups, self.scene = groups, scene
         self.visits = {g.index: _Visit(g, list(g.stops)) for g in entering if g.stops}
         self.stray: dict[int, float] = {}
+        self.left: dict[int, float] = {}
 
     def advance(self, t: float, state: Array) -> bool:
         """Lets groups stop and walk on at time t (s); returns True if `GroupState.rows` must be called afterwards.
@@ -60,6 +62,7 @@ class Stops:
         for column in over:
             del self.stray[column]
             self.groups.held[column] = False
+            self.left[int(self.groups.group_of[column])] = t
         changed = bool(over)
         for g, visit in list(self.visits.items()):
             columns = self.groups.members[g]
@@ -68,6 +71,11 @@ class Stops:
             elif self.groups.present[columns].all():
                 changed |= self._advance(g, visit, columns, t, state)
         return changed
+
+    def stood(self, g: int, columns: list[int], since: float) -> bool:
+        """Returns True if a group has stood at a stop since this time (s), or some of its members have."""
+        now = bool(self.groups.held[columns].any()) or (g in self.visits and self.visits[g].leaves is not None)
+        return now or self.left.get(g, -np.inf) >= since
 
     def _concerns(self, visit: _Visit, g: int, columns: list[int]) -> bool:
         exists = self.groups.alive.get(visit.group.name) == g
@@ -80,6 +88,7 @@ class Stops:
         if visit.leaves is not None:
             if t < visit.leaves:
                 return False
+            self.left[g] = t
             self._walk_on(g, visit, middle)
             self.groups.take_places(columns, walking(len(columns), self.groups.spacing[g]), middle, g, pos)
             return True

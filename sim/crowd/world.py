@@ -22,6 +22,7 @@ import pymunk.batch
 from scenarios.errors import WorkError
 from scenarios.schema.scenario import Scenario
 from sim.clock import PHYSICS_RATE, SCRIPT_RATE, STEPS, FrameTimes
+from sim.crowd.arrival import NEAR_GOAL, STAND_TIME, has_way, obstacle, stands
 from sim.crowd.forces import AMPLITUDE, COS, SIN, WAYPOINT, GroupArrays, Obstacles, PeopleArrays
 from sim.crowd.group_state import GroupState
 from sim.crowd.heading import facings, headings
@@ -32,7 +33,7 @@ from sim.crowd.stops import Stops
 from sim.elementary import cos, length, sin
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.scene.terrain import flight_rows
-from sim.types import Array, Ints, Motion, Scene, States
+from sim.types import Array, Ints, Motion, NeverArrives, Scene, States
 
 STEP_TIME = 1 / PHYSICS_RATE  # s
 OVERLAP_LEFT = 0.0012600931512018426  # 0.875^50: share of an overlap of bodies that is left after 1 s, 0.875 a step.
@@ -120,7 +121,30 @@ class World:
             states[tick], intents[tick] = state, group
             if tick and self.between is not None:  # what lies between two ticks is known at the second one
                 shown[frames.within(tick - 1)] = frames.states(tick - 1, self.between)
-        return self._motion(states[:count], intents[:count], shown, intents[frames.tick], frames)
+        lost = tuple(self._never_arrive(states[:count]))
+        motion = self._motion(states[:count], intents[:count], shown, intents[frames.tick], frames)
+        return motion.replace(never_arrive=lost) if lost else motion
+
+    def _never_arrive(self, states: Array) -> Iterator[NeverArrives]:
+        """Yields the groups that do not reach their goal. states (C, P, 4): at the ticks, by column."""
+        since = (len(states) - 1) / SCRIPT_RATE - STAND_TIME
+        for name, g in self.groups.alive.items():
+            columns = [c for c in self.groups.members[g] if np.isfinite(states[-1, c, 0])]
+            if not columns or (self.groups.queue_of[columns] >= 0).any() or self.stops.stood(g, columns, since):
+                continue
+            place, (goal, _) = states[-1, columns, :2], self.groups.goals[g]
+            targets = [goal] if self.groups.arrays.arrived[g] else [*self.groups.ahead(g), goal]
+            closed = next((target for target in targets if not has_way(self.scene, place, target)), None)
+            middle, target = place.mean(axis=0), goal if closed is None else closed
+            if closed is None and not self._stands_short(g, columns, states, middle, goal):
+                continue
+            pos, end = ((round(float(x), 2), round(float(y), 2)) for x, y in (middle, target))
+            words = obstacle(self.scene, middle, target)
+            yield NeverArrives(name, tuple(c + 1 for c in columns), pos, end, closed is not None, words)
+
+    def _stands_short(self, g: int, columns: list[int], states: Array, middle: Array, goal: Array) -> bool:
+        waits = self.groups.arrays.arrived[g] or self.groups.gathers(g) or float(length(middle - goal)) < NEAR_GOAL
+        return not waits and stands(states[:, columns], SCRIPT_RATE)
 
     def ticks(self, length: int) -> Iterator[tuple[Array, Ints]]:
         """Yields the states (P, 4) and group indices (P,) at each of the `length` ticks after the warm-up.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import socket
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import Any, cast
 from uuid import uuid4
 
-from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
+from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, counted
 from scenarios.loading.resolve import Entry, resolve
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import ObservationSpec
@@ -26,6 +27,7 @@ from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
 from sim.io.files.atomic import PARTIAL, lock_folder, remove_partials, write_file
 from sim.io.files.own_files import is_side_file, output_path, output_paths
 from sim.io.store import sequence_folder
+from sim.io.store.group_files import read_never_arrives
 from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
 from sim.streams import check_streams
 from sim.types import Camera, Sequence
@@ -227,7 +229,17 @@ def generate(
     if len(errors) > len(unfulfilled) or len(unfulfilled) > LEFT_OUT * len(jobs):
         many = len(unfulfilled) > LEFT_OUT * len(jobs)
         raise _summary({name: e for name, e in errors.items() if many or name not in unfulfilled}, len(jobs))
-    return Folders((job.folder for job in jobs if job.name not in unfulfilled), unfulfilled)
+    made = Folders((job.folder for job in jobs if job.name not in unfulfilled), unfulfilled)
+    _warn_of_lost_groups(made)
+    return made
+
+
+def _warn_of_lost_groups(folders: Iterable[Path]) -> None:
+    lost = [(folder.name, one) for folder in folders for one in read_never_arrives(folder)]
+    if lost:
+        (name, first), sequences = lost[0], len({name for name, _ in lost})
+        more = f"; {counted(len(lost), 'group')} in {counted(sequences, 'sequence')}" if len(lost) > 1 else ""
+        warnings.warn(f"{name}: {first.words}{more}", stacklevel=3)
 
 
 @contextmanager

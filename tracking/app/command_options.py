@@ -183,7 +183,8 @@ class ScoreOptions(BoxOptions, words="score"):
 
     truth: Path = ARGUMENT("Labelled sequence or dataset.", metavar="TRUTH")
     tracks: list[str] = ARGUMENT(
-        "Output of `track`, MOT text, or a tracker class (file.py:Class); several are ranked.", metavar="TRACKS…")
+        "Output of `track`, MOT text, or a tracker class (file.py:Class), as LABEL=TRACKS with a name. Several are "
+        "ranked.", metavar="TRACKS…")
     similarity: Similarity = SIMILARITY()
     group_match: Literal["hull", "members"] = option("How true and estimated groups are compared.", "hull")
     blocks: int = option("Intervals for a single recording, by N draws of blocks of frames.", 0, low=0, metavar="N")
@@ -196,7 +197,8 @@ class ScoreOptions(BoxOptions, words="score"):
 class StressOptions(SceneOptions, WorkerOptions, words="stress"):
     """Play trackers on scenes that get harder, and find where they break, or the scenes in which one is worst."""
 
-    trackers: list[str] = ARGUMENT("Trackers to compare: names, file.py:Class or module:Class.", metavar="TRACKER…")
+    trackers: list[str] = ARGUMENT(
+        "Trackers to compare: names, file.py:Class or module:Class, as LABEL=TRACKER with a name.", metavar="TRACKER…")
     vary: list[str] = option(
         "Axis: a name such as detection, or a key of scenarios with its ends. Twice: a matrix.", [],
         metavar="NAME|KEY=EASY:HARD", flag="--vary")
@@ -299,7 +301,8 @@ class ViewOptions(BoxOptions, words="view"):
 
     source: Path = SOURCE()
     tracks: list[str] = ARGUMENT(
-        "Output of `track`, MOT text, or a tracker class (file.py:Class).", [], metavar="TRACKS…")
+        "Output of `track`, MOT text, or a tracker class (file.py:Class), as LABEL=TRACKS with a name.", [],
+        metavar="TRACKS…")
     out: Path = FILE("Page to write; for several sequences, a folder.", metavar="FILE.html")
     video: Literal["auto", "inside", "beside", "none"] = option(
         "Pictures inside the page, beside it as FILE.view.mp4, or none. auto: beside from 12 MB on.", "auto")

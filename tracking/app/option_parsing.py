@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,34 @@ def seeds(text: str, option: str = "--seeds") -> range:
         raise InputError(place=option, got=repr(text), expected=expected, remedy="write 0:10 or 7")
     first = int(found[1])
     return range(first, first + 1 if found[2] is None else int(found[2]))
+
+
+def split_label(text: str) -> tuple[str, str]:
+    """Returns label and rest of a run or tracker "LABEL=rest"; the label is "" if the text has none.
+
+    A text that is a path, or a class of a file ("path.py:Class"), has no label: what exists comes first. Nor has a text
+    with a slash before its "=". Raises InputError for a label without a rest, or one that stands for the oracle.
+    """
+    label, equals, rest = text.partition("=")
+    exists = Path(text).exists() or (".py:" in text and Path(text.rpartition(":")[0]).exists())
+    if exists or not equals or "/" in label:
+        return "", text
+    if not label or not rest or label.split()[0] == "oracle":
+        expected = "LABEL=RUN, with a label that is not the oracle's"
+        raise InputError(place="label", got=repr(text), expected=expected, remedy="write mine=FOLDER, or leave it out")
+    return label, rest
+
+
+def labelled(texts: Iterable[str], short: Callable[[str], str] = str) -> dict[str, str]:
+    """Returns runs or trackers by name, as {name: text without its label}. The name is the label, else what `short`
+    makes of the text; the text itself where several are equal. Raises InputError if a name is given twice."""
+    parts = [split_label(text) for text in texts]
+    names = [label or short(rest) for label, rest in parts]
+    names = [n if label or (n and names.count(n) == 1) else rest for n, (label, rest) in zip(names, parts, strict=True)]
+    if twice := [name for name in names if names.count(name) > 1]:
+        remedy = "leave one out, or give each a label of its own: mine=…"
+        raise InputError(place="TRACKS", got=f"{twice[0]} twice", expected="each run once", remedy=remedy)
+    return dict(zip(names, (rest for _, rest in parts), strict=True))
 
 
 def settings(texts: Iterable[str], default: str, subjects: tuple[str, ...]) -> list[tuple[str, str]]:

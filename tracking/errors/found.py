@@ -47,7 +47,8 @@ class FoundError:
         error = self.error
         if isinstance(error, GroupError):
             others = f" with {' '.join(map(str, error.others))}" if error.others else ""
-            return f"people {' '.join(map(str, error.people))}{others}" if error.people else "nobody"
+            groups = f"groups {' '.join(map(str, error.engulfed))}: " if error.engulfed else ""
+            return f"{groups}people {' '.join(map(str, error.people))}{others}" if error.people else "nobody"
         if error.person is None:
             return f"track {error.after}"
         ids = " → ".join(str(id) for id in dict.fromkeys((error.before, error.after)) if id is not None)
@@ -61,7 +62,8 @@ class FoundError:
             "kind": error.kind, "start": error.start, "end": error.end,
             "seconds": (error.end - error.start + 1) / fps, "who": self.who,
             "of": "groups" if of_group else "people", "people": list(people),
-            "others": list(getattr(error, "others", ())), "before": getattr(error, "before", None),
+            "others": list(getattr(error, "others", ())),
+            "engulfed": list(getattr(error, "engulfed", ())), "before": getattr(error, "before", None),
             "after": getattr(error, "after", None),
             "cause": self.cause.name, "detail": self.cause.text, "cost": self.cost,
         }  # fmt: skip

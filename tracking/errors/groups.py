@@ -10,6 +10,8 @@ scores. A true group is in one of these states; a stretch of frames in one state
     engulfed group    most of it is in one group with most of another true group
     strangers joined  most of it is in one group with too many others
 
+Groups that are engulfed in one estimated group at the same time are one error, which names them all.
+
 A group that is found is divided, too, if members outside are most of another estimated group. A stretch that begins
 with a true merge is a *late merge*, or a *missed merge* if the group is not found before it ends; one that begins with
 a true split likewise. A missed group that begins with the group itself and is found later is a *late group*. A *false
@@ -57,6 +59,7 @@ class GroupError:
     rows: tuple[int, ...] = ()  # tracked rows that belong together
     alone: tuple[int, ...] = ()  # memberships, of the same estimated groups, of people who belong to no group there
     false: tuple[int, ...] = ()  # rows of estimated groups that should not be there
+    engulfed: tuple[int, ...] = ()  # ids of the true groups that are engulfed with each other, with `group`
 
 
 class Memberships:
@@ -137,7 +140,7 @@ def _split(of: Ints, member: Ints, count: int) -> list[list[int]]:
 
 def group_errors(of: Memberships, events: Sequence[GroupEvent], fps: float) -> list[GroupError]:
     """Returns all errors of groups except wrong lineages, sorted by start; events: the truth's events."""
-    found = [*_errors_of_groups(of), *_false_groups(of)]
+    found = [*_of_both_sides(_errors_of_groups(of)), *_false_groups(of)]
     named = [_named(error, of, events, AT_THE_EVENT * fps) for error in found]
     return sorted(named, key=lambda error: (error.start, error.end, error.kind))
 
@@ -163,6 +166,41 @@ def _errors_of_groups(of: Memberships) -> Iterator[GroupError]:
         others = tuple(id for id in _ids(of, (row for j in parts for row in of.members[j])) if id not in people)
         alone = tuple(k for j in parts for k in of.astray(j))
         yield GroupError(kind, *first_and_last(of.true.rows, stretch), id, people, others, tuple(rows), alone)
+
+
+def _of_both_sides(errors: Iterable[GroupError]) -> list[GroupError]:
+    """Returns the errors with those of groups that are engulfed with each other, at the same time, as one."""
+    found = list[GroupError]()
+    for error in errors:
+        both = [other for other in found if _engulfs(error, other)]
+        if both:
+            found = [other for other in found if other not in both]
+            error = _joined([*both, error])
+        found.append(error)
+    return found
+
+
+def _engulfs(a: GroupError, b: GroupError) -> bool:
+    meet = set(a.people) & set(b.others) and set(b.people) & set(a.others)
+    return a.kind == b.kind == ENGULFED and bool(meet) and a.start <= b.end and b.start <= a.end
+
+
+def _joined(errors: Sequence[GroupError]) -> GroupError:
+    first, start, end = errors[0], min(e.start for e in errors), max(e.end for e in errors)
+    others, alone, groups = ({x for e in errors for x in one(e)} for one in (_both, lambda e: e.alone, _groups_of))
+    rows = tuple(dict.fromkeys(row for e in errors for row in e.rows))
+    return replace(
+        first, start=start, end=end, others=tuple(sorted(others - {*first.people})), rows=rows,
+        alone=tuple(sorted(alone)), engulfed=tuple(sorted(groups)),
+    )  # fmt: skip
+
+
+def _both(error: GroupError) -> tuple[int, ...]:
+    return (*error.people, *error.others)
+
+
+def _groups_of(error: GroupError) -> tuple[int, ...]:
+    return error.engulfed or (() if error.group is None else (error.group,))
 
 
 def _false_groups(of: Memberships) -> Iterator[GroupError]:
@@ -209,13 +247,15 @@ def _concerns(event: GroupEvent, error: GroupError) -> bool:
     """Returns True if an event is about the true group, or about all people of the false one."""
     if error.group is None:
         return len(error.people) > 1 and set(error.people) <= set(event.members)
-    return error.group in (*event.before, *event.after) or bool(set(error.people) & set(event.members))
+    groups, people = {*event.before, *event.after}, set(event.members)
+    return bool(groups & {*_groups_of(error)} or people & {*error.people})
 
 
 def _when(error: GroupError, of: Memberships) -> str:
-    """Returns "late" if the group is found, or the false one gone, while its people are there; else "missed"."""
+    """Returns "late" if a group of the error is found, or the false one gone, while its people are there; else
+    "missed"."""
     if error.group is None:
         there = of.people.frame[np.isin(of.people.id, error.people)]
         return "late" if there.max() > error.end else "missed"
-    later = np.flatnonzero((of.true.rows.id == error.group) & (of.true.rows.frame > error.end))
+    later = np.flatnonzero(np.isin(of.true.rows.id, _groups_of(error)) & (of.true.rows.frame > error.end))
     return "late" if any(of.states[i] == FOUND for i in later.tolist()) else "missed"

@@ -1,14 +1,18 @@
 """A sweep: trackers and the oracle play scenes at values of axes until the budget is spent.
 
-Without an axis, the scenes are played as they are. Along one axis, values are placed where the curve breaks. First all
-scenes are played at five values. Then, in turn, the widest uncertainty is reduced: if a curve breaks and its breaking
-point's interval is wider than the distance of the two values beside it, more seeds are played; else a value is added in
-the middle of them. Over two axes, all scenes are played at a grid of five by five values, then with more seeds while
-there is budget.
+Without an axis, the scenes are played as they are. Along one axis, values are placed where the curves break. First all
+scenes are played at five values. Then, in turn, the widest uncertainty is reduced, of the shares of the oracle first,
+of the scores next: if a curve breaks and its breaking point's interval is wider than the distance of the two values
+beside it, more seeds are played; else a value is added in the middle of them. Over two axes, all scenes are played at a
+grid of five by five values, then with more seeds while there is budget.
 
-The oracle has the detections that the first tracker gets, and the true ids: what is lost in its score is not the
-tracker's fault. It does not count as an episode of the budget. Every episode is stored when it is played, so a sweep
-that was stopped goes on where it was.
+The budget is a number of episodes, or a time, which is converted to episodes by the pace so far. Along one axis, the
+first round takes at most half of it: with fewer seeds than `start`, or if these would be fewer than two scenes, with
+three values of each axis. A later round is played with as many seeds as the rest allows.
+
+The oracle has the detections that a tracker gets, and the true ids: what is lost in its score is not the tracker's
+fault. Trackers with different inputs have an oracle each. It does not count as an episode of the budget. Every episode
+is stored when it is played, so a sweep that was stopped goes on where it was.
 """
 
 from __future__ import annotations
@@ -19,6 +23,7 @@ import shlex
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -28,15 +33,18 @@ from scenarios.errors import InputError
 from sim.hashing import ENGINE
 from sim.types import Array, DetectionMode
 from tracking.environment.episode_cache import Source, sources
-from tracking.stress.axes import Axis, BreakingPoint, breaking_point
+from tracking.environment.episodes import streams_for
+from tracking.running.detection_mode import input_kind
+from tracking.stress.axes import Axis, BreakingPoint, Frontier, breaking_point, frontier
 from tracking.stress.scene_player import ORACLE, OracleTask, PlayScenes, Store
 from tracking.tuning.parallel_episodes import EpisodeTask
 from tracking.tuning.tuned_tracker import TunedTracker
 
-FIRST_VALUES = 5
+FIRST_VALUES = (5, 3)  # the second if the budget allows no two scenes at the first
 MOST_VALUES = 17
 NARROW = 0.05  # share of the axis: a breaking point is known well enough
 ROUNDING = 1e-9
+FIRST_SHARE = 0.5  # of the budget, for the first values of one axis
 
 Values = tuple[float, ...]  # one for each axis
 
@@ -50,7 +58,7 @@ class Plan:
     seeds: tuple[int, ...]  # all that may be played, the first `start` at once
     start: int
     by: str
-    share: float  # a curve breaks where it falls to this share of its easy value
+    share: float  # the limit: a curve breaks where it falls to this share of its easy value
     detections: DetectionMode
     settings: tuple[str, ...] = ()
     episodes: int | None = None  # budget
@@ -85,16 +93,18 @@ class Sweep:
     values: list[Values] = field(default_factory=list)
     seeds: int = 0
     scenes: dict[tuple[object, ...], Scene] = field(default_factory=dict)
+    rounds: int = 0
+    stopped: bool = False  # by the budget, before the breaking points were known well enough
     began: float = field(default_factory=time.monotonic)
+    _paced: tuple[float, int] = (0.0, 0)  # s, and the trackers' episodes played in them
     _made: dict[tuple[Values, int], tuple[Scene, ...]] = field(default_factory=dict)
 
     def run(self) -> None:
         """Plays until the breaking points are known, or the budget is spent."""
         self.check_scenes()
-        self.values = list(product(*(axis.spread(FIRST_VALUES) for axis in self.plan.axes)))
-        self._add_seeds(self.plan.start)
+        self._begin()
         self.play_values()
-        while not self.spent() and self._refine():
+        while self._refine():
             self.play_values()
 
     @property
@@ -102,10 +112,17 @@ class Sweep:
         """Number of the trackers' episodes on the scenes so far, stored ones included."""
         return sum(self.row(name, scene) is not None for scene in self.scenes.values() for name in self.trackers)
 
+    def left(self) -> float:
+        """Returns how many episodes the budget still allows, by minutes at the pace so far; inf without a budget."""
+        left = np.inf if self.plan.episodes is None else self.plan.episodes - self.played
+        if self.plan.minutes is not None:
+            seconds, (spent, count) = 60 * self.plan.minutes - (time.monotonic() - self.began), self._paced
+            left = min(left, (np.inf if seconds > 0 else 0.0) if not count else seconds * count / spent)
+        return left
+
     def spent(self) -> bool:
         """Returns True if the budget of time or of episodes is spent."""
-        over = self.plan.minutes is not None and time.monotonic() - self.began > 60 * self.plan.minutes
-        return over or (self.plan.episodes is not None and self.played >= self.plan.episodes)
+        return self.left() < 1
 
     def check_scenes(self) -> None:
         """Raises InputError if a tracker cannot play the scenes, or the two ends of an axis make the same ones."""
@@ -128,18 +145,40 @@ class Sweep:
             self._made[values, self.seeds] = tuple(Scene(source, values) for source in found)
         return self._made[values, self.seeds]
 
+    def _begin(self) -> None:
+        """Chooses the first values and the number of seeds so that the first round leaves a part of the budget."""
+        self.seeds = 1
+        if self.plan.minutes is not None:  # for the pace at both ends
+            ends = (tuple(axis.easy for axis in self.plan.axes), tuple(axis.hard for axis in self.plan.axes))
+            self.play([scene for values in ends for scene in self._scenes(values)], [*self.trackers])
+        budget = self.left() + self.played
+        if len(self.plan.axes) == 1:
+            budget *= FIRST_SHARE
+        for count in FIRST_VALUES:
+            self.values = list(product(*(axis.spread(count) for axis in self.plan.axes)))
+            each = len(self.values) * self._scenes_of_a_seed
+            seeds = int(min(budget / (each * len(self.trackers)), self.plan.start))
+            if seeds * self._scenes_of_a_seed >= min(2, self.plan.start * self._scenes_of_a_seed):
+                break
+        self.seeds = max(seeds, 1)
+
+    @cached_property
+    def _scenes_of_a_seed(self) -> int:
+        return len(sources(self.plan.scenarios, self.plan.seeds[:1], self.plan.settings))
+
     def play_values(self) -> None:
         """Plays all trackers at the values and with the seeds so far."""
+        self.rounds += 1
         self.play([scene for values in self.values for scene in self._scenes(values)], [*self.trackers])
 
     def play(self, scenes: Sequence[Scene], trackers: Sequence[str]) -> None:
         """Plays the episodes of the trackers and the oracle on these scenes that are not stored."""
         wanted = {(*scene.source.key, scene.values): scene for scene in scenes}
         self.scenes.update(wanted)
-        known = self.store.known
+        known, (before, count), began = self.store.known, self._paced, time.monotonic()
+        players = (*trackers, *dict.fromkeys(self.oracles[name] for name in trackers))
         every = (
-            (scene, [name for name in (*trackers, ORACLE) if self._key(name, scene) not in known])
-            for scene in wanted.values()
+            (scene, [name for name in players if self._key(name, scene) not in known]) for scene in wanted.values()
         )
         jobs = [(scene, names) for scene, names in every if names]
         tasks = [tuple(self._task(name, scene.source) for name in names) for scene, names in jobs]
@@ -148,31 +187,57 @@ class Sweep:
                 facts = {"tracker": name, "scenario": scene.source.name, "seed": scene.source.seed}
                 settings = list(self.plan.settings_at(scene.values))
                 self.store.add({"key": self._key(name, scene), **facts, "settings": settings, **asdict(outcome)})
-                if name != ORACLE:
+                if name in self.trackers:
+                    count += 1
+                    self._paced = before + time.monotonic() - began, count
                     self.report(" ".join([name, scene.source.name, *(f"{value:g}" for value in scene.values)]))
 
     def _task(self, name: str, source: Source) -> EpisodeTask | OracleTask:
-        if name == ORACLE:
-            return OracleTask(self._first, source, self.plan.detections)
-        return EpisodeTask(self.trackers[name], source, {}, self.plan.detections, every_score=True)
+        if name in self.trackers:
+            return EpisodeTask(self.trackers[name], source, {}, self.plan.detections, every_score=True)
+        return OracleTask(self._of_oracle(name), source, self.plan.detections)
 
-    @property
-    def _first(self) -> TunedTracker:
-        return next(iter(self.trackers.values()))
+    @cached_property
+    def oracles(self) -> dict[str, str]:
+        """By tracker, the name of the oracle that gets the same input."""
+        if len({tracker.needs for tracker in self.trackers.values()}) == 1:
+            return dict.fromkeys(self.trackers, ORACLE)
+        easy, mode = tuple(axis.easy for axis in self.plan.axes), self.plan.detections
+        (first, *_) = sources(self.plan.scenarios, self.plan.seeds[:1], self.plan.settings_at(easy))
+        kinds = {}
+        for name, tracker in self.trackers.items():
+            sequence = first.open(streams_for(tracker.tracker, mode))
+            frames = () if mode == "image" else sequence.without_pictures()
+            kinds[name] = input_kind(tracker.needs, mode, sequence, frames)
+        one = len({*kinds.values()}) == 1
+        return {name: ORACLE if one else f"{ORACLE} from {kind}" for name, kind in kinds.items()}
+
+    def _of_oracle(self, oracle: str) -> TunedTracker:
+        """Returns the first tracker with the input of an oracle."""
+        return next(self.trackers[name] for name, own in self.oracles.items() if own == oracle)
 
     def _key(self, name: str, scene: Scene) -> str:
-        code = ", ".join(self._first.needs) if name == ORACLE else self.trackers[name].code
-        facts = [ENGINE, name, code, self.plan.detections, *map(str, scene.source.key)]
+        one = self.trackers.get(name)
+        who = (one.name, one.code) if one else (ORACLE, ", ".join(self._of_oracle(name).needs))
+        facts = [ENGINE, *who, self.plan.detections, *map(str, scene.source.key)]
         return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:24]
+
+    @property
+    def oracle_names(self) -> tuple[str, ...]:
+        """The names of all oracles."""
+        return tuple(dict.fromkeys(self.oracles.values()))
 
     def rows(self) -> list[dict[str, Any]]:
         """Returns the stored episodes of this sweep as dicts, sorted by tracker, scenario, seed and values; "values" is
-        a dict by axis."""
+        a dict by axis, "oracle" the oracle's score (`score`) from the same input."""
         found = []
         for scene in self.scenes.values():
             values = {axis.name: value for axis, value in zip(self.plan.axes, scene.values, strict=True)}
-            rows = (self.row(name, scene) for name in (*self.trackers, ORACLE))
-            found += [{**row, "values": values} for row in rows if row is not None]
+            rows = ((name, self.row(name, scene)) for name in (*self.trackers, *self.oracle_names))
+            for name, row in rows:
+                if row is not None:
+                    best = self.score(self.oracles.get(name, name), scene)
+                    found.append({**row, "tracker": name, "values": values, "oracle": best})
         return sorted(found, key=lambda row: (row["tracker"], row["scenario"], row["seed"], *row["values"].values()))
 
     def row(self, name: str, scene: Scene) -> dict[str, Any] | None:
@@ -198,44 +263,71 @@ class Sweep:
         return (np.array([value for (value,) in self.values]) - axis.easy) / (axis.hard - axis.easy)
 
     def breaks(self) -> dict[str, BreakingPoint]:
-        """Returns the breaking point of each tracker on the only axis."""
-        return {name: breaking_point(self.way, self.scores(name), self.plan.share) for name in self.trackers}
+        """Returns the breaking point by score of each tracker and oracle on the only axis."""
+        names = (*self.trackers, *self.oracle_names)
+        return {name: breaking_point(self.way, self.scores(name), self.plan.share) for name in names}
+
+    def share_breaks(self) -> dict[str, BreakingPoint]:
+        """Returns the breaking point by share of the oracle of each tracker on the only axis."""
+        return {
+            name: breaking_point(self.way, self.scores(name), self.plan.share, self.scores(best))
+            for name, best in self.oracles.items()
+        }
+
+    def frontier(self, name: str) -> Frontier:
+        """Returns the frontier of a tracker over two axes."""
+        second = self.plan.axes[1]
+        way = np.array([*dict.fromkeys(value for _, value in self.values)])
+        scores, best = self.scores(name), self.scores(self.oracles[name])
+        return frontier((way - second.easy) / (second.hard - second.easy), scores, best, self.plan.share)
+
+    def cell(self, point: BreakingPoint) -> bool:
+        """Returns True if the interval of a breaking point is wide, and no narrower than the two values beside it."""
+        k = self._place(point)
+        gap = self.way[k] - self.way[k - 1]
+        return bool(gap > NARROW and point.high - point.low <= gap + ROUNDING)
+
+    def _place(self, point: BreakingPoint) -> int:
+        return int(np.clip(np.searchsorted(self.way, point.at), 1, len(self.way) - 1))
 
     def _refine(self) -> bool:
         """Adds a value or seeds where least is known; returns False if nothing is left to do."""
         if len(self.plan.axes) != 1:
             limited = self.plan.episodes is not None or self.plan.minutes is not None
             return (limited or not self.plan.axes) and self._add_seeds(self.seeds)
-        # The widest interval comes first; one that is not known at all counts as 0 wide.
-        for point in sorted(self.breaks().values(), key=lambda p: p.low - p.high if np.isfinite(p.low) else 0.0):
-            if np.isfinite(point.at):
-                if point.high - point.low > NARROW and (self._narrow(point) or self._add_seeds(self.seeds)):
+        own = (point for name, point in self.breaks().items() if name in self.trackers)
+        for points in (self.share_breaks().values(), own):
+            # The widest interval comes first; one that is not known at all counts as 0 wide.
+            for point in sorted(points, key=lambda p: p.low - p.high if np.isfinite(p.low) else 0.0):
+                if np.isfinite(point.at):
+                    if point.high - point.low > NARROW and (self._narrow(point) or self._add_seeds(self.seeds)):
+                        return True
+                elif np.isfinite(point.low) and self._add_seeds(self.seeds):
                     return True
-            elif np.isfinite(point.low) and self._add_seeds(self.seeds):
-                return True
         return False
 
     def _narrow(self, point: BreakingPoint) -> bool:
         """Adds the middle of the values beside a breaking point, if these are what its interval is wide by."""
-        k = int(np.clip(np.searchsorted(self.way, point.at), 1, len(self.way) - 1))
+        k = self._place(point)
         gap = self.way[k] - self.way[k - 1]
         wide = gap > NARROW / 2 and gap >= point.high - point.low - ROUNDING
         (axis,) = self.plan.axes
         middle = axis.between(*self.values[k - 1], *self.values[k])
         if not wide or len(self.values) >= MOST_VALUES or middle is None:
             return False
+        if self.left() < self.seeds * self._scenes_of_a_seed * len(self.trackers):
+            self.stopped = True
+            return False
         self.values.insert(k, (middle,))
         return True
 
     def _add_seeds(self, more: int) -> bool:
-        """Adds seeds, or as many as the budget of episodes allows, at first at least one; returns True if it did."""
+        """Adds seeds, or as many as the budget allows; returns True if it did."""
         more = min(more, len(self.plan.seeds) - self.seeds)
-        if self.plan.episodes is not None:
-            scenes = len(sources(self.plan.scenarios, self.plan.seeds[:1], self.plan.settings))
-            each = len(self.trackers) * len(self.values) * scenes
-            more = min(more, (self.plan.episodes - self.played) // each)
-        more = max(more, 0 if self.seeds else 1)
-        self.seeds += more
+        allowed = self.left() / (len(self.trackers) * len(self.values) * self._scenes_of_a_seed)
+        self.stopped |= more > 0 and allowed < 1
+        more = int(min(more, allowed))
+        self.seeds += max(more, 0)
         return more > 0
 
 

@@ -23,7 +23,6 @@ import numpy as np
 
 from scenarios.loading.resolve import Entry, SuiteEntry, load, rows
 from tracking.environment.episode_cache import Source
-from tracking.stress.scene_player import ORACLE
 from tracking.stress.sweep import Plan, Scene, Sweep, last_of_each_key
 
 if TYPE_CHECKING:
@@ -102,7 +101,7 @@ def search(
             drawn = [_drawn(sweep.plan, entries, trial, seed, trial.number % 4 < quarters) for trial in trials]
             sweep.play([failure.scene for failure in drawn], [tracker])
             for trial, failure in zip(trials, drawn, strict=True):
-                oracle, score = (sweep.score(name, failure.scene) for name in (ORACLE, tracker))
+                oracle, score = (sweep.score(name, failure.scene) for name in (sweep.oracles[tracker], tracker))
                 played = replace(failure, oracle=oracle, score=score)
                 if np.isfinite(played.shortfall):
                     study.tell(trial, _novelty(played, found))

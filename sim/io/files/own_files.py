@@ -17,6 +17,7 @@ import zlib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path, PurePath
+from urllib.parse import quote
 
 from scenarios.errors import InputError, is_control
 from sim.io.files import tables
@@ -133,6 +134,11 @@ def file_name(label: str) -> str:
 def output_path(folder: str | Path, label: str, ending: str = "") -> Path:
     """Returns the path of the file or folder for a label, directly inside `folder`; nothing is created."""
     return Path(folder) / (file_name(label) + ending)
+
+
+def address(path: PurePath) -> str:
+    """Returns a relative path as the address of a link, percent-encoded."""
+    return quote(path.as_posix().encode("utf-8", "surrogateescape"))
 
 
 def output_paths(folder: str | Path, labels: Iterable[str], ending: str = "", source: object = "") -> list[Path]:

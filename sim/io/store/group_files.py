@@ -22,12 +22,14 @@ from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES, INTEGER
+from scenarios.reading import is_present
 from sim.io.files import tables
 from sim.io.files.numeric_text import is_number_text, read_number, read_rows, read_text, whole_or_number
 from sim.io.files.tables import AXES, EXTENT, Count, FrameNumber, Id, Number, Pair, StoredTable, along, validated
-from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
+from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, NeverArrives, Order
 
 NEAR_COLUMNS = "start,end,a,b"
+NEVER_ARRIVES = "gt/never_arrives.json"
 GroupId = Annotated[int, Field(strict=True, ge=-1, le=INTEGER)]
 
 
@@ -93,6 +95,28 @@ def read_script(path: Path) -> tuple[Order, ...]:
     """Returns the orders in a script.json; () if it has no list of orders."""
     found = validated(path, tables.read_document(path), _Orders, "restore it").orders
     return tuple(Order(**order.model_dump()) for order in found)
+
+
+class _NeverArrives(BaseModel):
+    group: str
+    people: tuple[Id, ...]
+    pos: tuple[float, float]
+    goal: tuple[float, float]
+    no_way: bool
+    obstacle: str
+
+
+class _AllNeverArrive(BaseModel):
+    groups: tuple[_NeverArrives, ...]
+
+
+def read_never_arrives(folder: Path) -> tuple[NeverArrives, ...]:
+    """Returns the groups of a sequence folder that do not reach their goal; () if it has no such file."""
+    path = folder / NEVER_ARRIVES
+    if not is_present(path):
+        return ()
+    found = validated(path, tables.read_document(path), _AllNeverArrive, "restore it").groups
+    return tuple(NeverArrives(**one.model_dump()) for one in found)
 
 
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from dataclasses import asdict
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from sim.io.pictures.stored_pictures import StoredPictures, write_pictures
 from sim.io.recorded_sequence import recorded_sequence
 from sim.io.store import seal, truth_files
 from sim.io.store.camera_files import camera_document, read_camera, read_scene, scene_document
+from sim.io.store.group_files import NEVER_ARRIVES
 from sim.io.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
 from sim.streams import check_streams, coding, is_picture
 from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Image, Sequence, Truth
@@ -99,6 +101,8 @@ def sequence_files(
         files["scene.json"] = tables.json_document(scene_document(sequence.scene))
     if sequence.truth is not None:
         files |= truth_files.truth_files(sequence.truth)
+    if sequence.never_arrive:
+        files[NEVER_ARRIVES] = tables.json_list("groups", map(asdict, sequence.never_arrive))
     if found:
         files |= truth_files.detection_files(found, sequence.fps, sequence.scene)
     files = dict(sorted(files.items()))

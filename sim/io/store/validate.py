@@ -16,6 +16,7 @@ from sim.io.files.atomic import PARTIAL
 from sim.io.files.own_files import is_side_file
 from sim.io.source import generated_folders, split_and_name
 from sim.io.store import seal
+from sim.io.store.group_files import read_never_arrives
 from sim.io.store.seal import is_run, read_run, run_problems
 from sim.io.store.track_files import read_tracks
 
@@ -64,7 +65,8 @@ def _faults(folder: Path) -> Iterator[FlockscopeError]:
     try:
         if seal.is_sequence(folder):
             manifest = seal.read_manifest(folder)
-            yield from list(seal.damaged_files(folder, manifest["files"])) or _extra(folder, manifest)
+            damaged = list(seal.damaged_files(folder, manifest["files"]))
+            yield from damaged or [*_extra(folder, manifest), *_lost(folder)]
             return
         problems = list(run_problems(folder, read_run(folder)))
         yield from problems
@@ -72,6 +74,11 @@ def _faults(folder: Path) -> Iterator[FlockscopeError]:
             read_tracks(folder)
     except FlockscopeError as error:
         yield error
+
+
+def _lost(folder: Path) -> Iterator[InputError]:
+    for one in read_never_arrives(folder):
+        yield _problem(folder, one.words, "groups that reach their goals", "open the way, or move the goal")
 
 
 def _extra(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import sys
+from html import unescape
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
@@ -57,6 +60,30 @@ def test_no_command_leaves_out(tmp_path: Path, capsys) -> None:
     assert [video["name"] for video in listed["videos"]] == names
     scored = answer(capsys, "score", inside / "data", inside / "out" / "tracks")["sequences"]
     assert [row["name"] for row in scored] == names
+
+
+LINKED = ("a #1", "b%41 ü", "c?d=e&f;<g>", "--h+'\"i")
+
+
+def test_links_are_addresses(tmp_path: Path, capsys, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for k, name in enumerate(LINKED):
+        recording(Path("data") / str(k), name)
+    assert run(["track", "blob", "data", "--detections", "truth", "--px-per-m", "20", "--out", "t"]) == 0
+    assert run(["view", "data", "t", "--video", "beside", "--out", "pages"]) == 0
+    page = Path("pages/index.html").read_text(encoding="utf-8")
+    links = re.findall(r'<th scope="row"><a href="([^"]*)">', page)
+    assert len(links) == len(LINKED)
+    for link in links:
+        parts = urlsplit(unescape(link))
+        assert (parts.scheme, parts.query, parts.fragment) == ("", "", ""), link
+        shown = Path("pages") / unquote(parts.path)
+        assert shown.is_file(), link
+        data = re.search(r'"video":({[^}]*})', shown.read_text(encoding="utf-8"))
+        assert data is not None
+        video = urlsplit(json.loads(data[1])["src"])
+        assert (Path("pages") / unquote(video.path)).is_file()
+        assert (video.scheme, video.query, video.fragment) == ("", "", "")
 
 
 def test_a_manifest_names_files_of_its_own_folder_only(tmp_path: Path, capsys) -> None:

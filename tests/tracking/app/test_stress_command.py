@@ -22,8 +22,8 @@ def scene(tmp_path: Path, monkeypatch) -> str:
     return Path(write_scenes(tmp_path)[0]).name
 
 
-def stress(scene: str, *more: str) -> int:
-    options = ["--suite", scene, "--seeds", "0:2", "--start", "2", "--by", "HOTA", "--out", "o"]
+def stress(scene: str, *more: str, seeds: str = "0:2") -> int:
+    options = ["--suite", scene, "--seeds", seeds, "--start", "2", "--by", "HOTA", "--out", "o"]
     return run(["stress", FAKE, *options, *more])
 
 
@@ -53,13 +53,48 @@ def test_two_axes_make_a_matrix(scene: str, capsys) -> None:
     assert "detection  group.a.size 1" in capsys.readouterr().out
     data = json.loads(Path("o/stress.json").read_text())
     assert data["matrix"]["values"] == [[1.0, 0.9, 0.8, 0.7, 0.6], [1.0, 2.0]]
-    means = data["matrix"]["mean"]["oracle"]
+    means, frontier = data["matrix"]["mean"]["oracle"], data["matrix"]["frontier"][FAKE]
+    assert [len(row) for row in frontier["sides"]] == [2] * 5
+    assert {side for row in frontier["sides"] for side in row} == {"unknown"}, "two seeds decide nothing"
+    shares = data["matrix"]["share"][FAKE]
+    assert shares[1][1] == pytest.approx(data["matrix"]["mean"][FAKE][1][1] / means[1][1])
     assert [len(row) for row in means] == [2] * 5
     assert [value for row in means for value in row] == data["curves"]["oracle"]["mean"]
     assert means[0][0] > means[4][0]
     ends = re.findall(r"<td>[\d.]+ to ([\d.]+)</td>", Path("o/report.html").read_text())
     assert max(map(float, ends)) == 1.0, "intervals of two seeds end with the range of the score"
     assert pq.read_table("o/episodes.parquet")["group.a.size"].to_pylist().count(2.0) == 2 * 2 * 5
+
+
+def test_one_axis_is_told_by_both_measures(scene: str, capsys) -> None:
+    assert stress(scene, "--vary", "detection=1.0:0.4", "--episodes", "40", seeds="0:8") == 0
+    text = capsys.readouterr().out
+    data = json.loads(Path("o/stress.json").read_text())
+    tracker, oracle = data["curves"][FAKE], data["curves"]["oracle"]
+    assert tracker["share"]["mean"] == pytest.approx(
+        [a / b for a, b in zip(tracker["mean"], oracle["mean"], strict=True)]
+    )
+    assert text.index("share of the oracle, HOTA over detection") < text.index("\nHOTA over detection")
+    lines = [f"{FAKE}: share of the oracle ", f"{FAKE}: HOTA ", "oracle: HOTA "]
+    assert sorted(text.index(f"\n{line}") for line in lines) == [text.index(f"\n{line}") for line in lines]
+    rows = pq.read_table("o/episodes.parquet").to_pylist()
+    own = [row for row in rows if row["tracker"] == FAKE]
+    assert all(row["share"] == pytest.approx(row["HOTA"] / row["oracle"]) for row in own)
+    assert all(row["oracle"] == row["HOTA"] for row in rows if row["tracker"] == "oracle")
+    page = Path("o/report.html").read_text()
+    assert "As a share of the oracle" in page
+    assert "oracle: HOTA falls to" in page
+    assert max(high for curve in (tracker, oracle) for high in curve["high"] if high is not None) <= 1
+
+
+def test_a_budget_of_one_round_is_said(scene: str, capsys) -> None:
+    assert stress(scene, "--vary", "detection=1.0:0.4", "--episodes", "5", seeds="0:8") == 0
+    text = capsys.readouterr().out
+    assert "the budget ended in the first round: wide intervals need more --episodes or --minutes" in text
+    assert "fewer than 6 scenes: intervals are indicative" in text
+    data = json.loads(Path("o/stress.json").read_text())
+    assert (data["rounds"], data["budget_ended"]) == (1, True)
+    assert "the budget ended in the first round" in Path("o/report.html").read_text()
 
 
 def test_a_found_scene_is_generated_by_its_command(scene: str, capsys) -> None:

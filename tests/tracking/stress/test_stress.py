@@ -11,7 +11,7 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from tracking.environment.episode_cache import Source
-from tracking.stress.axes import AXES, NEVER, breaking_point, crossing, parse_axes, parse_axis
+from tracking.stress.axes import AXES, NEVER, breaking_point, crossing, frontier, parse_axes, parse_axis, shares
 from tracking.stress.scene_player import Outcome, Store, Tasks
 from tracking.stress.sweep import Plan, Sweep
 from tracking.tuning.parallel_episodes import EpisodeTask
@@ -64,6 +64,93 @@ def test_no_break() -> None:
     point = breaking_point(WAY, np.ones((8, 9)), 0.5)
     assert point.at == point.low == point.high == NEVER
     assert breaking_point(WAY, np.zeros((8, 9)), 0.5).at == NEVER
+
+
+def test_shares_of_one_oracle_for_all_are_scores() -> None:
+    """With an oracle of 1 everywhere both measures are one, with the same interval."""
+    scores = scenes(0.625, 12, 0)
+    by_score, by_share = (breaking_point(WAY, scores, 0.5, best) for best in (None, np.ones_like(scores)))
+    assert by_score == by_share
+    assert shares(scores, np.ones_like(scores))[0] == pytest.approx(scores.mean(axis=0))
+
+
+def detected(way: np.ndarray, slope: float, count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Scores (P, V) of a tracker that loses `slope` of the oracle's score on the way from easy to hard, and the oracle,
+    which loses half of its own. A scene is as hard for both."""
+    hard = 1 + 0.2 * np.random.default_rng(seed).standard_normal((count, 1))
+    oracle = 0.9 * (1 - 0.5 * way) * hard
+    return oracle * 0.8 * (1 - slope * way), oracle
+
+
+def test_both_measures_of_a_known_law() -> None:
+    """By share 1 - slope x = 0.8; by score (1 - x / 2) (1 - slope x) = 0.8."""
+    way = np.linspace(0, 1, 401)
+    scores, oracle = detected(way, 0.4, 12)
+    by_share, by_score = (breaking_point(way, scores, 0.8, best) for best in (oracle, None))
+    assert by_share.at == pytest.approx(0.2 / 0.4)
+    assert by_score.at == pytest.approx((0.9 - np.sqrt(0.9**2 - 4 * 0.2 * 0.2)) / 0.4, abs=1e-4)
+    assert breaking_point(way, oracle, 0.8).at == pytest.approx(0.2 / 0.5)
+    assert by_share.high - by_share.low < 0.01, "scenes that are hard for tracker and oracle alike do not count"
+
+
+def test_two_trackers_that_the_score_does_not_tell_apart() -> None:
+    """Equal to 80 % of the easy score, within 0.001 of detection; the detector's loss is all but the whole of it."""
+    way = np.linspace(0, 1, 101)
+    oracle = 1 - 0.55 * way
+    share = [np.interp(way, [0, 0.3, 0.75, 1], [1, 0.966, end, end - 0.2]) for end in (0.8, 0.72)]
+    jitter = 1 + 0.1 * np.random.default_rng(1).standard_normal((12, 1))
+    both = np.tile(oracle, (12, 1)) * jitter
+    first, second = (both * one for one in share)
+    by_score = [breaking_point(way, one, 0.8).at for one in (first, second)]
+    by_share = [breaking_point(way, one, 0.8, both) for one in (first, second)]
+    assert by_score[0] == pytest.approx(by_score[1], abs=0.002)
+    assert by_share[0].at == pytest.approx(0.75)
+    assert by_share[1].at == pytest.approx(0.3 + 0.45 * (0.966 - 0.8) / (0.966 - 0.72), abs=1e-3)
+    assert by_share[1].high < by_share[0].low
+
+
+def test_intervals_of_shares_hold_the_breaking_point() -> None:
+    inside = 0
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        scores, oracle = detected(way := np.linspace(0, 1, 65), 0.4, 8, seed)
+        scores = scores * (1 + 0.05 * rng.standard_normal((8, 1))) + 0.03 * rng.standard_normal(scores.shape)
+        point = breaking_point(way, scores, 0.8, oracle)
+        inside += point.low <= 0.5 <= point.high
+    assert inside >= 185
+
+
+def test_where_the_oracle_is_zero_or_unknown_there_is_no_share() -> None:
+    oracle = np.tile([1.0, 0.5, 0.0, np.nan], (8, 1))
+    scores = np.tile([1.0, 0.5, 0.0, 0.0], (8, 1))
+    way = np.linspace(0, 1, 4)
+    assert np.array_equal(shares(scores, oracle)[0], [1, 1, np.nan, np.nan], equal_nan=True)
+    assert breaking_point(way, scores, 0.8, oracle).at == NEVER, "0 of 0 is no break"
+    assert breaking_point(way, scores, 0.8).at == pytest.approx(0.4 / 3)
+    assert breaking_point(way, scores[:, ::-1], 0.8, oracle[:, ::-1]).at == NEVER
+
+
+def test_a_scene_without_oracle_counts_on_neither_side() -> None:
+    scores, oracle = detected(WAY, 0.4, 8)
+    more = np.vstack([scores, np.zeros((1, len(WAY)))]), np.vstack([oracle, np.full((1, len(WAY)), np.nan)])
+    assert breaking_point(WAY, more[0], 0.8, more[1]) == breaking_point(WAY, scores, 0.8, oracle)
+
+
+def test_frontier_of_a_known_law() -> None:
+    """The share is 1 - x - y over two axes: 0.8 at x + y = 0.2."""
+    x, y = np.meshgrid(np.linspace(0, 0.4, 5), np.linspace(0, 0.4, 5), indexing="ij")
+    rng = np.random.default_rng(0)
+    oracle = (0.9 - 0.3 * x - 0.5 * y).ravel() * (1 + 0.1 * rng.standard_normal((12, 1)))
+    scores = oracle * (1 - x - y).ravel() + 0.005 * rng.standard_normal(oracle.shape)
+    found = frontier(np.linspace(0, 1, 5), scores, oracle, 0.8)
+    true = 1 - x - y - 0.8
+    assert (found.sides[true > 0.05] == 1).all()
+    assert (found.sides[true < -0.05] == -1).all()
+    assert (found.sides[abs(true) < 1e-9] == 0).all()
+    assert found.points[0].at == pytest.approx(0.5, abs=0.03)
+    assert found.points[1].low <= 0.25 <= found.points[1].high
+    few = frontier(np.linspace(0, 1, 5), scores[:5], oracle[:5], 0.8)
+    assert not few.sides.any(), "fewer than 6 scenes decide nothing"
 
 
 @pytest.mark.parametrize("text", ["nothing", "detection=1", "detection=a:b", "detection=1:1", "sensor.x=1:2:3"])
@@ -171,7 +258,7 @@ def test_two_axes_are_a_grid_with_more_seeds_while_there_is_budget(episodes, see
 
 
 def test_sweeps_in_one_file_share_scenes(tmp_path: Path) -> None:
-    sweep(tmp_path, [], start=2, episodes=10).run()
+    sweep(tmp_path, [], start=2, episodes=20).run()
     made = sweep(tmp_path, seen := [], axes=parse_axes(["detection", "noise=1.0:3.0"]), start=2, episodes=None)
     made.run()
     assert len(seen) == 2 * 20
@@ -184,7 +271,7 @@ def test_the_oracle_is_played_on_every_scene_and_not_counted(tmp_path: Path) -> 
     rows = made.rows()
     assert sum(row["tracker"] == "oracle" for row in rows) == sum(row["tracker"] == "t" for row in rows) == made.played
     assert np.array_equal(made.scores("oracle"), np.ones_like(made.scores("t")))
-    assert made.breaks().keys() == {"t"}
+    assert made.share_breaks().keys() == {"t"}
 
 
 @pytest.mark.parametrize("axes", [["light"], ["detection", "light"]])
@@ -209,3 +296,69 @@ def test_a_file_of_somebody_else_is_refused_and_kept(line: str, tmp_path: Path) 
     with pytest.raises(InputError, match=r"e\.jsonl.*expected episodes of"):
         Store(path)
     assert path.read_text() == line
+
+
+@pytest.mark.parametrize(("episodes", "first"), [(400, (5, 8)), (40, (5, 4)), (16, (3, 2)), (5, (3, 1))])
+def test_the_first_round_leaves_a_part_of_the_budget(episodes: int, first: tuple[int, int], tmp_path: Path) -> None:
+    made = sweep(tmp_path, [], episodes=episodes)
+    rounds = []
+    made.run_scenes = (lambda play: lambda tasks: (rounds.append((len(made.values), made.seeds)), play(tasks))[1])(
+        made.run_scenes
+    )
+    made.run()
+    assert rounds[0] == first
+    assert (made.rounds > 1) == (episodes > 5)
+    assert made.played <= episodes
+
+
+def test_minutes_are_kept_by_the_pace_of_episodes(tmp_path: Path, monkeypatch) -> None:
+    """An episode takes 6 s: a budget of 4 minutes has 40."""
+    now = [0.0]
+    monkeypatch.setattr("tracking.stress.sweep.time.monotonic", lambda: now[0])
+    made = sweep(tmp_path, [], episodes=None, minutes=4.0)
+    made.began, play = 0.0, made.run_scenes
+
+    def slow(scenes: Sequence[Tasks]):
+        for outcome in play(scenes):
+            now[0] += 6.0
+            yield outcome
+
+    made.run_scenes = slow
+    made.run()
+    assert 30 <= made.played <= 40
+    assert now[0] <= 240
+    assert made.rounds > 1
+
+
+def test_an_interval_that_is_the_distance_of_two_values_is_known_as_such(tmp_path: Path) -> None:
+    made = sweep(tmp_path, [], episodes=10)
+    made.run()
+    coarse = made.share_breaks()["t"]
+    assert made.cell(coarse)
+    assert made.stopped
+    more = sweep(tmp_path, [], episodes=800)
+    more.run()
+    fine = more.share_breaks()["t"]
+    assert not more.cell(fine)
+    assert fine.high - fine.low < (coarse.high - coarse.low) / 2
+
+
+def test_trackers_with_different_inputs_have_an_oracle_each(tmp_path: Path) -> None:
+    made = sweep(tmp_path, [], episodes=40)
+    made.trackers = {"a": TunedTracker("blob", "a", ("points",)), "b": TunedTracker("blob", "b", ("boxes",))}
+    made.run_scenes = lambda scenes: (
+        [Outcome({"HOTA": {"points": 1.0, "boxes": 0.5}[t.tracker.needs[0]]}) for t in tasks] for tasks in scenes
+    )
+    made.run()
+    assert made.oracles == {"a": "oracle from points", "b": "oracle from boxes"}
+    assert (made.scores("oracle from boxes") == 0.5).all()
+    assert {row["oracle"] for row in made.rows() if row["tracker"] == "a"} == {1.0}
+
+
+def test_a_tracker_with_another_label_is_not_played_again(tmp_path: Path) -> None:
+    sweep(tmp_path, [], episodes=40).run()
+    again = sweep(tmp_path, seen := [], episodes=40)
+    again.trackers = {"mine": again.trackers["t"]}
+    again.run()
+    assert not seen
+    assert {row["tracker"] for row in again.rows()} == {"mine", "oracle"}

@@ -16,7 +16,7 @@ from itertools import zip_longest
 from pathlib import Path
 
 from scenarios.errors import counted
-from sim.io.files.own_files import GENERATOR, output_path
+from sim.io.files.own_files import GENERATOR, address, output_path
 from sim.types import DetectionMode, Sequence
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
@@ -93,7 +93,7 @@ def demo(options: DemoOptions) -> CommandResult:
     films = "".join(
         VIDEO.format(
             video=escape(f"pages/pixels/{name}.mp4"), start=0.4 * frames / scenes[0].fps, tracker=name,
-            page=escape(page.relative_to(out).as_posix()),
+            page=address(page.relative_to(out)),
         ) for name, (page,) in pages.items()
     )  # fmt: skip
     text = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
@@ -240,7 +240,7 @@ def _scenes(compared: ComparedRuns, key: str, pages: Mapping[str, list[Path]], r
     rows = [[escape(name)] for name in compared.sequences]
     for name, own in pages.items():
         for row, page, scores in zip(rows, own, compared.scores[name], strict=True):
-            row.append(f'<a href="{escape(page.relative_to(root).as_posix())}">{number(key, scores[key])}</a>')
+            row.append(f'<a href="{address(page.relative_to(root))}">{number(key, scores[key])}</a>')
     head = ["<th>sequence</th>", *(f"<th>{escape(name)}</th>" for name in pages)]
     return f"<details><summary>Replays, by {key}</summary>{_table(head, rows)}</details>"
 

@@ -24,7 +24,8 @@ from tracking.stats import SURE
 def score(options: ScoreOptions, ranked: bool = False) -> CommandResult:
     """Scores every sequence of the truth with its tracks; ranks several runs, or with `ranked` also a single one."""
     source = source_of(options, options.truth, without="box_scale")
-    sequences, first = source.open(), options.tracks[0]
+    names, sequences = run_names(options.tracks), source.open()
+    first = next(iter(names.values()))
     check_blocks(options.blocks, len(sequences))
     ranked = ranked or len(options.tracks) > 1 or is_class(first)
     if ranked:
@@ -33,7 +34,6 @@ def score(options: ScoreOptions, ranked: bool = False) -> CommandResult:
         refuse_options(vars(options), "by", Path(first), "one run", "only several are ranked")
     if options.by is not None:
         checked_key(options.by)
-    names = run_names(options.tracks)
     how = {"similarity": options.similarity, "group_match": options.group_match, "blocks": options.blocks}
     jobs = scoring_jobs(names.values(), sequences, options.box_scale, oracles=ranked, **how)
     if options.csv is not None:

@@ -12,6 +12,7 @@ from scenarios.errors import InputError
 from sim.io.formats.options import BoxScale, parse_box_scale
 from sim.types import DetectionMode, Sequence
 from tracking.app.commands.track import TrackerSetup
+from tracking.app.option_parsing import labelled
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
 from tracking.comparison import ComparedSequence, compare_one
 from tracking.running.run import TrackingRun
@@ -40,13 +41,9 @@ def is_class(text: str) -> bool:
 
 
 def run_names(texts: list[str]) -> dict[str, str]:
-    """Returns the given texts by short names, as {short name: text}. Raises InputError if a text is given twice. A
-    short name is a class or file name; the text itself stands for it if several are equal."""
-    short = [text.rpartition(":")[2] if is_class(text) else Path(text).name for text in texts]
-    if len(set(texts)) < len(texts):
-        twice = next(text for text in texts if texts.count(text) > 1)
-        raise InputError(place="TRACKS", got=f"{twice} twice", expected="each run once", remedy="leave one out")
-    return {name if short.count(name) == 1 and name else text: text for name, text in zip(short, texts, strict=True)}
+    """Returns the given texts by short names, as {short name: text without its label}: a label, a class name or a file
+    name, as `option_parsing.labelled`."""
+    return labelled(texts, lambda text: text.rpartition(":")[2] if is_class(text) else Path(text).name)
 
 
 def scoring_jobs(

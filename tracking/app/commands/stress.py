@@ -19,15 +19,18 @@ from tracking.app.command_result import CommandResult
 from tracking.app.commands.score_tables import checked_key, figure, table
 from tracking.app.progress import ProgressMeter
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import mean_interval
-from tracking.stress.axes import BreakingPoint, parse_axes
-from tracking.stress.scene_player import ORACLE, Store, contender, scene_player
+from tracking.stats import FEWEST, mean_interval
+from tracking.stress.axes import Axis, BreakingPoint, parse_axes, shares
+from tracking.stress.scene_player import Store, contender, scene_player
 from tracking.stress.sweep import Plan, Sweep, generate_command
 from tracking.stress.worst_scenes import SearchedScene, search, worst
 
 EPISODES, TABLE, RESULT = "episodes.jsonl", "episodes.parquet", "stress.json"
 REPORT = "report.html"
 MOST_AXES = 2  # without a search
+SIDES = {1: "above", -1: "below", 0: "unknown"}  # of the limit of a frontier
+MARKS = {"above": "+", "below": "-", "unknown": "?"}
+SIDE_WORDS = {"above": "surely above the limit", "below": "surely below it", "unknown": "not known"}
 
 
 def stress(options: StressOptions) -> CommandResult:
@@ -36,7 +39,8 @@ def stress(options: StressOptions) -> CommandResult:
     from tracking.app.report.page import check_packages, write_report
 
     check_packages()
-    trackers = {name: contender(name, options.step_timeout) for name in dict.fromkeys(options.trackers)}
+    named = option_parsing.labelled(options.trackers)
+    trackers = {name: contender(text, options.step_timeout) for name, text in named.items()}
     detects = all({"boxes", "points"} & {*tracker.needs} for tracker in trackers.values())
     plan = _plan(options, options.detections or ("file" if detects else "image"))
     refuse_foreign_file(options.out / REPORT)
@@ -75,53 +79,83 @@ def _plan(options: StressOptions, detections: DetectionMode) -> Plan:
 
 def _data(sweep: Sweep, found: list[SearchedScene] | None) -> dict[str, Any]:
     """Returns all that stress.json has. found: the scenes of a search."""
-    plan, rows, names = sweep.plan, sweep.rows(), [*sweep.trackers, ORACLE]
+    plan, rows, names = sweep.plan, sweep.rows(), [*sweep.trackers, *sweep.oracle_names]
     data: dict[str, Any] = {
         "axes": [{"name": axis.name, "easy": axis.easy, "hard": axis.hard} for axis in plan.axes],
         "values": sweep.values, "by": plan.by, "share": plan.share, "scenarios": list(plan.scenarios),
-        "seeds": sweep.seeds, "episodes": sum(row["tracker"] != ORACLE for row in rows),
+        "seeds": sweep.seeds, "episodes": sum(row["tracker"] in sweep.trackers for row in rows),
+        "rounds": sweep.rounds, "budget_ended": sweep.stopped, "oracles": sweep.oracles,
         "curves": {}, "by_scenario": None, "matrix": None, "found": None,
         "failures": [row for row in rows if row["failed"]],
-        "left_out": [row for row in rows if row["left_out"] and row["tracker"] == ORACLE],
+        "left_out": [row for row in rows if row["left_out"] and row["tracker"] == sweep.oracle_names[0]],
     }  # fmt: skip
     if found is not None:
         seeds = len({scene.source.seed for scene in sweep.scenes.values()})
         return {**data, "seeds": seeds, "found": [_failure(failure, k) for k, failure in enumerate(worst(found), 1)]}
-    data["curves"] = {name: {**_means(sweep.scores(name)), "break": None} for name in names}
+    data["curves"] = {name: {**_means(sweep, name), "break": None} for name in names}
+    for name, best in sweep.oracles.items():
+        of_share = zip(("mean", "low", "high"), map(plain, shares(sweep.scores(name), sweep.scores(best))), strict=True)
+        data["curves"][name] |= {"oracle": best, "share": {**dict(of_share), "break": None}}
     if not plan.axes:
         data["by_scenario"] = {name: _by_scenario(sweep, name) for name in names}
     elif len(plan.axes) == 1:
         for name, point in sweep.breaks().items():
-            data["curves"][name]["break"] = _on_axis(plan, point)
+            data["curves"][name]["break"] = _break(sweep, point)
+        for name, point in sweep.share_breaks().items():
+            data["curves"][name]["share"]["break"] = _break(sweep, point)
     else:
-        first, second = ([*dict.fromkeys(values[k] for values in sweep.values)] for k in range(MOST_AXES))
-        means = {name: np.reshape(curve["mean"], (len(first), -1)).tolist() for name, curve in data["curves"].items()}
-        data["matrix"] = {"values": [first, second], "mean": means}
+        data["matrix"] = _matrix(sweep, data["curves"])
     return data
 
 
-def _means(scores: Array) -> dict[str, list[float | None]]:
+def _means(sweep: Sweep, name: str) -> dict[str, list[float | None]]:
+    return _ends(sweep.scores(name), sweep.plan.by)
+
+
+def _ends(scores: Array, by: str) -> dict[str, list[float | None]]:
     """Returns mean, ends of its 95 % interval, and number of scenes, for each column of scores (P, V)."""
-    mean, low, high = map(plain, mean_interval(scores))
+    mean, low, high = (plain(CATALOGUE[by].within(end)) for end in mean_interval(scores))
     return {"mean": mean, "low": low, "high": high, "scenes": np.isfinite(scores).sum(axis=0).tolist()}
+
+
+def _matrix(sweep: Sweep, curves: Mapping[str, Any]) -> dict[str, Any]:
+    first, second = ([*dict.fromkeys(values[k] for values in sweep.values)] for k in range(MOST_AXES))
+    wide = len(second)
+
+    def rows(flat: list[Any]) -> list[list[Any]]:
+        return [flat[k : k + wide] for k in range(0, len(flat), wide)]
+
+    frontiers = {}
+    for name in sweep.trackers:
+        found = sweep.frontier(name)
+        sides = [[SIDES[side] for side in row] for row in found.sides.tolist()]
+        points = [_on_axis(sweep.plan.axes[1], point) for point in found.points]
+        frontiers[name] = {"sides": sides, "mean_above": found.above.tolist(), "points": points}
+    return {
+        "values": [first, second], "mean": {name: rows(curve["mean"]) for name, curve in curves.items()},
+        "share": {name: rows(curves[name]["share"]["mean"]) for name in sweep.trackers}, "frontier": frontiers,
+    }  # fmt: skip
 
 
 def _by_scenario(sweep: Sweep, name: str) -> dict[str, dict[str, float | None]]:
     scores: dict[str, list[float]] = {}
     for scene in sweep.scenes.values():
         scores.setdefault(scene.source.name, []).append(sweep.score(name, scene))
-    return {scenario: _first(_means(np.array([found]).T)) for scenario, found in scores.items()}
+    return {scenario: _first(_ends(np.array([found]).T, sweep.plan.by)) for scenario, found in scores.items()}
 
 
-def _first(means: dict[str, Any], k: int = 0) -> dict[str, float | None]:
-    return {key: means[key][k] for key in ("mean", "low", "high", "scenes")}
+def _first(means: dict[str, Any]) -> dict[str, float | None]:
+    return {key: means[key][0] for key in ("mean", "low", "high", "scenes")}
 
 
-def _on_axis(plan: Plan, point: BreakingPoint) -> dict[str, float | None]:
-    (axis,) = plan.axes
+def _on_axis(axis: Axis, point: BreakingPoint) -> dict[str, Any]:
     ends = {"at": point.at, "low": point.low, "high": point.high}
-    found: dict[str, float | None] = plain({k: axis.easy + x * (axis.hard - axis.easy) for k, x in ends.items()})
+    found: dict[str, Any] = plain({k: axis.easy + x * (axis.hard - axis.easy) for k, x in ends.items()})
     return found
+
+
+def _break(sweep: Sweep, point: BreakingPoint) -> dict[str, Any]:
+    return {**_on_axis(sweep.plan.axes[0], point), "cell": sweep.cell(point)}
 
 
 def _failure(failure: SearchedScene, place: int) -> dict[str, Any]:
@@ -140,6 +174,9 @@ def _parquet(sweep: Sweep) -> bytes:
     columns = {key: np.array([row[key] for row in rows], object) for key in words}
     columns["seed"] = np.array([row["seed"] for row in rows])
     columns |= {axis.name: np.array([row["values"][axis.name] for row in rows]) for axis in sweep.plan.axes}
+    best = np.array([row["oracle"] for row in rows], float)
+    own = np.array([0.0 if row["failed"] else row["scores"].get(sweep.plan.by, np.nan) for row in rows], float)
+    columns |= {"oracle": best, "share": own / np.where(best > 0, best, np.nan)}
     columns |= {key: np.array([row["scores"].get(key, np.nan) for row in rows], float) for key in CATALOGUE}
     units = {key: score.unit for key, score in CATALOGUE.items()}
     return table_bytes(columns, {"axes": [axis.name for axis in sweep.plan.axes]}, units)
@@ -156,33 +193,75 @@ def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
     over = f" over {' and '.join(axes)}" if axes else ""
     title = f"{plan.by}{over} ({', '.join(plan.scenarios)}, {counted(sweep.seeds, 'seed')})"
     if data["matrix"] is not None:
-        first, second = data["matrix"]["values"]
-        columns = [f"{axes[1]} {second[0]:g}", *(f"{value:g}" for value in second[1:])]
-        for name, means in data["matrix"]["mean"].items():
-            rows = [[f"{value:g}", *map(figure, row)] for value, row in zip(first, means, strict=True)]
-            yield table(f"{name}: {title}", (), [axes[0], *columns], rows)
+        yield from _matrices(sweep, data["matrix"], title)
         return
+    names = [f"{values[0]:g}" if axes else "all" for values in sweep.values]
+    if axes:
+        of_shares = {name: curves[name]["share"] for name in sweep.trackers}
+        rows = [[name, *(_interval(curve, k) for curve in of_shares.values())] for k, name in enumerate(names)]
+        yield table(f"share of the oracle, {title}", (), [axes[0], *of_shares], rows)
     rows = []
-    for scenario in {} if axes else data["by_scenario"][ORACLE]:
+    for scenario in {} if axes else data["by_scenario"][sweep.oracle_names[0]]:
         rows.append([scenario, *(_interval(of[scenario]) for of in data["by_scenario"].values())])
-    for k, values in enumerate(sweep.values):
-        name = f"{values[0]:g}" if axes else "all"
-        rows.append([name, *(_interval(_first(curve, k)) for curve in curves.values())])
+    for k, name in enumerate(names):
+        rows.append([name, *(_interval(curve, k) for curve in curves.values())])
     yield table(title, (), [axes[0] if axes else "", *curves], rows)
     yield from _break_lines(sweep, data)
 
 
+def _matrices(sweep: Sweep, matrix: dict[str, Any], title: str) -> Iterator[str]:
+    (first, second), (a, b) = matrix["values"], (axis.name for axis in sweep.plan.axes)
+    columns = [f"{b} {second[0]:g}", *(f"{value:g}" for value in second[1:])]
+    for name, found in matrix["frontier"].items():
+        rows, means = list[list[str]](), matrix["share"][name]
+        for value, shown, sides, point in zip(first, means, found["sides"], found["points"], strict=True):
+            cells = [f"{figure(share)} {MARKS[side]}" for share, side in zip(shown, sides, strict=True)]
+            rows.append([f"{value:g}", *cells, _ends_words(point)])
+        yield table(f"{name}: share of the oracle, {title}", (), [a, *columns], rows, [f"limit at {b}"])
+    yield from _frontier_lines(sweep, matrix)
+    for name, means in matrix["mean"].items():
+        rows = [[f"{value:g}", *map(figure, row)] for value, row in zip(first, means, strict=True)]
+        yield table(f"{name}: {title}", (), [a, *columns], rows)
+
+
+def _frontier_lines(sweep: Sweep, matrix: dict[str, Any]) -> Iterator[str]:
+    level = f"{sweep.plan.share:.0%} of the share at the easy end"
+    yield f"limit: {level}; + surely above it, - surely below it, ? not known"
+    for name, found in matrix["frontier"].items():
+        sides = [side for row in found["sides"] for side in row]
+        words = ", ".join(f"{sides.count(side)} {word}" for side, word in SIDE_WORDS.items())
+        yield printable(f"{name}: of {counted(len(sides), 'value')} {words}")
+    yield ""
+
+
 def _break_lines(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
-    """Yields words on the breaking points of a sweep along one axis."""
-    if len(sweep.plan.axes) != 1 or data["found"] is not None:
+    """Yields words on the breaking points of a sweep along one axis, and on the frontiers of one over two."""
+    if data["found"] is not None:
         return
-    for name in sweep.trackers:
-        yield f"{printable(name)} {_break_words(data['curves'][name]['break'], sweep.plan.share)}"
+    if data["matrix"] is not None:
+        yield from filter(None, _frontier_lines(sweep, data["matrix"]))
+    if len(sweep.plan.axes) != 1:
+        return
+    curves, limit = data["curves"], sweep.plan.share
+    shown = {f"{name}: share of the oracle": curves[name]["share"] for name in sweep.trackers}
+    shown |= {f"{name}: {sweep.plan.by}": curve for name, curve in curves.items()}
+    for words, curve in shown.items():
+        yield printable(f"{words} {_break_words(curve, limit, [value for (value,) in sweep.values])}")
+    points = [curve["break"] for curve in shown.values()]
+    if any(p["cell"] or (p["at"] is not None and None in p.values()) for p in points):
+        when = "in the first round" if sweep.rounds == 1 else f"after {sweep.rounds} rounds"
+        if sweep.stopped:
+            yield f"the budget ended {when}: wide intervals need more --episodes or --minutes"
+        elif sweep.seeds == len(sweep.plan.seeds):
+            yield "all seeds are played: wide intervals need more --seeds"
+    scenes = min((count for curve in curves.values() for count in curve["scenes"]), default=0)
+    if scenes < FEWEST:
+        yield f"fewer than {FEWEST} scenes: intervals are indicative"
 
 
 def _found(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
     plan, tracker = sweep.plan, next(iter(sweep.trackers))
-    columns = ["scenario", "seed", *(axis.name for axis in plan.axes), tracker, ORACLE, "shortfall"]
+    columns = ["scenario", "seed", *(axis.name for axis in plan.axes), tracker, sweep.oracles[tracker], "shortfall"]
     rows = [
         [f["scenario"], str(f["seed"]), *(f"{value:g}" for value in f["values"]),
          *(figure(f[key]) for key in ("score", "oracle", "shortfall"))]
@@ -208,15 +287,33 @@ def _note(words: str, first: Mapping[str, Any], key: str) -> str:
     return printable(f"{words}, the first {first['scenario']}, seed {first['seed']}: {first[key]}")
 
 
-def _interval(row: Mapping[str, float | None]) -> str:
-    low, high = row["low"], row["high"]
-    return figure(row["mean"]) + ("" if low is None or high is None else f" ± {(high - low) / 2:.3f}")
+def _interval(curve: Mapping[str, Any], k: int | None = None) -> str:
+    mean, low, high = (curve[key] if k is None else curve[key][k] for key in ("mean", "low", "high"))
+    # An end at the limit of the score is nearer.
+    return figure(mean) + ("" if low is None or high is None else f" ± {max(high - mean, mean - low):.3f}")
 
 
-def _break_words(point: Mapping[str, float | None], share: float) -> str:
-    level = f"{share:.0%} of its value at the easy end"
+def _break_words(curve: Mapping[str, Any], limit: float, values: list[float]) -> str:
+    point, level = curve["break"], f"{limit:.0%} of its value at the easy end"
+    known = [value for value, mean in zip(values, curve["mean"], strict=True) if mean is not None]
+    if not curve["mean"][0]:
+        return "is 0 or unknown at the easy end: no breaking point"
     if point["at"] is None:
-        return f"does not fall to {level}"
+        return f"does not fall to {level}" + (
+            f" up to {known[-1]:g}, the last known" if known[-1] != values[-1] else ""
+        )
+    cell = ", two neighbouring values" if point["cell"] else ""
+    return f"falls to {level} at {_ends_words(point, cell)}"
+
+
+def _ends_words(point: Mapping[str, Any], more: str = "") -> str:
+    """Returns a breaking point in words, "–" if there is none."""
+    if point["at"] is None:
+        return "–"
     known = sorted(v for v in (point["low"], point["high"]) if v is not None)
-    ends = f"{known[0]:.3g} to {known[1]:.3g}" if len(known) == 2 else "its interval is not known: play more episodes"
-    return f"falls to {level} at {point['at']:.3g} ({ends})"
+    ends = (
+        f"{known[0]:.3g} to {known[1]:.3g}{more}"
+        if len(known) == 2
+        else "its interval is not known: play more episodes"
+    )
+    return f"{point['at']:.3g} ({ends})"

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError, counted
-from sim.io.files.own_files import output_file, output_paths, refuse_foreign_file
+from sim.io.files.own_files import address, output_file, output_paths, refuse_foreign_file
 from sim.types import Sequence
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
@@ -88,7 +88,9 @@ def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str,
     if len(names) == 1:
         known = {sequence.name: one.errors[0] for sequence, one in zip(sequences, found, strict=True)}
         pages = _pages(options, sequences, names, known)
-    files = {sequence.name: path.name for sequence, path in zip(sequences, pages.data["files"], strict=False)}
+    files = {
+        sequence.name: address(Path(path.name)) for sequence, path in zip(sequences, pages.data["files"], strict=False)
+    }
     write_report(report_of_runs([*names], sequences, found, options.by, files), index)
     return CommandResult({"files": [index, *pages.data["files"]]}, f"{index}\n{pages.text}".rstrip())
 

@@ -8,13 +8,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
-from urllib.parse import quote
 
 import numpy as np
 
 from scenarios.errors import InputError
 from sim.io.files.atomic import staged_path
-from sim.io.files.own_files import GENERATOR, refuse_foreign_file
+from sim.io.files.own_files import GENERATOR, address, refuse_foreign_file
 from sim.io.pictures.video_files import rate_of, write_video
 from sim.types import Frame, Image, Sequence
 
@@ -56,7 +55,7 @@ def page_video(
             return PageVideo("", base64.b64encode(partial.read_bytes()).decode(), rate, lost)
         refuse_foreign_file(beside)
         os.replace(partial, beside)
-    return PageVideo(quote(beside.name), "", rate, lost)
+    return PageVideo(address(Path(beside.name)), "", rate, lost)
 
 
 def refuse_source(sequence: Sequence, path: Path) -> None:

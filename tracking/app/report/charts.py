@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from collections.abc import Sequence as SequenceOf
 from typing import Any
 
@@ -15,11 +16,11 @@ from bokeh.resources import Resources
 
 from tracking.app.report.content import Curves, Json, Report
 from tracking.errors.found import CauseRow
-from tracking.scoring.catalogue import CATALOGUE
 
 # Their contrast to both backgrounds is 3 : 1 or more.
 COLOURS = ("#2f81d8", "#d9730d", "#1a9e6c", "#c2478f", "#8a63d2", "#a08000", "#d6453d", "#3d8ea3", "#6b7a2f", "#8b6f5c")
 GREY = "#808890"
+LONGEST = 26  # characters of a name in a chart
 DASHES = ("solid", "dashed", "dotdash", "dotted")
 GAINS = ("HOTA", "group_F1")
 TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
@@ -34,7 +35,8 @@ def charts(report: Report) -> Json:
     """Returns the charts of a report as JSON for Bokeh, by the id of the HTML element that each fills."""
     found: dict[str, Any] = {}
     if report.curves:
-        found["chart-curves"] = _curves(report.curves, report.by)
+        found["chart-shares"] = _curves(report.curves, report.curves.shares, f"share of the oracle's {report.by}")
+        found["chart-curves"] = _curves(report.curves, report.curves.curves, report.by)
     if report.causes:
         found["chart-causes"] = _causes(report.causes)
     return {name: json_item(model, ID(name)) for name, model in found.items()}
@@ -48,18 +50,25 @@ def _figure(height: int, **given: Any) -> Any:
     return made
 
 
+def short_names(names: Iterable[str]) -> dict[str, str]:
+    """Returns the ends of names, which fit into a chart on a phone; of equal ends the whole names."""
+    ends = {name: name if len(name) <= LONGEST else f"…{name[1 - LONGEST :]}" for name in names}
+    found = list(ends.values())
+    return {name: end if found.count(end) == 1 else name for name, end in ends.items()}
+
+
 def colour(k: int) -> str:
     """Returns the colour of the k-th tracker."""
     return COLOURS[k % len(COLOURS)]
 
 
-def _curves(curves: Curves, by: str) -> Any:
+def _curves(curves: Curves, shown: Mapping[str, Json], by: str) -> Any:
     plot = _figure(380, x_axis_label=f"{curves.axis}: {curves.about}" if curves.about else curves.axis, y_axis_label=by)
     plot.x_range.start, plot.x_range.end = first, last = curves.values[0], curves.values[-1]
     plot.x_range.flipped = first > last
-    items, order = [], np.argsort(curves.values)
-    for k, (name, one) in enumerate(curves.curves.items()):
-        data = {key: CATALOGUE[by].within(np.array(one[key], float)) for key in ("mean", "low", "high")}
+    items, order, short = [], np.argsort(curves.values), short_names(shown)
+    for k, (name, one) in enumerate(shown.items()):
+        data = {key: np.array(one[key], float) for key in ("mean", "low", "high")}
         source, look = ColumnDataSource({"x": curves.values, **data}), {"color": colour(k)}
         band = plot.varea("x", "low", "high", source=source, fill_alpha=0.14, **look)
         line = plot.line("x", "mean", source=source, line_width=2.4, line_dash=DASHES[k % len(DASHES)], **look)
@@ -69,7 +78,7 @@ def _curves(curves: Curves, by: str) -> Any:
             height = np.interp(at, np.array(curves.values)[order], data["mean"][order])
             parts.append(plot.scatter([at], [height], size=15, marker="x", line_width=3, **look))
         plot.add_tools(HoverTool(renderers=[dots], tooltips=[("", name), (curves.axis, "@x"), (by, "@mean{0.000}")]))
-        items.append((name, parts))
+        items.append((short[name], parts))
     plot.add_layout(Legend(items=items, click_policy="hide", orientation="horizontal", ncols=2), "below")
     return plot
 
@@ -91,9 +100,10 @@ def cause_parts(causes: SequenceOf[tuple[str, CauseRow]]) -> dict[str, tuple[str
 
 def _causes(causes: SequenceOf[tuple[str, CauseRow]]) -> Any:
     names, parts = list(dict.fromkeys(name for name, _ in causes)), cause_parts(causes)
-    plot = _figure(80 + 34 * len(names), y_range=names[::-1], x_axis_label="what the repair adds to HOTA + group_F1")
+    shown = list(short_names(names).values())
+    plot = _figure(80 + 34 * len(names), y_range=shown[::-1], x_axis_label="what the repair adds to HOTA + group_F1")
     data = {kind: [gains.get(name, 0.0) for name in names] for kind, (_, gains) in parts.items()}
-    fills, source = [fill for fill, _ in parts.values()], ColumnDataSource({"name": names, **data})
+    fills, source = [fill for fill, _ in parts.values()], ColumnDataSource({"name": shown, **data})
     bars = plot.hbar_stack([*parts], y="name", height=0.7, source=source, color=fills, line_color=None)
     plot.add_tools(HoverTool(renderers=bars, tooltips=[("", "@name"), ("$name", "@$name{0.000}")]))
     plot.x_range.start = 0

@@ -42,6 +42,8 @@ class HeatCell:
     score: float
     best: float  # the oracle's, nan without one
     why: str = ""  # why it is empty
+    side: str = ""  # of the limit, in words: "above", "below" or "unknown"; "" if there is no limit
+    edges: str = ""  # classes of the sides at which the frontier lies: "left", "top"
 
     @property
     def share(self) -> float:
@@ -83,7 +85,8 @@ class Curves:
     axis: str
     about: str
     values: SequenceOf[float]
-    curves: Mapping[str, Json]  # by tracker, as in stress.json: mean, low and high by value, and the breaking point
+    curves: Mapping[str, Json]  # by tracker or oracle, as in stress.json: mean, low and high by value, breaking point
+    shares: Mapping[str, Json]  # the same of the share of the oracle, by tracker
     words: SequenceOf[str]  # breaking points in words
 
 
@@ -110,6 +113,7 @@ class Report:
     heat: HeatMap | None = None
     curves: Curves | None = None
     matrices: SequenceOf[HeatMap] = ()
+    matrix_words: SequenceOf[str] = ()
     causes: SequenceOf[tuple[str, CauseRow]] = ()  # tracker, and what a kind and cause of errors costs it
     causes_about: str = ""
     moments: SequenceOf[Moment] = ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
+from dataclasses import replace
 from operator import itemgetter
 
 import numpy as np
@@ -14,7 +15,7 @@ from scenarios.loading.resolve import SuiteEntry, rows
 from sim.types import Array, Sequence
 from tracking.app.commands.score_ranking import rank_words
 from tracking.app.replay_page.page import Run
-from tracking.app.report.content import Curves, HeatMap, Json, Played, Report, heat_map
+from tracking.app.report.content import Curves, HeatCell, HeatMap, Json, Played, Report, heat_map
 from tracking.app.report.moments import COSTS, cause_rows, moments, shown_errors
 from tracking.environment.episodes import streams_for
 from tracking.errors.found import RunErrors
@@ -22,7 +23,6 @@ from tracking.ranking import rank
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval, mean_of_finite
-from tracking.stress.scene_player import ORACLE
 from tracking.stress.sweep import Scene, Sweep, generate_command
 from tracking.tuning.parallel_episodes import opened_sources
 
@@ -44,7 +44,9 @@ def report_of_sweep(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Report:
         title=f"Stress of {', '.join(sweep.trackers)}", about=_about(sweep, data), by=plan.by,
         ranking=[] if searched else list(_ranking(sweep, easy)), ranking_words=_ranking_words(sweep, easy),
         heat=heat_map(f"{plan.by} by scenario", easiest),
-        curves=_curves(sweep, data, words), matrices=list(_matrices(sweep, played)) if data["matrix"] else [],
+        curves=_curves(sweep, data, words),
+        matrix_words=words if data["matrix"] else [],
+        matrices=list(_matrices(sweep, played, data["matrix"])) if data["matrix"] else [],
         causes=cause_rows(errors), causes_about=CAUSES, moments=shown, failures=data["failures"],
     )  # fmt: skip
 
@@ -62,14 +64,15 @@ def _values(sweep: Sweep, name: str, scenes: SequenceOf[Scene], key: str) -> Arr
 
 
 def _ranking(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[Json]:
-    names = [*sweep.trackers]
-    best, *scores = (np.array([sweep.score(name, scene) for scene in scenes]) for name in (ORACLE, *names))
-    found = rank(np.array(scores))
+    names, oracles = [*sweep.trackers], [*sweep.oracle_names]
+    of_all = {name: np.array([sweep.score(name, scene) for scene in scenes]) for name in (*oracles, *names)}
+    found = rank(np.array([of_all[name] for name in names]))
     ranks = [{"first": a, "last": b} for a, b in zip(found.first.tolist(), found.last.tolist(), strict=True)]
-    words = ["", *map(rank_words, ranks)]
-    ends = zip(mean_interval(best[:, None]), (found.mean, found.low, found.high), strict=True)
+    words = [*("" for _ in oracles), *map(rank_words, ranks)]
+    best = np.array([of_all[name] for name in oracles]).T
+    ends = zip(mean_interval(best), (found.mean, found.low, found.high), strict=True)
     mean, low, high = (CATALOGUE[sweep.plan.by].within(np.concatenate(pair)).tolist() for pair in ends)
-    for k, name in enumerate([ORACLE, *(names[k] for k in found.order.tolist())]):
+    for k, name in enumerate([*oracles, *(names[k] for k in found.order.tolist())]):
         means = {key: mean_of_finite(_values(sweep, name, scenes, key)) for key in CATALOGUE}
         yield {"run": name, "rank": words[k], "mean": mean[k], "low": low[k], "high": high[k], **means}
 
@@ -83,15 +86,28 @@ def _curves(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Curves | None:
     if len(sweep.plan.axes) != 1 or not data["curves"]:
         return None
     (axis,) = sweep.plan.axes
-    return Curves(axis.name, axis.about, [value for (value,) in sweep.values], data["curves"], words)
+    shares = {name: data["curves"][name]["share"] for name in sweep.trackers}
+    return Curves(axis.name, axis.about, [value for (value,) in sweep.values], data["curves"], shares, words)
 
 
-def _matrices(sweep: Sweep, played: Mapping[Played, Scene]) -> Iterator[HeatMap]:
+def _matrices(sweep: Sweep, played: Mapping[Played, Scene], matrix: Json) -> Iterator[HeatMap]:
     rows, columns = (axis.name for axis in sweep.plan.axes)
     order = {values: k for k, values in enumerate(sweep.values)}
     every = sorted(((order[scene.values], scene.values, one) for one, scene in played.items()), key=itemgetter(0))
     for name in sweep.trackers:
-        yield heat_map(name, ((f"{rows} {a:g}", f"{columns} {b:g}", p) for _, (a, b), p in every if p.name == name))
+        heat = heat_map(name, ((f"{rows} {a:g}", f"{columns} {b:g}", p) for _, (a, b), p in every if p.name == name))
+        yield replace(heat, rows=dict(zip(heat.rows, _with_frontier(heat, matrix["frontier"][name]), strict=True)))
+
+
+def _with_frontier(heat: HeatMap, frontier: Json) -> Iterator[list[HeatCell]]:
+    above: list[list[bool]] = frontier["mean_above"]
+    for i, (cells, sides) in enumerate(zip(heat.rows.values(), frontier["sides"], strict=True)):
+        edges = [
+            ("left " if k and above[i][k] != above[i][k - 1] else "")
+            + ("top" if i and above[i][k] != above[i - 1][k] else "")
+            for k in range(len(cells))
+        ]
+        yield [replace(cell, side=s, edges=e) for cell, s, e in zip(cells, sides, edges, strict=True)]
 
 
 def _played(sweep: Sweep, scene: Scene, entries: Mapping[str, SuiteEntry]) -> Iterator[Played]:
@@ -105,7 +121,9 @@ def _played(sweep: Sweep, scene: Scene, entries: Mapping[str, SuiteEntry]) -> It
         why = "" if math.isfinite(score) else "not scored"
         if row is None or row["failed"] or row["left_out"]:
             why = "not played" if row is None else "failed" if row["failed"] else "left out"
-        yield Played(name, scene.source.name, name_and_seed, words, score, sweep.score(ORACLE, scene), why, command)
+        yield Played(
+            name, scene.source.name, name_and_seed, words, score, sweep.score(sweep.oracles[name], scene), why, command
+        )
 
 
 def _replay(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,10 +65,18 @@ def report_html(report: Report) -> str:
     return str(found)
 
 
+def _breaking(text: str) -> str:
+    """Returns text as HTML that breaks after the separators of paths and names, not inside words."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"(&[#\w]+;|[/._:=-])", r"\1<wbr>", str(escape(text))))
+
+
 def _environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     made = Environment(loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined)
     made.globals["nan"] = math.nan
     made.filters["score"] = lambda value: number("HOTA", value)
+    made.filters["breaking"] = _breaking
     return made

@@ -69,6 +69,15 @@ function onKey(event) {
   if (event.key === "Escape") $("player").close();
 }
 
+// Tables that are wider than the page say so; in closed parts their width is known when they open.
+const widths = new ResizeObserver(entries => {
+  for (const { target } of entries) {
+    const wide = target.closest(".wide");
+    wide.classList.toggle("more", wide.scrollWidth > wide.clientWidth + 1);
+  }
+});
+for (const table of document.querySelectorAll(".wide, .wide > table")) widths.observe(table);
+
 drawCharts();
 if (items.length) {
   filter();

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from tests.browser import CHROMIUM, Page, browser
+from tests.report_parts import full
 from tracking.app.cli import run
+from tracking.app.report.page import report_html
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")]
 
@@ -84,3 +86,30 @@ def test_looks(page: Page, dark: bool) -> None:
     page.wait("document.documentElement.scrollWidth <= 390")
     assert page.value(INK) == ("#c9d1d9" if dark else "#3b434b")
     assert page.messages == []
+
+
+WIDE = """[...document.querySelectorAll('.wide')].filter(table => table.checkVisibility())
+    .map(table => [table.scrollWidth > table.clientWidth + 1, table.classList.contains('more')])"""
+LINES = """(() => { const node = document.querySelector('h1'), found = []; let top = null;
+    const walk = document.createTreeWalker(node, NodeFilter.SHOW_TEXT); const range = document.createRange();
+    for (let text; text = walk.nextNode();) for (let k = 0; k < text.length; k++) {
+        range.setStart(text, k); range.setEnd(text, k + 1);
+        const at = range.getBoundingClientRect().top;
+        if (top === null || at > top + 4) { found.push(''); top = at; }
+        found[found.length - 1] += text.data[k];
+    } return found; })()"""
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+def test_a_narrow_page_cuts_nothing(width: int, tmp_path: Path) -> None:
+    name = "experiments/baseline_v2/my_nearest_neighbour_tracker.py:NearestNeighbourTracker"
+    (tmp_path / "r.html").write_text(report_html(full(name)), encoding="utf-8")
+    with browser(tmp_path) as opened:
+        opened.look(width, 900)
+        opened.open(tmp_path / "r.html")
+        opened.wait("Bokeh.documents.length === document.querySelectorAll('.chart').length")
+        opened.wait(f"{WIDE}.every(([wide, more]) => wide === more)")
+        assert opened.value("document.documentElement.scrollWidth") <= width
+        assert any(wide for wide, _ in opened.value(WIDE)) or width > 390
+        for line in opened.value(LINES)[:-1]:
+            assert line.rstrip()[-1] in "/._:=-" or line.endswith(" "), f"a line of the title ends in a word: {line}"

@@ -3,41 +3,18 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from dataclasses import replace
 
 import pytest
 
+from tests.report_parts import candidate, full
 from tracking.app.report import content, moments
 from tracking.app.report.moments import chosen
 from tracking.app.report.page import report_html
-from tracking.errors.found import CauseRow
 
 EVIL = "<img src=x onerror=alert(1)></script><script>alert(2)</script>"
 EMPTY = content.Report("Two trackers", "about", "HOTA", [])
-
-
-def candidate(name: str, scenario: str, score: float) -> content.Played:
-    return content.Played(name, scenario, f"{scenario}-s{score}", f"{scenario}-s{score}", score, 0.9)
-
-
-def full(name: str) -> content.Report:
-    """A report with all parts, in which trackers, scenes and errors have this name."""
-    curve = {"mean": [0.9, None, 0.3], "low": [0.8, None, 0.2], "high": [1, None, 0.4], "break": {"at": 0.6}}
-    oracle = {"run": "oracle", "rank": "", "mean": 0.9, "low": math.nan, "high": math.nan}
-    rows = [oracle, {"run": name, "rank": "1", "mean": 0.8, "low": 0.7, "high": 0.9, "MOTA": 0.5}]
-    runs = [candidate(name, name, score) for score in (0.4, 0.6, math.nan)]
-    runs[2] = replace(runs[2], why=f"no scene, {name}")
-    maps = [content.heat_map(name, zip([name] * 3, [name, name, "b"], runs, strict=True)) for _ in range(2)]
-    return content.Report(
-        name, name, "HOTA", rows, [name], maps[0],
-        content.Curves(name, name, [1, 0.8, 0.4], {name: curve}, [name]), maps[1:],
-        [(name, CauseRow(name, name, 2, 1.5, {"HOTA": 0.1, "group_F1": 0.2}))], name,
-        [content.Moment(runs[0], 1.0, name, name, json.dumps({"name": "x"}))],
-        [dict.fromkeys(("tracker", "scenario", "seed", "failed", "settings", "traceback"), name)],
-        [(name, "page.html", 0.5)],
-    )  # fmt: skip
 
 
 def test_all_parts_stand_in_the_page() -> None:
@@ -45,7 +22,7 @@ def test_all_parts_stand_in_the_page() -> None:
     parts = ("ranking", "scenes", "curves", "matrices", "moments", "causes", "sequences", "failures")
     assert [id for id in parts if f'<section id="{id}">' in page] == list(parts)
     charts = json.loads(re.findall(r'id="charts">(.*?)</script>', page, re.DOTALL)[0])
-    assert list(charts) == ["chart-curves", "chart-causes"]
+    assert list(charts) == ["chart-shares", "chart-curves", "chart-causes"]
     assert all(f'id="{id}"' in page for id in charts)
     assert "no scene, blob" in page, "an empty cell says why"
     assert page.count("56 %<small>0.500") == 2, "means, as a share of the oracle's 0.9"

@@ -1,0 +1,97 @@
+"""Groups that never reach their goal: walls leave them no way, or they stand short of it to the end.
+
+A group has *no way* if its members are in a part of the free space that a goal or point of their way is not in. Free is
+every point that is 0.21 m or more from all walls and pillars, on a grid of 5 cm in the world. A group *stands* if its
+members have moved less than 0.5 m in the last 10 s and less than 0.1 m in the last second, more than 2 m from the goal,
+without an order to wait.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from sim.crowd.navigation import blocked, wall_distances
+from sim.crowd.population import BODY_RADIUS
+from sim.elementary import length
+from sim.types import Array, Ints, Scene
+
+CELL = 0.05  # m
+FREE = BODY_RADIUS + 0.01  # m from walls and pillars
+STAND_TIME = 10.0  # s
+STAND_MOVE, STILL_MOVE = 0.5, 0.1  # m: less in this time, and in the last second, is standing
+NEAR_GOAL = 2.0  # m: a group that stands nearer has found no better place
+
+
+def has_way(scene: Scene, people: Array, goal: Array) -> bool:
+    """Returns True if a body can walk from all of the points people (N, 2) m to the goal (2,) m."""
+    if not len(scene.walls) + len(scene.pillars):
+        return True
+    parts = _parts(
+        *(float(x) for x in scene.size),
+        tuple(np.asarray(scene.walls, float).ravel().tolist()),
+        tuple(np.asarray(scene.pillars, float).ravel().tolist()),
+    )
+    (end, *starts) = (_part(parts, point) for point in (goal, *people))
+    return all(start == end for start in starts)
+
+
+@lru_cache(maxsize=8)
+def _parts(width: float, height: float, walls: tuple[float, ...], pillars: tuple[float, ...]) -> Ints:
+    """Returns the number of the connected part of free space of each grid cell, (X, Y); 0 where there is no room."""
+    from scipy.ndimage import label
+
+    x, y = (CELL * (np.arange(max(1, round(size / CELL))) + 0.5) for size in (width, height))
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    free = np.ones(points.shape[:2], bool)
+    for wall in np.reshape(walls, (-1, 2, 2)):
+        free &= wall_distances(points, wall) >= FREE
+    for a, b, radius in np.reshape(pillars, (-1, 3)).tolist():
+        free &= length(points - np.array([a, b])) >= radius + FREE
+    return np.asarray(label(free, np.ones((3, 3)))[0], np.int64)
+
+
+def _part(parts: Ints, point: Array) -> int:
+    """Returns the part of free space in which a point is, or that is nearest to it; points outside are moved to the
+    border of the world."""
+    k = np.clip(np.floor(point / CELL).astype(np.int64), 0, np.array(parts.shape) - 1)
+    if not parts[tuple(k)]:
+        free = np.argwhere(parts > 0)
+        if not len(free):
+            return 0
+        k = free[np.argmin(((free - k) ** 2).sum(axis=1))]
+    return int(parts[tuple(k)])
+
+
+def obstacle(scene: Scene, place: Array, goal: Array) -> str:
+    """Returns in words what is in the straight way from a place (2,) m to a goal (2,) m: the nearest wall, door or
+    pillar; "others" if there is none."""
+    walls, doors = (np.asarray(part, float).reshape(-1, 2, 2) for part in (scene.walls, scene.doors))
+    found = [(float(wall_distances(place, w)), f"the wall {_numbers(w)}") for w in walls if _crossed(place, goal, w)]
+    for door in doors:
+        if _crossed(place, goal, door):
+            words = f"the door of {float(length(door[1] - door[0])):.2f} m at {_numbers(door.mean(axis=0))}"
+            found.append((float(wall_distances(place, door)), words))
+    for x, y, radius in np.asarray(scene.pillars, float).reshape(-1, 3).tolist():
+        if wall_distances(np.array([x, y]), np.stack([place, goal])) < radius + BODY_RADIUS:
+            found.append((float(length(place - np.array([x, y]))) - radius, f"the pillar {_numbers([x, y, radius])}"))
+    return min(found, default=(0.0, "others"))[1]
+
+
+def _crossed(place: Array, goal: Array, wall: Array) -> bool:
+    return bool(blocked(place[None], goal[None], wall[None])[0])
+
+
+def _numbers(values: object) -> str:
+    return str([round(value, 2) for value in np.ravel(np.asarray(values, float)).tolist()])
+
+
+def stands(states: Array, rate: float) -> bool:
+    """Returns True if people have stood in the last 10 s. states (C, N, 4): x, y, vx, vy of N people at C ticks, `rate`
+    per second; nan while absent."""
+    last = states[-1 - round(STAND_TIME * rate) :, :, :2]
+    if len(last) <= STAND_TIME * rate or not np.isfinite(last).all():
+        return False
+    still = last[-1 - round(rate) :]
+    return bool((length(last - last[:1]) < STAND_MOVE).all() and (length(still - still[-1]) < STILL_MOVE).all())
