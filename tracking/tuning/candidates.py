@@ -25,7 +25,7 @@ from scenarios.loading.toml_files import did_you_mean
 from sim.dataset.generate import LEFT_OUT
 from tracking.config import Config
 from tracking.environment.episodes import Episode, Source
-from tracking.stats import mean_of_known, paired
+from tracking.stats import FEWEST, mean_of_known, paired
 
 if TYPE_CHECKING:
     import optuna
@@ -109,8 +109,9 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """How `after` compares: "better" or "worse" if the interval excludes 0, else "no sure difference"."""
-        if not (self.low > 0 or self.high < 0):
+        """How `after` compares: "better" or "worse" if the interval over at least 6 sequences excludes 0, else "no sure
+        difference"."""
+        if self.sequences < FEWEST or not (self.low > 0 or self.high < 0):
             return "no sure difference"
         return "better" if (self.difference > 0) == self.higher else "worse"
 
