@@ -1,8 +1,11 @@
-"""How often the gate (`flockscope compare`) calls a regression where there is no difference.
+"""How often the gate (`flockscope compare`) calls a regression where there is no difference; and this project's gate.
 
-    python -m benchmarks.gate [--calls 1000]
+    python -m benchmarks.gate calls [--calls 1000]
+    python -m benchmarks.gate headline [--write]
 
-Each call compares a baseline with another run, at tolerance 0, in one or four scores, over 2 to 24 sequences. All
+headline: compares the scores of all trackers on the suite `quick` with those in tests/tracking/app/headline; exit code
+1 unless each is without difference or better. --write stores the present scores.
+calls: each call compares a baseline with another run, at tolerance 0, in one or four scores, over 2 to 24 sequences. All
 values are random. In the first laws both sides have the same law, scene by scene:
 
     normal       scenes differ in difficulty, both runs err around it by normal noise
@@ -20,14 +23,23 @@ Cells: share of calls with at least one verdict `regression`, with Wilson's inte
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 
 from benchmarks.support.options import new_parser
 from benchmarks.support.tables import head, row, share
+from sim.dataset.generate import generate
+from sim.io.files.tables import json_document, plain
 from sim.types import Array
-from tracking.app.commands.compare import judged
+from tracking.app.command_options import CompareOptions, ScoreOptions, TrackOptions
+from tracking.app.command_result import CommandResult
+from tracking.app.commands.compare import compare, judged
+from tracking.app.commands.score import score
+from tracking.app.commands.track import track
 
 SEQUENCES = (2, 3, 6, 12, 24)
 KEYS = (("HOTA",), ("HOTA", "MOTA", "IDF1", "group_F1"))
@@ -66,10 +78,47 @@ def false_regressions(sequences: int, scores: int, calls: int, laws: tuple[str, 
     return found
 
 
+HEADLINE = Path(__file__).resolve().parents[1] / "tests" / "tracking" / "app" / "headline"
+GROUPS = ("group_F1", "pairwise_F1")
+TRACKERS = {**dict.fromkeys(("blob", "relational", "particle", "joint"), ("HOTA", *GROUPS)), "group-pda": GROUPS}
+SEEDS = range(20_000, 20_003)
+TOLERANCE = 0.02  # Another processor rounds differently, which can change a decision of a tracker.
+
+
+def headline(folder: Path, stored: Path | None = HEADLINE) -> Iterator[tuple[str, Path, CommandResult]]:
+    """Yields for each tracker its name, the file of its present scores as `compare --save` writes it, and their
+    comparison with those of the folder `stored`, or None with themselves. folder: for data and runs."""
+    data = folder / "data"
+    generate(["quick"], SEEDS, data, streams=())
+    for name, keys in TRACKERS.items():
+        track(TrackOptions(tracker=name, source=data, out=folder / name, detections="file"))
+        now, kept = folder / f"{name}.json", folder / f"{name}-kept.json"
+        now.write_bytes(json_document(plain(score(ScoreOptions(truth=data, tracks=[str(folder / name)])).data)))
+        before = now if stored is None else stored / f"{name}.json"
+        options = CompareOptions(baseline=before, now=now, by=list(keys), tolerance=TOLERANCE, save=kept)
+        yield name, kept, compare(options)
+
+
 def main() -> None:
     parser = new_parser(__doc__)
+    parser.add_argument("mode", choices=["calls", "headline"])
     parser.add_argument("--calls", type=int, default=1000)
-    calls = parser.parse_args().calls
+    parser.add_argument("--write", action="store_true")
+    given = parser.parse_args()
+    if given.mode == "calls":
+        print_calls(given.calls)
+        return
+    failed = False
+    with tempfile.TemporaryDirectory() as folder:
+        for name, kept, found in headline(Path(folder), None if given.write else HEADLINE):
+            print(f"{name}\n{found.text}\n", flush=True)
+            failed |= found.code != 0
+            if given.write:
+                shutil.copyfile(kept, HEADLINE / f"{name}.json")
+    raise SystemExit(int(failed))
+
+
+def print_calls(calls: int) -> None:
     print(f"\nCalls with a false regression, {calls} calls each, tolerance 0")
     head(["sequences", "scores", *EQUAL, SKEWED])
     for sequences in SEQUENCES:

@@ -128,6 +128,24 @@ def test_what_is_known_only_now_is_listed_and_improves_nothing(tmp_path, capsys)
     assert (code, row["verdict"], row["sequences"], row["known_now"]) == (0, "no difference", 6, ["s6"])
 
 
+def events(path: Path, f1: list[float | None], recall: float | None) -> str:
+    rows = [{"name": f"s{k}", **WAY, "merge_F1": f, "merge_recall": recall} for k, f in enumerate(f1)]
+    path.write_text(json.dumps({"sequences": rows}))
+    return str(path)
+
+
+def test_a_false_alarm_that_is_gone_is_no_regression(tmp_path, capsys):
+    """Without true merges a false one gives F1 = 0, and none gives no F1. With true ones, unknown is a regression."""
+    some, none = [0.5] * 6 + [0.0], [0.5] * 6 + [None]
+    now = events(tmp_path / "b.json", none, None)
+    before = events(tmp_path / "a.json", some, None)
+    code, found = verdicts(capsys, before, now, "--by", "merge_F1", "--save", tmp_path / "c.json")
+    assert (code, found["scores"][0]["sequences"]) == (0, 6)
+    assert "merge_recall" in json.loads((tmp_path / "c.json").read_text())["sequences"][0]
+    before = events(tmp_path / "a.json", some, 0.5)
+    assert verdicts(capsys, before, now, "--by", "merge_F1")[0] == 1
+
+
 RANK = {"regression": 0, "too few": 1, "too noisy": 1, "no difference": 2, "improvement": 3}
 SCORES = st.lists(st.integers(0, 100).map(lambda n: n / 100), min_size=24, max_size=24)
 
@@ -211,7 +229,7 @@ def test_the_remedy_for_an_unknown_score_works(tmp_path, capsys):
 
 
 def test_several_scores_are_corrected_together(tmp_path, capsys):
-    """t = -3 on 5 degrees of freedom: p = 0.0301 alone, below 0.05; beside three other scores it must be below 0.0125."""
+    """t = -3 on 5 degrees of freedom: p = 0.0301, below 0.05; beside three other scores it must be below 0.0125."""
     change = np.array([-1.0, -1, -1, 1, 1, 1]) * 0.01
     change = (change - change.mean()) / change.std(ddof=1) * 0.05
     change -= 3 * 0.05 / np.sqrt(6)

@@ -9,6 +9,9 @@ sequences that have it on both sides, in the direction that is better. Its inter
     improvement    d is surely above 0, and above the tolerance
     no difference  the interval lies within +- tolerance
     too noisy      none of these: more sequences are needed to tell
+
+Where there is nothing true to find, only false alarms give an F1 (0) and a precision. If the score is unknown now, they
+are gone: such a sequence is not compared.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from scenarios.limits import INTEGER, is_number
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import output_file
 from sim.io.files.tables import json_document, read_json
-from sim.types import Array
+from sim.types import Array, Bools
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.score import CONDITIONS
@@ -51,6 +54,7 @@ def compare(options: CompareOptions) -> CommandResult:
     before, now = _read(options.baseline), _read(options.now)
     names, notes = list(before), _require_same(options, before, now)
     first, second = _values(options.baseline, before, names, keys), _values(options.now, now, names, keys)
+    first[np.isnan(second) & _nothing_to_find(before, names, keys)] = np.nan
     for key, values in zip(keys, first.T, strict=True):
         if np.isnan(values).all():
             known = [k for k in CATALOGUE if any(is_number(row.get(k)) for row in before.values())]
@@ -58,7 +62,8 @@ def compare(options: CompareOptions) -> CommandResult:
             raise InputError(file=options.baseline, place=key, got="no value", expected="a known score", remedy=remedy)
     rows = judged(keys, names, first, second, options.tolerance)
     if options.save is not None:
-        kept = [{k: row[k] for k in ("name", *CONDITIONS, *keys) if k in row} for row in now.values()]
+        wanted = dict.fromkeys(("name", *CONDITIONS, *keys, *map(_recall, keys)))
+        kept = [{k: row[k] for k in wanted if k in row} for row in now.values()]
         write_file(output_file(options.save, ".json", "--save"), json_document({"sequences": kept}))
     data = {"sequences": len(before), "tolerance": options.tolerance, "scores": rows, "notes": notes}
     lines, code = [_table(rows), *(line for row in rows for line in _changes(row)), *notes], 0
@@ -109,7 +114,7 @@ def _require_same(options: CompareOptions, before: Stored, now: Stored) -> list[
     for name in both:
         old, own = before[name], now[name]
         for key in CONDITIONS:
-            if key not in old and key not in own or old.get(key) == own.get(key) == "":
+            if (key not in old and key not in own) or old.get(key) == own.get(key) == "":
                 unstated[key] = unstated.get(key, 0) + 1
             elif key not in old or key not in own or _differ(old[key], own[key]):
                 got, expected = (_stated(row, key) for row in (own, old))
@@ -140,6 +145,16 @@ def _value(path: Path, name: str, row: Mapping[str, Any], key: str) -> float:
         remedy = "score the tracks again"
         raise InputError(file=path, place=f"{name}: {key}", got=got, expected=expected, remedy=remedy)
     return float(value)
+
+
+def _nothing_to_find(before: Stored, names: Sequence[str], keys: Sequence[str]) -> Bools:
+    """Returns where the recall that belongs to a score is stated as unknown, (S, K): the truth has none of its kind."""
+    return np.array([[before[name].get(_recall(key), 0) is None for key in keys] for name in names])
+
+
+def _recall(key: str) -> str:
+    core = "_core" if key.endswith("_core") else ""
+    return f"{key.removesuffix(core).rpartition('_')[0]}_recall{core}"
 
 
 def judged(
