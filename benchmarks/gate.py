@@ -3,10 +3,10 @@
     python -m benchmarks.gate calls [--calls 1000]
     python -m benchmarks.gate headline [--write]
 
-headline: compares the scores of all trackers on the suite `quick` with those in tests/tracking/app/headline; exit code
-1 unless each is without difference or better. --write stores the present scores.
-calls: each call compares a baseline with another run, at tolerance 0, in one or four scores, over 2 to 24 sequences. All
-values are random. In the first laws both sides have the same law, scene by scene:
+headline: compares the scores of all trackers on the suite `quick` with those in tests/tracking/app/headline. The exit
+code is 1 unless each is without difference or better. --write stores the present scores.
+calls: each call compares a baseline with another run, at tolerance 0, in one or four scores, over 2 to 24 sequences.
+All values are random. In the first laws both sides have the same law, scene by scene:
 
     normal       scenes differ in difficulty, both runs err around it by normal noise
     skewed       scores near 1 with a long tail downwards

@@ -182,8 +182,8 @@ def judged(
             {
                 "score": key, "sequences": int(both.sum()), "baseline": first, "now": second,
                 "difference": float(mean[k]), "low": float(low[k]), "high": float(high[k]), "verdict": verdict,
-                "unknown_now": [names[i] for i in np.flatnonzero(lost)],
-                "known_now": [names[i] for i in np.flatnonzero(found)],
+                "unknown_now": [names[i] for i in np.flatnonzero(lost).tolist()],
+                "known_now": [names[i] for i in np.flatnonzero(found).tolist()],
             }
         )  # fmt: skip
     return rows
