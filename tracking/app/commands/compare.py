@@ -110,18 +110,18 @@ def _require_same(options: CompareOptions, before: Stored, now: Stored) -> list[
         remedy = "score the same sequences, or save a new baseline with --save"
         expected = "the sequences of the baseline"
         raise InputError(file=options.now, place="other sequences", got=got, expected=expected, remedy=remedy)
-    unstated = dict[str, int]()
+    unstated = dict[str, None]()
     for name in both:
         old, own = before[name], now[name]
         for key in CONDITIONS:
             if (key not in old and key not in own) or old.get(key) == own.get(key) == "":
-                unstated[key] = unstated.get(key, 0) + 1
+                unstated[key] = None
             elif key not in old or key not in own or _differ(old[key], own[key]):
                 got, expected = (_stated(row, key) for row in (own, old))
                 remedy = "track and score the same sequences in the same way, both with this version of flockscope"
                 expected = f"{expected}, as in {options.baseline}"
                 raise InputError(file=options.now, place=f"{name}: {key}", got=got, expected=expected, remedy=remedy)
-    return [f"not compared, as neither side states it: {key} ({counted(n, 'sequence')})" for key, n in unstated.items()]
+    return [f"not compared, as neither side states it: {', '.join(unstated)}"] if unstated else []
 
 
 def _differ(one: Any, other: Any) -> bool:
