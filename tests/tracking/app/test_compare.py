@@ -163,6 +163,25 @@ def test_a_score_that_becomes_unknown_never_improves_a_verdict(values, lost, tol
     assert row["unknown_now"] == [names[k] for k in sorted(set(lost))]
 
 
+@given(SCORES, st.lists(st.integers(0, 11), min_size=1, max_size=12), st.sampled_from([0.0, 0.01]))
+def test_a_score_that_becomes_known_has_no_effect(values, found, tolerance):
+    before, now = np.reshape(values, (2, 12, 1))
+    before = before.copy()
+    before[found] = np.nan
+    kept = np.isfinite(before[:, 0])
+    names = np.array([f"s{k}" for k in range(12)])
+    (whole,) = judged(["HOTA"], names.tolist(), before, now, tolerance)
+    (row,) = judged(["HOTA"], names[kept].tolist(), before[kept], now[kept], tolerance)
+    assert whole["known_now"] == names[~kept].tolist()
+    assert (whole["verdict"], whole["sequences"]) == (row["verdict"], row["sequences"])
+
+
+def test_rounding_of_another_processor_is_no_difference(tmp_path, capsys):
+    before, now = stored(tmp_path / "a.json", BASE), stored(tmp_path / "b.json", np.nextafter(BASE, 0))
+    code, found = verdicts(capsys, before, now, "--tolerance", "0")
+    assert (code, found["scores"][0]["verdict"]) == (0, "no difference")
+
+
 NOT_COMPARED = [
     (lambda p: stored(p, np.append(BASE, 0.5)), "other sequences: got s6, not in"),
     (lambda p: str(p.parent), "no scores of sequences; expected a file of `flockscope score --json`"),

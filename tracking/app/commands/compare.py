@@ -40,6 +40,7 @@ UNDECIDED = {
     "too noisy": ("an interval within the tolerance, or off 0", "score more sequences, or give a larger --tolerance"),
 }
 EXPECTED = "a file of `flockscope score --json`, or of `compare --save`"
+ROUNDING = 1e-12  # A difference up to this share of the score, or of 1, is due to the processor.
 LISTED = 80  # Characters of a list of names.
 
 Stored = dict[str, dict[str, Any]]  # by name of the sequence
@@ -164,7 +165,9 @@ def judged(
     known = np.isfinite(before), np.isfinite(now)
     paired = known[0] & known[1]
     upwards = np.array([1.0 if CATALOGUE[key].better == "higher" else -1.0 for key in keys])
-    mean, low, high, sign = compared(now - before, len(keys))
+    less = now - before
+    less[np.abs(less) <= ROUNDING * np.maximum(1.0, np.abs(before))] = 0.0
+    mean, low, high, sign = compared(less, len(keys))
     rows = []
     for k, key in enumerate(keys):
         lost, found, both = known[0][:, k] & ~known[1][:, k], known[1][:, k] & ~known[0][:, k], paired[:, k]
