@@ -237,7 +237,7 @@ class ErrorsOptions(BoxOptions, words="errors"):
 
 
 class CompareOptions(Options, words="compare"):
-    """Compare stored scores with those of a baseline. Exit code 1 if a score is surely worse."""
+    """Compare stored scores with those of a baseline. Exit code 1 for a regression, 2 if a score is undecided."""
 
     baseline: Path = ARGUMENT("Scores of `score --json`, or of --save.", metavar="BASELINE.json")
     now: Path = ARGUMENT("Scores of the same sequences.", metavar="NOW.json")
