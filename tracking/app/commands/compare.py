@@ -24,17 +24,24 @@ import numpy as np
 
 from scenarios.errors import InputError, counted, shortened
 from scenarios.limits import INTEGER, is_number
+from sim.hashing import canonical_hash
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import output_file
 from sim.io.files.tables import json_document, read_json
 from sim.types import Array, Bools
+from sim.types import Sequence as Recording
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score import CONDITIONS
 from tracking.app.commands.score_tables import checked_key, figure, table
-from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.catalogue import CATALOGUE, SCORER
 from tracking.stats import FEWEST, compared
 
+# The keys of a sequence's scores that are no scores, but decide them: scores are compared only if these are equal.
+CONDITIONS = (
+    "scorer", "similarity", "surface", "group_match", "given", "frames_scored", "label_step", "px_per_m", "camera",
+    "unscored", "truth",
+)  # fmt: skip
+DIGITS = 9  # Decimals that count of a camera, whose last bits depend on the processor.
 UNDECIDED = {
     "too few": (f"at least {FEWEST} sequences with the score on both sides", "generate more seeds"),
     "too noisy": ("an interval within the tolerance, or off 0", "score more sequences, or give a larger --tolerance"),
@@ -77,6 +84,21 @@ def compare(options: CompareOptions) -> CommandResult:
         data["error"], code = error.as_dict(), 2
         lines.append(f"undecided: {error.line()}")
     return CommandResult(data, "\n".join(lines), code)
+
+
+def conditions(sequence: Recording) -> dict[str, Any]:
+    """Returns the scorer's number, and what options of the source change in the truth; large parts as hashes."""
+    truth, camera = sequence.truth, sequence.camera
+    assert truth is not None
+    view = None
+    if camera is not None:
+        numbers = (camera.focal_px, camera.centre_px, camera.position, camera.rotation.ravel(), camera.radial)
+        view = (camera.kind, camera.image, np.round(np.hstack(numbers), DIGITS) + 0.0, sequence.scene)
+    rules = (truth.labelled, truth.unscored, truth.visibility, truth.truncation)
+    return {
+        "scorer": SCORER, "px_per_m": round(truth.px_per_m, DIGITS), "camera": view and canonical_hash(view)[:16],
+        "unscored": canonical_hash(rules)[:16],
+    }  # fmt: skip
 
 
 def _check_score(key: str, others: Sequence[str], tolerance: float) -> None:

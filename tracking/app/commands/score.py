@@ -5,31 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence as SequenceOf
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from sim.hashing import canonical_hash
 from sim.io.formats.options import refuse_options
 from sim.io.store.seal import tracked_hash
 from sim.types import Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.commands.compare import conditions
 from tracking.app.commands.score_ranking import ranked_runs, ranking_result, scoring_notes
 from tracking.app.commands.score_tables import Means, checked_key, tables
 from tracking.app.commands.scored_sequence import is_class, run_names, score_sequence, scoring_jobs
 from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.comparison import ComparedSequence, check_blocks
-from tracking.scoring.catalogue import ALL, CATALOGUE, SCORER
+from tracking.scoring.catalogue import ALL, CATALOGUE
 from tracking.scoring.evaluation import Scores
 from tracking.stats import mean_interval
-
-# The keys of a sequence's scores that are no scores, but decide them: scores are compared only if these are equal.
-CONDITIONS = (
-    "scorer", "similarity", "surface", "group_match", "given", "frames_scored", "label_step", "px_per_m", "camera",
-    "unscored", "truth",
-)  # fmt: skip
-DIGITS = 9  # Decimals that count of a camera, whose last bits depend on the processor.
 
 
 def score(options: ScoreOptions, ranked: bool = False) -> CommandResult:
@@ -66,7 +58,7 @@ def _run_result(sequences: list[Sequence], found: list[ComparedSequence]) -> Com
     data = {
         "sequences": [
             {
-                **_conditions(sequence),
+                **conditions(sequence),
                 "name": name, "similarity": s.similarity, "surface": s.surface, "group_match": s.group_match,
                 "given": words, "frames_scored": s.frames, "label_step": s.step, **s, "truth": tracked_hash(sequence),
             }
@@ -75,21 +67,6 @@ def _run_result(sequences: list[Sequence], found: list[ComparedSequence]) -> Com
         "mean": None if mixed else means, "notes": notes,
     }  # fmt: skip
     return CommandResult(data, tables(rows, given, means, notes))
-
-
-def _conditions(sequence: Sequence) -> dict[str, Any]:
-    """Returns the scorer's number, and what options of the source change in the truth; large parts as hashes."""
-    truth, camera = sequence.truth, sequence.camera
-    assert truth is not None
-    view = None
-    if camera is not None:
-        numbers = (camera.focal_px, camera.centre_px, camera.position, camera.rotation.ravel(), camera.radial)
-        view = (camera.kind, camera.image, np.round(np.hstack(numbers), DIGITS) + 0.0, sequence.scene)
-    rules = (truth.labelled, truth.unscored, truth.visibility, truth.truncation)
-    return {
-        "scorer": SCORER, "px_per_m": round(truth.px_per_m, DIGITS), "camera": view and canonical_hash(view)[:16],
-        "unscored": canonical_hash(rules)[:16],
-    }  # fmt: skip
 
 
 def summary(scores: SequenceOf[Scores]) -> Means:
