@@ -32,7 +32,7 @@ def write_scenes(folder: Path) -> tuple[str, str]:
 def tune_arguments(folder: Path, **more: Any) -> dict[str, Any]:
     """Arguments of `tune` for a small search on scenes in `folder`."""
     one, two = write_scenes(folder)
-    seeds = {"seeds": range(5), "validation": range(10_000, 10_004), "test": range(20_000, 20_006)}
+    seeds = {"seeds": range(5), "validation": range(10_000, 10_006), "test": range(20_000, 20_006)}
     return {"tracker": TOY, "suite": one, "check": two, "trials": 12, "objective": "HOTA", **seeds, **more}
 
 

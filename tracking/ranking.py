@@ -24,7 +24,7 @@ from sim.types import Array, Bools, Ints, Truth
 from tracking.scoring.annotated_frames import annotated_frames
 from tracking.scoring.catalogue import ALL, CATALOGUE, Score
 from tracking.scoring.rows import numbered
-from tracking.stats import DRAWS, FEWEST, LEVEL, Scale, block_intervals, joint_level, mean_interval
+from tracking.stats import DRAWS, LEVEL, Scale, block_intervals, compared, joint_level, mean_interval, sign_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,23 +50,24 @@ def rank(values: Array, upwards: bool = True) -> Ranking:
     scores = values[:, np.isfinite(values).all(axis=0)]
     runs, count = scores.shape
     less = (scores[:, None] - scores[None]).reshape(runs * runs, count)
-    less_ends = mean_interval(less.T, joint_level(runs * (runs - 1) // 2))
-    mean, low, high = (end.reshape(runs, runs) for end in less_ends)
-    return ordered(mean_interval(scores.T), (mean, low, high), upwards, count, sure=count >= FEWEST)
+    mean, low, high, sign = compared(less.T, runs * (runs - 1) // 2)
+    square = runs, runs
+    pairs = mean.reshape(square), low.reshape(square), high.reshape(square)
+    return ordered(mean_interval(scores.T), pairs, sign.reshape(square), upwards, count)
 
 
 def ordered(
-    own: tuple[Array, Array, Array], pairs: tuple[Array, Array, Array], upwards: bool, count: int, sure: bool = True
+    own: tuple[Array, Array, Array], pairs: tuple[Array, Array, Array], sign: Ints, upwards: bool, count: int
 ) -> Ranking:
     """Returns the ranking of R runs by their means.
 
-    own: mean, low and high of each run, (R,) each. pairs: mean, low and high of run i minus run j, (R, R) each.
-    upwards: True if greater means are better. count: number of sequences. sure: False calls no run surely better.
+    own: mean, low and high of each run, (R,) each. pairs: mean, low and high of run i minus run j, (R, R) each. sign
+    (R, R): sure sign of run i minus run j. upwards: True if greater means are better. count: number of sequences.
     """
     mean, own_low, own_high = own
     less, low, high = pairs
     runs = len(mean)
-    better = (low > 0 if upwards else high < 0) & sure
+    better = sign == (1 if upwards else -1)
     order = np.argsort(-mean if upwards else mean, kind="stable")
     first, last = 1 + better.sum(axis=0), runs - better.sum(axis=1)
     both = np.ix_(order, order)
@@ -111,7 +112,9 @@ def recording_rankings(
             mean, low, high = less[:, n, k]
             of_pairs[:, i, j], of_pairs[:, j, i] = (mean, low, high), (-mean, -high, -low)
         mean, low, high = own[:, :, k]
-        found[key] = ordered((mean, low, high), tuple(of_pairs), entry.better == "higher", 1)  # type: ignore[arg-type]
+        less_mean, less_low, less_high = of_pairs
+        pair_ends, sign = (less_mean, less_low, less_high), sign_of(less_low, less_high)
+        found[key] = ordered((mean, low, high), pair_ends, sign, entry.better == "higher", 1)
     return found
 
 

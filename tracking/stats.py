@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from sim.types import Array
+from sim.types import Array, Ints
 from tracking.scoring.catalogue import Score
 
 DRAWS = 2000  # Draws of weights, or bootstrap samples.
@@ -69,6 +69,22 @@ def joint_level(count: int) -> float:
 def paired(first: Array, second: Array) -> tuple[Array, Array, Array]:
     """Returns mean, low end and high end, (K,) each, of second - first over the same S sequences; both (S, K)."""
     return mean_interval(second - first)
+
+
+def compared(differences: Array, comparisons: int = 1) -> tuple[Array, Array, Array, Ints]:
+    """Returns mean, low end, high end and sure sign, (K,) each, of paired differences (S, K) over S sequences.
+
+    The intervals of all comparisons hold together at 95 %. The sure sign is 1 or -1 if the interval lies above or below
+    0 and at least `FEWEST` differences are finite, else 0.
+    """
+    mean, low, high = mean_interval(differences, joint_level(comparisons))
+    enough = np.isfinite(differences).sum(axis=0) >= FEWEST
+    return mean, low, high, np.where(enough, sign_of(low, high), 0)
+
+
+def sign_of(low: Array, high: Array) -> Ints:
+    """Returns 1 where an interval lies above 0, -1 where it lies below 0, else 0; ends that are nan give 0."""
+    return (low > 0).astype(np.int64) - (high < 0)
 
 
 def block_intervals(

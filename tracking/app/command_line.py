@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import inspect
+import math
 import os
 import re
 import sys
@@ -70,7 +71,7 @@ def _declared(f: Any) -> Any:
 
 class StrictCommand(TyperCommand):
     """A command that raises InputError if an option has an empty value, or is given twice and takes one value only, or
-    if --out DIR is no folder."""
+    if a number is not finite, or --out DIR is no folder."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parses the words of the command line after the command's name, as Typer does."""
@@ -87,6 +88,9 @@ class StrictCommand(TyperCommand):
             if "" in (text if isinstance(text, list | tuple) else [text]):
                 name = param.opts[0] if param.param_type_name == "option" else param.name.upper()
                 raise InputError(place=name, got="''", expected="a value", remedy="give one, or leave it out")
+            value = ctx.params[param.name]
+            if isinstance(value, float) and not math.isfinite(value):
+                raise InputError(place=param.opts[0], got=text, expected="a finite number", remedy="correct it")
             if param.name == "out" and param.metavar == "DIR":
                 check_output_folder(ctx.params["out"])
         return rest

@@ -209,7 +209,7 @@ class StressOptions(SceneOptions, WorkerOptions, words="stress"):
         "Search N scenes between the ends of all axes for the worst of the first tracker.", None, low=1, metavar="N")
     by: str = option("The score.", "objective", metavar="SCORE")
     share: float = option(
-        "A tracker breaks where its score falls to this share of its easy value.", 0.8, low=0.0, high=1.0)
+        "A tracker breaks where its score falls to this share of its easy value.", 0.8, low=0.01, high=0.99)
     start: int = option("Seeds that are played at first.", 4, low=2, metavar="N")
     episodes: int | None = option("Stop after about so many episodes.", None, low=1, metavar="N")
     minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
@@ -245,7 +245,7 @@ class ErrorsOptions(BoxOptions, words="errors"):
 
 
 class CompareOptions(Options, words="compare"):
-    """Compare stored scores with those of a baseline. Exit code 1 if a score is surely worse."""
+    """Compare stored scores with those of a baseline. Exit code 1 for a regression, 2 if a score is undecided."""
 
     baseline: Path = ARGUMENT("Scores of `score --json`, or of --save.", metavar="BASELINE.json")
     now: Path = ARGUMENT("Scores of the same sequences.", metavar="NOW.json")

@@ -25,11 +25,11 @@ class CommandResult:
 
     data: dict[str, Any]  # content of the JSON object that --json prints, without its "status"
     text: str = ""  # printed without --json
-    code: int = 0  # exit code: 0, or 1 if a check found problems
+    code: int = 0  # exit code: 0; 1 if a check found problems; 2 if the input does not suffice for it
 
 
 def print_result(result: CommandResult, as_json: bool) -> int:
-    """Prints the result of a command on stdout and returns its exit code, 0 or 1."""
+    """Prints the result of a command on stdout and returns its exit code."""
     if as_json:
         from sim.io.files.tables import plain
 

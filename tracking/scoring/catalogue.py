@@ -13,6 +13,8 @@ from typing import Any, Literal
 from sim.types import Array
 
 CORE = "groups, core"
+# Raise this whenever the same tracks and truth give another score; stored scores in the tests check that.
+SCORER = 1
 
 Better = Literal["higher", "lower", "neither"]
 

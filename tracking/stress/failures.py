@@ -1,9 +1,9 @@
 """When a tracker fails: a score beyond a bound, or an error of a kind; and one episode in which it may fail.
 
-`HOTA<0.7` compares a score of the catalogue by <, <=, > or >=. It counts only where the oracle has the score, too: a
-false group in a scene without true groups is no failure of group_F1. `late split` is a kind of error of `flockscope
-errors` that occurs at least once, `switch:hidden` one of this kind with this cause. `crash` is an error that the
-tracker raises.
+`HOTA<0.7` compares a score of the catalogue by <, <=, > or >=. A perfect tracker must not fulfil it. It counts only
+where the oracle has the score, too: a false group in a scene without true groups is no failure of group_F1. `late
+split` is a kind of error of `flockscope errors` that occurs at least once, `switch:hidden` one of this kind with this
+cause. `crash` is an error that the tracker raises.
 
 An error that the start explains does not count: it must last until its people have been in view for the time that a
 tracker needs to report them, 0.5 s, or their group, 2 s. Else each failure would become a scene of a few frames.
@@ -11,6 +11,7 @@ tracker needs to report them, 0.5 s, or their group, 2 s. Else each failure woul
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from collections.abc import Callable, Iterable, Mapping
@@ -90,13 +91,34 @@ def parse_failure(text: str) -> Failure:
     if score not in CATALOGUE:
         raise _wrong(text, "a score of docs/reference/metrics.md", did_you_mean(score, CATALOGUE, "choose one of them"))
     try:
-        return Failure(f"{score}{beyond}{number}", score, beyond, float(number))
+        failure = Failure(f"{score}{beyond}{number}", score, beyond, float(number))
     except ValueError:
         raise _wrong(text, expected, "correct the number") from None
+    _check_can_fail(failure)
+    return failure
 
 
-def _wrong(text: str, expected: str, remedy: str) -> InputError:
-    return InputError(place="--while", got=repr(text), expected=expected, remedy=remedy)
+def _check_can_fail(failure: Failure) -> None:
+    """Raises InputError for a condition that holds for a perfect tracker, too, or for no value of the score."""
+    score, beyond = CATALOGUE[failure.score], OPERATORS[failure.beyond]
+    worst, best = (score.low, score.high) if score.better == "higher" else (score.high, score.low)
+    # A number of hits has no upper bound. It is small for a perfect tracker in a small scene.
+    perfect = [best] if math.isfinite(best) else [worst, best]
+    always = any(beyond(value, failure.bound) for value in perfect)
+    if always or not beyond(worst, failure.bound):
+        got = f"{failure.text!r}, true of {'a perfect' if always else 'no'} tracker"
+        if not math.isfinite(best):
+            expected, remedy = "a score with a best value", "give a share, such as HOTA<0.7"
+        else:
+            sign = "<" if score.better == "higher" else ">"
+            expected = f"{score.key}{sign}NUMBER, with a number from {score.low:g} to {score.high:g}"
+            example = best - 0.3 if score.better == "higher" else best + 2
+            remedy = f"write {score.key}{sign}{example:g}"
+        raise _wrong(failure.text, expected, remedy, got)
+
+
+def _wrong(text: str, expected: str, remedy: str, got: str = "") -> InputError:
+    return InputError(place="--while", got=got or repr(text), expected=expected, remedy=remedy)
 
 
 def play_episode(

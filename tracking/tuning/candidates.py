@@ -69,8 +69,6 @@ class Goal:
 def goals_of(keys: Iterable[str]) -> tuple[Goal, ...]:
     """Returns one goal per different key, in the order given; the catalogue says which direction is better. Raises
     InputError for an unknown key, or a score of which neither direction is better."""
-    from tracking.scoring.catalogue import CATALOGUE
-
     found: list[Goal] = []
     allowed = [SPEED, *(key for key, score in CATALOGUE.items() if score.better != "neither")]
     for key in dict.fromkeys(keys):
@@ -110,8 +108,9 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """How `after` compares: "better" or "worse" if the interval excludes 0, else "no sure difference"."""
-        if not (self.low > 0 or self.high < 0):
+        """How `after` compares: "better" or "worse" if the interval over at least 6 sequences excludes 0, else "no sure
+        difference"."""
+        if self.sequences < FEWEST or not (self.low > 0 or self.high < 0):
             return "no sure difference"
         return "better" if (self.difference > 0) == self.higher else "worse"
 

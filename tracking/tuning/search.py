@@ -19,6 +19,7 @@ from scenarios.errors import InputError, counted
 from sim.io.files.own_files import Marks, output_file, refuse_foreign_file
 from sim.types import Tracker
 from tracking.keyword_options import documented
+from tracking.stats import FEWEST
 from tracking.tuning.candidates import Candidate, Goal, HeldOutEvaluator, TrialRecord, pareto_front
 from tracking.tuning.options import Scenes, TuneOptions
 from tracking.tuning.parallel_episodes import episode_player
@@ -123,8 +124,9 @@ def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
     if not gains:
         return ["the defaults stay: no trial was better in training"]
     best = max(gains, key=lambda c: goal.gain(c.before, c.after))
-    if best.sequences < 2:
-        return ["the defaults stay: one validation scene says nothing of others; give more --validation seeds"]
+    if best.sequences < FEWEST:
+        few = f"with {counted(best.sequences, 'validation scene')}, fewer than {FEWEST}, no gain is sure"
+        return [f"the defaults stay: {few}; give more --validation seeds"]
     ends = f"{best.difference_words}, {counted(best.sequences, 'sequence')}"
     return [f"the defaults stay: nothing is surely better on the validation scenes; at best {goal.key} {ends}"]
 

@@ -51,6 +51,7 @@ TEXTS = {
 }
 MINUTE = 60.0  # s
 LINE = 2  # corners of a line
+THIN = 1e-6  # m or px: shorter lines have no length, and thinner zones no area
 Places = Mapping[str, Array]  # by name the corners (K, 2), m or px
 NOWHERE: Places = {}
 BOX = ("box_left_px", "box_top_px", "box_width_px", "box_height_px")
@@ -392,7 +393,8 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
     """Returns the corners (K, 2) of each place, by name.
 
     lines: texts of two corners, such as "door=2,5,4,5". zones: texts of three or more corners, such as
-    "hall=0,0,9,0,9,6". Raises InputError if a text has another form, or a name is repeated.
+    "hall=0,0,9,0,9,6". Raises InputError if a text has another form, a name is repeated, a line has no length, or a
+    zone has no area or edges that cross.
     """
     found: dict[str, Array] = {}
     forms = {"--line": "NAME=x1,y1,x2,y2", "--zone": "NAME=x1,y1,x2,y2,x3,y3,…"}
@@ -400,12 +402,33 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
         name, _, cells = text.partition("=")
         values = list(map(number_or_nan, cells.split(",")))
         count = len(values) == 4 if option == "--line" else len(values) >= 6 and len(values) % 2 == 0
-        if not name.isidentifier() or name in found or not count or not np.max(np.abs(values)) <= COORDINATE:
-            got, expected = repr(text), f"{forms[option]}, each name once, of letters, digits and _"
-            remedy = "write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image"
-            raise InputError(place=option, got=got, expected=expected, remedy=remedy)
-        found[name] = np.reshape(values, (-1, 2))
+        got, expected = repr(text), f"{forms[option]}, each name once, of letters, digits and _"
+        remedy = "write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image"
+        if name.isidentifier() and name not in found and count and np.max(np.abs(values)) <= COORDINATE:
+            found[name] = np.reshape(values, (-1, 2))
+            fault = _fault(found[name])
+            if not fault:
+                continue
+            got, expected = (
+                f"{text!r}, {fault}",
+                "two ends apart" if option == "--line" else "corners in order round it",
+            )
+        raise InputError(place=option, got=got, expected=expected, remedy=remedy)
     return found
+
+
+def _fault(corners: Array) -> str:
+    """Returns why corners (K, 2) are no line or zone, "" if they are one."""
+    size = float(np.ptp(corners, axis=0).max())
+    if len(corners) == LINE:
+        return "" if size > THIN else "of length 0"
+    a, b = corners, np.roll(corners, -1, axis=0)
+    sides = [cross(b - a, point - a) for point in corners]  # of corner j from edge i: above 0 if it lies to the left
+    left = np.array(sides).T
+    apart = left * np.roll(left, -1, axis=1) < 0  # edge i has the ends of edge j on its two sides
+    if (apart & apart.T).any():
+        return "whose edges cross"
+    return "" if abs(cross(a, b).sum()) > 2 * THIN * size else "of area 0"
 
 
 def crossings(frame: Ints, id: Ints, pos: Array, line: Array, downwards: bool) -> tuple[Ints, Ints]:

@@ -59,7 +59,7 @@ def made(tmp_path_factory) -> Path:
     assert run([*line, str(folder / "seen"), "--seeds", "40000", "--set", "camera.image=[128,96]", *pair]) == 0
     for name, out in (("data", "tracks"), ("seen/flockscope-demo/scene-s40000", "tracks-seen")):
         assert run(["track", FAKE, str(folder / name), "--out", str(folder / out)]) == 0
-    rows = [{"name": f"s{k}", "objective": k / 4} for k in range(3)]
+    rows = [{"name": f"s{k}", "objective": k / 8} for k in range(6)]
     (folder / "scores.json").write_text(json.dumps({"sequences": rows}))
     return folder
 
@@ -118,7 +118,7 @@ COMMANDS = {
         "stress " + FAKE + " --vary nothing --suite {scene} --out {out}/x",
     ),
     "minimize": (
-        "minimize {scene} --tracker " + FAKE + " --while HOTA<=1 --confirm 1 --episodes 6 --out {out}/small.toml",
+        "minimize {scene} --tracker " + FAKE + " --while HOTA<1 --confirm 1 --episodes 6 --out {out}/small.toml",
         "minimize {scene} --tracker " + FAKE + " --while HOTTA<0.7 --out {out}/small.toml",
     ),
     "compare": (

@@ -121,8 +121,12 @@ OPTIONS = {
     "score {made}/data {made}/run {made}/run/scene-s40000 --by HOTAA": "--by: got HOTAA … such as HOTA",
     "score {made}/data {made}/run --by HOTA": "got --by; expected none for one run; leave it out",
     "export coco {made}/data --out {tmp}/scene.toml": "--out: got … ends in .json",
-    "replay {made}/data --out {tmp}/x --duration nan": "--duration: got nan; expected seconds above 0",
+    "replay {made}/data --out {tmp}/x --duration nan": "--duration: got nan; expected a finite number",
     "export csv {made}/data --out {tmp}/x --line a=nan,2,3,4": "--line: got 'a=nan,2,3,4'",
+    "export csv {made}/data --out {tmp}/x --line a=1,1,1,1": "--line: got 'a=1,1,1,1', of length 0; expected two ends",
+    "stress blob --suite crossing --vary detection --share 1 --out {tmp}/x": "invalid value for '--share'",
+    "minimize cross --tracker blob --while HOTA<0.5 --minutes inf --out {tmp}/x.toml": "--minutes: got inf",
+    "minimize cross --tracker blob --while HOTA<2 --out {tmp}/x.toml": "--while: got 'HOTA<2', true of a perfect",
 }  # fmt: skip
 
 

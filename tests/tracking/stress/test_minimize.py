@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from collections.abc import Callable
@@ -22,6 +23,7 @@ from tracking.app.commands.minimize import _of_run
 from tracking.app.commands.track import TrackerSetup
 from tracking.errors import groups
 from tracking.errors.people import PersonKind
+from tracking.scoring.catalogue import ALL, Score
 from tracking.stress.failures import Judgement, parse_failure, play_episode
 from tracking.stress.minimize import STAGES, Minimizer
 from tracking.stress.reductions import beginning, difficulties, pinned, script, without
@@ -188,6 +190,10 @@ WRONG_CONDITIONS = [
     ("HOTA", "choose one of switch"), ("HOTTA<0.7", "did you mean HOTA"), ("HOTA=0.7", "SCORE<NUMBER"),
     ("HOTA<0..7", "correct the number"), ("hota<0.7", "mean HOTA"),
     ("swich", "mean switch"), ("switch:hiden", "mean hidden"), ("switch:", "a cause"),
+    ("HOTA<2", "true of a perfect tracker.*HOTA<0.7"), ("HOTA<=1", "a perfect"), ("HOTA>=0", "a perfect"),
+    ("HOTA>0.5", "a perfect"), ("HOTA<0", "true of no tracker"), ("HOTA<-1", "no tracker"), ("HOTA>1", "no tracker"),
+    ("IDSW>=0", "a perfect tracker.*IDSW>2"), ("IDSW<3", "a perfect"), ("IDSW<-1", "no tracker"),
+    ("TP<50", "a perfect tracker.*HOTA<0.7"), ("PT<2", "a perfect"),
 ]  # fmt: skip
 
 
@@ -197,9 +203,19 @@ def test_wrong_conditions(text: str, got: str) -> None:
         parse_failure(text)
 
 
+@pytest.mark.parametrize(
+    "score", [s for s in ALL if s.better != "neither" and math.isfinite(s.high)], ids=lambda s: s.key
+)
+def test_the_remedy_for_a_condition_that_cannot_fail_works(score: Score) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_failure(f"{score.key}<={score.high:g}")
+    assert parse_failure(caught.value.remedy.removeprefix("write ")).score == score.key
+
+
 def test_conditions() -> None:
-    outcome = Judgement({"IDSW": 3.0}, frozenset({("switch", "hidden")}))
-    true, false = ["IDSW>=3", "IDSW > 2", "IDSW<=3", "switch", "switch:hidden"], ["IDSW<3", "HOTA<0.5", "switch:near"]
+    outcome = Judgement({"IDSW": 3.0, "HOTA": 0.6}, frozenset({("switch", "hidden")}))
+    true = ["IDSW>=3", "IDSW > 2", "HOTA<=0.6", "HOTA < 0.7", "switch", "switch:hidden"]
+    false = ["IDSW>3", "HOTA<0.5", "MOTA<0.5", "switch:near"]
     assert [text for text in (*true, *false, "late split") if parse_failure(text).holds(outcome)] == true
 
     assert all(parse_failure(kind).kind == kind for kind in (*get_args(PersonKind), *groups.KINDS))
@@ -287,7 +303,7 @@ def test_a_run_is_minimised_with_its_tracker_and_inputs(tmp_path, monkeypatch, c
     assert "recordings cannot be made smaller" in refused(capsys, "minimize", "../tracks", *line)
 
 
-@pytest.mark.parametrize("condition", ["crash", "IDSW>=0"])
+@pytest.mark.parametrize("condition", ["crash", "IDSW>=1"])
 def test_a_tracker_that_raises_fails_if_that_is_the_condition(condition: str) -> None:
     setup, failure = TrackerSetup(FAKE.replace("Nearest", "Crashes")), parse_failure(condition)
     scene = load("merge", set=("duration=4", "camera.fps=4", "event=[]"))

@@ -23,13 +23,20 @@ def episodes(values, key: str = "HOTA") -> list[Episode]:
 
 def test_differences_are_paired():
     """The same gain on scenes that differ much more than it: sure."""
-    before = [0.1, 0.5, 0.9, 0.3, 0.7]
+    before = [0.1, 0.5, 0.9, 0.3, 0.7, 0.5]
     found = compare_episodes("s", Goal("HOTA"), episodes(before), episodes([v + 0.01 for v in before]))
     assert (found.before, found.after) == (pytest.approx(0.5), pytest.approx(0.51))
     assert found.low == pytest.approx(0.01)
     assert found.verdict == "better"
     other = compare_episodes("s", Goal("HOTA", False), episodes(before), episodes([v + 0.01 for v in before]))
     assert other.verdict == "worse"
+
+
+def test_fewer_sequences_than_a_ranking_needs_are_not_sure():
+    before = [0.1, 0.5, 0.9, 0.3, 0.7]
+    found = compare_episodes("s", Goal("HOTA"), episodes(before), episodes([v + 0.01 for v in before]))
+    assert found.low == pytest.approx(0.01)
+    assert found.verdict == "no sure difference"
 
 
 def test_front_of_two_goals():
@@ -68,10 +75,10 @@ def test_what_brings_nothing_is_taken_back(made):
     game = Game({("reach", 1.0): 0.5, ("skip", 3): -0.1})
     winner = ToyConfig(reach=1.0, skip=3, colour="green")
     kept, value = HeldOutEvaluator(made, game, optuna.create_study()).simplified(
-        winner, 0.4 + 0.01, ["colour", "skip", "reach", "forbidden"]
+        winner, 0.4 + 0.01 - 1e-9, ["colour", "skip", "reach", "forbidden"]
     )
     assert kept == ToyConfig(reach=1.0)
-    assert value == pytest.approx(0.5 + 0.01 * (1 + 2 + 0 + 1) / 4)
+    assert value == pytest.approx(0.5 + 0.01 * (1 + 2 + 0 + 1 + 2 + 0) / 6)
     assert len(game.seen) == 3, "what is at its default is not tried"
 
 

@@ -37,7 +37,7 @@ def test_the_three_sets_share_no_source(tmp_path):
     made = toy_plan(tmp_path)
     sets = [made.training, made.validation, *made.tests.values()]
     keys = [source.key for sources in sets for source in sources]
-    assert len(set(keys)) == len(keys) == 5 + 4 + 6 + 6
+    assert len(set(keys)) == len(keys) == 5 + 6 + 6 + 6
 
 
 def test_a_recording_is_never_tuned_on(tmp_path):

@@ -1,60 +1,121 @@
 """`flockscope compare`: a gate. Are the scores of a run worse than those of a baseline, beyond a tolerance?
 
-Both are stored scores of the same sequences. Of each score, d is the mean difference over sequences, in the direction
-that is better, with its 95 % interval (Student's, paired). The verdict follows from the interval and the tolerance:
+Both are stored scores of the same sequences, made in the same way. Of each score, d is the mean difference over the
+sequences that have it on both sides, in the direction that is better. Its interval is that of a ranking
+(`tracking.stats.compared`): all intervals of one call hold together at 95 %. The verdict is the first that applies:
 
-    regression     the interval lies below 0, and d below -tolerance
-    improvement    the interval lies above 0, and d above the tolerance
+    regression     the score was known and is unknown in a sequence, or d is surely below 0, and below -tolerance
+    too few        fewer than 6 sequences have the score on both sides
+    improvement    d is surely above 0, and above the tolerance
     no difference  the interval lies within +- tolerance
     too noisy      none of these: more sequences are needed to tell
+
+Where there is nothing true to find, only false alarms give an F1 (0) and a precision. If the score is unknown now, they
+are gone: such a sequence is not compared.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from itertools import product
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from scenarios.errors import InputError, counted, shortened
+from scenarios.limits import INTEGER, is_number
+from sim.hashing import canonical_hash
 from sim.io.files.atomic import write_file
 from sim.io.files.own_files import output_file
 from sim.io.files.tables import json_document, read_json
+from sim.types import Array, Bools
+from sim.types import Sequence as Recording
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import checked_key, table
-from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import paired
+from tracking.app.commands.score_tables import checked_key, figure, table
+from tracking.scoring.catalogue import CATALOGUE, SCORER
+from tracking.stats import FEWEST, compared
 
-FEWEST = 2  # sequences without which there is no interval
-HOW = ("similarity", "given", "truth")  # what must be equal for scores to be compared
+# The keys of a sequence's scores that are no scores, but decide them: scores are compared only if these are equal.
+CONDITIONS = (
+    "scorer", "similarity", "surface", "group_match", "given", "frames_scored", "label_step", "px_per_m", "camera",
+    "unscored", "truth",
+)  # fmt: skip
+DIGITS = 9  # Decimals that count of a camera, whose last bits depend on the processor.
+UNDECIDED = {
+    "too few": (f"at least {FEWEST} sequences with the score on both sides", "generate more seeds"),
+    "too noisy": ("an interval within the tolerance, or off 0", "score more sequences, or give a larger --tolerance"),
+}
 EXPECTED = "a file of `flockscope score --json`, or of `compare --save`"
+ROUNDING = 1e-12  # A difference up to this share of the score, or of 1, is due to the processor.
+LISTED = 80  # Characters of a list of names.
 
 Stored = dict[str, dict[str, Any]]  # by name of the sequence
 
 
 def compare(options: CompareOptions) -> CommandResult:
-    """Compares stored scores with those of a baseline; the exit code of the result is 1 if a score is surely worse."""
-    keys = [checked_key(key) for key in options.by or ["objective"]]
+    """Compares stored scores with those of a baseline. The exit code of the result is 1 for a regression, 2 if a score
+    is undecided."""
+    keys = options.by or ["objective"]
+    for place, key in enumerate(keys):
+        _check_score(key, keys[:place], options.tolerance)
     before, now = _read(options.baseline), _read(options.now)
-    _require_same(options, before, now)
-    rows = [_row(key, before, now, options.tolerance) for key in keys]
+    names, notes = list(before), _require_same(options, before, now)
+    first, second = _values(options.baseline, before, names, keys), _values(options.now, now, names, keys)
+    first[np.isnan(second) & _nothing_to_find(before, names, keys)] = np.nan
+    for key, values in zip(keys, first.T, strict=True):
+        if np.isnan(values).all():
+            known = [k for k in CATALOGUE if any(is_number(row.get(k)) for row in before.values())]
+            remedy = f"choose scores that it has: {shortened(' '.join(f'--by {k}' for k in known), LISTED)}"
+            raise InputError(file=options.baseline, place=key, got="no value", expected="a known score", remedy=remedy)
+    rows = judged(keys, names, first, second, options.tolerance)
     if options.save is not None:
-        kept = [{"name": name, **{k: row[k] for k in (*HOW, *keys) if k in row}} for name, row in now.items()]
+        wanted = dict.fromkeys(("name", *CONDITIONS, *keys, *map(_recall, keys)))
+        kept = [{k: row[k] for k in wanted if k in row} for row in now.values()]
         write_file(output_file(options.save, ".json", "--save"), json_document({"sequences": kept}))
-    worse = [row["score"] for row in rows if row["verdict"] == "regression"]
-    data = {"sequences": len(before), "tolerance": options.tolerance, "scores": rows}
-    return CommandResult(data, _table(rows, len(before)), int(bool(worse)))
+    data = {"sequences": len(before), "tolerance": options.tolerance, "scores": rows, "notes": notes}
+    lines, code = [_table(rows), *(line for row in rows for line in _changes(row)), *notes], 0
+    if any(row["verdict"] == "regression" for row in rows):
+        code = 1
+    elif undecided := next((row for row in rows if row["verdict"] in UNDECIDED), None):
+        expected, remedy = UNDECIDED[undecided["verdict"]]
+        got = f"{undecided['verdict']}, {counted(undecided['sequences'], 'sequence')}"
+        error = InputError(file=options.now, place=undecided["score"], got=got, expected=expected, remedy=remedy)
+        data["error"], code = error.as_dict(), 2
+        lines.append(f"undecided: {error.line()}")
+    return CommandResult(data, "\n".join(lines), code)
+
+
+def conditions(sequence: Recording) -> dict[str, Any]:
+    """Returns the scorer's number, and what options of the source change in the truth; large parts as hashes."""
+    truth, camera = sequence.truth, sequence.camera
+    assert truth is not None
+    view = None
+    if camera is not None:
+        numbers = (camera.focal_px, camera.centre_px, camera.position, camera.rotation.ravel(), camera.radial)
+        view = (camera.kind, camera.image, np.round(np.hstack(numbers), DIGITS) + 0.0, sequence.scene)
+    rules = (truth.labelled, truth.unscored, truth.visibility, truth.truncation)
+    return {
+        "scorer": SCORER, "px_per_m": round(truth.px_per_m, DIGITS), "camera": view and canonical_hash(view)[:16],
+        "unscored": canonical_hash(rules)[:16],
+    }  # fmt: skip
+
+
+def _check_score(key: str, others: Sequence[str], tolerance: float) -> None:
+    score = CATALOGUE[checked_key(key)]
+    if key in others:
+        raise InputError(place="--by", got=f"{key} twice", expected="each score once", remedy="leave one out")
+    if not tolerance < score.high - score.low:
+        expected = f"less than the range of {key}, {score.low:g} to {score.high:g}"
+        raise InputError(place="--tolerance", got=tolerance, expected=expected, remedy="give a smaller one")
 
 
 def _read(path: Path) -> Stored:
     document = {} if path.is_dir() else read_json(path)
     rows = document.get("sequences") if isinstance(document, dict) else None
     rows = rows if isinstance(rows, list) else []
-    named = [row for row in rows if isinstance(row, dict) and "name" in row]
-    found = {str(row["name"]): row for row in named}
+    named = [row for row in rows if isinstance(row, dict) and isinstance(row.get("name"), str)]
+    found = {row["name"]: row for row in named}
     if not named or len(named) < len(rows):
         remedy = "score the tracks: flockscope score TRUTH TRACKS --json > FILE"
         raise InputError(file=path, got="no scores of sequences", expected=EXPECTED, remedy=remedy)
@@ -63,61 +124,108 @@ def _read(path: Path) -> Stored:
     return found
 
 
-def _require_same(options: CompareOptions, before: Stored, now: Stored) -> None:
-    missing, new = sorted(before.keys() - now.keys()), sorted(now.keys() - before.keys())
-    place, got, expected, remedy = "", "", "the sequences of the baseline", "score the same sequences"
-    if missing or new:
-        names = shortened(", ".join(missing or new), 80)
-        place, got = "incomplete", f"no {names}" if missing else f"{names}, not in {options.baseline}"
-        remedy += ", or save a new baseline with --save"
-    elif len(before) < FEWEST:
-        place, got, expected, remedy = "too few", "1 sequence", f"at least {FEWEST}", "generate more seeds"
-    else:
-        known = [(n, k) for n, k in product(before, HOW) if k in before[n] and k in now[n]]
-        name, key = next(((n, k) for n, k in known if before[n][k] != now[n][k]), ("", ""))
-        if name:
-            place, got = f"{name}: {key}", repr(now[name][key])
-            expected = f"{before[name][key]!r}, as in {options.baseline}"
-            remedy = "track and score the same sequences" if key == "truth" else "score both alike"
-    if place:
-        raise InputError(file=options.now, place=place, got=got, expected=expected, remedy=remedy)
+def _require_same(options: CompareOptions, before: Stored, now: Stored) -> list[str]:
+    """Returns notes on conditions that neither side states. Raises InputError if there are sequences without a
+    baseline, or if scores were not made in the same way."""
+    new, both = sorted(now.keys() - before.keys()), [name for name in before if name in now]
+    if new or not both:
+        got = f"{shortened(', '.join(new), LISTED)}, not in {options.baseline}"
+        remedy = "score the same sequences, or save a new baseline with --save"
+        expected = "the sequences of the baseline"
+        raise InputError(file=options.now, place="other sequences", got=got, expected=expected, remedy=remedy)
+    unstated = dict[str, None]()
+    for name in both:
+        old, own = before[name], now[name]
+        for key in CONDITIONS:
+            if (key not in old and key not in own) or old.get(key) == own.get(key) == "":
+                unstated[key] = None
+            elif key not in old or key not in own or _differ(old[key], own[key]):
+                got, expected = (_stated(row, key) for row in (own, old))
+                remedy = "track and score the same sequences in the same way, both with this version of flockscope"
+                expected = f"{expected}, as in {options.baseline}"
+                raise InputError(file=options.now, place=f"{name}: {key}", got=got, expected=expected, remedy=remedy)
+    return [f"not compared, as neither side states it: {', '.join(unstated)}"] if unstated else []
 
 
-def _row(key: str, before: Stored, now: Stored, tolerance: float) -> dict[str, Any]:
-    pairs = np.array([[_value(row, key), _value(now[name], key)] for name, row in before.items()])
-    first, second = pairs[np.isfinite(pairs).all(axis=1)].T
-    if len(first) < FEWEST:
-        got = f"known in {counted(len(first), 'sequence')} on both sides"
-        both = [k for k in CATALOGUE if all(any(k in row for row in side.values()) for side in (before, now))]
-        remedy = f"choose other scores, that both have: {shortened(' '.join(f'--by {k}' for k in both), 80)}"
-        raise InputError(place=key, got=got, expected=f"at least {FEWEST}", remedy=remedy)
-    mean, low, high = (float(end[0]) for end in paired(first[:, None], second[:, None]))
-    upwards = CATALOGUE[key].better != "lower"
-    verdict = _verdict(*((mean, low, high) if upwards else (-mean, -high, -low)), tolerance)
-    return {
-        "score": key, "sequences": len(first), "baseline": float(first.mean()), "now": float(second.mean()),
-        "difference": mean, "low": low, "high": high, "verdict": verdict,
-    }  # fmt: skip
+def _differ(one: Any, other: Any) -> bool:
+    return bool(one != other) or isinstance(one, bool) != isinstance(other, bool)
 
 
-def _value(row: Mapping[str, Any], key: str) -> float:
-    value = row.get(key)
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else float("nan")
+def _stated(row: Mapping[str, Any], key: str) -> str:
+    return shortened(repr(row[key]), LISTED) if key in row else "nothing"
 
 
-def _verdict(mean: float, low: float, high: float, tolerance: float) -> str:
-    if high < 0 and mean < -tolerance:
-        return "regression"
-    if low > 0 and mean > tolerance:
-        return "improvement"
-    return "no difference" if -tolerance <= low and high <= tolerance else "too noisy"
+def _values(path: Path, stored: Stored, names: Sequence[str], keys: Sequence[str]) -> Array:
+    return np.array([[_value(path, name, stored.get(name, {}), key) for key in keys] for name in names], float)
 
 
-def _table(rows: list[dict[str, Any]], sequences: int) -> str:
+def _value(path: Path, name: str, row: Mapping[str, Any], key: str) -> float:
+    value, score = row.get(key), CATALOGUE[key]
+    if value is None:
+        return float("nan")
+    if not is_number(value, max(score.low, -INTEGER), min(score.high, INTEGER)):
+        got, expected = shortened(repr(value), LISTED), f"a number from {score.low:g} to {score.high:g}, or null"
+        remedy = "score the tracks again"
+        raise InputError(file=path, place=f"{name}: {key}", got=got, expected=expected, remedy=remedy)
+    return float(value)
+
+
+def _nothing_to_find(before: Stored, names: Sequence[str], keys: Sequence[str]) -> Bools:
+    """Returns where the recall that belongs to a score is stated as unknown, (S, K): the truth has none of its kind."""
+    return np.array([[before[name].get(_recall(key), 0) is None for key in keys] for name in names])
+
+
+def _recall(key: str) -> str:
+    core = "_core" if key.endswith("_core") else ""
+    return f"{key.removesuffix(core).rpartition('_')[0]}_recall{core}"
+
+
+def judged(
+    keys: Sequence[str], names: Sequence[str], before: Array, now: Array, tolerance: float
+) -> list[dict[str, Any]]:
+    """Returns the comparison of each score as a dict. before, now: the scores, (S, K), nan where unknown."""
+    known = np.isfinite(before), np.isfinite(now)
+    paired = known[0] & known[1]
+    upwards = np.array([1.0 if CATALOGUE[key].better == "higher" else -1.0 for key in keys])
+    less = now - before
+    less[np.abs(less) <= ROUNDING * np.maximum(1.0, np.abs(before))] = 0.0
+    mean, low, high, sign = compared(less, len(keys))
+    rows = []
+    for k, key in enumerate(keys):
+        lost, found, both = known[0][:, k] & ~known[1][:, k], known[1][:, k] & ~known[0][:, k], paired[:, k]
+        better, sure = mean[k] * upwards[k], sign[k] * upwards[k]
+        if lost.any() or (sure < 0 and better < -tolerance):
+            verdict = "regression"
+        elif both.sum() < FEWEST:
+            verdict = "too few"
+        elif sure > 0 and better > tolerance:
+            verdict = "improvement"
+        else:
+            verdict = "no difference" if -tolerance <= low[k] and high[k] <= tolerance else "too noisy"
+        first, second = (float(side[both, k].mean()) if both.any() else np.nan for side in (before, now))
+        rows.append(
+            {
+                "score": key, "sequences": int(both.sum()), "baseline": first, "now": second,
+                "difference": float(mean[k]), "low": float(low[k]), "high": float(high[k]), "verdict": verdict,
+                "unknown_now": [names[i] for i in np.flatnonzero(lost).tolist()],
+                "known_now": [names[i] for i in np.flatnonzero(found).tolist()],
+            }
+        )  # fmt: skip
+    return rows
+
+
+def _changes(row: Mapping[str, Any]) -> list[str]:
+    words = {"unknown_now": "known before, unknown now", "known_now": "unknown before, known now, not compared"}
+    return [
+        f"{row['score']}: {text}: {shortened(', '.join(row[key]), LISTED)}" for key, text in words.items() if row[key]
+    ]
+
+
+def _table(rows: list[dict[str, Any]]) -> str:
     cells = []
     for row in rows:
-        ends = f"{row['low']:+.4f} to {row['high']:+.4f}"
-        numbers = f"{row['baseline']:.4f}", f"{row['now']:.4f}", f"{row['difference']:+.4f}", ends
-        cells.append([row["score"], *numbers, row["verdict"]])
-    columns = ["baseline", "now", "difference", "95 % interval"]
-    return table(f"{counted(sequences, 'sequence')}, paired", ["score"], columns, cells, ["verdict"])
+        low, high = (figure(row[end], "+.4f") for end in ("low", "high"))
+        numbers = *(figure(row[key], ".4f") for key in ("baseline", "now")), figure(row["difference"], "+.4f")
+        cells.append([row["score"], str(row["sequences"]), *numbers, f"{low} to {high}", row["verdict"]])
+    columns = ["sequences", "baseline", "now", "difference", "95 % interval"]
+    return table("paired by sequence", ["score"], columns, cells, ["verdict"]).rstrip("\n")

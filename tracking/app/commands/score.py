@@ -12,6 +12,7 @@ from sim.io.store.seal import tracked_hash
 from sim.types import Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.commands.compare import conditions
 from tracking.app.commands.score_ranking import ranked_runs, ranking_result, scoring_notes
 from tracking.app.commands.score_tables import CSV_HEAD, checked_key, csv_bytes, summary, tables
 from tracking.app.commands.scored_sequence import is_class, run_names, score_sequence, scoring_jobs
@@ -67,6 +68,7 @@ def _run_result(sequences: list[Sequence], found: list[ComparedSequence]) -> Com
     data = {
         "sequences": [
             {
+                **conditions(sequence),
                 "name": name, "similarity": s.similarity, "surface": s.surface, "group_match": s.group_match,
                 "given": words, "frames_scored": s.frames, "label_step": s.step, "left_out": s.left_out, **s,
                 "truth": tracked_hash(sequence),

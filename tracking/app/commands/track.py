@@ -6,6 +6,7 @@ Its options and their help stand in tracking.app.command_options.
 from __future__ import annotations
 
 import pickle
+import warnings
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
@@ -144,6 +145,9 @@ def _check_modes(
     if background is not None and "image" not in modes:
         got, expected = f"--detections {modes[0]}", "a tracker that works on pictures"
         raise InputError(place="--background", got=got, expected=expected, remedy="leave --background out")
+    if setup.tracker == "stereo" and modes[0] != "image":
+        text = "stereo is made for stereo pairs; on points, group-pda finds groups better (docs/trackers/stereo.md)"
+        warnings.warn(text, UserWarning, stacklevel=2)
 
 
 def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:

@@ -61,3 +61,25 @@ NO_PLACES = [
 def test_what_is_no_place_is_refused(lines, zones):
     with pytest.raises(InputError, match="NAME="):
         parse_places(lines, zones)
+
+
+THIN = [
+    (["a=1,1,1,1"], [], "of length 0"), (["a=1,1,1,1.0000000001"], [], "of length 0"),
+    ([], ["a=0,0,1,1,2,2"], "of area 0"), ([], ["a=0,0,0,0,0,0"], "of area 0"), ([], ["a=0,0,4,0,4,0"], "of area 0"),
+    ([], ["a=0,0,2,2,2,0,0,2"], "edges cross"), ([], ["a=0,0,9,0,9,9,5,-1"], "edges cross"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("lines", "zones", "fault"), THIN)
+def test_what_nobody_can_cross_or_be_in_is_refused(lines, zones, fault):
+    """The remedy works: its own examples are read."""
+    with pytest.raises(InputError, match=fault) as caught:
+        parse_places(lines, zones)
+    words = caught.value.remedy.replace(";", "").split()
+    assert [*parse_places([words[2]], [words[5]])] == ["door", "hall"]
+
+
+@pytest.mark.parametrize("text", ["a=0,0,4,0,4,1,1,1,1,4,0,4", "a=0,0,4,0,4,4,0,0", "a=0,0,2,0,2,2,2,2,0,2"])
+def test_zones_that_are_one_round_are_read(text):
+    """An L, one that repeats its first corner, and one that repeats another."""
+    assert len(parse_places([], [text, text.replace("a", "b")])) == 2
