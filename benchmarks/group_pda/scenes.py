@@ -18,11 +18,11 @@ import numpy as np
 
 from benchmarks.group_pda.runs import REPLACED, Row, TrackingJob, Variant, measure, trackers, with_points
 from benchmarks.support.options import seeds_text
-from benchmarks.support.tables import mean_cell, share, signed, table
+from benchmarks.support.tables import difference_cell, mean_cell, share, table
 from scenarios.loading.resolve import Entry, resolve
 from sim.types import Array, DetectionMode
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.stats import paired
+from tracking.scoring.catalogue import CATALOGUE
 
 SCENES = ("merge", "split", "cross", "queue", "side-by-side")
 DENSE = ("cross-dense", "pass-by-dense")  # Of the suite `standard`.
@@ -147,8 +147,8 @@ def means(rows: Sequence[Row]) -> list[str]:
 
 def differences(first: Sequence[Row], second: Sequence[Row]) -> list[str]:
     """Returns cells of the paired differences of the scores DECIDED, first minus second."""
-    ends = paired(values(second, DECIDED), values(first, DECIDED))
-    return [signed(*(float(e[k]) for e in ends)) for k in range(len(DECIDED))]
+    less = values(first, DECIDED) - values(second, DECIDED)
+    return [difference_cell(less[:, k], key if key in CATALOGUE else "HOTA") for k, key in enumerate(DECIDED)]
 
 
 def gathered(
