@@ -16,16 +16,13 @@ import numpy as np
 
 from sim.scene.body import BODY, DEPTH_SHARE, HEAD, PERSON_HEIGHT, SHOULDER_SHARE
 from sim.scene.camera import project, seen_ground, standing_share, to_ground
-from sim.scene.standing_kernels import bodies
 from sim.scene.terrain import height_at
 from sim.types import Array, Camera, Scene
 
 LEVELS, HALVINGS, ROUNDS = 65, 40, 4  # of the search for the height of the ground on stairs
 # Body and head: height of the centre, squared half axes across, along the heading and up; of a person 1 m tall.
-PARTS = np.array([
-    [BODY.centre, (BODY.across * SHOULDER_SHARE) ** 2, (BODY.along * DEPTH_SHARE) ** 2, BODY.up**2],
-    [HEAD.centre, HEAD.across**2, HEAD.along**2, HEAD.up**2],
-])  # fmt: skip
+AXES = [[BODY.across * SHOULDER_SHARE, BODY.along * DEPTH_SHARE, BODY.up], [HEAD.across, HEAD.along, HEAD.up]]
+PARTS = np.column_stack([[BODY.centre, HEAD.centre], np.square(AXES)])
 
 
 def standing_points(box: Array, camera: Camera, scene: Scene | None = None) -> Array:
@@ -48,6 +45,8 @@ def standing_points(box: Array, camera: Camera, scene: Scene | None = None) -> A
 
 def _standing(box: Array, z: Array, camera: Camera) -> tuple[Array, Array]:
     """Returns the places (R, 2) and heights (R,) of the bodies with the boxes on ground of height z (R,), m."""
+    from sim.scene.standing_kernels import bodies  # compiled code: few scores need it
+
     low, size = box[:, :2], np.maximum(box[:, 2:], 1e-6)
     lens = np.array([*camera.focal_px, *camera.centre_px, camera.radial])
     two = bodies(low, size, z, lens, camera.position, camera.rotation, PARTS)

@@ -41,13 +41,13 @@ def _error(q, low, size, z, lens, eye, turn, parts, out):  # type: ignore[no-unt
         centre, across, along, up = parts[part, 0] * h, parts[part, 1], parts[part, 2], parts[part, 3]
         x2 = depth + centre * turn[2, 2]
         n2, m2 = hx * turn[2, 0] + hy * turn[2, 1], hy * turn[2, 0] - hx * turn[2, 1]
-        below = h * h * (across * m2 * m2 + along * n2 * n2 + up * turn[2, 2] ** 2) - x2 * x2
+        below = h * h * (across * m2 * m2 + along * n2 * n2 + up * turn[2, 2] * turn[2, 2]) - x2 * x2
         if not (x2 > 0.0 and below < 0.0):
             return
         for axis in range(2):
             x = (a if axis == 0 else b) * depth + centre * turn[axis, 2]
             n, m = hx * turn[axis, 0] + hy * turn[axis, 1], hy * turn[axis, 0] - hx * turn[axis, 1]
-            own = h * h * (across * m * m + along * n * n + up * turn[axis, 2] ** 2) - x * x
+            own = h * h * (across * m * m + along * n * n + up * turn[axis, 2] * turn[axis, 2]) - x * x
             both = h * h * (across * m * m2 + along * n * n2 + up * turn[axis, 2] * turn[2, 2]) - x * x2
             middle = both / below
             half = np.sqrt(max(middle * middle - own / below, 0.0))
