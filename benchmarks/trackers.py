@@ -44,7 +44,7 @@ def main() -> None:
     given = parser.parse_args()
     inputs = dict[str, list[str]]()
     for name in tracker_registry.names():
-        inputs.setdefault("boxes" if "boxes" in tracker_registry.find(name).needs else "points", []).append(name)
+        inputs.setdefault("points" if "points" in tracker_registry.find(name).needs else "boxes", []).append(name)
     with tempfile.TemporaryDirectory() as folder:
         data, runs = Path(folder) / "data", Path(folder) / "runs"
         generate([given.suite], given.seeds, data, workers=WorkerOptions(given.workers), streams=())

@@ -417,7 +417,8 @@ class Sequence:
     camera and scene are None if unknown, px_per_m is nan.
     Fields that load are functions, or None if there is nothing to load: load_truth() gives the Truth; load_background()
     pictures (K, H, W, 3) of a scene to train a background model; load_people() the person ids of each group that the
-    script names; load_pixels(index) the PixelTruth of frame `index`; load_light() the factor of brightness of each
+    script names; load_owners() for each frame the ids (M,) of the people whom its detections show, -1 for false alarms;
+    load_pixels(index) the PixelTruth of frame `index`; load_light() the factor of brightness of each
     frame, (length,), without clouds. source: where it comes from ("kind", "path", "seed", …)."""
 
     name: str
@@ -434,6 +435,7 @@ class Sequence:
     has_detections: bool = False
     load_background: Callable[[], Image] | None = None
     load_people: Callable[[], Mapping[str, tuple[int, ...]]] | None = None
+    load_owners: Callable[[], list[Ints]] | None = None
     source: dict[str, Any] = field(default_factory=dict)
     bare: Callable[[], Iterator[Frame]] | None = None
     load_pixels: Callable[[int], PixelTruth] | None = None

@@ -20,7 +20,15 @@ from scenarios.limits import INTEGER
 from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
 from tracking.config import Config
 from tracking.running import image_scale, tracker_registry
-from tracking.running.detection_mode import InputKind, check_detections, choose_mode, frames_with_detections, input_kind
+from tracking.running.detection_mode import (
+    InputKind,
+    as_frames,
+    as_needed,
+    check_detections,
+    choose_mode,
+    given_detections,
+    input_kind,
+)
 from tracking.running.image_scale import ImageScale
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracks_check import ReportHistory, check_tracks
@@ -116,8 +124,11 @@ def prepare(
         remedy = "add --detections truth, or leave out the sensor settings"
         place, got = "--sensor, --set sensor", f"--detections {mode}"
         raise InputError(place=place, got=got, expected="--detections truth", remedy=remedy)
-    frames = frames_with_detections(instance.needs, mode, sequence, sensor or {}, seed)
-    scale = image_scale.of_sequence(sequence, mode, frames)
+    frames = given = None
+    if mode != "image":
+        given = given_detections(mode, sequence, sensor or {}, seed)
+        frames = as_frames(as_needed(given, instance.needs, mode, sequence).detections, sequence.fps)
+    scale = image_scale.of_sequence(sequence, given)
     background = sequence.background() if mode == "image" else None
     context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
     return PreparedTracker(name, instance, config, context, mode, sequence, frames, scale.frames)
