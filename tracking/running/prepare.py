@@ -30,6 +30,7 @@ from tracking.running.detection_mode import (
     input_kind,
 )
 from tracking.running.image_scale import ImageScale
+from tracking.running.plane_check import PlaneCheck
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracks_check import ReportHistory, check_tracks
 from tracking.running.user_code import tracker_failed, user_code
@@ -52,6 +53,7 @@ class PreparedTracker:
     frames_given: tuple[Frame, ...] | None
     scale_frames: int = 0  # as of ImageScale
     history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
+    planes: PlaneCheck = field(default_factory=PlaneCheck)  # the same, compared with its input
 
     @property
     def input(self) -> InputKind:
@@ -78,6 +80,7 @@ class PreparedTracker:
     def reset(self, seed: int) -> None:
         """Resets the tracker for this sequence and forgets what it has reported."""
         self.history.clear()
+        vars(self.planes).update(vars(PlaneCheck()))
         with self._naming("reset()", self.sequence.name):
             self.tracker.reset(self.context, seed)
 
@@ -89,7 +92,9 @@ class PreparedTracker:
             check_detections(detections, self.tracker.needs)
         with self._naming("step()", f"{self.sequence.name}, frame {frame.index}"):
             tracks = self.tracker.step(frame, detections)
-        return check_tracks(tracks, frame.index, self.name, self.sequence.name, self.history)
+        checked = check_tracks(tracks, frame.index, self.name, self.sequence.name, self.history)
+        self.planes.check(checked, detections, self.context, self.name, self.sequence.name)
+        return checked
 
     @contextmanager
     def _naming(self, part: str, place: str) -> Iterator[None]:
