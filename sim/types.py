@@ -131,8 +131,9 @@ class Tracks(Frozen):
 
     @classmethod
     def of_boxes(cls, frame: Frame, id: Any, box: Any, score: Any = (), **more: Any) -> Tracks:
-        """Returns the tracks of people with boxes in the image, in the frame. Velocities are unknown, covariances are the
-        identity, and nobody has a group, unless `more` says otherwise.
+        """Returns the tracks of people with boxes in the image, in the frame.
+
+        Velocities are unknown, covariances are the identity, and nobody has a group, unless `more` says otherwise.
 
         Args:
             frame: The frame that `step` was given.

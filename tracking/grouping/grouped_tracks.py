@@ -86,8 +86,8 @@ def _has_groups(tracks: Tracks) -> bool:
 
 
 def without_groups(tracks: Sequence[Tracks]) -> list[Tracks]:
-    """Returns the tracks with groups and events removed, and no kind of event the tracker's own; `Tracks` of whole groups
-    are returned unchanged."""
+    """Returns the tracks with groups and events removed, and no kind of event as the tracker's own; `Tracks` of whole
+    groups are returned unchanged."""
     none: dict[str, Any] = {"groups": None, "events": (), "own_events": (), "derived": False}
     return [t if t.unit == "group" else t.replace(group=np.full(len(t.id), -1), **none) for t in tracks]
 

@@ -1,4 +1,4 @@
-"""Finds trackers whose answers lie in another plane or unit than they say: px as metres, metres as px, corners as sizes.
+"""Finds trackers whose answers are in another unit than they say: px as metres, metres as px, corners as sizes.
 
 Such answers are never near what the tracker was given. So each row of the first answers is compared with the
 detections of its frame, and its box with its position. The check ends with the first few rows that fit; it costs
@@ -54,12 +54,12 @@ class PlaneCheck:
         self.compared += len(fits)
         self.fitting += int(fits.sum())
         if self.compared >= COMPARED and self.fitting < SHARE * self.compared:
-            row = int(np.argmin(fits))
-            raise WorkError(
-                file=tracker, place=f"{sequence}, frame {t.index}", got=_words(t, row), expected=self._expected(t, given),
-                remedy="report what is tracked in px by Tracks.of_boxes (left, top, width, height) or with "
-                'plane="image", and what is tracked in m with plane="ground"',
-            )  # fmt: skip
+            place, got = f"{sequence}, frame {t.index}", _words(t, int(np.argmin(fits)))
+            remedy = (
+                "report what is tracked in px by Tracks.of_boxes (left, top, width, height) or with "
+                'plane="image", and what is tracked in m with plane="ground"'
+            )
+            raise WorkError(file=tracker, place=place, got=got, expected=self._expected(t, given), remedy=remedy)
 
     def _fits(self, t: Tracks, given: Detections | None, context: Context) -> Bools | None:
         every = [self._near(t, given, context), _as_given(t, given), _of_a_person(t, context)]
