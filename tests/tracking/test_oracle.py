@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,3 +75,13 @@ def test_compare_ranks_runs_and_shows_an_oracle_for_each_input() -> None:
     for name, row in runs.items():
         expected = np.mean([evaluate(s.truth, run)["HOTA"] for s, run in zip(scenes, row, strict=True)])
         assert table["HOTA"][table["run"].index(name)] == pytest.approx(expected)
+
+
+def test_an_oracle_of_detections_without_owners_is_matched_and_says_so() -> None:
+    scene = simulate(load("split", ["camera.fps=5"]), 0)
+    recorded = replace(scene, load_owners=None)
+    for sequence, words in ((scene, ""), (recorded, ", matched")):
+        run = track("blob", sequence, detections="file")
+        found = tracking.compare([sequence], {"blob": [run]})
+        assert found.to_arrow("HOTA").to_pydict()["run"][0] == f"oracle from boxes (file){words}"
+    assert oracle(recorded, {"detections": "truth"}).info["owners"] == "known"
