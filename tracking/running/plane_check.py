@@ -1,12 +1,12 @@
 """Finds trackers whose answers are in another unit than they say: px as metres, metres as px, corners as sizes.
 
-Such answers are never near what the tracker was given. So each row of the first answers is compared with the
-detections of its frame, and its box with its position. The check ends with the first few rows that fit; it costs
-nothing afterwards. It fails if of the first rows hardly any fits.
+Such answers are hardly ever near what the tracker was given. So each row of the first answers is compared with the
+detections of its frame, and its box with its position. The check ends as soon as a few rows, and half of all, fit; it
+costs nothing afterwards. It fails if hardly any of the first rows fits.
 
 A row fits if
 - its position lies on the ground near the detections of the frames so far (GROUND), or in the image at most a person's
-  height from a detection,
+  height from a detection; without a camera, positions on the ground are not the px of detections,
 - its box overlaps that of a detection, if both have boxes,
 - its box is of a person at its position, if a camera is known; in the image, its position lies in its box,
 - its position is in the picture or near it, if a tracker of pictures is on the ground before a camera.
@@ -26,7 +26,7 @@ from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Context, Detections, Tracks
 
 FITTING, COMPARED = 3, 12  # rows that end the check, and rows of which hardly any may be wrong
-SHARE = 0.1  # of the rows compared that must fit
+SHARE = 0.2  # of the rows compared that must fit
 GROUND = 20.0  # m: how far from the detections a person may be
 OVERLAP = 0.05  # least IoU of boxes that show one person
 VIEW = 1.0  # widths and heights of the picture by which a person may be outside it
@@ -46,7 +46,7 @@ class PlaneCheck:
 
     def check(self, t: Tracks, given: Detections | None, context: Context, tracker: str, sequence: str) -> None:
         """Compares the answer of a frame. Raises WorkError if the answers so far lie elsewhere than they say."""
-        if self.fitting >= FITTING or not len(t.id):
+        if not len(t.id) or self.fitting >= max(FITTING, self.compared / 2):
             return
         fits = self._fits(t, given, context)
         if fits is None:
@@ -67,25 +67,23 @@ class PlaneCheck:
         return np.logical_and.reduce(known) if known else None
 
     def _near(self, t: Tracks, given: Detections | None, context: Context) -> Bools | None:
-        pos = t.pos[:, :2]
-        if t.plane == "image":
-            if given is None or not len(given.pos) or (given.box is None and given.plane != "image"):
-                return None
-            centre = given.pos[:, :2] if given.box is None else given.box[:, :2] + given.box[:, 2:] / 2
-            tall = context.px_per_m * PERSON_HEIGHT if given.box is None else given.box[:, 2:].max()
-            away = np.abs(pos[:, None] - centre).max(axis=2).min(axis=1)
-            return None if np.isnan(tall) else np.asarray(away <= tall)
         if given is None:
-            return _in_view(t, context)
+            return None if t.plane == "image" else _in_view(t, context)
+        if t.plane == "image":
+            return _at_centres(t, given, context)
         points = given.pos[:, :2]
         if given.plane == "image":
-            if given.box is None or context.camera is None:
+            if context.camera is None:  # the tracker may know the ground, but px are none of it
+                copied = _at_centres(t, given, context)
+                return None if copied is None else ~copied
+            if given.box is None:
                 return None
             points = standing_points(given.box, context.camera, context.scene)
         points = points[np.isfinite(points).all(axis=1)]
         self.low, self.high = np.vstack([points, self.low]).min(axis=0), np.vstack([points, self.high]).max(axis=0)
         if not np.isfinite(self.low).all():
             return None
+        pos = t.pos[:, :2]
         return np.asarray(((pos > self.low - GROUND) & (pos < self.high + GROUND)).all(axis=1))
 
     def _expected(self, t: Tracks, given: Detections | None) -> str:
@@ -97,6 +95,24 @@ class PlaneCheck:
                 f"boxes like the detections', such as {_box(given.box[0])}, and positions in m or px as the plane says"
             )
         return "people where the camera sees them, boxes and positions that agree"
+
+
+def _at_centres(t: Tracks, given: Detections, context: Context) -> Bools | None:
+    """Returns which rows lie at most a person's height, px, from the middle of a detection in the image."""
+    tall = context.px_per_m * PERSON_HEIGHT
+    if given.box is not None:
+        centre, tall = given.box[:, :2] + given.box[:, 2:] / 2, float(given.box[:, 2:].max(initial=0.0))
+    elif given.plane == "image":
+        centre = given.pos
+    elif context.camera is not None:
+        points = given.pos[:, :2]
+        centre, _ = project(context.camera, np.column_stack([points, np.full(len(points), PERSON_HEIGHT / 2)]))
+        centre = centre[np.isfinite(centre).all(axis=1)]
+    else:
+        return None
+    if not len(centre) or np.isnan(tall):
+        return None
+    return np.asarray(np.abs(t.pos[:, None, :2] - centre).max(axis=2).min(axis=1) <= tall)
 
 
 def _as_given(t: Tracks, given: Detections | None) -> Bools | None:

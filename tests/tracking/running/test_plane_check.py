@@ -90,6 +90,21 @@ def test_answers_in_a_wrong_unit_end_the_run(scene: Sequence, name: str) -> None
     assert all([error.got, error.expected, "Tracks.of_boxes" in error.remedy])
 
 
+def test_points_in_metres_are_not_px(scene: Sequence) -> None:
+    wrong = answered(("points",), lambda f, d, i: Tracks.of_points(f, i, d.pos, plane="image"))
+    with pytest.raises(WorkError, match='plane "image"'):
+        track(wrong, scene, detections="file")
+
+
+@pytest.mark.parametrize("needs", [("boxes",), ("points",)])
+def test_px_are_not_the_ground_of_a_recording_without_a_camera(flat: Sequence, needs: tuple[str, ...]) -> None:
+    wrong = answered(needs, lambda f, d, i: Tracks.of_points(f, i, d.pos, plane="ground"))
+    with pytest.raises(WorkError, match='plane "ground"'):
+        track(wrong, flat, detections="truth")
+    own = answered(needs, lambda f, d, i: Tracks.of_points(f, i, d.pos * [0.02, 0.03] - 9, plane="ground"))
+    assert len(track(own, flat, detections="truth")) == flat.length  # of a tracker that knows the ground
+
+
 @pytest.mark.parametrize("name", ["corners as sizes", "shares of the picture"])
 def test_without_a_camera_boxes_are_compared_with_the_detections(flat: Sequence, name: str) -> None:
     with pytest.raises(WorkError, match="boxes like the detections'"):
