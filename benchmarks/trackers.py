@@ -53,7 +53,7 @@ def print_ranking(title: str, options: ScoreOptions) -> None:
 def ranking(suite: str, seeds: range, workers: int) -> None:
     inputs = dict[str, list[str]]()
     for name in tracker_registry.names():
-        inputs.setdefault("boxes" if "boxes" in tracker_registry.find(name).needs else "points", []).append(name)
+        inputs.setdefault("points" if "points" in tracker_registry.find(name).needs else "boxes", []).append(name)
     with tempfile.TemporaryDirectory() as folder:
         data, out = Path(folder) / "data", Path(folder) / "runs"
         generate([suite], seeds, data, workers=WorkerOptions(workers), streams=())

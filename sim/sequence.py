@@ -22,7 +22,7 @@ from sim.truth.order_fulfilment import check_orders
 # isort: off
 # fmt: off
 from sim.types import (
-    BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, Image, Motion, PixelTruth, Sequence, Truth,
+    BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, Image, Ints, Motion, PixelTruth, Sequence, Truth,
 )
 # fmt: on
 # isort: on
@@ -92,16 +92,16 @@ def observe(
         return named_people(scenario, motion.scene, motion.seed, motion.repeat, motion.orders)
 
     @cache
-    def detections() -> list[Detections]:
-        from sim.detector.sense import sense
+    def sensed() -> tuple[list[Detections], list[Ints]]:
+        from sim.detector.sense import sense_owned
 
         hidden = named() if any(hide.group is not None for hide in scenario.sensor.hide) else {}
         seen = bodies(motion, camera)
-        found = sense(seen, scenario.sensor, motion.seed, camera, camera.image, motion.repeat, hidden)
-        return [d.replace(index=k + 1, t=k / kept.fps) for k, d in enumerate(found[::stride])]
+        found, owners = sense_owned(seen, scenario.sensor, motion.seed, camera, camera.image, motion.repeat, hidden)
+        return [d.replace(index=k + 1, t=k / kept.fps) for k, d in enumerate(found[::stride])], owners[::stride]
 
     def bare() -> Iterator[Frame]:
-        return (Frame(d.index, d.t, detections=d) for d in detections())
+        return (Frame(d.index, d.t, detections=d) for d in sensed()[0])
 
     # A frame's pixels are usually read right after its pictures.
     @lru_cache(maxsize=1)
@@ -121,7 +121,7 @@ def observe(
         return np.stack([renderer.background(k) for k in range(BACKGROUNDS)])
 
     def frames() -> Iterator[Frame]:
-        for d in detections():
+        for d in sensed()[0]:
             made = drawn(d.index)
             yield Frame(d.index, d.t, made.image, made.right, d)
 
@@ -143,6 +143,7 @@ def observe(
         name=motion.name, fps=kept.fps, length=len(kept.present), frames=frames, load_truth=truth,
         image_size=camera.image, camera=camera, scene=motion.scene, px_per_m=px_per_m_at_centre(camera),
         has_images=left, has_right=right, has_detections=True, load_people=named, source=source, bare=bare,
+        load_owners=lambda: sensed()[1],
         load_background=None if renderer is None else background, load_pixels=None if renderer is None else pixels,
         load_light=light, never_arrive=motion.never_arrive,
     )  # fmt: skip

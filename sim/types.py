@@ -129,6 +129,49 @@ class Tracks(Frozen):
     own_events: tuple[str, ...] = ()
     seen: Bools = field(default_factory=lambda: np.zeros(0, bool))
 
+    @classmethod
+    def of_boxes(cls, frame: Frame, id: Any, box: Any, score: Any = (), **more: Any) -> Tracks:
+        """Returns the tracks of people with boxes in the image, in the frame.
+
+        Velocities are unknown, covariances are the identity, and nobody has a group, unless `more` says otherwise.
+
+        Args:
+            frame: The frame that `step` was given.
+            id: Ids (N,) of the people, not below 0 and never used for another person.
+            box: Boxes (N, 4): left, top, width, height in px.
+            score: Scores (N,) in [0, 1], or empty.
+            **more: Further fields of `Tracks`, such as `group` or `seen`.
+
+        Example:
+            return Tracks.of_boxes(frame, [t.id for t in found], [t.ltwh for t in found])
+        """
+        box = np.asarray(box, float).reshape(-1, 4)
+        return cls._of_people(frame, "image", id, box[:, :2] + box[:, 2:] / 2, box=box, score=score, **more)
+
+    @classmethod
+    def of_points(
+        cls, frame: Frame, id: Any, pos: Any, score: Any = (), *, plane: Plane = "ground", **more: Any
+    ) -> Tracks:
+        """Returns the tracks of people at points, in the frame. The other fields are as of `of_boxes`.
+
+        Args:
+            frame: The frame that `step` was given.
+            id: As for `of_boxes`.
+            pos: Positions (N, 2): x, y in m on the ground, or in px in the image; (N, 3) in space, m.
+            score: As for `of_boxes`.
+            plane: In which `pos` lies: "ground", "image" or "space".
+            **more: Further fields of `Tracks`, such as `vel` or `box`.
+        """
+        pos = np.asarray(pos, float).reshape(-1, 3 if plane == "space" else 2)
+        return cls._of_people(frame, plane, id, pos, score=score, **more)
+
+    @classmethod
+    def _of_people(cls, frame: Frame, plane: Plane, id: Any, pos: Array, score: Any, **more: Any) -> Tracks:
+        n, dims = pos.shape
+        moving = {"vel": np.full((n, dims), np.nan), "cov": np.tile(np.eye(2 * dims), (n, 1, 1))}
+        fields = {"group": np.full(n, -1), **moving, "score": np.asarray(score, float), **more}
+        return cls(frame.index, frame.t, plane, "person", np.asarray(id) if n else no_ids(), pos=pos, **fields)
+
     @property
     def measured(self) -> Bools:
         """Flags (N,), True for each row measured in this frame: `seen`, or all True if `seen` is empty."""
@@ -444,9 +487,10 @@ class Sequence:
     camera and scene are None if unknown, px_per_m is nan.
     Fields that load are functions, or None if there is nothing to load: load_truth() gives the Truth; load_background()
     pictures (K, H, W, 3) of a scene to train a background model; load_people() the person ids of each group that the
-    script names; load_pixels(index) the PixelTruth of frame `index`; load_light() the factor of brightness of each
-    frame, (length,), without clouds. source: where it comes from ("kind", "path", "seed", …). never_arrive: groups of a
-    simulated crowd that do not reach their goal."""
+    script names; load_owners() for each frame the ids (M,) of the people whom its detections show, -1 for false alarms;
+    load_pixels(index) the PixelTruth of frame `index`; load_light() the factor of brightness of each frame, (length,),
+    without clouds. source: where it comes from ("kind", "path", "seed", …). never_arrive: groups of a simulated crowd
+    that do not reach their goal."""
 
     name: str
     fps: float
@@ -462,6 +506,7 @@ class Sequence:
     has_detections: bool = False
     load_background: Callable[[], Image] | None = None
     load_people: Callable[[], Mapping[str, tuple[int, ...]]] | None = None
+    load_owners: Callable[[], list[Ints]] | None = None
     source: dict[str, Any] = field(default_factory=dict)
     bare: Callable[[], Iterator[Frame]] | None = None
     load_pixels: Callable[[int], PixelTruth] | None = None

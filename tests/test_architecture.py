@@ -17,7 +17,7 @@ LINES = 500
 SCORING = (
     "scenarios.limits", "tracking.scoring", "tracking.grouping.grouped_tracks", "tracking.grouping.foot_points",
     "scenarios.errors", "sim.arrays", "sim.types", "sim.truth.group_hulls", "sim.truth.crossing_events",
-    "sim.truth.queue_detection", "sim.geometry.polygons", "sim.scene.camera", "sim.scene.terrain",
+    "sim.truth.queue_detection", "sim.geometry.polygons", "sim.scene.camera", "sim.scene.standing", "sim.scene.terrain",
 )  # fmt: skip
 
 

@@ -28,6 +28,7 @@ from tracking.stats import FEWEST, SURE, mean_of_finite
 if TYPE_CHECKING:
     import pyarrow
 
+MATCHED = ", matched"  # ends the name of an oracle whose detections do not tell whose they are
 UNKNOWN = "unknown"  # Stands for the input of tracks without run.json.
 
 
@@ -52,7 +53,8 @@ class ComparedRuns:
         sequences: Names, in the order given.
         scores: By run, a list of `Scores`, one per sequence.
         inputs: By run, the tracker's inputs in words, such as "boxes (file)"; one unless they differ by sequence.
-        oracles: By input, the scores of its oracle on each sequence, None where no run got this input.
+        oracles: By input, the scores of its oracle on each sequence, None where no run got this input. The name of an
+            input ends with ", matched" if its detections do not tell whose they are.
         similarity: How people were compared in all sequences.
         blocks: For a single recording, the ranking by each score (by key), with intervals by resampling of blocks of
             frames; None if these were not computed.
@@ -224,7 +226,8 @@ def compare_one(
         given = {name: info for name, info in sorted(zip(inputs, infos, strict=True), key=lambda one: one[0]) if name}
         if not given:
             given = {"stored detections" if sequence.has_detections else "labels": {}}
-        best = {name: oracle(sequence, info, similarity) for name, info in given.items()} if oracles else {}
+        found_best = {name: oracle(sequence, info, similarity) for name, info in given.items()} if oracles else {}
+        best = {name + MATCHED * (run.info["owners"] == "matched"): run for name, run in found_best.items()}
         rows: list[SequenceOf[Tracks]] = [*best.values(), *runs]
         compared = scorer.compare(rows, similarity)
         found, drawn = [one.scores(group_match) for one in compared], None

@@ -1,9 +1,12 @@
-"""The oracle of a sequence: the detections that a tracker got, with the ids and groups of the true people they match.
+"""The oracle of a sequence: the detections that a tracker got, with the ids and groups of the people whom they show.
 
 It is the best that any tracker can report from these detections without smoothing: no false alarm, no switch, the true
 groups and events of the people who were detected. What it lacks in a score is the detector's, not the tracker's. From
-points it has the points, from boxes the boxes, whose foot points suffer where feet are hidden. From pixels it has the
-boxes of what is visible of each person, from stereo pairs the true places of those who are visible.
+points it has the points, from boxes the boxes, whose places suffer where feet are hidden. From pixels it has the boxes
+of what is visible of each person, from stereo pairs the true places of those who are visible.
+
+Simulated detections and labels tell whose they are (`Given.owners`). A detection that lies as far from its person as a
+false alarm is none of the oracle's. Detections of a recording are matched with the true people.
 """
 
 from __future__ import annotations
@@ -20,10 +23,7 @@ from sim.types import (
     EVENT_KINDS,
     Array,
     Bools,
-    Context,
     DetectionMode,
-    Detections,
-    Frame,
     GroupEvent,
     Groups,
     Ints,
@@ -33,28 +33,11 @@ from sim.types import (
     Truth,
 )
 from tracking.grouping.grouped_tracks import groups_in_frames, with_velocities
-from tracking.running.prepare import prepare
+from tracking.running.detection_mode import as_frames, as_needed, choose_mode, given_detections
 from tracking.running.run import TrackingRun
+from tracking.scoring.candidate_pairs import EPS, FOUND
 from tracking.scoring.evaluation import Scorer
-from tracking.scoring.people_comparison import Similarity, in_one_plane
-
-
-class _Detections:
-    """A tracker that reports each detection as a track of one frame: the box if it needs only boxes, else the point."""
-
-    def __init__(self, needs: tuple[str, ...]) -> None:
-        self.needs = needs
-
-    def reset(self, context: Context, seed: int) -> None:
-        pass
-
-    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        assert detections is not None, "a tracker of boxes or points gets detections"
-        pos, plane, box = detections.pos, detections.plane, detections.box
-        if self.needs == ("boxes",) and box is not None:
-            pos, plane = box[:, :2] + box[:, 2:] / 2, "image"
-        who = (np.arange(len(pos)), np.full(len(pos), -1))
-        return _tracks(frame.index, frame.t, plane, who, pos, box, detections.score)
+from tracking.scoring.people_comparison import Similarity
 
 
 def _tracks(
@@ -69,40 +52,55 @@ def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity 
     """Returns the oracle's tracks of a sequence with truth.
 
     given: the content of a run's run.json, of which detections, input, sensor and seed say what input the oracle gets.
-    similarity: how detections are matched with true people; None: by the data.
+    similarity: how detections are compared with true people; None: by the data. `info["owners"]` of the result is
+    "known", or "matched" if the data do not tell whose the detections are.
     """
     truth, mode = _truth(sequence), _mode(sequence, given)
+    named, known = _named(sequence, given, similarity)
     info = {"tracker": "oracle", "detections": mode, "sensor": given.get("sensor") or {}}
-    people = [_rows(t, t.id >= 0) for t in named_detections(sequence, given, similarity)]
-    return TrackingRun(_with_groups_and_events(with_velocities(people, truth.fps), truth), info)
+    people = [_rows(t, t.id >= 0) for t in named]
+    tracks = _with_groups_and_events(with_velocities(people, truth.fps), truth)
+    return TrackingRun(tracks, {**info, "owners": "known" if known else "matched"})
 
 
 def named_detections(
     sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None = None
 ) -> list[Tracks]:
     """Returns a run's input as tracks with the ids and groups of the true people that it shows, one `Tracks` per frame.
-    The arguments are as in `oracle`. False alarms have ids below 0 and the group -1."""
+    The arguments are as in `oracle`. False alarms, and detections far from their person, have ids below 0 and the group
+    -1."""
+    return _named(sequence, given, similarity)[0]
+
+
+def _named(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None) -> tuple[list[Tracks], bool]:
     truth, mode = _truth(sequence), _mode(sequence, given)
     if mode == "image":
-        return [_visible(truth, index, given.get("input") == "stereo") for index in range(1, truth.length + 1)]
+        places = given.get("input") == "stereo"
+        return [_visible(truth, index, places) for index in range(1, truth.length + 1)], True
     seed = (given.get("seed") or 0) if given.get("sensor") else 0  # without errors it only shuffles the detections
-    boxes = given.get("input") == "boxes" and sequence.camera is not None  # without a camera boxes have no foot points
-    needs = ("boxes",) if boxes else ("boxes", "points")
-    prepared = prepare(_Detections(needs), sequence, detections=mode, sensor=given.get("sensor"), seed=seed)
-    prepared.reset(seed)
-    reported = [prepared.tracker.step(f, f.detections) for f in prepared.frames() if f.index <= truth.length]
-    scorer = Scorer(truth)
-    # Boxes are moved first: then they are matched with the true places, with which trackers on the ground are compared.
-    moved, _ = in_one_plane(scorer.truth, [reported], [None], similarity)
-    (compared,) = scorer.compare(moved, similarity, None)
-    sides, true = compared.sides, compared.sides.true
+    needs = ("boxes",) if given.get("input") == "boxes" else ("boxes", "points")
+    choose_mode(needs, sequence, mode)
+    every = given_detections(mode, sequence, given.get("sensor") or {}, seed, owned=True)
+    seen = as_needed(every, needs, mode, sequence)
+    reported = [
+        _tracks(f.index, f.t, d.plane, (np.arange(len(d.pos)), np.full(len(d.pos), -1)), d.pos, d.box, d.score)
+        for f in as_frames(seen.detections, sequence.fps)[: truth.length] if (d := f.detections) is not None
+    ]  # fmt: skip
+    (compared,) = Scorer(truth).compare([reported], similarity, None)
+    sides, true, pairs = compared.sides, compared.sides.true, compared.people
+    mapping = sides.mapping
+    if seen.owners is not None and pairs is not None:
+        owner = np.concatenate([np.zeros(0, np.int64), *seen.owners[: truth.length]])
+        own = pairs.keep((pairs.true.id[pairs.i] == owner[pairs.j]) & (pairs.s >= FOUND - EPS))
+        mapping = np.full(len(owner), -1)
+        mapping[own.j] = own.i
     cuts = np.cumsum([0, *(len(t.id) for t in sides.tracks)]).tolist()
-    rows = [sides.mapping[a:b] for a, b in pairwise(cuts)]
     id, group = np.append(true.rows.id, -1), np.append(true.group, -1)  # the last: of nobody
-    return [
+    named = [
         t.replace(id=np.where(row >= 0, id[row], -1 - np.arange(len(row))), group=group[row])
-        for t, row in zip(sides.tracks, rows, strict=True)
+        for t, row in zip(sides.tracks, (mapping[a:b] for a, b in pairwise(cuts)), strict=True)
     ]
+    return named, seen.owners is not None
 
 
 def _truth(sequence: Sequence) -> Truth:

@@ -92,6 +92,7 @@ class Readings:
     score (R,)    in [0, 1]
     order (R,)    random, above 0 and at most 1: the detections of a frame are listed in ascending order of it, so that
                   a place in the list tells nothing
+    id (R,)       of the detected person; None: all are false alarms
     """
 
     frame: Ints
@@ -99,10 +100,12 @@ class Readings:
     box: Array | None
     score: Array
     order: Array
+    id: Ints | None = None
 
 
-def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> list[Detections]:
-    """Returns one Detections for each of the frames 1 to truth.length: true detections and false alarms together.
+def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> tuple[list[Detections], list[Ints]]:
+    """Returns one Detections for each of the frames 1 to truth.length, true detections and false alarms together, and
+    for each the ids (M,) of the detected people, -1 for a false alarm.
 
     Those of a frame are sorted by `order`, which is random. A frame without any has empty Detections. The plane is
     "ground" (positions in m) if the truth has positions, else "image" (px). Boxes are None unless `true` and `false`
@@ -112,6 +115,7 @@ def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> list[D
     order = np.lexsort((np.concatenate([true.order, false.order]), frame))
     pos = np.concatenate([true.pos, false.pos])[order]
     score = np.concatenate([true.score, false.score])[order]
+    ids = [np.full(len(r.frame), -1) if r.id is None else r.id for r in (true, false)]
     box = None if true.box is None or false.box is None else np.concatenate([true.box, false.box])[order]
     plane: Plane = "image" if truth.pos is None else "ground"
     cuts = np.searchsorted(frame[order], np.arange(1, truth.length + 2))
@@ -119,7 +123,8 @@ def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> list[D
     for k, (a, b) in enumerate(pairwise(cuts)):
         here = None if box is None else box[a:b]
         found.append(Detections(k + 1, k / truth.fps, plane, pos[a:b], None, here, score[a:b]))
-    return found
+    owners = np.concatenate(ids)[order]
+    return found, [owners[a:b] for a, b in pairwise(cuts)]
 
 
 CLOCK = 50.0  # Hz, of what lasts in the simulated detector: errors, misses, false alarms

@@ -57,6 +57,15 @@ def sense(
     Raises InputError if `sensor.hide` names a group that is not in `people`, AssertionError if the truth has neither
     positions nor boxes, ValueError for a negative seed or person id.
     """
+    return sense_owned(truth, sensor, seed, camera, image_size, repeat, people)[0]
+
+
+def sense_owned(
+    truth: Truth, sensor: Sensor, seed: int, camera: Camera | None = None, image_size: tuple[int, int] | None = None,
+    repeat: int = 0, people: Mapping[str, tuple[int, ...]] | None = None,
+) -> tuple[list[Detections], list[Ints]]:  # fmt: skip
+    """Returns the detections of `sense`, and for each frame the ids (M,) of the people whom they show, -1 for a false
+    alarm."""
     true = _true_detections(truth, sensor, seed, repeat, people or {}, camera)
     false = false_alarms(truth, sensor, seed, camera, image_size, repeat)
     return draws.detections_by_frame(true, false, truth)
@@ -83,7 +92,7 @@ def _true_detections(
         assert box is not None, "labels have positions or boxes"
         pos = box[:, :2] + box[:, 2:] / 2
     score = draws.true_scores(u[:, SCORE], truth.visibility[seen], sensor)
-    return Readings(truth.frame[seen], pos, box, score, u[:, ORDER])
+    return Readings(truth.frame[seen], pos, box, score, u[:, ORDER], truth.id[seen])
 
 
 def _displaced(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -22,7 +24,9 @@ def scene(request):
 def test_the_oracle_only_misses(scene, similarity) -> None:
     found = evaluate(scene.truth, oracle(scene, {}, similarity), similarity=similarity)
     assert found.similarity == (similarity or "ground")
-    assert (found["FP"], found["IDSW"]) == (0, 0)
+    assert found["FP"] == 0
+    # Of two people nearer to each other than the error of a detection, the scores may match it with the other.
+    assert found["IDSW"] <= 0.004 * len(scene.truth.id)
     assert similarity == "image" or found["group_IDSW"] == 0  # in the image, hulls of two groups may lie on each other
     assert 0 < found["FN"] < 0.35 * len(scene.truth.id)
     for key in ("merge_F1", "queue_F1", "cross_F1"):
@@ -71,3 +75,13 @@ def test_compare_ranks_runs_and_shows_an_oracle_for_each_input() -> None:
     for name, row in runs.items():
         expected = np.mean([evaluate(s.truth, run)["HOTA"] for s, run in zip(scenes, row, strict=True)])
         assert table["HOTA"][table["run"].index(name)] == pytest.approx(expected)
+
+
+def test_an_oracle_of_detections_without_owners_is_matched_and_says_so() -> None:
+    scene = simulate(load("split", ["camera.fps=5"]), 0)
+    recorded = replace(scene, load_owners=None)
+    for sequence, words in ((scene, ""), (recorded, ", matched")):
+        run = track("blob", sequence, detections="file")
+        found = tracking.compare([sequence], {"blob": [run]})
+        assert found.to_arrow("HOTA").to_pydict()["run"][0] == f"oracle from boxes (file){words}"
+    assert oracle(recorded, {"detections": "truth"}).info["owners"] == "known"

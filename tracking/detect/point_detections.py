@@ -157,7 +157,7 @@ class PointTracker:
     plane, "ground" or "image". All but config exist after `begin` only.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
+    needs: ClassVar[tuple[str, ...]] = ("pixels", "points", "boxes")
     config: Any
 
     def begin(self, context: Context, divide: bool) -> None:

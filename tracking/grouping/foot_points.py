@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.scene.camera import seen_ground, standing_share
+from sim.scene.standing import standing_points
 from sim.types import Array, Bools, Camera, GroupEvent, Ints, Scene, Tracks
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 from tracking.grouping.grouped_tracks import groups_in_frames, names_groups, with_groups, with_velocities
@@ -123,7 +123,7 @@ def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> l
     """Returns tracks of boxes in the image as tracks on the ground, at the points where the boxes stand. Velocities
     become nan. Groups that the tracker named are kept, with new shapes; other `groups` become None."""
     boxes = [np.zeros((0, 4)) if t.box is None else t.box for t in tracks]
-    ground = feet(np.concatenate([np.zeros((0, 4)), *boxes]), camera, scene)
+    ground = standing_points(np.concatenate([np.zeros((0, 4)), *boxes]), camera, scene)
     cuts = np.cumsum([0, *map(len, boxes)]).tolist()
     moved = [
         t.replace(
@@ -134,11 +134,6 @@ def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> l
     named = [t.groups is not None or bool((t.group >= 0).any()) for t in moved]
     every = groups_in_frames(moved) if any(named) else [None] * len(moved)
     return [t.replace(groups=groups if own else None) for t, groups, own in zip(moved, every, named, strict=True)]
-
-
-def feet(box: Array, camera: Camera, scene: Scene | None) -> Array:
-    """Returns the ground points x, y (R, 2), m, on which boxes (R, 4), px, stand; nan for a box that stands nowhere."""
-    return seen_ground(camera, box[:, :2] + box[:, 2:] * np.array([0.5, standing_share(camera)]), scene)
 
 
 def moved_events(events: Sequence[GroupEvent], id: Ints, pos: Array) -> tuple[GroupEvent, ...]:

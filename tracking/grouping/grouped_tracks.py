@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -85,11 +86,10 @@ def _has_groups(tracks: Tracks) -> bool:
 
 
 def without_groups(tracks: Sequence[Tracks]) -> list[Tracks]:
-    """Returns the tracks with groups and events removed; `Tracks` of whole groups are returned unchanged."""
-    return [
-        t if t.unit == "group" else t.replace(group=np.full(len(t.id), -1), groups=None, events=(), derived=False)
-        for t in tracks
-    ]
+    """Returns the tracks with groups and events removed, and no kind of event as the tracker's own; `Tracks` of whole
+    groups are returned unchanged."""
+    none: dict[str, Any] = {"groups": None, "events": (), "own_events": (), "derived": False}
+    return [t if t.unit == "group" else t.replace(group=np.full(len(t.id), -1), **none) for t in tracks]
 
 
 def derive(

@@ -4,7 +4,8 @@
     file   the detections stored with the sequence (det/det.txt)
     truth  the labelled positions or boxes, degraded only by the sensor settings of the command
 
-A tracker lists in `needs` what it can work with: pixels, stereo, boxes, points. It works with any one of them.
+A tracker lists in `needs` what it can work with: pixels, stereo, boxes, points. It works with any one of them, and gets
+no more than it lists: `as_needed`.
 
 Also here: detections made from the labels, for `--detections truth`: perfect, or degraded by sensor settings.
 
@@ -16,13 +17,17 @@ they tell nothing about who is who.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
+from collections.abc import Sequence as SequenceOf
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
 
 from scenarios.errors import InputError
 from sim.rng import rng
+from sim.scene.standing import standing_points
 from sim.types import DetectionMode, Detections, Frame, FrameTruth, Ints, Sequence, Truth
 from tracking.running.tracks_check import finite
 
@@ -58,33 +63,73 @@ def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
 
 def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, frames: Iterable[Frame]) -> InputKind:
     """Returns what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes" or "points". frames:
-    with the detections that the tracker gets; not used if `mode` is "image"."""
+    with the detections that the tracker gets; used only by a tracker that takes boxes and points: of detections in the
+    image it works on the boxes, of others on the points."""
     if mode == "image":
         return "pixels" if "pixels" in needs and sequence.has_images else "stereo"
+    if not {"boxes", "points"} <= set(needs):
+        return "boxes" if "boxes" in needs else "points"
     in_image = any(f.detections is not None and f.detections.plane == "image" for f in frames)
-    return "boxes" if in_image or "points" not in needs else "points"
+    return "boxes" if in_image else "points"
 
 
-def frames_with_detections(
-    needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int
-) -> tuple[Frame, ...] | None:
-    """Returns the frames with the detections of `mode` and without pictures; None if `mode` is "image".
+@dataclass(frozen=True, eq=False)
+class Given:
+    """The detections of frames 1, 2, … of a sequence, None for a frame without a detector. owners: of each frame the
+    ids (M,) of the people whom the detections show, -1 for a false alarm; None if unknown."""
 
-    sensor, seed: degrade and shuffle the detections of "truth". Raises InputError if the detections are points only,
-    but the tracker needs boxes.
+    detections: SequenceOf[Detections | None]
+    owners: SequenceOf[Ints] | None = None
+
+
+def given_detections(
+    mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int, *, owned: bool = False
+) -> Given:
+    """Returns the detections of the mode "file" or "truth". sensor, seed: degrade and shuffle those of "truth". owned:
+    whether the owners of stored detections are read, too."""
+    if mode == "truth":
+        return from_truth(sequence, sensor, seed)
+    owners = sequence.load_owners() if owned and sequence.load_owners is not None else None
+    return Given([f.detections for f in sequence.without_pictures()], owners)
+
+
+def as_needed(given: Given, needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence) -> Given:
+    """Returns the detections as a tracker with these needs gets them.
+
+    Without "boxes" among the needs they have no boxes. Without "points" their positions follow from their boxes. With a
+    camera that is where the bodies with the boxes stand on the ground; a box whose foot shows no ground is left out.
+    Without a camera it is the middle of the box. Raises InputError if the needs lack "points" and there are no boxes.
     """
-    if mode == "image":
-        return None
-    if mode == "file":
-        found: list[Detections | None] = [f.detections for f in sequence.without_pictures()]
-    else:
-        found = list(from_truth(sequence, sensor, seed))
-    nonempty = [d for d in found if d is not None and len(d.pos)]
-    if nonempty and "points" not in needs and all(d.box is None for d in nonempty):
+    if "boxes" not in needs:
+        return Given([None if d is None else d.replace(box=None) for d in given.detections], given.owners)
+    if "points" in needs:
+        return given
+    nonempty = [d for d in given.detections if d is not None and len(d.pos)]
+    if nonempty and all(d.box is None for d in nonempty):
         got, remedy = f"points alone, in {sequence.name}", "take a tracker that takes points"
         raise InputError(place=f"--detections {mode}", got=got, expected="boxes", remedy=remedy)
-    own = (None if d is None else d.copy() for d in found)  # a slice would show later frames as its base
-    return tuple(Frame(k, (k - 1) / sequence.fps, detections=d) for k, d in enumerate(own, 1))
+    boxes = [np.zeros((0, 4)) if d is None or d.box is None else d.box for d in given.detections]
+    box, camera, plane = np.concatenate([np.zeros((0, 4)), *boxes]), sequence.camera, "ground"
+    if camera is None:
+        pos, plane = box[:, :2] + box[:, 2:] / 2, "image"
+    else:
+        pos = standing_points(box, camera, sequence.scene)
+    there = np.isfinite(pos).all(axis=1) | ~np.isfinite(box).all(axis=1)  # check_detections names a box that is nan
+    cuts = list(pairwise(np.cumsum([0, *map(len, boxes)]).tolist()))
+    found = [
+        d if d is None or (d.box is None and len(d.pos)) else d.replace(
+            plane=plane, pos=pos[a:b][there[a:b]], vel=None, box=box[a:b][there[a:b]],
+            score=d.score[there[a:b]] if len(d.score) else d.score,
+        ) for d, (a, b) in zip(given.detections, cuts, strict=True)
+    ]  # fmt: skip
+    owners = given.owners
+    return Given(found, owners and [who[there[a:b]] for who, (a, b) in zip(owners, cuts, strict=True)])
+
+
+def as_frames(detections: Iterable[Detections | None], fps: float) -> tuple[Frame, ...]:
+    """Returns frames without pictures that have these detections."""
+    own = (None if d is None else d.copy() for d in detections)  # a slice would show later frames as its base
+    return tuple(Frame(k, (k - 1) / fps, detections=d) for k, d in enumerate(own, 1))
 
 
 def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:
@@ -104,26 +149,27 @@ PERFECT_SENSOR = {"detect_prob": 1.0, "clutter_rate": 0.0, "box_noise": {"scale"
 SEES_ALL = {"occlusion_power": 0.0, "min_visibility": 0.0, "small_px": 0.0}
 
 
-def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
-    """Returns an iterator over detections made from the labels, one `Detections` for each frame in order, from 1.
-    sensor: settings that degrade them, by name; {} gives the labels in random order."""
+def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Given:
+    """Returns detections made from the labels, with their owners. sensor: settings that degrade them, by name; {} gives
+    the labels in random order."""
     truth = sequence.truth
     assert truth is not None, "the mode was chosen for a source with labels"
-    if not sensor:
-        return (shuffled(perfect(truth.at(i)), seed) for i in range(1, truth.length + 1))
-    return _sensed(truth, sequence, sensor, seed)
+    if sensor:
+        return Given(*_sensed(truth, sequence, sensor, seed))
+    made = [_shuffled(*perfect(truth.at(i)), seed) for i in range(1, truth.length + 1)]
+    return Given([d for d, _ in made], [who for _, who in made])
 
 
-def shuffled(detections: Detections, seed: int) -> Detections:
-    """Returns the detections of a frame in random order; the order follows from seed, frame number and row count."""
-    d = detections  # the order of labels would tell who is who
+def _shuffled(d: Detections, owners: Ints, seed: int) -> tuple[Detections, Ints]:
+    # The order of labels would tell who is who.
     order: Ints = rng(seed, "delivery", d.index).permutation(len(d.pos))
-    vel, box = (None if a is None else a[order] for a in (d.vel, d.box))
-    return d.replace(pos=d.pos[order], vel=vel, box=box, score=d.score[order] if len(d.score) else d.score)
+    box = None if d.box is None else d.box[order]
+    return d.replace(pos=d.pos[order], box=box, score=d.score[order]), owners[order]
 
 
-def perfect(truth: FrameTruth) -> Detections:
-    """Returns the labels of a frame as detections with score 1, one row per labelled person, hidden or not.
+def perfect(truth: FrameTruth) -> tuple[Detections, Ints]:
+    """Returns the labels of a frame as detections with score 1, one row per labelled person, hidden or not, and the
+    ids of the people.
 
     Detections lie on the ground if positions are labelled, else at the centres of the boxes. If boxes are labelled, a
     person without a finite box, such as one behind the camera, has no row.
@@ -131,15 +177,18 @@ def perfect(truth: FrameTruth) -> Detections:
     seen = np.ones(len(truth.id), bool) if truth.box is None else np.isfinite(truth.box).all(axis=1)
     box, score = None if truth.box is None else truth.box[seen], np.ones(int(seen.sum()))
     if truth.pos is not None:
-        return Detections(truth.index, truth.t, "ground", truth.pos[seen], None, box, score)
+        return Detections(truth.index, truth.t, "ground", truth.pos[seen], None, box, score), truth.id[seen]
     assert box is not None, "labels have positions or boxes"
-    return Detections(truth.index, truth.t, "image", box[:, :2] + box[:, 2:] / 2, None, box, score)
+    centre = box[:, :2] + box[:, 2:] / 2
+    return Detections(truth.index, truth.t, "image", centre, None, box, score), truth.id[seen]
 
 
-def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Iterator[Detections]:
+def _sensed(
+    truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: int
+) -> tuple[list[Detections], list[Ints]]:
     from scenarios.loading.resolve import SensorFile
     from scenarios.loading.validation import validate
-    from sim.detector.sense import sense
+    from sim.detector.sense import sense_owned
     from sim.scene.visibility import with_visibility
 
     spec = validate({"sensor": PERFECT_SENSOR | SEES_ALL | _nested(sensor)}, model=SensorFile).sensor
@@ -147,7 +196,7 @@ def _sensed(truth: Truth, sequence: Sequence, sensor: Mapping[str, Any], seed: i
         truth = with_visibility(truth, sequence.image_size)
     hides_groups, load_people = any(hide.group is not None for hide in spec.hide), sequence.load_people
     people = load_people() if hides_groups and load_people is not None else {}
-    return iter(sense(truth, spec, seed, sequence.camera, sequence.image_size, people=people))
+    return sense_owned(truth, spec, seed, sequence.camera, sequence.image_size, people=people)
 
 
 def _nested(settings: Mapping[str, Any]) -> dict[str, Any]:

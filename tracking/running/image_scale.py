@@ -16,7 +16,8 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import is_number
 from sim.scene.camera import scale_of_first_boxes
-from sim.types import DetectionMode, Detections, Frame, Sequence, Tracks
+from sim.types import Detections, Sequence, Tracks
+from tracking.running.detection_mode import Given
 
 
 @dataclass(frozen=True)
@@ -57,16 +58,14 @@ def learned_by(tracker: object) -> float:
     return float(value) if is_number(value) else float("nan")
 
 
-def of_sequence(sequence: Sequence, mode: DetectionMode, frames: tuple[Frame, ...] | None) -> ImageScale:
+def of_sequence(sequence: Sequence, given: Given | None) -> ImageScale:
     """Returns the image scale that a tracker is given with a sequence; px_per_m is nan if it is unknown.
 
-    frames: the frames with the detections that the tracker gets; their boxes decide if the sequence has no scale and
-    `mode` is not "image". None takes the sequence's own frames.
+    given: all detections of the sequence; their boxes decide if the sequence has no scale. None: the tracker works on
+    pictures.
     """
     known = before_frames(sequence)
-    if np.isfinite(known.px_per_m) or mode == "image":
-        return known
-    return from_boxes(f.detections for f in (sequence.without_pictures() if frames is None else frames))
+    return known if np.isfinite(known.px_per_m) or given is None else from_boxes(given.detections)
 
 
 def before_frames(sequence: Sequence) -> ImageScale:

@@ -20,8 +20,17 @@ from scenarios.limits import INTEGER
 from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
 from tracking.config import Config
 from tracking.running import image_scale, tracker_registry
-from tracking.running.detection_mode import InputKind, check_detections, choose_mode, frames_with_detections, input_kind
+from tracking.running.detection_mode import (
+    InputKind,
+    as_frames,
+    as_needed,
+    check_detections,
+    choose_mode,
+    given_detections,
+    input_kind,
+)
 from tracking.running.image_scale import ImageScale
+from tracking.running.plane_check import PlaneCheck
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracks_check import ReportHistory, check_tracks
 from tracking.running.user_code import tracker_failed, user_code
@@ -44,6 +53,7 @@ class PreparedTracker:
     frames_given: tuple[Frame, ...] | None
     scale_frames: int = 0  # as of ImageScale
     history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
+    planes: PlaneCheck = field(default_factory=PlaneCheck)  # the same, compared with its input
 
     @property
     def input(self) -> InputKind:
@@ -70,6 +80,7 @@ class PreparedTracker:
     def reset(self, seed: int) -> None:
         """Resets the tracker for this sequence and forgets what it has reported."""
         self.history.clear()
+        vars(self.planes).update(vars(PlaneCheck()))
         with self._naming("reset()", self.sequence.name):
             self.tracker.reset(self.context, seed)
 
@@ -81,7 +92,9 @@ class PreparedTracker:
             check_detections(detections, self.tracker.needs)
         with self._naming("step()", f"{self.sequence.name}, frame {frame.index}"):
             tracks = self.tracker.step(frame, detections)
-        return check_tracks(tracks, frame.index, self.name, self.sequence.name, self.history)
+        checked = check_tracks(tracks, frame.index, self.name, self.sequence.name, self.history)
+        self.planes.check(checked, detections, self.context, self.name, self.sequence.name)
+        return checked
 
     @contextmanager
     def _naming(self, part: str, place: str) -> Iterator[None]:
@@ -116,8 +129,11 @@ def prepare(
         remedy = "add --detections truth, or leave out the sensor settings"
         place, got = "--sensor, --set sensor", f"--detections {mode}"
         raise InputError(place=place, got=got, expected="--detections truth", remedy=remedy)
-    frames = frames_with_detections(instance.needs, mode, sequence, sensor or {}, seed)
-    scale = image_scale.of_sequence(sequence, mode, frames)
+    frames = given = None
+    if mode != "image":
+        given = given_detections(mode, sequence, sensor or {}, seed)
+        frames = as_frames(as_needed(given, instance.needs, mode, sequence).detections, sequence.fps)
+    scale = image_scale.of_sequence(sequence, given)
     background = sequence.background() if mode == "image" else None
     context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
     return PreparedTracker(name, instance, config, context, mode, sequence, frames, scale.frames)

@@ -38,7 +38,6 @@ from tracking.scoring.people_comparison import (
     Similarity,
     grounded,
     in_one_plane,
-    on_feet,
     people_pairs,
     plane_of,
 )
@@ -254,11 +253,6 @@ class Scorer:
         self._groups: dict[Surface, TrueGroups] = {}
 
     @cached_property
-    def of_feet(self) -> Scorer:
-        """The scorer for tracks that were moved from boxes to the ground; true people are moved in the same way."""
-        return Scorer(on_feet(self.truth))
-
-    @cached_property
     def people(self) -> PersonRows:
         """The true people of all frames as `PersonRows`, one row per person and frame, sorted by frame."""
         return true_people(self.truth, chosen_frames(None, self.truth.length))
@@ -300,13 +294,7 @@ class Scorer:
         inside = self.scored(frames)
         ordered = [_in_order(run, inside) for run in runs]
         moved, chosen = in_one_plane(self.truth, ordered, [source_of(run) for run in runs], similarity)
-        judges = [self.judge(given, run) for given, run in zip(ordered, moved, strict=True)]
-        return [judge._matched(run, chosen, inside) for judge, run in zip(judges, moved, strict=True)]
-
-    def judge(self, given: Sequence[Tracks], moved: Sequence[Tracks]) -> Scorer:
-        """Returns the scorer for one run: `of_feet` if its tracks were moved to the ground, else this scorer. given,
-        moved: the run's tracks before and after `in_one_plane`, the same object if they were not moved."""
-        return self.of_feet if moved is not given and plane_of(self.truth, moved) == "ground" else self
+        return [self._matched(run, chosen, inside) for run in moved]
 
     def _matched(self, given: Sequence[Tracks], similarity: Similarity, inside: Bools) -> MatchedSides:
         truth = self.truth

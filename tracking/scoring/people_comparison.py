@@ -2,8 +2,8 @@
 
 Also here: what is compared: a property of the data, so that the scores of any number of runs can be laid side by side.
 
-Calibrated data (positions on the ground, or boxes and a camera) are compared on the ground, boxes by the foot points of
-both sides.
+Calibrated data (positions on the ground, or boxes and a camera) are compared on the ground, with the true positions if
+they are known. Boxes are moved to where the bodies stand that have them (`sim.scene.standing`).
 Other data are compared by overlap of boxes if everybody has one, else by position in the image. Tracks from pixels are
 never projected to the ground, as a blob's foot is no person's: with such a run, all runs of calibrated data are
 compared in the image.
@@ -16,9 +16,10 @@ from typing import Literal
 
 import numpy as np
 
+from sim.scene.standing import standing_points
 from sim.truth.group_hulls import groups_over_time
 from sim.types import Array, Tracks, Truth
-from tracking.grouping.foot_points import boxed, can_stand, completed, feet, moved_events, standing
+from tracking.grouping.foot_points import boxed, can_stand, completed, moved_events, standing
 from tracking.grouping.grouped_tracks import groups_in_frames
 from tracking.scoring.candidate_pairs import REACH, Pairs, box_pairs, point_pairs
 from tracking.scoring.group_and_event_scores import ComparedSides
@@ -64,19 +65,11 @@ def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
 
 
 def grounded(truth: Truth) -> Truth:
-    """Returns the truth with people and groups on the ground, as `on_feet`, if it has boxes and a camera but no `pos`.
-    Any other truth is returned unchanged."""
+    """Returns the truth with people where their boxes stand and groups derived there, if it has boxes and a camera but
+    no `pos`. Groups are derived only if it has groups. Any other truth is returned unchanged."""
     if truth.pos is not None or truth.box is None or truth.camera is None:
         return truth
-    return on_feet(truth)
-
-
-def on_feet(truth: Truth) -> Truth:
-    """Returns the truth with people at the ground points where their boxes stand, and groups derived there. The truth
-    must have boxes and a camera. `vel` becomes None. Groups are derived only if the truth has groups."""
-    assert truth.box is not None, "only boxes have feet"
-    assert truth.camera is not None, "only boxes of a calibrated sequence have feet on the ground"
-    pos = feet(truth.box, truth.camera, truth.scene)
+    pos = standing_points(truth.box, truth.camera, truth.scene)
     there = np.isfinite(pos).all(axis=1)
     rows = (truth.frame[there], truth.id[there], truth.group[there], pos[there], np.full_like(pos[there], np.nan))
     labelled = truth.groups is not None or truth.groups_px is not None
@@ -90,9 +83,8 @@ def in_one_plane(
     """Returns the tracks of all runs of one sequence in one plane, and the similarity of people to use for all.
 
     truth: as `grounded` returns it. sources: of each run, as `source_of` returns it. similarity: returned as it is
-    unless None, which chooses it by the data. Tracks that were moved to the ground must be compared with the truth that
-    `on_feet` returns. Raises IncomparableError if a run on the ground must be moved to the image but has no boxes of
-    people.
+    unless None, which chooses it by the data. Raises IncomparableError if a run on the ground must be moved to the
+    image but has no boxes of people.
     """
     ground = similarity == "ground"
     if similarity in (None, "boxes"):

@@ -72,7 +72,7 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     bare, source = sequence.bare, {**sequence.source, "boxes": str(path)}
     return replace(
         sequence, frames=lambda: joined(sequence.frames), bare=None if bare is None else lambda: joined(bare),
-        has_detections=True, source=source,
+        has_detections=True, load_owners=None, source=source,
     )  # fmt: skip
 
 

@@ -105,6 +105,8 @@ def sequence_files(
         files[NEVER_ARRIVES] = tables.json_list("groups", map(asdict, sequence.never_arrive))
     if found:
         files |= truth_files.detection_files(found, sequence.fps, sequence.scene)
+    if found and sequence.load_owners is not None:
+        files["gt/det_ids.txt"] = truth_files.owner_text(sequence.load_owners())
     files = dict(sorted(files.items()))
     truth = hashing.truth_hash(scenario, seed, repeat, sequence.truth)
     manifest: dict[str, Any] = {
@@ -173,6 +175,7 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         left=partial(pictures.all, "left", length) if "left" in pictures.streams else None,
         right=partial(pictures.all, "right", length) if "right" in pictures.streams else None,
         load_truth=truth if "gt/truth.parquet" in has else None,
+        load_owners=(lambda: truth_files.read_owners(folder, detections())) if "gt/det_ids.txt" in has else None,
         image_size=None if size is None else (size[0], size[1]),
         camera=read_camera(folder / "camera.json") if "camera.json" in has else None,
         scene=read_scene(folder / "scene.json") if "scene.json" in has else None,

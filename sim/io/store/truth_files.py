@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel
 
+from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.io.files import tables
 from sim.io.files.tables import (
@@ -31,6 +32,7 @@ from sim.io.files.tables import (
     read_table,
 )
 from sim.io.store import group_files
+from sim.io.store.seal import REDO
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Detections, Groups, Ints, Order, Scene, Truth
 
@@ -216,3 +218,19 @@ def read_detections(path: Path) -> list[Detections]:
         cut = (pos[a:b], None if vel is None else vel[a:b], None if box is None else box[a:b], score[a:b])
         found.append(Detections(k + 1, k / facts.fps, facts.plane, *cut))
     return found
+
+
+def owner_text(owners: list[Ints]) -> bytes:
+    """Returns gt/det_ids.txt: for each row of det.txt the frame and the id of the person whom it shows, -1 for none."""
+    return "".join(f"{k},{id}\n" for k, ids in enumerate(owners, 1) for id in ids.tolist()).encode()
+
+
+def read_owners(folder: Path, detections: list[Detections]) -> list[Ints]:
+    """Returns the ids (M,) in a det_ids.txt of the people whom the detections of each frame show, -1 for none."""
+    path, counts = folder / "gt" / "det_ids.txt", [len(d.pos) for d in detections]
+    rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+    frame = np.repeat(np.arange(1, len(counts) + 1), counts)
+    if [row[0] for row in rows] != [str(k) for k in frame.tolist()] or any(len(row) != 2 for row in rows):
+        got, expected = f"{len(rows)} rows", f"frame,id for each of the {len(frame)} rows of det.txt"
+        raise InputError(file=path, got=got, expected=expected, remedy=REDO)
+    return np.split(np.array([row[1] for row in rows], dtype=np.int64), np.cumsum(counts)[:-1])

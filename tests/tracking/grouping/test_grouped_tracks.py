@@ -4,11 +4,14 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from scenarios.loading.resolve import load
 from sim.io.formats.labelled_truth import labelled_truth_fields
+from sim.sequence import simulate
 from sim.types import GroupEvent, Groups, Tracks
 from tests.reference_sense import paced
 from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.grouping.link_rule import LinkRule
+from tracking.running.run import TrackingRun, group, track
 
 FPS = 10.0
 # Whose times follow from the paths by hand.
@@ -218,3 +221,13 @@ def test_a_kind_that_is_told_is_not_derived_but_the_others_are():
     for told, kinds in ((merge, ["merge", "cross"]), (cross, ["cross"]), (queue, ["queue", "cross"])):
         given = [t.replace(events=(told,) if t.index == 6 else (), derived=False) for t in named]
         assert [e[1] for e in events(with_groups(given, FPS, 1.0))] == kinds
+
+
+def test_groups_of_a_run_are_found_anew_also_where_the_tracker_reported_events_itself() -> None:
+    """The same run without groups and events of its own has the same groups and events."""
+    sequence = simulate(load("merge"), 0)
+    own = [t.replace(own_events=("merge", "split"), events=()) for t in track("blob", sequence, detections="truth")]
+    bare = [t.replace(group=np.full(len(t.id), -1), groups=None, own_events=(), derived=False) for t in own]
+    found, expected = (group(sequence, TrackingRun(tuple(run), {"input": "boxes"})) for run in (own, bare))
+    assert repr([t.events for t in found]) == repr([t.events for t in expected])
+    assert {"merge"} <= {e.kind for t in found for e in t.events}

@@ -78,7 +78,7 @@ def demo(options: DemoOptions) -> CommandResult:
     sequences, scenes = [open_source(folder)[0] for folder in folders], open_source(rendered)
     given: dict[str, dict[str, list[TrackingRun]]] = {"points": {}, "boxes": {}, "pixels": {}}
     for job in sorted(runs, key=lambda job: trackers.index(job.tracker)):
-        of_boxes = "boxes" in tracker_registry.find(job.tracker).needs
+        of_boxes = "points" not in tracker_registry.find(job.tracker).needs
         given["pixels" if job.overlay else "boxes" if of_boxes else "points"][job.tracker] = runs[job]
     parts, cells = list[str](), list[list[str]]()
     for word, found in given.items():

@@ -26,7 +26,7 @@ from tracking.app.commands.score_tables import (
     number,
     table,
 )
-from tracking.comparison import ComparedRuns, ComparedSequence, joined
+from tracking.comparison import MATCHED, ComparedRuns, ComparedSequence, joined
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import FEWEST, SURE, mean_of_known
 
@@ -151,6 +151,8 @@ def _last_lines(every: RankedRuns) -> Iterable[str]:
     match = next(iter(c.scores.values()))[0].group_match
     yield f"people compared by {SIMILARITY[c.similarity]}, groups by {GROUP_MATCH[match]}"
     yield "oracle: true ids on the same input, without false alarms"
+    if any(name.endswith(MATCHED) for name in c.oracles):
+        yield "matched: the detections do not tell whose they are, so that they count for the people nearest to them"
 
 
 def _ranking_table(every: RankedRuns) -> str:

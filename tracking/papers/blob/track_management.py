@@ -33,11 +33,11 @@ import numpy as np
 
 from sim.scene.body import PERSON_HEIGHT
 from sim.scene.camera import project
+from sim.scene.standing import standing_points
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Camera, Context, Ints
 from tracking.detect.person_size import upright
 from tracking.filters import assignment, existence, kalman, track_uncertainty
-from tracking.grouping.foot_points import feet
 from tracking.papers.blob import box_geometry, person_look_kernels
 from tracking.papers.blob.config import BlobConfig
 
@@ -235,7 +235,7 @@ class TrackedPeople:
         new = np.flatnonzero(np.isnan(self.stand).any(1))
         if not len(new):
             return
-        ground = feet(box_geometry.ltwh_from_centred(box[new]), camera, self.context.scene)
+        ground = standing_points(box_geometry.ltwh_from_centred(box[new]), camera, self.context.scene)
         if camera.kind == "pinhole":  # just below the horizon feet say little: the height of a box says how far at most
             away, most = ground - camera.position[:2], camera.focal_px[1] * PERSON_HEIGHT / box[new, 2]
             far = np.hypot(*away.T)

@@ -156,7 +156,7 @@ class GroupPda:
     since the last observed frame, and from the one before to it. All but config exist after `reset` only.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("pixels", "points")
+    needs: ClassVar[tuple[str, ...]] = ("pixels", "points", "boxes")
     config_class: ClassVar[type[GroupPdaConfig]] = GroupPdaConfig
 
     def __init__(self, config: GroupPdaConfig | None = None) -> None:

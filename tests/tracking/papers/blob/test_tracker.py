@@ -249,7 +249,7 @@ def test_reports_on_the_ground_where_the_camera_is_known(camera, high):
 
 
 def test_places_on_the_ground_are_steadier_than_feet_of_boxes():
-    from tracking.grouping.foot_points import feet
+    from sim.scene.standing import standing_points
     from tracking.papers.blob import box_geometry
     from tracking.papers.blob.track_management import seen_boxes
 
@@ -258,7 +258,7 @@ def test_places_on_the_ground_are_steadier_than_feet_of_boxes():
     box = np.insert(seen_boxes(camera, path, np.zeros(len(path))), 3, 20, axis=1)
     box[:, 1:3] += box[:, 2:3] * r.normal(0, [0.05, 0.09], (60, 2))
     frames = run(box_geometry.ltwh_from_centred(box), context=Context(FPS, 30.0, camera, None, camera.image))
-    pos, below = np.array([(t.pos[0], feet(t.box, camera, None)[0]) for t in frames])[20:, :, 1].T
+    pos, below = np.array([(t.pos[0], standing_points(t.box, camera)[0]) for t in frames])[20:, :, 1].T
     assert np.std(np.diff(pos, 2)) < 0.4 * np.std(np.diff(below, 2))
 
 

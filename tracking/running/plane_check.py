@@ -1,0 +1,163 @@
+"""Finds trackers whose answers are in another unit than they say: px as metres, metres as px, corners as sizes.
+
+Such answers are hardly ever near what the tracker was given. So each row of the first answers is compared with the
+detections of its frame, and its box with its position. The check ends as soon as a few rows, and half of all, fit; it
+costs nothing afterwards. It fails if hardly any of the first rows fits.
+
+A row fits if
+- its position lies on the ground near the detections of the frames so far (GROUND), or in the image at most a person's
+  height from a detection; without a camera, positions on the ground are not the px of detections,
+- its box overlaps that of a detection, if both have boxes,
+- its box is of a person at its position, if a camera is known; in the image, its position lies in its box,
+- its position is in the picture or near it, if a tracker of pictures is on the ground before a camera.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from scenarios.errors import WorkError
+from sim.scene.body import PERSON_HEIGHT, person_boxes
+from sim.scene.camera import project
+from sim.scene.standing import standing_points
+from sim.scene.terrain import height_at
+from sim.types import Array, Bools, Context, Detections, Tracks
+
+FITTING, COMPARED = 3, 12  # rows that end the check, and rows of which hardly any may be wrong
+SHARE = 0.2  # of the rows compared that must fit
+GROUND = 20.0  # m: how far from the detections a person may be
+OVERLAP = 0.05  # least IoU of boxes that show one person
+VIEW = 1.0  # widths and heights of the picture by which a person may be outside it
+
+
+@dataclass
+class PlaneCheck:
+    """The comparison of a tracker's first answers with its input in one sequence.
+
+    State: compared, fitting, numbers of rows; low, high (2,): corners of the detections on the ground so far, m.
+    """
+
+    compared: int = 0
+    fitting: int = 0
+    low: Array = field(default_factory=lambda: np.full(2, np.inf))
+    high: Array = field(default_factory=lambda: np.full(2, -np.inf))
+
+    def check(self, t: Tracks, given: Detections | None, context: Context, tracker: str, sequence: str) -> None:
+        """Compares the answer of a frame. Raises WorkError if the answers so far lie elsewhere than they say."""
+        if not len(t.id) or self.fitting >= max(FITTING, self.compared / 2):
+            return
+        fits = self._fits(t, given, context)
+        if fits is None:
+            return
+        self.compared += len(fits)
+        self.fitting += int(fits.sum())
+        if self.compared >= COMPARED and self.fitting < SHARE * self.compared:
+            place, got = f"{sequence}, frame {t.index}", _words(t, int(np.argmin(fits)))
+            remedy = (
+                "report what is tracked in px by Tracks.of_boxes (left, top, width, height) or with "
+                'plane="image", and what is tracked in m with plane="ground"'
+            )
+            raise WorkError(file=tracker, place=place, got=got, expected=self._expected(t, given), remedy=remedy)
+
+    def _fits(self, t: Tracks, given: Detections | None, context: Context) -> Bools | None:
+        every = [self._near(t, given, context), _as_given(t, given), _of_a_person(t, context)]
+        known = [fits for fits in every if fits is not None]
+        return np.logical_and.reduce(known) if known else None
+
+    def _near(self, t: Tracks, given: Detections | None, context: Context) -> Bools | None:
+        if given is None:
+            return None if t.plane == "image" else _in_view(t, context)
+        if t.plane == "image":
+            return _at_centres(t, given, context)
+        points = given.pos[:, :2]
+        if given.plane == "image":
+            if context.camera is None:  # the tracker may know the ground, but px are none of it
+                copied = _at_centres(t, given, context)
+                return None if copied is None else ~copied
+            if given.box is None:
+                return None
+            points = standing_points(given.box, context.camera, context.scene)
+        points = points[np.isfinite(points).all(axis=1)]
+        self.low, self.high = np.vstack([points, self.low]).min(axis=0), np.vstack([points, self.high]).max(axis=0)
+        if not np.isfinite(self.low).all():
+            return None
+        pos = t.pos[:, :2]
+        return np.asarray(((pos > self.low - GROUND) & (pos < self.high + GROUND)).all(axis=1))
+
+    def _expected(self, t: Tracks, given: Detections | None) -> str:
+        if t.plane != "image" and np.isfinite(self.low).all():
+            (x, y), (far_x, far_y) = self.low, self.high
+            return f"people in m near the detections, which lie at x {x:.1f} to {far_x:.1f}, y {y:.1f} to {far_y:.1f}"
+        if given is not None and given.box is not None and len(given.box):
+            return (
+                f"boxes like the detections', such as {_box(given.box[0])}, and positions in m or px as the plane says"
+            )
+        return "people where the camera sees them, boxes and positions that agree"
+
+
+def _at_centres(t: Tracks, given: Detections, context: Context) -> Bools | None:
+    """Returns which rows lie at most a person's height, px, from the middle of a detection in the image."""
+    tall = context.px_per_m * PERSON_HEIGHT
+    if given.box is not None:
+        centre, tall = given.box[:, :2] + given.box[:, 2:] / 2, float(given.box[:, 2:].max(initial=0.0))
+    elif given.plane == "image":
+        centre = given.pos
+    elif context.camera is not None:
+        points = given.pos[:, :2]
+        centre, _ = project(context.camera, np.column_stack([points, np.full(len(points), PERSON_HEIGHT / 2)]))
+        centre = centre[np.isfinite(centre).all(axis=1)]
+    else:
+        return None
+    if not len(centre) or np.isnan(tall):
+        return None
+    return np.asarray(np.abs(t.pos[:, None, :2] - centre).max(axis=2).min(axis=1) <= tall)
+
+
+def _as_given(t: Tracks, given: Detections | None) -> Bools | None:
+    if t.box is None or t.unit == "group" or given is None or given.box is None or not len(given.box):
+        return None
+    return np.asarray(_iou(t.box[:, None], given.box).max(axis=1) >= OVERLAP)
+
+
+def _of_a_person(t: Tracks, context: Context) -> Bools | None:
+    if t.box is None or t.unit == "group":
+        return None
+    if t.plane == "image":
+        away = np.abs(t.pos - t.box[:, :2] - t.box[:, 2:] / 2)
+        return np.asarray((away <= np.maximum(t.box[:, 2:], 1)).all(axis=1))
+    camera, n = context.camera, len(t.id)
+    if camera is None:
+        return None
+    xy = t.pos[:, :2]
+    z = np.zeros(n) if context.scene is None else height_at(context.scene, xy)
+    body = person_boxes(camera, np.column_stack([xy, z]), np.zeros(n), np.full(n, PERSON_HEIGHT))
+    return np.asarray(np.nan_to_num(_iou(t.box, body)) >= OVERLAP)
+
+
+def _in_view(t: Tracks, context: Context) -> Bools | None:
+    if context.camera is None:
+        return None
+    z = t.pos[:, 2] if t.plane == "space" else np.zeros(len(t.id))
+    uv, _ = project(context.camera, np.column_stack([t.pos[:, :2], z]))
+    size = np.array(context.camera.image)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(((uv >= -VIEW * size) & (uv <= (1 + VIEW) * size)).all(axis=1))
+
+
+def _iou(a: Array, b: Array) -> Array:
+    low, high = np.maximum(a[..., :2], b[..., :2]), np.minimum(a[..., :2] + a[..., 2:], b[..., :2] + b[..., 2:])
+    common = np.prod(np.maximum(high - low, 0), axis=-1)
+    return np.asarray(common / np.maximum(a[..., 2:].prod(-1) + b[..., 2:].prod(-1) - common, 1e-12))
+
+
+def _words(t: Tracks, row: int) -> str:
+    unit = "px" if t.plane == "image" else "m"
+    at = ", ".join(f"{v:.1f}" for v in t.pos[row])
+    box = "" if t.box is None else f" with the box {_box(t.box[row])}"
+    return f'plane "{t.plane}", {t.unit} {t.id[row]} at {at} {unit}{box}; so all {t.unit}s so far'
+
+
+def _box(box: Array) -> str:
+    return ", ".join(f"{v:.4g}" for v in box)
