@@ -18,6 +18,7 @@ from sim.arrays import Frozen
 from sim.arrays import Image as Image
 from sim.arrays import Ints as Ints
 from sim.arrays import no_ids as no_ids
+from sim.never_arrives import NeverArrives
 
 Plane = Literal["ground", "space", "image"]
 Unit = Literal["person", "group"]
@@ -275,28 +276,6 @@ class Order:
     after: tuple[tuple[int, ...], ...]
     time: float | None = None
     event: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class NeverArrives:
-    """A group of a simulated crowd that does not reach its goal, as in gt/never_arrives.json. group: its name in the
-    script. people: ids of its members. pos, goal: their mean place at the end, and the point that they do not reach, x,
-    y in m. no_way: True if walls and pillars leave a body no way; False if the group stood in the last 10 s. obstacle:
-    in words, what is in the straight way."""
-
-    group: str
-    people: tuple[int, ...]
-    pos: tuple[float, float]
-    goal: tuple[float, float]
-    no_way: bool
-    obstacle: str
-
-    @property
-    def words(self) -> str:
-        """The finding in one line."""
-        ways = {True: "a body of 0.4 m has no way", False: "it stood to the end on the way"}
-        places = f"from {list(self.pos)} to its goal {list(self.goal)}"
-        return f"group {self.group} never arrives: {ways[self.no_way]} {places}; in the way: {self.obstacle}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

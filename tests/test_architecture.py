@@ -156,8 +156,8 @@ DRAWS = {
 
 # Of scipy only what adds and compares, or proposes.
 WITHOUT_ARITHMETIC = {
-    "scipy.optimize.linear_sum_assignment", "scipy.sparse.coo_array", "scipy.sparse.csgraph.connected_components",
-    "scipy.sparse.csgraph.dijkstra", "scipy.spatial.cKDTree",
+    "scipy.ndimage.label", "scipy.optimize.linear_sum_assignment", "scipy.sparse.coo_array",
+    "scipy.sparse.csgraph.connected_components", "scipy.sparse.csgraph.dijkstra", "scipy.spatial.cKDTree",
 }  # fmt: skip
 
 

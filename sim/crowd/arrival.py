@@ -60,7 +60,8 @@ def _part(parts: Ints, point: Array) -> int:
         free = np.argwhere(parts > 0)
         if not len(free):
             return 0
-        k = free[np.argmin(((free - k) ** 2).sum(axis=1))]
+        away = free - k
+        k = free[np.argmin((away * away).sum(axis=1))]
     return int(parts[tuple(k)])
 
 

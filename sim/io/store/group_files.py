@@ -26,7 +26,8 @@ from scenarios.reading import is_present
 from sim.io.files import tables
 from sim.io.files.numeric_text import is_number_text, read_number, read_rows, read_text, whole_or_number
 from sim.io.files.tables import AXES, EXTENT, Count, FrameNumber, Id, Number, Pair, StoredTable, along, validated
-from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, NeverArrives, Order
+from sim.never_arrives import NeverArrives
+from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
 NEVER_ARRIVES = "gt/never_arrives.json"

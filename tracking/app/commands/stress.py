@@ -311,9 +311,5 @@ def _ends_words(point: Mapping[str, Any], more: str = "") -> str:
     if point["at"] is None:
         return "–"
     known = sorted(v for v in (point["low"], point["high"]) if v is not None)
-    ends = (
-        f"{known[0]:.3g} to {known[1]:.3g}{more}"
-        if len(known) == 2
-        else "its interval is not known: play more episodes"
-    )
+    ends = f"{known[0]:.3g} to {known[1]:.3g}{more}" if len(known) == 2 else "its interval is not known"
     return f"{point['at']:.3g} ({ends})"
