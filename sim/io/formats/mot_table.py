@@ -265,11 +265,23 @@ def _meanings(text: TextRows, names: list[str], times: bool, classes: bool) -> d
 
 def _columns(text: TextRows, names: list[str], found: dict[str, int]) -> tuple[NumericTable, dict[str, Column], bool]:
     """Returns the rows, their columns by meaning, and True if times are dates, in s. Words of ids are numbered."""
-    cells = {meaning: text.words(found[meaning], first=1) for meaning in ("id", "group", "time") if meaning in found}
-    worded = {meaning: each for meaning, each in cells.items() if not are_numbers(each)}
-    numeric = {meaning: k for meaning, k in found.items() if meaning not in worded}
-    layout = "those that the first line names"
-    rows = text.numbers((len(names),), first=1, layout=layout, use=list(numeric.values()))
+    layout, worded = "those that the first line names", dict[str, list[str]]()
+
+    def read() -> NumericTable:
+        use = [k for meaning, k in found.items() if meaning not in worded]
+        return text.numbers((len(names),), first=1, layout=layout, use=use)
+
+    try:
+        rows = read()
+    except InputError:
+        cells = {
+            meaning: text.words(found[meaning], first=1) for meaning in ("id", "group", "time") if meaning in found
+        }
+        worded |= {meaning: each for meaning, each in cells.items() if not are_numbers(each)}
+        if not worded:
+            raise
+        rows = read()
+    numeric = [meaning for meaning in found if meaning not in worded]
     column: dict[str, Column] = dict(zip(numeric, rows.values.T, strict=False))
     for meaning in worded.keys() - {"time"}:
         column[meaning], known = numbered(rows, worded[meaning], meaning)
