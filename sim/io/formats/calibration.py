@@ -33,6 +33,8 @@ from sim.types import Array, Camera
 
 MM = 1000.0  # per m
 YAML = (".yml", ".yaml")
+OWN = ("kind", "image", "focal_px", "centre_px")  # keys of camera.json
+FORMS = f"Tsai's XML, OpenCV's K or P1 and P2, or a camera.json with {', '.join(OWN)}, rotation, position"
 PARTS = {
     "Geometry": ("width", "height", "dpx", "dpy"),
     "Intrinsic": ("focal", "kappa1", "cx", "cy", "sx"),
@@ -57,6 +59,8 @@ def read_tsai(path: Path) -> Camera:
 
 def _values(path: Path) -> dict[str, float]:
     root = xml_root(path, "Tsai's calibration as XML, or a camera.json", "check --camera")
+    if all(root.find(part) is None for part in PARTS):
+        raise _wrong(path, "", f"<{root.tag}>", FORMS, "write its numbers as a camera.json")
     found = {}
     for part, name in ((part, name) for part, names in PARTS.items() for name in names):
         element = root.find(part)
@@ -186,7 +190,11 @@ def _reader(path: Path) -> Callable[[Path], Camera]:
         return read_opencv
     keys = {name for key, (_, others) in KEYS.items() for name in (key, *others)} - {"rotation", "position"}
     document = parse_json(read_text(path, JSON_BYTES), path, "give a camera.json")
-    return read_opencv if isinstance(document, dict) and not keys.isdisjoint(document) else read_camera
+    if isinstance(document, dict) and not keys.isdisjoint(document):
+        return read_opencv
+    if isinstance(document, dict) and document.keys().isdisjoint(OWN):
+        raise _wrong(path, "", f"the keys {', '.join(document)}"[:100], FORMS, "write its numbers as a camera.json")
+    return read_camera
 
 
 def scaled_to_image(

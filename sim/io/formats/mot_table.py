@@ -24,7 +24,7 @@ from scenarios.errors import InputError
 from sim.arrays import repeated_ids
 from sim.io.files.numeric_text import CORRECT, NAME_THEM, NumericTable, TextRows, is_number_text, read_rows
 from sim.io.formats.options import BoxScale
-from sim.io.formats.worded_cells import TIME_UNITS, are_numbers, in_seconds, instants, numbered_ids
+from sim.io.formats.worded_cells import TIME_UNITS, are_numbers, in_seconds, instants, numbered
 from sim.types import LENGTH_UNITS, Array, Bools, Ints
 
 ENOUGH = 10  # rows that are needed to judge by how their columns vary
@@ -188,7 +188,7 @@ FramesAt = Callable[[Column, Column], Ints]  # frames (N,) from 1 of times (N,),
 
 NUMBER_THEM = "write numbers of frames in a column frame: (time - time of frame 1) × frames per second + 1, times in s"
 
-SECONDS = "if the frames are times, name their column t in the first line; or number frames from 1"
+SECONDS = "if the frames are times, name their column t in the first line; else number frames 1, 2, 3, …"
 
 EMPTY = 100  # A text with people in fewer than one of so many frames may have times for frames.
 
@@ -265,15 +265,27 @@ def _meanings(text: TextRows, names: list[str], times: bool, classes: bool) -> d
 
 def _columns(text: TextRows, names: list[str], found: dict[str, int]) -> tuple[NumericTable, dict[str, Column], bool]:
     """Returns the rows, their columns by meaning, and True if times are dates, in s. Words of ids are numbered."""
-    cells = {meaning: text.words(found[meaning], first=1) for meaning in ("id", "time") if meaning in found}
-    worded = {meaning: each for meaning, each in cells.items() if not are_numbers(each)}
-    numeric = {meaning: k for meaning, k in found.items() if meaning not in worded}
-    layout = "those that the first line names"
-    rows = text.numbers((len(names),), first=1, layout=layout, use=list(numeric.values()))
+    layout, worded = "those that the first line names", dict[str, list[str]]()
+
+    def read() -> NumericTable:
+        use = [k for meaning, k in found.items() if meaning not in worded]
+        return text.numbers((len(names),), first=1, layout=layout, use=use)
+
+    try:
+        rows = read()
+    except InputError:
+        cells = {
+            meaning: text.words(found[meaning], first=1) for meaning in ("id", "group", "time") if meaning in found
+        }
+        worded |= {meaning: each for meaning, each in cells.items() if not are_numbers(each)}
+        if not worded:
+            raise
+        rows = read()
+    numeric = [meaning for meaning in found if meaning not in worded]
     column: dict[str, Column] = dict(zip(numeric, rows.values.T, strict=False))
-    if "id" in worded:
-        column["id"], known = numbered_ids(rows, worded["id"])
-        rows = replace(rows, names=known)
+    for meaning in worded.keys() - {"time"}:
+        column[meaning], known = numbered(rows, worded[meaning], meaning)
+        rows = replace(rows, names=known) if meaning == "id" else rows
     if "time" in worded:
         column["time"] = instants(rows, worded["time"])
     return rows, column, "time" in worded
@@ -437,7 +449,7 @@ def table_of_rows(
     last, seen = int(frame.max(initial=0)), len(np.unique(frame))
     if last >= EMPTY * max(seen, ENOUGH):
         said = f"people are in {seen} of {last} frames, the last in {rows.unit} {rows.line[frame.argmax()]}"
-        warnings.warn(f"{rows.file}: {said}: number frames 1, 2, 3, …; {SECONDS}", stacklevel=4)
+        warnings.warn(f"{rows.file}: {said}: {SECONDS}", stacklevel=4)
     flat, boxed = (table.box[:, 2:] <= 0).any(axis=1), ~table.without_box()
     rows.reject(flat & boxed if boxless else flat, "boxes with width and height above 0", CORRECT)
     if box_scale is not None:

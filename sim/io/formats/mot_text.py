@@ -90,8 +90,8 @@ def require_metres(table: MotTable, fps: float) -> None:
     if len(speed) >= ENOUGH and np.median(speed) > FAST:
         raise InputError(
             file=table.rows.file, place="columns x, y", got=f"half of the steps faster than {np.median(speed):.3g} m/s",
-            expected="positions in m", remedy="if they are in cm or mm, name them x_cm,y_cm or x_mm,y_mm in the first "
-            f"line, as frame,id,x_cm,y_cm; pixels need boxes; else correct --fps, here {fps:g}",
+            expected="positions in m", remedy="if they are in cm, mm or px, name them x_cm,y_cm, x_mm,y_mm or x_px,y_px"
+            f" (with --px-per-m) in the first line, as frame,id,x_cm,y_cm; else correct --fps, here {fps:g}",
         )  # fmt: skip
 
 

@@ -79,19 +79,21 @@ def _instant(rows: NumericTable, k: int, cell: str) -> float:
     return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp()
 
 
-def numbered_ids(rows: NumericTable, cells: Sequence[str]) -> tuple[Array, tuple[tuple[int, str], ...]]:
-    """Returns ids (N,) in place of words, and the number and word of each; warns of it.
+def numbered(rows: NumericTable, cells: Sequence[str], what: str) -> tuple[Array, tuple[tuple[int, str], ...]]:
+    """Returns ids or groups (N,) in place of words, and the number and word of each; warns of it.
 
-    ped7 is 7 if each word ends in a number of its own; else words are numbered 1, 2, 3, … as they first appear. Raises
-    InputError for an empty cell.
+    ped7 is 7 if each word ends in a number of its own; else words are numbered 1, 2, 3, … as they first appear. -1
+    stays so. Raises InputError for an empty cell. what: "id" or "group".
     """
     if not all(cells):
-        place = f"line {rows.line[cells.index('')]}"
-        raise InputError(file=rows.file, place=place, got="no id", expected="an id in each line", remedy="add it")
-    words = list(dict.fromkeys(cells))
+        place, expected = f"line {rows.line[cells.index('')]}", f"one {what} in each line, or -1 for none"
+        raise InputError(file=rows.file, place=place, got=f"no {what}", expected=expected, remedy="add it")
+    words = [word for word in dict.fromkeys(cells) if word != "-1"]
     ends = [int(end[0]) if (end := re.search("[0-9]{1,15}$", word)) else LARGEST for word in words]
     own = len(set(ends)) == len(ends) and max(ends) < LARGEST
     number = dict(zip(words, ends if own else range(1, len(words) + 1), strict=True))
     shown = ", ".join(f"{word} as {id}" for word, id in list(number.items())[:SHOWN]) + ", …" * (len(words) > SHOWN)
-    warnings.warn(f"{rows.file}: ids in words are numbered: {shown}", stacklevel=5)
-    return np.array([number[cell] for cell in cells], np.float64), tuple((id, word) for word, id in number.items())
+    warnings.warn(f"{rows.file}: {what}s in words are numbered: {shown}", stacklevel=5)
+    return np.array([number.get(cell, -1) for cell in cells], np.float64), tuple(
+        (id, word) for word, id in number.items()
+    )

@@ -162,6 +162,17 @@ def test_a_calibration_without_a_place_names_the_keys_to_add(tmp_path, name):
     assert read_calibration(as_json({**BARE[name], **POSE})(tmp_path / name)).focal_px == (520, 510)
 
 
+@pytest.mark.parametrize(
+    ("name", "text"), [("a.json", '{"intrinsics": [1, 2]}'), ("a.xml", "<chunk><sensors/></chunk>")]
+)
+def test_another_form_names_those_that_are_read(tmp_path, name, text):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(
+        InputError, match=r"got (<chunk>|the keys intrinsics); expected Tsai's .* or a camera\.json with"
+    ):
+        read_calibration(tmp_path / name)
+
+
 def test_a_distorted_camera_is_refused(tmp_path):
     (tmp_path / "a.yaml").write_text(
         ROS.format(0.1) + f"rotation: {np.ravel(ROTATION).tolist()}\nposition: {POSITION}\n"

@@ -127,6 +127,15 @@ def test_ids_in_words_are_numbered_and_said(tmp_path, words, ids):
         open_source(tmp_path / "a.csv")
 
 
+def test_groups_in_words_are_numbered(tmp_path):
+    rows = "".join(
+        f"{f},{p},{f / 50 + p},{p},{g}\n" for f in (1, 2) for p, g in enumerate(("family", "family", "-1", "A", "A"))
+    )
+    with pytest.warns(UserWarning, match="groups in words are numbered: family as 1, A as 2"):
+        truth = opened(tmp_path, "frame,id,x,y,group\n" + rows).truth
+    assert truth.group.tolist() == [1, 1, -1, 2, 2] * 2
+
+
 @pytest.mark.filterwarnings("ignore:.*columns that are not used. width, length")
 @pytest.mark.parametrize("names", ["x,y", "xCenter,yCenter", "cx,cy"])
 def test_a_position_beside_a_lone_width(tmp_path, names):
