@@ -14,8 +14,8 @@ second also without the boxes that it predicts of hidden people, which most peer
 real: PETS09-S2L1-first200, TUD-Campus and AVG-TownCentre-first225 with their det/det.txt: one recording each, so
 indicative. The parameters are those tuned on simulated scenes.
 rates: HOTA with defaults, mean of RATED, over the frame rate and the probability of detection; with --chart a picture.
-speed: CPU time of a step, in ms per frame, of one thread, after a warm-up; the best of three rounds. Stone Soup once, on
-20 squares alone.
+speed: CPU time of a step, in ms per frame, of one thread, after a warm-up; the best of three rounds. Stone Soup
+once, on 20 squares alone.
 """
 
 from __future__ import annotations
