@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from tracking.running.detection_mode import InputKind, check_detections, choose_
 from tracking.running.image_scale import ImageScale
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracks_check import ReportHistory, check_tracks
+from tracking.running.used_files import inside, owner_of
 from tracking.running.user_code import tracker_failed, user_code
 
 # A config, parameter values by name, the name of a preset, the path of a TOML file, or None for the defaults.
@@ -86,7 +88,10 @@ class PreparedTracker:
     @contextmanager
     def _naming(self, part: str, place: str) -> Iterator[None]:
         try:
-            with user_code(lambda error: tracker_failed(self.name, part, place, error)):
+            with (
+                user_code(lambda error: tracker_failed(self.name, part, place, error)),
+                inside(owner_of(type(self.tracker).__module__)),
+            ):
                 yield
         except FlockscopeError as error:
             path = self.sequence.source.get("path", self.sequence.name)
@@ -138,7 +143,8 @@ def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) 
         remedy = "leave the parameters out, or give the class a config_class (docs/guides/your-own-tracker.md)"
         raise InputError(place="params", got=name, expected="a tracker with parameters", remedy=remedy)
     config = None if kind is None else config_of(kind, params)
-    with user_code(lambda error: tracker_failed(name, "__init__()", "before the first frame", error)):
+    failed = partial(tracker_failed, name, "__init__()", "before the first frame")
+    with user_code(failed), inside(owner_of(found.__module__)):
         if limited is not None:
             return name, limited.make(config), config
         return name, found() if config is None else found(config), config

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.hashing import ENGINE
+from sim.hashing import runtime
 from sim.types import Array, DetectionMode
 from tracking.environment.episode_cache import Source, sources
 from tracking.stress.axes import Axis, BreakingPoint, breaking_point
@@ -102,6 +102,13 @@ class Sweep:
         """Number of the trackers' episodes on the scenes so far, stored ones included."""
         return sum(self.row(name, scene) is not None for scene in self.scenes.values() for name in self.trackers)
 
+    @property
+    def taken_over(self) -> dict[str, Any]:
+        """The number of the trackers' episodes so far that were stored before, and when the last of them was stored."""
+        keys = {self._key(name, scene) for scene in self.scenes.values() for name in self.trackers}
+        count = len(keys & self.store.taken)
+        return {"episodes": count, "stored": self.store.date if count else None}
+
     def spent(self) -> bool:
         """Returns True if the budget of time or of episodes is spent."""
         over = self.plan.minutes is not None and time.monotonic() - self.began > 60 * self.plan.minutes
@@ -161,8 +168,9 @@ class Sweep:
         return next(iter(self.trackers.values()))
 
     def _key(self, name: str, scene: Scene) -> str:
-        code = ", ".join(self._first.needs) if name == ORACLE else self.trackers[name].code
-        facts = [ENGINE, name, code, self.plan.detections, *map(str, scene.source.key)]
+        tracker = self._first if name == ORACLE else self.trackers[name]
+        own = tracker.needs if name == ORACLE else (tracker.code, tracker.step_timeout)
+        facts = [runtime(), name, own, self.plan.detections, *map(str, scene.source.key)]
         return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:24]
 
     def rows(self) -> list[dict[str, Any]]:
