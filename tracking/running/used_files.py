@@ -39,6 +39,7 @@ THIS_PROCESS = secrets.token_hex(6)
 LONGEST_NAME = 255  # characters of a string in code that may name a file
 
 _owner = ""  # whose code is running; "": this project's
+_home = ""  # working folder of the command, while a tracker is in another one
 _opened: set[str] = set()  # absolute paths that it has opened or listed since it began
 _written: set[str] = set()  # that any tracker has written
 _files: dict[str, dict[str, str]] = {}  # by owner: fingerprints of the files that were opened, by absolute path
@@ -67,25 +68,24 @@ def owner_of(module: str) -> str:
 def inside(owner: str) -> Iterator[None]:
     """Stands around code of this owner: notes the files that it opens, and keeps its working folder apart from that of
     the command. It has no effect for "", this project's code, and inside another such block."""
-    global _owner, _times
+    global _owner, _home, _times
     if not owner or _owner:
         yield
         return
     if _hook not in _hooks:
         sys.addaudithook(_hook)
         _hooks.append(_hook)
-    before = _working_folder()
-    if owner in _folders:
-        os.chdir(_folders[owner])
     _owner = owner
     try:
+        if owner in _folders:
+            os.chdir(_folders[owner])
         yield
     finally:
         _owner = ""
-        after = _working_folder()
-        if after != before:
-            _folders[owner] = after
-            os.chdir(before)
+        if _home:
+            _folders[owner] = _working_folder()
+            os.chdir(_home)
+            _home = ""
         user_modules.forget_aliases()
         if _opened:
             _times += 1
@@ -104,9 +104,13 @@ def _working_folder() -> str:
 
 
 def _hook(event: str, arguments: tuple[Any, ...]) -> None:
-    if not _owner or event not in ("open", "os.listdir", "os.scandir"):
+    global _home
+    if not _owner or event not in ("open", "os.listdir", "os.scandir", "os.chdir"):
         return
     with suppress(Exception):  # an exception here would be one of open()
+        if event == "os.chdir":
+            _home = _home or _working_folder()
+            return
         path = os.path.abspath(os.fsdecode(arguments[0] or "."))
         if event == "open" and arguments[2] & (os.O_WRONLY | os.O_CREAT | os.O_TRUNC):
             _written.add(path)
@@ -258,5 +262,7 @@ class UsedFiles(dict[str, str]):
         """Adds fingerprints. Warns of those that differ from an earlier episode, and keeps the first."""
         for name, known in more.items():
             if self.setdefault(name, known) != known:
-                text = f"{tracker}: {name} has changed while the command ran: run it again with --fresh"
+                text = (
+                    f"{tracker}: {name} has changed while the command ran: run it again, stress and tune with --fresh"
+                )
                 warnings.warn(text, UserWarning, stacklevel=2)
