@@ -2,9 +2,8 @@
 
 `inside(owner)` stands around every call of a tracker's code, and notes which files are opened. `used(tracker)` returns
 the fingerprints of all that it has used so far in this process, and `changes` tells which of them are others now.
-Names of fingerprints are paths, relative to the tracker's folder if below it, or "packages" for the versions of all
-installed packages. A fingerprint is the hash of a file's content, of the names in a folder that was listed, or "" if
-there is no such file.
+Names of fingerprints are absolute paths, or "packages" for the versions of all installed packages. A fingerprint is the
+hash of a file's content, of the names in a folder that was listed, or "" if there is no such file.
 
 Files that a compiled library opens itself are known if the tracker's code names them in a string.
 """
@@ -149,9 +148,7 @@ def used(tracker: type[Tracker]) -> dict[str, str]:
         return {}
     found = dict(_modules_used(owner))
     found |= {p: known for p, known in _files.get(owner, {}).items() if p not in _written and is_users(p)}
-    folder = _folder_of(tracker)
-    named = {os.path.relpath(path, folder) if path.startswith(folder) else path: known for path, known in found.items()}
-    return named | _elsewhere.get(owner, {}) | {INSTALLED: packages_hash()}
+    return found | _elsewhere.get(owner, {}) | {INSTALLED: packages_hash()}
 
 
 def opened() -> int:
@@ -165,19 +162,25 @@ def note(tracker: type[Tracker], others: Mapping[str, str]) -> None:
         _elsewhere.setdefault(owner_of(tracker.__module__), {}).update(others)
 
 
-def changes(tracker: type[Tracker], stored: Mapping[str, str]) -> list[str]:
-    """Returns the names of those fingerprints that differ from the present ones. stored: by name, of this tracker."""
-    folder = _folder_of(tracker)
-    return [name for name, known in stored.items() if known != _now(os.path.join(folder, name), name)]
+def changes(stored: Mapping[str, str], folder: str = "") -> list[str]:
+    """Returns the names of fingerprints that differ from the present ones. folder: to which names are relative."""
+    return [name for name, known in stored.items() if known != _now(name, folder)]
 
 
-def _now(path: str, name: str) -> str:
-    return packages_hash() if name == INSTALLED else fingerprint(path)
+def _now(name: str, folder: str) -> str:
+    return packages_hash() if name == INSTALLED else fingerprint(os.path.join(folder, name))
 
 
-def _folder_of(tracker: type[Tracker]) -> str:
+def relative(found: Mapping[str, str], folder: str) -> dict[str, str]:
+    """Returns fingerprints with the names of files below the folder relative to it."""
+    below = os.path.join(folder, "")
+    return {name.removeprefix(below): known for name, known in found.items()}
+
+
+def folder_of(tracker: type[Tracker]) -> str:
+    """Returns the folder of the file that defines a tracker class, "" if there is none."""
     file = getattr(sys.modules.get(tracker.__module__), "__file__", None)
-    return os.path.join(os.path.dirname(os.path.realpath(file)) if file else "", "")
+    return os.path.dirname(os.path.realpath(file)) if file else ""
 
 
 def _modules_used(owner: str) -> Iterator[tuple[str, str]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -135,7 +135,6 @@ class Store:
     """
 
     path: Path
-    trackers: Mapping[str, TunedTracker] = field(default_factory=dict)
     fresh: bool = False
     known: dict[str, dict[str, Any]] = field(default_factory=dict)
     taken: set[str] = field(default_factory=set)
@@ -163,13 +162,9 @@ class Store:
             write_file(self.path, "".join(json.dumps(row) + "\n" for row in rows).encode())
         if rows:
             self.date = time.strftime("%Y-%m-%d %H:%M", time.localtime(self.path.stat().st_mtime))
-        unchanged = cache(self._unchanged)
-        self.known = {row["key"]: row for row in rows if unchanged(row["tracker"], json.dumps(row.get("used", {})))}
+        changed = cache(lambda used: changes(json.loads(used)))
+        self.known = {row["key"]: row for row in rows if not changed(json.dumps(row.get("used", {})))}
         self.taken = set(self.known)
-
-    def _unchanged(self, name: str, used: str) -> bool:
-        tracker = self.trackers.get(name)
-        return tracker is None or not changes(find(tracker.tracker), json.loads(used))
 
     def add(self, row: dict[str, Any]) -> None:
         """Stores an episode, a dict with its "key", in memory and as a new last line of the file."""

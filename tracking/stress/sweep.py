@@ -169,7 +169,7 @@ class Sweep:
 
     def _key(self, name: str, scene: Scene) -> str:
         tracker = self._first if name == ORACLE else self.trackers[name]
-        own = tracker.needs if name == ORACLE else (tracker.code, tracker.step_timeout)
+        own = tracker.needs if name == ORACLE else (str(tracker.tracker), tracker.code, tracker.step_timeout)
         facts = [runtime(), name, own, self.plan.detections, *map(str, scene.source.key)]
         return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:24]
 

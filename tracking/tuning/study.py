@@ -40,7 +40,7 @@ from optuna.trial import FrozenTrial, TrialState
 from scenarios.errors import FlockscopeError, InputError
 from tracking.environment.episodes import Episode
 from tracking.running.tracker_registry import find
-from tracking.running.used_files import UsedFiles, changes
+from tracking.running.used_files import UsedFiles, changes, folder_of, relative
 from tracking.stats import mean_of_known
 from tracking.tuning.candidates import STORED, TrialRecord
 from tracking.tuning.options import Progress
@@ -133,6 +133,7 @@ class SearchStudy:
 
     def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, storage: object = None) -> None:
         self.plan, self.optuna, self.locks, self._used = plan, study, locks, UsedFiles()
+        self._folder = _folder(plan)
         self._space = {p.name: distribution(p) for p in plan.space}
         with self._choosing():
             if not self.trials() and SETTINGS not in study.user_attrs:
@@ -144,6 +145,7 @@ class SearchStudy:
 
     def note(self, used: Mapping[str, str]) -> None:
         """Stores what the tracker has used in an episode; a search that goes on needs all of it unchanged."""
+        used = relative(used, self._folder)  # so that the study can be moved with the tracker
         if used.items() <= self._used.items():
             return
         with self._choosing():
@@ -273,8 +275,8 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
 def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> None:
     mine, stored = plan.identity(), study.user_attrs.get(SETTINGS, {})
     different = [key for key in mine if stored.get(key) != mine[key]]
-    if not different and plan.tracker.name != RULE:
-        changed = changes(find(plan.tracker.tracker), study.user_attrs.get(USED, {}))
+    if not different:
+        changed = changes(study.user_attrs.get(USED, {}), _folder(plan))
         if changed:
             raise InputError(
                 file=storage, place=f"study {study.study_name}", got=f"trials made before {', '.join(changed)} changed",
@@ -287,6 +289,10 @@ def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> N
             expected=f"{key} {stored.get(key)}, not {mine[key]}",
             remedy="begin anew with --fresh, choose another --out or --study, or repeat the command that began it",
         )  # fmt: skip
+
+
+def _folder(plan: SearchPlan) -> str:
+    return "" if plan.tracker.name == RULE else folder_of(find(plan.tracker.tracker))
 
 
 @contextmanager

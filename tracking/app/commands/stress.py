@@ -46,7 +46,7 @@ def stress(options: StressOptions) -> CommandResult:
         scene_player(options.workers, options.cluster) as play,
     ):
         sweep, found = (
-            Sweep(plan, trackers, play, Store(options.out / EPISODES, trackers, options.fresh), meter.step),
+            Sweep(plan, trackers, play, Store(options.out / EPISODES, options.fresh), meter.step),
             None,
         )
         if options.search is None:
