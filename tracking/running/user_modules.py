@@ -64,8 +64,8 @@ def _load_package(file: Path, inside: Callable[[str], AbstractContextManager[Non
     if _Finder not in sys.meta_path:
         sys.meta_path.insert(0, _Finder)
         sys.meta_path.append(_Neighbours)
-    # The same name in every process, so that exceptions of a worker can be unpickled here.
-    digest = hashlib.sha256(f"{file}\0{_hash_now(file)}".encode()).hexdigest()[:12]
+    # The same name in every process, for pickles and numba's cache; of a folder, as its files share their caches.
+    digest = hashlib.sha256(str(file.parent).encode()).hexdigest()[:12]
     name = next(
         name for name in (f"{PREFIX}{digest}{'x' * k}" for k in range(len(packages) + 1)) if name not in packages
     )
@@ -142,6 +142,10 @@ class _Finder:
     @classmethod
     def find_spec(cls, name: str, path: Sequence[str] | None = None, target: object = None) -> ModuleSpec | None:
         tail = name.rpartition(".")[2]
+        if name.startswith(PREFIX) and path is None and packages:  # of another process, or before the folder was moved
+            folder = packages[next(reversed(packages))].folder
+            packages[name] = UserPackage(folder)
+            return _folder_spec(name, folder)
         for folder in map(Path, path or () if name.startswith(PREFIX) else ()):
             for suffix in (".py", *EXTENSION_SUFFIXES):
                 package, module = folder / tail / f"__init__{suffix}", folder / f"{tail}{suffix}"
@@ -150,10 +154,14 @@ class _Finder:
                 if module.is_file():
                     return _spec(name, module)
             if (folder / tail).is_dir():
-                found = ModuleSpec(name, None, is_package=True)
-                found.submodule_search_locations = [str(folder / tail)]
-                return found
+                return _folder_spec(name, folder / tail)
         return None
+
+
+def _folder_spec(name: str, folder: Path) -> ModuleSpec:
+    spec = ModuleSpec(name, None, is_package=True)
+    spec.submodule_search_locations = [str(folder)]
+    return spec
 
 
 class _Neighbours:

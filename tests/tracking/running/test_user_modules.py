@@ -128,6 +128,29 @@ def test_modules_imported_by_name_and_pickles(tmp_path: Path) -> None:
     assert "helper" not in sys.modules
 
 
+KERNEL = "from numba import njit\n@njit(cache=True)\ndef f(x):\n    print('ran')\n    return x + 1\n"
+
+
+def test_compiled_neighbours_are_found_in_their_cache(tmp_path: Path) -> None:
+    """By another process, after a change of the tracker's file, by another file, and after a move of the folder."""
+    folder = tmp_path / "a"
+    write(folder, "from kernel import f", "f(1)", kernel=KERNEL)
+    shown = "from tracking.running.tracker_registry import find; import sys; print(find(sys.argv[1]).value)"
+    root = str(Path(tracking.__file__).parents[1])
+
+    def value(spec: str) -> str:
+        command = [sys.executable, "-c", shown, spec]
+        return subprocess.run(command, env={"PYTHONPATH": root}, capture_output=True, text=True, check=True).stdout
+
+    assert value(f"{folder}/mine.py:Mine") == "ran\n2\n"
+    write(folder, "from kernel import f", "f(2)")
+    assert value(f"{folder}/mine.py:Mine") == "ran\n3\n"
+    (folder / "mine.py").rename(folder / "other.py")
+    assert value(f"{folder}/other.py:Mine") == "ran\n3\n"
+    folder.rename(tmp_path / "b")
+    assert value(f"{tmp_path}/b/other.py:Mine") == "ran\n3\n"
+
+
 def test_a_module_of_a_package_that_has_changed_is_refused(tmp_path: Path, monkeypatch) -> None:
     """Python keeps what it has imported; answers of the old code would be stored as those of the new."""
     monkeypatch.syspath_prepend(tmp_path)
