@@ -206,10 +206,12 @@ def runtime() -> dict[str, str]:
 
 
 def source_hash(root: Path) -> str:
-    """Returns 12 hex digits of the SHA-256 over the .py and .toml files of our packages below the folder `root`."""
+    """Returns 12 hex digits of the SHA-256 over the .py, .toml and .tsv files of our packages below the folder `root`,
+    without those of commands and drawing, which decide no result."""
     h = hashlib.sha256()
     for package in PACKAGES:
         for path in sorted((root / package).rglob("*")):
-            if path.suffix in (".py", ".toml"):
+            shown = {"app", "drawing"} & {*path.relative_to(root).parts}
+            if path.suffix in (".py", ".toml", ".tsv") and not shown:
                 h.update(f"{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes() + b"\0")
     return h.hexdigest()[:12]

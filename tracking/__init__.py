@@ -8,9 +8,29 @@ and `tracking.tune(tracker, suite)` searches parameters. Each is imported when i
 
 from __future__ import annotations
 
+import sys
+from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tracking.environment import register_when_imported
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def _import_beside(name: str) -> None:
+    """Imports the package `name` of this project, also if a file in the working folder has its name."""
+    sys.path.insert(0, str(ROOT))
+    try:
+        found = str(import_module(name).__file__)
+    finally:
+        sys.path.remove(str(ROOT))
+    if Path(found).resolve().parents[1] != ROOT:
+        raise ImportError(f"{found} was imported in place of {ROOT / name}: rename it, or import tracking before it")
+
+
+for package in ("scenarios", "sim"):
+    _import_beside(package)
+
+from tracking.environment import register_when_imported  # noqa: E402
 
 if TYPE_CHECKING:
     from tracking.comparison import compare
@@ -34,6 +54,4 @@ _HOME = {
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'tracking' has no attribute {name!r}")
-    from importlib import import_module
-
     return getattr(import_module(_HOME[name]), name)

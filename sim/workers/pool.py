@@ -290,10 +290,13 @@ def _run_here(
         yield item, function(item)
 
 
-def results_in_order(run: RunItems, function: Callable[[T], R], items: Sequence[T]) -> Generator[R, None, None]:
-    """Yields function(item), run by `run`, in the order of `items`, which must be distinct objects."""
+def results_in_order(
+    run: RunItems, function: Callable[[T], R], items: Sequence[T], on_loss: OnLoss[T, R] = None
+) -> Generator[R, None, None]:
+    """Yields function(item), run by `run`, in the order of `items`, which must be distinct objects. on_loss: as of
+    `RunItems`."""
     wanted, found = True, dict[int, R]()
-    arriving = run(function, (item for item in items if wanted))
+    arriving = run(function, (item for item in items if wanted), on_loss=on_loss)
     try:
         for item in items:
             while id(item) not in found:

@@ -13,6 +13,7 @@ import typer
 from tracking.app.command_line import add_command, run_command
 from tracking.app.command_options import COMMANDS
 from tracking.app.command_result import INTERRUPTED
+from tracking.app.watched_process import user_trackers, watched
 
 GROUPS = {
     "export": "Convert a dataset, or tracks, to another format.",
@@ -63,7 +64,12 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    code = run(sys.argv[1:])
+    arguments = sys.argv[1:]
+    trackers = user_trackers(arguments)
+    ended = watched(trackers, "--json" in arguments) if trackers else None
+    code = run(arguments)
+    if ended is not None:
+        ended()
     if code == INTERRUPTED:
         sys.stdout.flush()
         os._exit(code)  # sys.exit would end by SIGINT, not with 130, where Ctrl-C came inside an exec of a library

@@ -35,6 +35,7 @@ CLUSTER = partial(option, "Scheduler of a dask cluster that does the work.", Non
 STEP_TIMEOUT = partial(
     option, "Stop a tracker whose reset or step takes longer. It then runs in a process of its own.", None,
     metavar="SECONDS")
+FRESH = partial(option, "Ignore and remove what an earlier command stored here.", False)
 STREAMS = partial(
     option, "Pictures to store: left, right, disparity, ids, background; or none.", "left", metavar="A,B,…")
 IMAGES = partial(option, "Format of left, right and background pictures. Default: jpg.", None)
@@ -216,6 +217,7 @@ class StressOptions(SceneOptions, WorkerOptions, words="stress"):
     detections: Detections = option(
         "Input of the trackers. Default: file, if they can.", None)
     step_timeout: float | None = STEP_TIMEOUT()
+    fresh: bool = FRESH()
 
 
 class MinimizeOptions(Options, words="minimize"):
@@ -278,6 +280,7 @@ class TuneCommandOptions(WorkerOptions, words="tune"):
     prune: float = tuned("prune")
     finalists: int = tuned("finalists")
     seed: int = tuned("seed")
+    fresh: bool = FRESH()
 
 
 class ReplayCommandOptions(PictureOptions, LabelOptions, words="replay", run="datasets:replay"):

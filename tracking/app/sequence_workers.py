@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -77,7 +77,7 @@ def _in_processes(
 
     tasks: list[_Task] = [(source, k, function, job) for k, job in enumerate(jobs)]
     with start_workers(min(workers, len(sequences))) as run:
-        for value, error, texts in results_in_order(partial(run, on_loss=lost), _outcome, tasks):  # type: ignore[arg-type]
+        for value, error, texts in results_in_order(run, _outcome, tasks, lost):
             for text in texts:
                 warnings.warn(text, stacklevel=2)
             if error is not None:

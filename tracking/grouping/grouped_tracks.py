@@ -147,13 +147,24 @@ def _grouped(table: TracksTable, named: bool, fps: float, rule: Grouping) -> tup
 
 def _crossings_and_queues(table: TracksTable, fps: float) -> list[GroupEvent]:
     motion = table.motion()
-    crossed, queued = crossings(motion, fps), queues(motion, fps)
-    # a crossing is known once both groups are the same as before for a while, a queue once its people can no longer be
-    # advancing and its line no longer be lost
-    after_cross, after_queue = frames_of(SAME_BEFORE, fps), frames_of(ADVANCE_TIME, fps) + frames_of(BRIDGE_TIME, fps)
-    return [replace(e, emitted=min(e.end + after_cross, table.length)) for e in crossed] + [
-        replace(e, emitted=min(e.end + after_queue, table.length)) for e in queued
-    ]
+    after = _known_after(fps)
+    found = [*crossings(motion, fps), *queues(motion, fps)]
+    return [replace(e, emitted=min(e.end + after[e.kind], table.length)) for e in found]
+
+
+def _known_after(fps: float) -> dict[str, int]:
+    # A crossing is known once both groups are the same as before for a while, a queue once its people can no longer be
+    # advancing and its line no longer be lost.
+    return {"cross": frames_of(SAME_BEFORE, fps), "queue": frames_of(ADVANCE_TIME, fps) + frames_of(BRIDGE_TIME, fps)}
+
+
+def events_at_end(reported: Sequence[Tracks], filled: Sequence[Tracks], fps: float) -> int:
+    """Returns how many derived crossings and queues stand in the last frame only because the recording ends there.
+    reported: the tracks of the tracker; filled: the same with groups and events."""
+    if not reported:
+        return 0
+    after, last, own = _known_after(fps), filled[-1], len(reported[-1].events)
+    return sum(e.kind in after and e.end + after[e.kind] > last.index for e in last.events[own:])
 
 
 def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupEvent]) -> list[Tracks]:

@@ -6,17 +6,20 @@ out. `tracking.running.run.track` is the loop over it. The environment drives a 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scenarios.errors import FlockscopeError, InputError
-from scenarios.limits import INTEGER
+from scenarios.errors import FlockscopeError, InputError, WorkError
+from scenarios.limits import INTEGER, JSON_BYTES
+from scenarios.reading import parse_json
 from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
 from tracking.config import Config
 from tracking.running import image_scale, tracker_registry
@@ -33,8 +36,10 @@ from tracking.running.image_scale import ImageScale
 from tracking.running.plane_check import PlaneCheck
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracks_check import ReportHistory, check_tracks
+from tracking.running.used_files import inside, owner_of
 from tracking.running.user_code import tracker_failed, user_code
 
+DIAGNOSTICS = JSON_BYTES // 8  # characters; run.json has indented lines
 # A config, parameter values by name, the name of a preset, the path of a TOML file, or None for the defaults.
 Params = Config | Mapping[str, Any] | str | Path | None
 
@@ -96,10 +101,31 @@ class PreparedTracker:
         self.planes.check(checked, detections, self.context, self.name, self.sequence.name)
         return checked
 
+    def diagnostics(self, place: str) -> Any:
+        """Returns the tracker's attribute `diagnostics` as JSON has it, None if there is none. Raises WorkError if it
+        is no JSON, or cannot be read. place: where in the run, such as "frame 3"."""
+        place = f"{self.sequence.name}, {place}"
+        with self._naming("diagnostics", place):
+            found = getattr(self.tracker, "diagnostics", None)
+        try:
+            text = json.dumps({"diagnostics": found}, allow_nan=False)
+            if len(text) > DIAGNOSTICS:
+                raise ValueError(f"{len(text):,} characters, more than {DIAGNOSTICS:,}")
+            return parse_json(text, self.name, "")["diagnostics"]
+        except (TypeError, ValueError, RecursionError, InputError) as error:
+            raise WorkError(
+                file=self.name, place=place, got=f"diagnostics that are no JSON: {getattr(error, 'got', error)}",
+                expected="dicts, lists, texts, finite numbers, True, False and None",
+                remedy="convert arrays by tolist(), and write None for what is unknown",
+            ) from error  # fmt: skip
+
     @contextmanager
     def _naming(self, part: str, place: str) -> Iterator[None]:
         try:
-            with user_code(lambda error: tracker_failed(self.name, part, place, error)):
+            with (
+                user_code(lambda error: tracker_failed(self.name, part, place, error)),
+                inside(owner_of(type(self.tracker).__module__)),
+            ):
                 yield
         except FlockscopeError as error:
             path = self.sequence.source.get("path", self.sequence.name)
@@ -154,7 +180,8 @@ def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) 
         remedy = "leave the parameters out, or give the class a config_class (docs/guides/your-own-tracker.md)"
         raise InputError(place="params", got=name, expected="a tracker with parameters", remedy=remedy)
     config = None if kind is None else config_of(kind, params)
-    with user_code(lambda error: tracker_failed(name, "__init__()", "before the first frame", error)):
+    failed = partial(tracker_failed, name, "__init__()", "before the first frame")
+    with user_code(failed), inside("" if limited else owner_of(found.__module__)):
         if limited is not None:
             return name, limited.make(config), config
         return name, found() if config is None else found(config), config

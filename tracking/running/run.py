@@ -53,7 +53,7 @@ def run_info(
     """
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
-    diagnostics = getattr(prepared.tracker, "diagnostics", None)
+    diagnostics = prepared.diagnostics("after the last frame")
     return {
         "tracker": prepared.name,
         "config": prepared.config.as_dict() if prepared.config else {},
@@ -221,7 +221,7 @@ def track(
     """
     from sim.compiler import clock
     from tracking.grouping.foot_points import completed
-    from tracking.grouping.grouped_tracks import late_groups, names_groups
+    from tracking.grouping.grouped_tracks import events_at_end, late_groups, names_groups
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
@@ -232,6 +232,8 @@ def track(
         start = clock()
         reported.append(prepared.step(frame))
         spent += clock() - start
+        if len(reported) == 1:
+            prepared.diagnostics(f"frame {frame.index}")
         if progress is not None:
             progress(frame.index)
     whole = clock() - begun
@@ -252,6 +254,7 @@ def track(
         warnings.warn(text, UserWarning, stacklevel=2)
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
     info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
+    info["events_at_end"] = events_at_end(reported, tracks, sequence.fps)
     return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
 
 
@@ -276,7 +279,7 @@ def group(
         WorkError: A simulated person did not carry out an order of the scenario's script.
     """
     from tracking.grouping.foot_points import completed, source_of
-    from tracking.grouping.grouped_tracks import without_groups
+    from tracking.grouping.grouped_tracks import events_at_end, without_groups
     from tracking.grouping.known_people import known_people
     from tracking.grouping.plausibility import implausible
 
@@ -305,7 +308,8 @@ def group(
         info |= {"sensor": {}, "background": None}
     else:
         info = {**run.info, **{key: info[key] for key in OF_TRACKS}}
-    return TrackingRun(tracks, {**info, "grouping": rule.as_dict()})
+    at_end = events_at_end(people, tracks, sequence.fps)
+    return TrackingRun(tracks, {**info, "events_at_end": at_end, "grouping": rule.as_dict()})
 
 
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:

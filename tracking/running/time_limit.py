@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import signal
+import sys
 from typing import Any, Self
 
 from scenarios.errors import InputError
@@ -15,8 +16,9 @@ from scenarios.limits import is_number
 from sim.types import Context, Detections, Frame, Tracker, Tracks
 from sim.workers.pool import RemoteTraceback, WorkerProcess
 from tracking.config import Config
-from tracking.running import tracker_registry
+from tracking.running import tracker_registry, used_files
 from tracking.running.image_scale import learned_by
+from tracking.running.used_files import inside, owner_of
 
 GRACE = 5.0  # s after the limit at which a process ends itself, should its parent be gone.
 
@@ -75,9 +77,9 @@ class TimeLimited:
     def call(self, number: int, method: str, *arguments: Any) -> Any:
         """Calls "create", "reset" or "step" of the tracker with this number in the process; returns the result.
 
-        "create" has no time limit and returns None. "reset" and "step" return the method's result and the tracker's
-        px_per_m. Raises TimeoutError if the limit is exceeded, ChildProcessError if the process has ended, or what the
-        tracker raised.
+        "create" has no time limit and returns None. "reset" and "step" return the method's result, the tracker's
+        px_per_m, and what is new of that which it has used. Raises TimeoutError if the limit is exceeded,
+        ChildProcessError if the process has ended, or what the tracker raised.
         """
         pipe = self._process.send(_call, (number, method, arguments, self.seconds + GRACE))
         if method != "create" and not pipe.poll(self.seconds):
@@ -107,31 +109,42 @@ class RemoteTracker:
     def reset(self, context: Context, seed: int) -> None:
         """Resets the tracker; if its process has ended, the tracker is made again before."""
         self.create()
-        _, self.px_per_m = self._host.call(self._number, "reset", context, seed)
+        self._call("reset", context, seed)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the tracker's tracks of the frame, with these detections."""
-        tracks, self.px_per_m = self._host.call(self._number, "step", frame, detections)
-        return tracks  # type: ignore[no-any-return]
+        return self._call("step", frame, detections)  # type: ignore[no-any-return]
+
+    def _call(self, method: str, *arguments: Any) -> Any:
+        result, self.px_per_m, used = self._host.call(self._number, method, *arguments)
+        used_files.note(tracker_registry.find(self._host.tracker), used) if used else None
+        return result
 
 
+_sent = (-1, 0, 0)  # In the process: what was known when `used` was sent last.
 _made: dict[int, Tracker] = {}  # In the process: the tracker by its number; at most one.
 
 
 def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
+    global _sent
     number, method, given, limit = request
     if method == "create":
         if number not in _made:
             spec, values = given
             found: Any = tracker_registry.find(spec)
-            made = found() if values is None else found(found.config_class.from_dict(values))
+            with inside(owner_of(found.__module__)):
+                made = found() if values is None else found(found.config_class.from_dict(values))
             _made.clear()
             _made[number] = made
         return None
     if number not in _made:
         raise RuntimeError("the process of this tracker was started again since its reset")
     signal.setitimer(signal.ITIMER_REAL, limit)  # without a handler this ends the process, also in compiled code
+    tracker = type(_made[number])
     try:
-        return getattr(_made[number], method)(*given), learned_by(_made[number])
+        with inside(owner_of(tracker.__module__)):
+            result, learned = getattr(_made[number], method)(*given), learned_by(_made[number])
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
+    before, _sent = _sent, (number, len(sys.modules), used_files.opened())
+    return result, learned, {} if _sent == before else used_files.used(tracker)

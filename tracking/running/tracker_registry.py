@@ -6,11 +6,7 @@ class themselves.
 
 from __future__ import annotations
 
-import hashlib
 import importlib
-import importlib.util
-import sys
-from functools import cache
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,6 +14,7 @@ from scenarios.errors import InputError
 from scenarios.loading.toml_files import did_you_mean
 from sim.types import Tracker
 from tracking.config import Config
+from tracking.running import used_files, user_modules
 from tracking.running.user_code import tracker_failed, user_code, what_was_raised
 
 REGISTRY = {
@@ -51,37 +48,20 @@ def find(spec: str | type[Tracker]) -> type[Tracker]:
         found = getattr(module, class_name, None)
     if found is None:
         raise InputError(file=where, got=repr(class_name), expected="a class of this module", remedy="check the name")
-    return checked(found, spec)
+    found = checked(found, spec)
+    used_files.require_as_imported(found)
+    return found
 
 
 def _from_file(path: Path) -> Any:
-    # The private name hides no other module. An unchanged file is imported once, so that a config keeps fitting its
-    # tracker; a changed file is imported again.
     if not path.is_file():
         raise InputError(file=path, got="no such file", expected="a Python file", remedy="check the path")
-    resolved = path.resolve()
-    content = hashlib.sha256(str(resolved).encode() + b"\0" + resolved.read_bytes())
-    name = f"_flockscope_{resolved.stem}_{content.hexdigest()[:12]}"
-    if name in sys.modules:
-        return sys.modules[name]
-    if str(resolved.parent) not in sys.path:  # last, so that files beside it hide no installed module
-        sys.path.append(str(resolved.parent))
-    spec = importlib.util.spec_from_file_location(name, resolved)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses of the file look their module up
-    try:
-        with user_code(lambda error: _import_failed(path, error), passing=()):
-            spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
+    with user_code(lambda error: _import_failed(path, error), passing=()):
+        return user_modules.load(path, used_files.inside)
 
 
 def _from_module(name: str) -> Any:
-    with user_code(lambda error: _import_failed(name, error), passing=()):
+    with user_code(lambda error: _import_failed(name, error), passing=()), used_files.inside(used_files.owner_of(name)):
         return importlib.import_module(name)
 
 
@@ -117,13 +97,6 @@ def config_class(tracker: type[Tracker], spec: str) -> type[Config]:
         remedy = "give the class a config_class that declares them (docs/guides/your-own-tracker.md)"
         raise InputError(place="tracker", got=spec, expected="a tracker with parameters", remedy=remedy)
     return cast("type[Config]", kind)
-
-
-@cache
-def code_hash(tracker: type[Tracker]) -> str:
-    """Returns the first 12 hex digits of the SHA-256 of the file that defines the class; "" if there is no file."""
-    file = Path(getattr(sys.modules.get(tracker.__module__), "__file__", None) or "")
-    return hashlib.sha256(file.read_bytes()).hexdigest()[:12] if file.is_file() else ""
 
 
 def _class_fault(found: Any) -> str | None:

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite
-from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from scenarios.errors import WorkError
+from scenarios.limits import COORDINATE, FRAMES, INTEGER
 from sim.types import EVENT_KINDS, GroupEvent, Groups, Tracks
 
 Fault = tuple[str, str]  # What the tracker returned, and what was expected instead.
@@ -112,16 +112,36 @@ def _array_faults(
     nan."""
     for name, (kind, *shape) in arrays.items():
         a = getattr(owner, name)
-        good = isinstance(a, np.ndarray) and a.dtype.kind == kind and a.shape == (*shape,)
-        got = getattr(a, "dtype", type(a).__name__)
+        good = type(a) in ARRAYS and a.dtype.kind == kind and a.shape == (*shape,)
+        got = a.dtype if type(a) in ARRAYS else type(a).__name__
         yield not good and (f"{prefix}{name} of shape {np.shape(a)}, {got}", f"{(*shape,)}, {NUMBERS[kind]}")
+        if kind != "f" or _small(a):
+            continue
         yield name not in unknown and not finite(a) and (f"NaN or infinity in {prefix}{name}", "finite numbers")
+        yield name != "cov" and not _in_bounds(a) and (f"{_greatest(a)} in {prefix}{name}", BOUNDS)
+
+
+ARRAYS = (np.ndarray, np.memmap)  # Of other classes, such as np.matrix, operators mean something else.
+BOUNDS = f"numbers from {-COORDINATE:g} to {COORDINATE:g}"  # as files have them
 
 
 def finite(a: Any) -> bool:
     """Returns True if all numbers of the array are finite; True for an empty array."""
     # The sum of squares is cheap and finite for ordinary numbers; only if it overflows is each number looked at.
     return isfinite(np.vdot(a, a)) or bool(np.isfinite(a).all())
+
+
+def _small(a: Any) -> bool:
+    # So are ordinary numbers, and then neither NaN, nor infinite, nor out of bounds.
+    return bool(np.vdot(a, a) <= COORDINATE**2)
+
+
+def _in_bounds(a: Any) -> bool:
+    return not bool((np.abs(a) > COORDINATE).any())
+
+
+def _greatest(a: Any) -> str:
+    return f"{a.flat[np.nanargmax(np.abs(a))]:g}"
 
 
 def _id_fault(id: Any, name: str) -> Fault | None:
@@ -137,9 +157,10 @@ def _group_faults(groups: Any, d: int, people: Iterable[int]) -> Iterator[Any]:
     # without groups any number of columns passes: Groups.none() has 2
     yield from _array_faults(groups, "groups.", arrays if n else {"id": ("i", 0)}, ("vel", "extent", "size"))
     yield _id_fault(groups.id, "group id")
+    yield bool((groups.size < 0).any()) and (f"groups.size {groups.size.min()}", "sizes from 0, or nan for unknown")
     for name in ("members", "hull"):
         items = getattr(groups, name)
-        good = isinstance(items, tuple) and len(items) in (0, n) and all(isinstance(a, np.ndarray) for a in items)
+        good = isinstance(items, tuple) and len(items) in (0, n) and all(type(a) in ARRAYS for a in items)
         got = len(items) if isinstance(items, tuple) else type(items).__name__
         yield not good and (f"{got} groups.{name}", f"a tuple of {n} arrays, or an empty one")
     for ids in groups.members:
@@ -149,6 +170,7 @@ def _group_faults(groups: Any, d: int, people: Iterable[int]) -> Iterator[Any]:
     for hull in groups.hull:
         good = hull.ndim == 2 and hull.shape[1] == 2 and hull.dtype.kind in "if" and finite(hull)
         yield not good and (f"groups.hull of shape {hull.shape}, or NaN in it", "(V, 2) finite numbers each")
+        yield not _in_bounds(hull) and (f"{_greatest(hull)} in groups.hull", BOUNDS)
 
 
 def _member_fault(members: Iterable[Any], people: Iterable[int], name: str) -> Fault | None:
@@ -161,12 +183,15 @@ def _event_faults(event: GroupEvent, index: int, people: Iterable[int]) -> Itera
     yield kind not in EVENT_KINDS and (f"an event of kind {kind!r}", "one of " + ", ".join(EVENT_KINDS))
     checks = {
         "start": (_whole(start) and 1 <= start <= index, f"a whole number from 1 to {index}"),
-        "end": (_whole(event.end) and _whole(start) and event.end >= start, f"a whole number, {start} or later"),
+        "end": (
+            _whole(event.end) and _whole(start) and start <= event.end <= FRAMES,
+            f"a whole number from {start} to {FRAMES}",
+        ),
         "emitted": (_whole(event.emitted) and event.emitted == index, f"{index}, the present frame, or None"),
         "before": (_are_groups(event.before), "a tuple of group ids, -1 for a person alone"),
         "after": (_are_groups(event.after), "a tuple of group ids, -1 for a person alone"),
         "members": (isinstance(event.members, tuple), "a tuple of ids"),
-        "pos": (np.shape(event.pos) == (2,) and all(isinstance(v, Real) for v in event.pos), "x, y"),
+        "pos": (np.shape(event.pos) == (2,) and all(map(_coordinate, event.pos)), f"x, y: {BOUNDS}, or nan"),
     }
     for name, (good, expected) in checks.items():
         yield not good and (f"{kind}: {name} {getattr(event, name)!r}", expected)
@@ -174,7 +199,12 @@ def _event_faults(event: GroupEvent, index: int, people: Iterable[int]) -> Itera
 
 
 def _are_groups(ids: Any) -> bool:
-    return isinstance(ids, tuple) and all(_whole(g) and g >= -1 for g in ids)
+    return isinstance(ids, tuple) and all(_whole(g) and -1 <= g <= INTEGER for g in ids)
+
+
+def _coordinate(value: Any) -> bool:
+    number = isinstance(value, float | int | np.floating | np.integer) and not isinstance(value, bool)
+    return number and not abs(value) > COORDINATE
 
 
 def _whole(value: Any) -> bool:

@@ -6,14 +6,16 @@ All who play a scene play it in one process, so that it is simulated once.
 from __future__ import annotations
 
 import json
+import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import FlockscopeError, InputError, shortened
+from scenarios.errors import FlockscopeError, InputError, WorkError, shortened
 from sim.io.files.atomic import write_file
 from sim.types import DetectionMode
 from sim.workers.pool import RemoteTraceback
@@ -22,7 +24,8 @@ from tracking.environment.episodes import Episode, streams_for
 from tracking.oracle import oracle
 from tracking.running.detection_mode import input_kind
 from tracking.running.tracker_registry import find
-from tracking.tuning.parallel_episodes import EpisodeTask, opened_sources, play_task, playing_workers
+from tracking.running.used_files import UsedFiles, changes
+from tracking.tuning.parallel_episodes import EpisodeTask, opened_sources, play_task, playing_workers, used_by
 from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
 ORACLE = "oracle"  # its name among the trackers
@@ -52,6 +55,7 @@ class Outcome:
     left_out: str = ""
     failed: str = ""
     traceback: str = ""  # of the failed tracker's own code, its last lines
+    used: dict[str, str] = field(default_factory=dict)  # by the tracker, as `used_files.used`
 
 
 PlayScenes = Callable[[Sequence[Tasks]], Iterator[Sequence[Outcome]]]  # Yields the outcomes of each scene, in order.
@@ -70,7 +74,11 @@ def scene_player(workers: int = 1, cluster: str | None = None) -> Iterator[PlayS
     from sim.workers.pool import results_in_order
 
     with playing_workers(workers, cluster) as run:
-        yield lambda scenes: results_in_order(run, play_scene, scenes)
+        yield lambda scenes: results_in_order(run, play_scene, scenes, _lost)
+
+
+def _lost(tasks: Tasks, error: WorkError) -> list[Outcome]:
+    raise error.replaced(file=", ".join(dict.fromkeys(task.tracker.name for task in tasks)), place=tasks[0].source.name)
 
 
 def play_scene(tasks: Tasks) -> list[Outcome]:
@@ -82,7 +90,11 @@ def play_scene(tasks: Tasks) -> list[Outcome]:
         _ = opened.truth
     except FlockscopeError as error:
         return [Outcome({}, left_out=error.line())] * len(tasks)
-    return [_outcome(play_task(task)) if isinstance(task, EpisodeTask) else play_oracle(task, opened) for task in tasks]
+    return [_play(task) if isinstance(task, EpisodeTask) else play_oracle(task, opened) for task in tasks]
+
+
+def _play(task: EpisodeTask) -> Outcome:
+    return replace(_outcome(play_task(task)), used=used_by(task.tracker))
 
 
 def play_oracle(task: OracleTask, opened: OpenedSource) -> Outcome:
@@ -113,29 +125,50 @@ def _traceback(cause: BaseException | None) -> str:
 
 @dataclass
 class Store:
-    """The episodes of a sweep in a file, one line each; state: `known`, the lines by key of the episode."""
+    """The episodes of a sweep in a file, one line each.
+
+    Stored episodes of a tracker that has changed are left out. State: `known`, the lines by key of the episode;
+    `taken`, the keys of those that were stored before; `used`, what each tracker has used, by name; `date`, when the
+    file was written last before.
+
+    fresh: True leaves all stored episodes out, and removes them.
+    """
 
     path: Path
+    fresh: bool = False
     known: dict[str, dict[str, Any]] = field(default_factory=dict)
+    taken: set[str] = field(default_factory=set)
+    used: dict[str, UsedFiles] = field(default_factory=dict)
+    date: str = ""
 
     def __post_init__(self) -> None:
         text = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
+        rows = list[dict[str, Any]]()
         for line in text.splitlines():
             try:
                 row = json.loads(line)
             except ValueError:  # the last line of a sweep that was killed
                 continue
-            if not isinstance(row, dict) or not row.keys() >= {"key", *Outcome.__dataclass_fields__}:
+            if not isinstance(row, dict) or not row.keys() >= {"key", "tracker", *Outcome.__dataclass_fields__} - {
+                "used"
+            }:
                 raise InputError(
                     file=self.path, got=shortened(line, 80), expected="episodes of `flockscope stress`",
                     remedy="move the file away, or choose another --out",
                 )  # fmt: skip
-            self.known[row["key"]] = row
-        if text and not text.endswith("\n"):
-            write_file(self.path, "".join(json.dumps(row) + "\n" for row in self.known.values()).encode())
+            rows.append(row)
+        if text and (self.fresh or not text.endswith("\n")):
+            rows = [] if self.fresh else rows
+            write_file(self.path, "".join(json.dumps(row) + "\n" for row in rows).encode())
+        if rows:
+            self.date = time.strftime("%Y-%m-%d %H:%M", time.localtime(self.path.stat().st_mtime))
+        changed = cache(lambda used: changes(json.loads(used)))
+        self.known = {row["key"]: row for row in rows if not changed(json.dumps(row.get("used", {})))}
+        self.taken = set(self.known)
 
     def add(self, row: dict[str, Any]) -> None:
         """Stores an episode, a dict with its "key", in memory and as a new last line of the file."""
+        self.used.setdefault(row["tracker"], UsedFiles()).add(row["tracker"], row["used"])
         self.known[row["key"]] = row
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.open("a", encoding="utf-8") as file:

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.hashing import ENGINE
+from sim.hashing import runtime
 from sim.types import Array, DetectionMode
 from tracking.environment.episode_cache import Source, sources
 from tracking.environment.episodes import streams_for
@@ -119,6 +119,13 @@ class Sweep:
             seconds, (spent, count) = 60 * self.plan.minutes - (time.monotonic() - self.began), self._paced
             left = min(left, (np.inf if seconds > 0 else 0.0) if not count else seconds * count / spent)
         return left
+
+    @property
+    def taken_over(self) -> dict[str, Any]:
+        """The number of the trackers' episodes so far that were stored before, and when the last of them was stored."""
+        keys = {self._key(name, scene) for scene in self.scenes.values() for name in self.trackers}
+        count = len(keys & self.store.taken)
+        return {"episodes": count, "stored": self.store.date if count else None}
 
     def spent(self) -> bool:
         """Returns True if the budget of time or of episodes is spent."""
@@ -217,9 +224,9 @@ class Sweep:
         return next(self.trackers[name] for name, own in self.oracles.items() if own == oracle)
 
     def _key(self, name: str, scene: Scene) -> str:
-        one = self.trackers.get(name)
-        who = (one.name, one.code) if one else (ORACLE, ", ".join(self._of_oracle(name).needs))
-        facts = [ENGINE, *who, self.plan.detections, *map(str, scene.source.key)]
+        tracker = self.trackers.get(name)
+        own = (str(tracker.tracker), tracker.code, tracker.step_timeout) if tracker else self._of_oracle(name).needs
+        facts = [runtime(), name, own, self.plan.detections, *map(str, scene.source.key)]
         return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:24]
 
     @property

@@ -57,6 +57,7 @@ class TuneOptions:
         "Stop a trial whose loss has a p-value below this; 0: never.", 0.1, low=0, below=1, metavar="P")
     finalists: int = option("Number of best trials that validation chooses from.", 5, low=1, metavar="N")
     seed: int = option("Seed of the search.", 0, low=0)
+    fresh: bool = option("Ignore and remove what an earlier search stored under this name.", False)
     progress: Progress | None = option("Function that is called as progress(finished, trials, text).", None)
     # fmt: on
 

@@ -18,7 +18,8 @@ from sim.workers.pool import RunItems
 from tracking.environment.episodes import Episode, Source, SourceCache, play
 from tracking.grouping.link_rule import LinkRule
 from tracking.running.time_limit import TimeLimited
-from tracking.running.tracker_registry import code_hash, find
+from tracking.running.tracker_registry import find
+from tracking.running.used_files import code_of, used
 from tracking.scoring.people_comparison import Similarity
 from tracking.tuning.tuned_tracker import RULE, TunedTracker
 
@@ -49,9 +50,11 @@ def episode_player(
     workers: int = 1,
     cluster: str | None = None,
     similarity: Similarity | None = None,
+    note: Callable[[dict[str, str]], None] = lambda used: None,
 ) -> Iterator[PlayEpisodes]:
     """Context manager: opens the workers and yields the function play(sources, values, every_score) (`PlayEpisodes`).
-    cluster: address of a dask scheduler, None for processes here. A class as tracker needs one worker here."""
+    cluster: address of a dask scheduler, None for processes here. A class as tracker needs one worker here. note:
+    called after each episode with what the tracker has used, as of `used_by`."""
     from sim.workers.pool import results_in_order
 
     if isinstance(tracker.tracker, type) and (workers > 1 or cluster):
@@ -63,7 +66,10 @@ def episode_player(
             sources: Sequence[Source], values: dict[str, Any], every_score: bool
         ) -> Generator[EpisodeOrError, None, None]:
             given = (values, detections, every_score, similarity)
-            yield from results_in_order(run, play_task, [EpisodeTask(tracker, s, *given) for s in sources])
+            tasks = [EpisodeTask(tracker, s, *given) for s in sources]
+            for result, more in results_in_order(run, _play_and_list, tasks, _lost):
+                note(more)
+                yield result
 
         yield play_all
 
@@ -82,6 +88,19 @@ def playing_workers(workers: int = 1, cluster: str | None = None) -> Iterator[Ru
                 limited.close()
             _limited.clear()
             opened_sources.cache_clear()
+
+
+def _play_and_list(task: EpisodeTask) -> tuple[EpisodeOrError, dict[str, str]]:
+    return play_task(task), used_by(task.tracker)
+
+
+def _lost(task: EpisodeTask, error: WorkError) -> tuple[EpisodeOrError, dict[str, str]]:
+    return error.replaced(file=task.tracker.name), {}
+
+
+def used_by(tracker: TunedTracker) -> dict[str, str]:
+    """Returns what a tracker has used in this process so far, as `used_files.used`; {} for the rule."""
+    return {} if tracker.name == RULE else used(find(tracker.tracker))
 
 
 def play_task(task: EpisodeTask) -> EpisodeOrError:
@@ -110,10 +129,10 @@ _limited: dict[TunedTracker, TimeLimited] = {}  # In a worker: the processes of 
 
 
 def _runnable(tracker: TunedTracker) -> str | type[Tracker] | TimeLimited:
-    if tracker.name != RULE and code_hash(find(tracker.tracker)) != tracker.code:
+    if tracker.name != RULE and code_of(find(tracker.tracker)) != tracker.code:
         raise WorkError(
-            place="tracker", got=f"another {tracker.name} in a worker", expected="the file as it is here",
-            remedy="put the same file there, and start the workers anew",
+            place="tracker", got=f"another {tracker.name} than when the command began", expected="the same files",
+            remedy="run the command again; put the same files on all machines of a cluster",
         )  # fmt: skip
     if isinstance(tracker.tracker, type) or tracker.step_timeout is None:
         return tracker.tracker

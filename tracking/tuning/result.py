@@ -111,6 +111,8 @@ class TuningResult:
         validation: The values on the validation scenes, one per goal: a tuple of the defaults, then of the winner.
         notes: Remarks for the reader.
         left_out: A line for each scene whose script did not come true.
+        taken_over: The number of "trials" and of held-out "episodes" that an earlier call had stored, and when the last
+            trial was "stored", None if there was none. It stands in no file.
     """
 
     plan: SearchPlan = field(repr=False)
@@ -123,6 +125,7 @@ class TuningResult:
     validation: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     notes: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
+    taken_over: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def default(self) -> Config:

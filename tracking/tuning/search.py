@@ -11,6 +11,7 @@ Candidates are played on validation and test scenes by `tracking.tuning.candidat
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -71,13 +72,16 @@ def _search(options: TuneOptions) -> TuningResult:
     name = options.study or (target.stem if target is not None else "flockscope")
     with (
         open_study(plan, storage, name) as study,
-        episode_player(plan.tracker, plan.detections, options.workers, options.cluster, options.similarity) as play,
+        episode_player(
+            plan.tracker, plan.detections, options.workers, options.cluster, options.similarity, study.note
+        ) as play,
     ):
+        taken_over = study.taken_over()
         run_trials(study, play, progress)
         report = partial(progress, options.trials, options.trials)
         evaluator = HeldOutEvaluator(plan, play, study.optuna, report)
         evaluator.count(plan.training, study.left_out())
-        found = _evaluated(plan, study, evaluator)
+        found = replace(_evaluated(plan, study, evaluator), taken_over=taken_over)
     if target is not None:
         found.write(target)
     evaluator.require_most()

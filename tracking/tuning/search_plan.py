@@ -161,6 +161,7 @@ class SearchPlan:
         return {
             "tracker": self.tracker_name,
             "code": self.tracker.code,
+            "step_timeout": self.options.step_timeout,
             "versions": _digest(runtime().values()),
             "suite": self.suite_name,
             "seeds": seeds_text(self.seeds["train"]),

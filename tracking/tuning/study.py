@@ -22,9 +22,10 @@ import fcntl
 import json
 import math
 import os
+import re
 import time
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
@@ -32,21 +33,25 @@ from typing import Any
 import numpy as np
 import optuna
 from optuna.exceptions import UpdateFinishedTrialError
-from optuna.storages import JournalStorage
+from optuna.storages import JournalStorage, get_storage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
 from scenarios.errors import FlockscopeError, InputError
 from tracking.environment.episodes import Episode
+from tracking.running.tracker_registry import find
+from tracking.running.used_files import UsedFiles, changes, folder_of, relative
 from tracking.stats import mean_of_known
-from tracking.tuning.candidates import TrialRecord
+from tracking.tuning.candidates import STORED, TrialRecord
 from tracking.tuning.options import Progress
 from tracking.tuning.parallel_episodes import PlayEpisodes
 from tracking.tuning.sampler import PRUNED, distribution, propose, should_prune, tpe_sampler
 from tracking.tuning.search_plan import SearchPlan
+from tracking.tuning.tuned_tracker import RULE
 
 SUFFIX = ".locks"  # What the name of the lock file adds to the name of the journal.
 CHOOSING, WRITING, FIRST_TRIAL = 0, 1, 2  # Bytes of the lock file.
+SQLITE = re.compile(r"sqlite(?:\+\w+)?:///(?!:memory:)([^?]+)(?:\?.*)?")  # URL of a file, which gets locks, too
 HEAD = b'{"op_code":'  # How every journal begins.
 
 
@@ -112,6 +117,7 @@ class LockedJournal(JournalFileBackend):
 
 
 SETTINGS = "settings"  # Attribute of a study that holds the identity of its plan.
+USED = "used"  # Attribute of a study that holds what its tracker has used, as `used_files.used`.
 # Attributes of a trial: why its parameters are impossible; of the first: for each scene why it was left out, or "".
 ERROR, LEFT_OUT = "error", "left out"
 
@@ -126,14 +132,35 @@ class SearchStudy:
     """
 
     def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, storage: object = None) -> None:
-        self.plan, self.optuna, self.locks = plan, study, locks
+        self.plan, self.optuna, self.locks, self._used = plan, study, locks, UsedFiles()
+        self._folder = _folder(plan)
         self._space = {p.name: distribution(p) for p in plan.space}
         with self._choosing():
             if not self.trials() and SETTINGS not in study.user_attrs:
                 study.set_user_attr(SETTINGS, plan.identity())
             _check_identity(plan, study, storage)
+            self._used.update(study.user_attrs.get(USED, {}))
             if not self.trials():
                 study.enqueue_trial(dict(plan.defaults))
+
+    def note(self, used: Mapping[str, str]) -> None:
+        """Stores what the tracker has used in an episode; a search that goes on needs all of it unchanged."""
+        used = relative(used, self._folder)  # so that the study can be moved with the tracker
+        if used.items() <= self._used.items():
+            return
+        with self._choosing():
+            self._used.add(self.plan.tracker_name, used)
+            self._used.update(self.optuna.user_attrs.get(USED, {}))
+            self.optuna.set_user_attr(USED, dict(self._used))
+
+    def taken_over(self) -> dict[str, Any]:
+        """Returns the number of finished trials and of episodes on held-out scenes that are stored, and when the last
+        trial ended, None if there is none."""
+        finished, attributes = self.finished(), self.optuna.user_attrs
+        ends = [trial.datetime_complete for trial in finished if trial.datetime_complete is not None]
+        episodes = sum(len(value) for key, value in attributes.items() if key.startswith(STORED))
+        stored = f"{max(ends):%Y-%m-%d %H:%M}" if ends else None
+        return {"trials": len(finished), "episodes": episodes, "stored": stored}
 
     def trials(self) -> list[FrozenTrial]:
         """Returns all of Optuna's trials in the order of their numbers."""
@@ -218,16 +245,22 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
     URL (with "://"), or None for memory. Raises InputError if it cannot be opened or is of another search."""
     url = str(storage) if "://" in str(storage) else None
     file = Path(storage) if storage is not None and url is None else None
+    database = SQLITE.fullmatch(url or "")
+    locked = Path(database[1]) if database else file
     with quiet_optuna(), ExitStack() as opened:
-        locks = None if file is None else TrialLocks(file.with_name(file.name + SUFFIX))
+        locks = None if locked is None else TrialLocks(locked.with_name(locked.name + SUFFIX))
         if locks is not None:
             opened.callback(locks.close)
         try:
-            study = optuna.create_study(
-                storage=JournalStorage(LockedJournal(file, locks)) if file and locks else url, study_name=name,
-                load_if_exists=True,
-                directions=["maximize" if goal.higher else "minimize" for goal in plan.goals],
-            )  # fmt: skip
+            with nullcontext() if locks is None else locks.locked(CHOOSING):
+                place = JournalStorage(LockedJournal(file, locks)) if file and locks else get_storage(url)
+                if plan.options.fresh:
+                    with suppress(KeyError):  # there is no such study
+                        optuna.delete_study(study_name=name, storage=place)
+                study = optuna.create_study(
+                    storage=place, study_name=name, load_if_exists=True,
+                    directions=["maximize" if goal.higher else "minimize" for goal in plan.goals],
+                )  # fmt: skip
         except OSError:
             raise
         except Exception as error:  # each database has its own
@@ -242,13 +275,24 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
 def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> None:
     mine, stored = plan.identity(), study.user_attrs.get(SETTINGS, {})
     different = [key for key in mine if stored.get(key) != mine[key]]
+    if not different:
+        changed = changes(study.user_attrs.get(USED, {}), _folder(plan))
+        if changed:
+            raise InputError(
+                file=storage, place=f"study {study.study_name}", got=f"trials made before {', '.join(changed)} changed",
+                expected="the tracker as it was", remedy="begin anew with --fresh, or choose another --out or --study",
+            )  # fmt: skip
     if different:
         key = different[0]
         raise InputError(
             file=storage, place=f"study {study.study_name}", got=f"another search: {', '.join(different)} differ",
             expected=f"{key} {stored.get(key)}, not {mine[key]}",
-            remedy="choose another --out or --study, or repeat the command that began it",
+            remedy="begin anew with --fresh, choose another --out or --study, or repeat the command that began it",
         )  # fmt: skip
+
+
+def _folder(plan: SearchPlan) -> str:
+    return "" if plan.tracker.name == RULE else folder_of(find(plan.tracker.tracker))
 
 
 @contextmanager

@@ -11,7 +11,8 @@ from tracking.config import Config
 from tracking.environment.episodes import Source, streams_for
 from tracking.grouping.link_rule import LinkRule
 from tracking.running.time_limit import TimeLimited
-from tracking.running.tracker_registry import code_hash, config_class, find, located
+from tracking.running.tracker_registry import config_class, find, located
+from tracking.running.used_files import code_of
 from tracking.scoring.people_comparison import Similarity
 
 RULE = LinkRule.tracker
@@ -24,7 +25,7 @@ class TunedTracker:
     tracker: str | type[Tracker]  # as `tracking.track` takes it, or "grouping" for the rule
     name: str
     needs: tuple[str, ...]
-    code: str = ""  # hash of the file that defines the tracker, "" if there is none
+    code: str = ""  # as `used_files.code_of`
     objective: str = "objective"  # key of the score that it is tuned for by default
     detections: DetectionMode = "file"  # its input by default
     step_timeout: float | None = None  # seconds that each `reset` and `step` may take; never for a class and the rule
@@ -65,4 +66,4 @@ def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = Non
     if step_timeout is not None:
         TimeLimited(spec, step_timeout)  # refuses a class, and a wrong limit
     mode: DetectionMode = "file" if {"boxes", "points"} & {*found.needs} else "image"
-    return TunedTracker(spec, name, tuple(found.needs), code_hash(found), detections=mode, step_timeout=step_timeout)
+    return TunedTracker(spec, name, tuple(found.needs), code_of(found), detections=mode, step_timeout=step_timeout)

@@ -9,7 +9,7 @@ from sim.io.formats.labelled_truth import labelled_truth_fields
 from sim.sequence import simulate
 from sim.types import GroupEvent, Groups, Tracks
 from tests.reference_sense import paced
-from tracking.grouping.grouped_tracks import derive, with_groups
+from tracking.grouping.grouped_tracks import derive, events_at_end, with_groups
 from tracking.grouping.link_rule import LinkRule
 from tracking.running.run import TrackingRun, group, track
 
@@ -163,6 +163,19 @@ def test_crossings_and_queues_of_tracks():
     gone = [paced((5, (-1, 0)), (7, (0, 0)), (8, (0, 1)), start=(5 + 0.8 * k, 0)) for k in range(3)]
     (row,) = [e for e in derive(tracks(gone), FPS) for e in e.events if e.kind == "queue"]
     assert row.emitted == row.end + 30 + 15, "3 s until leaving is told from advancing, 1.5 s for a line that is lost"
+
+
+@pytest.mark.parametrize(("length", "at_end"), [(77, 1), (78, 0), (79, 0), (110, 0)])
+def test_events_that_the_end_of_a_recording_makes_known_are_counted(length, at_end):
+    """The crossing ends in frame 58 and is known in frame 78."""
+    given = tracks(passing())[:length]
+    made = derive(given, FPS)
+    assert [e.kind for t in made for e in t.events] == ["cross"]
+    assert events_at_end(given, made, FPS) == at_end
+    assert events_at_end(made, made, FPS) == 0, "the tracker's own do not count"
+    still = tracks([paced((5, (-1, 0)), (7, (0, 0)), start=(5 + 0.8 * k, 0)) for k in range(3)])
+    assert events_at_end(still, derive(still, FPS), FPS) == 1, "a queue that lasts"
+    assert events_at_end([], [], FPS) == 0
 
 
 def test_who_joins_as_they_come_is_no_merge():

@@ -34,13 +34,13 @@ def counted(*given):
     return attempt(*given)
 work.play_task = counted
 folder = Path(sys.argv[1])
-tune(**tune_arguments(folder), out=folder / sys.argv[3], storage=folder / "study.journal", study="toy")
+tune(**tune_arguments(folder), out=folder / sys.argv[3], storage=sys.argv[4], study="toy")
 """
 
 
-def in_another_process(folder: Path, at: int, out: str = "toy.toml") -> subprocess.Popen:
+def in_another_process(folder: Path, at: int, out: str = "toy.toml", storage: str = "") -> subprocess.Popen:
     """The search, killed at its episode number `at`."""
-    line = [sys.executable, "-c", KILLED_AT, str(folder), str(at), out]
+    line = [sys.executable, "-c", KILLED_AT, str(folder), str(at), out, storage or str(folder / "study.journal")]
     return subprocess.Popen(line, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)})
 
 
@@ -114,6 +114,17 @@ def test_more_trials_go_on_where_it_ended(found):
     assert len(more.trials) == 14
     assert more.trials[:12] == found[0].trials
     (folder / "toy.journal").write_bytes(journal)
+
+
+@pytest.mark.slow
+def test_two_processes_begin_a_study_in_one_database(tmp_path):
+    """The second one failed with IntegrityError, as both made the tables."""
+    url = f"sqlite:///{tmp_path}/study.db"
+    others = [in_another_process(tmp_path, -1, f"{k}.toml", url) for k in range(2)]
+    assert [other.wait(240) for other in others] == [0, 0]
+    assert (tmp_path / "0.json").read_bytes() == (tmp_path / "1.json").read_bytes()
+    with open_study(toy_plan(tmp_path), url, "toy") as study:
+        assert [t.number for t in study.finished()] == [t.number for t in study.trials()] == list(range(12))
 
 
 @pytest.mark.slow

@@ -97,7 +97,7 @@ def test_a_worker_whose_tracker_is_another_one_ends_it_all(tmp_path: Path) -> No
     (source,) = sources(write_scenes(tmp_path)[0], (1,))
     same = tuned_tracker(TOY)
     assert play_task(EpisodeTask(same, source, {}, "file", every_score=False)).frames == 20
-    with pytest.raises(WorkError, match=r"another .*toy_tracker.py:Toy in a worker; .* start the workers anew"):
+    with pytest.raises(WorkError, match=r"another .*toy_tracker.py:Toy than when the command began"):
         play_task(EpisodeTask(replace(same, code="another"), source, {}, "file", every_score=False))
 
 

@@ -26,6 +26,7 @@ from tracking.environment.episodes import streams_for
 from tracking.grouping.grouping_choice import default_grouping
 from tracking.grouping.link_rule import LinkRule
 from tracking.running.tracker_registry import find
+from tracking.running.used_files import UsedFiles, used
 from tracking.stress.failures import CRASH, Failure, Judgement, parse_failure, play_episode
 from tracking.stress.minimize import Minimizer
 from tracking.stress.reductions import OBSTACLES, difficulties, table_of
@@ -55,11 +56,13 @@ def minimize(options: MinimizeOptions) -> CommandResult:
         got, remedy = "the scene itself", "choose another file"
         raise InputError(file=out, place="--out", got=got, expected="another file", remedy=remedy)
     scene, setup = _scene_and_tracker(options)
-    streams = streams_for(setup.tracker, setup.detections)
+    streams, files = streams_for(setup.tracker, setup.detections), UsedFiles()
 
     def play(scenario: Scenario, seed: int, repeat: int = 0) -> Judgement:
         meter.step(f"{scenario.duration:g} s, {counted(len(scenario.group), 'group')}")
-        return play_episode(setup.run, streams, failure, scenario, seed, repeat)
+        found = play_episode(setup.run, streams, failure, scenario, seed, repeat)
+        files.add(setup.tracker, used(find(setup.tracker)))
+        return found
 
     with ProgressMeter("minimize", options.episodes) as meter:
         search = Minimizer(play, failure, scene.seed, options.confirm, options.episodes, options.minutes)

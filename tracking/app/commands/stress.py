@@ -49,7 +49,10 @@ def stress(options: StressOptions) -> CommandResult:
         ProgressMeter("stress", options.search or options.episodes) as meter,
         scene_player(options.workers, options.cluster) as play,
     ):
-        sweep, found = Sweep(plan, trackers, play, Store(options.out / EPISODES), meter.step), None
+        sweep, found = (
+            Sweep(plan, trackers, play, Store(options.out / EPISODES, options.fresh), meter.step),
+            None,
+        )
         if options.search is None:
             sweep.run()
         else:
@@ -58,7 +61,7 @@ def stress(options: StressOptions) -> CommandResult:
         write_file(options.out / RESULT, json_document(data))
         write_file(options.out / TABLE, _parquet(sweep))
         write_report(report_of_sweep(sweep, data, [*_break_lines(sweep, data)]), options.out / REPORT)
-    return CommandResult(data, _text(sweep, data, options.out))
+    return CommandResult({**data, "taken_over": sweep.taken_over}, _text(sweep, data, options.out))
 
 
 def _plan(options: StressOptions, detections: DetectionMode) -> Plan:
@@ -184,7 +187,9 @@ def _parquet(sweep: Sweep) -> bytes:
 
 def _text(sweep: Sweep, data: dict[str, Any], out: Path) -> str:
     parts = _found(sweep, data) if data["found"] is not None else _curves(sweep, data)
-    end = f"{counted(data['episodes'], 'episode')} stored in {out}; report: {out / REPORT}"
+    taken, episodes = sweep.taken_over, counted(data["episodes"], "episode")
+    stored = f", stored {taken['stored']}" if taken["episodes"] else ""
+    end = f"{episodes} stored in {out}, {taken['episodes']} of them taken over{stored}; report: {out / REPORT}"
     return "\n".join([*parts, *_notes(data), end])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from scenarios.errors import counted
 from tracking.app import option_parsing
 from tracking.app.command_options import TuneCommandOptions
 from tracking.app.command_result import CommandResult
@@ -33,5 +34,9 @@ def tune(options: TuneCommandOptions) -> CommandResult:
         f"{name}: {short(old)} → {short(new)} {params[name].unit}".rstrip()
         for name, (old, new) in result.changed.items()
     ]
-    text = "\n".join([*result.lines(), *changed, f"{options.out}, all figures and plots beside it"])
-    return CommandResult({**result.as_dict(), "file": options.out}, text)
+    taken = result.taken_over
+    stored = f", stored {taken['stored']}" if taken["stored"] else ""
+    counts = f"{counted(taken['trials'], 'trial')}, {counted(taken['episodes'], 'held-out episode')}"
+    lines = [*result.lines(), *changed, f"taken over: {counts}{stored}"]
+    text = "\n".join([*lines, f"{options.out}, all figures and plots beside it"])
+    return CommandResult({**result.as_dict(), "taken_over": dict(taken), "file": options.out}, text)

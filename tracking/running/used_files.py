@@ -1,0 +1,271 @@
+"""What decides the answers of a user's tracker, beside this project: its modules, the files it opens, other packages.
+
+`inside(owner)` stands around every call of a tracker's code, and notes which files are opened. `used(tracker)` returns
+the fingerprints of all that it has used so far in this process, and `changes` tells which of them are others now.
+Names of fingerprints are absolute paths, or "packages" for the versions of all installed packages. A fingerprint is the
+hash of a file's content, of the names in a folder that was listed, or "" if there is no such file.
+
+Files that a compiled library opens itself are known if the tracker's code names them in a string.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+import sys
+import sysconfig
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cache
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from typing import Any
+
+from scenarios.errors import InputError
+from sim.hashing import PACKAGES, canonical_hash, file_hash
+from sim.types import Tracker
+from tracking.running import user_modules
+from tracking.running.user_modules import PREFIX, strings_of
+
+INSTALLED = "packages"  # name of the fingerprint of all installed packages
+OURS = Path(__file__).resolve().parents[2]
+NOT_USERS = {"site-packages", "dist-packages", "__pycache__"}  # names of folders
+SYSTEM = ("/dev/", "/proc/", "/sys/")
+THIS_PROCESS = secrets.token_hex(6)
+LONGEST_NAME = 255  # characters of a string in code that may name a file
+
+_owner = ""  # whose code is running; "": this project's
+_home = ""  # working folder of the command, while a tracker is in another one
+_opened: set[str] = set()  # absolute paths that it has opened or listed since it began
+_written: set[str] = set()  # that any tracker has written
+_files: dict[str, dict[str, str]] = {}  # by owner: fingerprints of the files that were opened, by absolute path
+_folders: dict[str, str] = {}  # by owner: its working folder, if it has changed it
+_elsewhere: dict[str, dict[str, str]] = {}  # by owner: fingerprints from its other processes, by name
+
+
+@dataclass(frozen=True)
+class _Module:
+    spec: ModuleSpec | None  # another one after a reload
+    path: str
+    hash: str
+    words: frozenset[str]  # strings in its code
+
+
+_modules: dict[str, _Module] = {}  # modules of users that are in no private package, as they were at first sight
+
+
+def owner_of(module: str) -> str:
+    """Returns whose code a module is, by its name: its package, or "" for this project."""
+    head = module.partition(".")[0]
+    return "" if head in PACKAGES else head
+
+
+@contextmanager
+def inside(owner: str) -> Iterator[None]:
+    """Stands around code of this owner: notes the files that it opens, and keeps its working folder apart from that of
+    the command. It has no effect for "", this project's code, and inside another such block."""
+    global _owner, _home, _times
+    if not owner or _owner:
+        yield
+        return
+    if _hook not in _hooks:
+        sys.addaudithook(_hook)
+        _hooks.append(_hook)
+    _owner = owner
+    try:
+        if owner in _folders:
+            os.chdir(_folders[owner])
+        yield
+    finally:
+        _owner = ""
+        if _home:
+            _folders[owner] = _working_folder()
+            os.chdir(_home)
+            _home = ""
+        user_modules.forget_aliases()
+        if _opened:
+            _times += 1
+            _files.setdefault(owner, {}).update({path: fingerprint(path) for path in _opened})
+            _opened.clear()
+
+
+_hooks: list[object] = []
+_times = 0
+
+
+def _working_folder() -> str:
+    with suppress(FileNotFoundError):
+        return os.getcwd()
+    return os.sep
+
+
+def _hook(event: str, arguments: tuple[Any, ...]) -> None:
+    global _home
+    if not _owner or event not in ("open", "os.listdir", "os.scandir", "os.chdir"):
+        return
+    with suppress(Exception):  # an exception here would be one of open()
+        if event == "os.chdir":
+            _home = _home or _working_folder()
+            return
+        path = os.path.abspath(os.fsdecode(arguments[0] or "."))
+        if event == "open" and arguments[2] & (os.O_WRONLY | os.O_CREAT | os.O_TRUNC):
+            _written.add(path)
+        elif event == "open" or path not in sys.path_importer_cache:
+            _opened.add(path)
+
+
+def fingerprint(path: str) -> str:
+    """Returns the fingerprint of the file or folder at an absolute path as it is now."""
+    try:
+        names = os.listdir(path) if os.path.isdir(path) else None
+        return file_hash(Path(path)) if names is None else hashlib.sha256("\0".join(sorted(names)).encode()).hexdigest()
+    except OSError:
+        return ""
+
+
+@cache
+def is_users(path: str) -> bool:
+    """Returns True if a file belongs neither to this project, nor to Python, an installed package or the system."""
+    path = os.path.realpath(path)
+    return not (path.startswith((*SYSTEM, *_places())) or NOT_USERS & {*Path(path).parts})
+
+
+@cache
+def _places() -> tuple[str, ...]:
+    names = ("stdlib", "platstdlib")
+    ours = [str(OURS / name) for name in PACKAGES]
+    return tuple(f"{os.path.realpath(place)}{os.sep}" for place in (*ours, *map(sysconfig.get_path, names)))
+
+
+def used(tracker: type[Tracker]) -> dict[str, str]:
+    """Returns the fingerprints of all that a tracker class has used in this process so far, by name; {} for a tracker
+    of this project."""
+    owner = owner_of(tracker.__module__)
+    if not owner:
+        return {}
+    found = dict(_modules_used(owner))
+    found |= {p: known for p, known in _files.get(owner, {}).items() if p not in _written and is_users(p)}
+    return found | _elsewhere.get(owner, {}) | {INSTALLED: packages_hash()}
+
+
+def opened() -> int:
+    """Returns how many times files have been opened by trackers in this process, and noted."""
+    return _times
+
+
+def note(tracker: type[Tracker], others: Mapping[str, str]) -> None:
+    """Notes what a tracker class has used in another process, as `used` returned it there."""
+    if others:
+        _elsewhere.setdefault(owner_of(tracker.__module__), {}).update(others)
+
+
+def changes(stored: Mapping[str, str], folder: str = "") -> list[str]:
+    """Returns the names of fingerprints that differ from the present ones. folder: to which names are relative."""
+    return [name for name, known in stored.items() if known != _now(name, folder)]
+
+
+def _now(name: str, folder: str) -> str:
+    return packages_hash() if name == INSTALLED else fingerprint(os.path.join(folder, name))
+
+
+def relative(found: Mapping[str, str], folder: str) -> dict[str, str]:
+    """Returns fingerprints with the names of files below the folder relative to it."""
+    below = os.path.join(folder, "")
+    return {name.removeprefix(below): known for name, known in found.items()}
+
+
+def folder_of(tracker: type[Tracker]) -> str:
+    """Returns the folder of the file that defines a tracker class, "" if there is none."""
+    file = getattr(sys.modules.get(tracker.__module__), "__file__", None)
+    return os.path.dirname(os.path.realpath(file)) if file else ""
+
+
+def _modules_used(owner: str) -> Iterator[tuple[str, str]]:
+    """Yields path and hash of the modules of the owner's private package, and of other modules of users."""
+    package = user_modules.packages.get(owner)
+    if package is not None:
+        for path, known in package.files.items():
+            yield str(path), known
+            yield from _named(package.words[path], path.parent)
+    for name in [*sys.modules]:
+        known_module = _module(name) if (name == "__main__") == (owner == "__main__") else None
+        if known_module is not None:
+            yield known_module.path, known_module.hash
+            yield from _named(known_module.words, Path(known_module.path).parent)
+
+
+def _module(name: str) -> _Module | None:
+    """Returns a module of a user that is in no private package, None for another module."""
+    module = sys.modules.get(name)
+    file = getattr(module, "__dict__", {}).get("__file__")
+    if name.startswith(PREFIX) or not isinstance(file, str) or not is_users(file):
+        return None
+    spec = getattr(module, "__spec__", None)
+    if name not in _modules or _modules[name].spec is not spec:
+        path, words = os.path.realpath(file), frozenset[str]()
+        with suppress(Exception):  # a compiled module has no code
+            words = frozenset(strings_of(compile(Path(path).read_bytes(), path, "exec")))
+        _modules[name] = _Module(spec, path, fingerprint(path), words)
+    return _modules[name]
+
+
+def _named(words: Iterable[str], folder: Path) -> Iterator[tuple[str, str]]:
+    """Yields path and fingerprint of the files that strings in code name, below the folder."""
+    for word in words:
+        if 0 < len(word) <= LONGEST_NAME and "." in word and "\0" not in word and (folder / word).is_file():
+            path = os.path.realpath(folder / word)
+            if path not in _written and is_users(path):
+                yield path, fingerprint(path)
+
+
+@cache
+def packages_hash() -> str:
+    """Returns the hash of names and versions of all installed packages."""
+    names = sorted(found.name for folder in sys.path for found in Path(folder).glob("*.dist-info"))
+    return hashlib.sha256("\0".join(names).encode()).hexdigest()
+
+
+def code_of(tracker: type[Tracker]) -> str:
+    """Returns 12 hex digits that name the code of a tracker class and its base classes as it was imported, "" for a
+    tracker of this project. It is the same in every process, except for a class without a file, whose code is unknown.
+    """
+    owner = owner_of(tracker.__module__)
+    if not owner:
+        return ""
+    if owner in user_modules.packages:
+        return user_modules.packages[owner].code
+    files = {name: _module(name) for name in dict.fromkeys(kind.__module__ for kind in tracker.__mro__)}
+    own = {name: known.hash for name, known in files.items() if known is not None}
+    return canonical_hash(own)[:12] if tracker.__module__ in own else THIS_PROCESS
+
+
+def require_as_imported(tracker: type[Tracker]) -> None:
+    """Raises InputError if a module that a tracker class comes from, or imports, has changed since its import. The
+    modules beside a tracker's file are not looked at: they are loaded anew."""
+    owner = owner_of(tracker.__module__)
+    heads = {kind.__module__.partition(".")[0] for kind in tracker.__mro__}
+    if owner in user_modules.packages:
+        heads |= user_modules.packages[owner].installed
+    for name in [name for name in sys.modules if owner and name.partition(".")[0] in heads]:
+        known = _module(name)
+        if known is not None and fingerprint(known.path) != known.hash:
+            raise InputError(
+                file=known.path, got=f"another content than when {name} was imported", expected="the code that runs",
+                remedy="start Python anew",
+            )  # fmt: skip
+
+
+class UsedFiles(dict[str, str]):
+    """What a tracker has used in one command, from all processes: fingerprints by name."""
+
+    def add(self, tracker: str, more: Mapping[str, str]) -> None:
+        """Adds fingerprints. Warns of those that differ from an earlier episode, and keeps the first."""
+        for name, known in more.items():
+            if self.setdefault(name, known) != known:
+                text = (
+                    f"{tracker}: {name} has changed while the command ran: run it again, stress and tune with --fresh"
+                )
+                warnings.warn(text, UserWarning, stacklevel=2)
