@@ -1,9 +1,9 @@
 """Groups that never reach their goal: walls leave them no way, or they stand short of it to the end.
 
 A group has *no way* if its members are in a part of the free space that a goal or point of their way is not in. Free is
-every point that is 0.21 m or more from all walls and pillars, on a grid of 5 cm in the world. A group *stands* if its
-members have moved less than 0.5 m in the last 10 s and less than 0.1 m in the last second, more than 2 m from the goal,
-without an order to wait.
+every point that is 0.21 m or more from all walls and pillars, on a grid of 5 cm, in worlds of up to 200 m by 200 m. A
+group *stands* if its members have moved less than 0.5 m in the last 10 s and less than 0.1 m in the last second, more
+than 2 m from the goal, without an order to wait.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from sim.elementary import length
 from sim.types import Array, Ints, Scene
 
 CELL = 0.05  # m
+MOST_CELLS = 16_000_000  # in larger worlds only standing is found
 FREE = BODY_RADIUS + 0.01  # m from walls and pillars
 STAND_TIME = 10.0  # s
 STAND_MOVE, STILL_MOVE = 0.5, 0.1  # m: less in this time, and in the last second, is standing
@@ -26,7 +27,7 @@ NEAR_GOAL = 2.0  # m: a group that stands nearer has found no better place
 
 def has_way(scene: Scene, people: Array, goal: Array) -> bool:
     """Returns True if a body can walk from all of the points people (N, 2) m to the goal (2,) m."""
-    if not len(scene.walls) + len(scene.pillars):
+    if not len(scene.walls) + len(scene.pillars) or np.prod(scene.size) > MOST_CELLS * CELL * CELL:
         return True
     parts = _parts(
         *(float(x) for x in scene.size),
@@ -43,12 +44,22 @@ def _parts(width: float, height: float, walls: tuple[float, ...], pillars: tuple
     from scipy.ndimage import label
 
     x, y = (CELL * (np.arange(max(1, round(size / CELL))) + 0.5) for size in (width, height))
-    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
-    free = np.ones(points.shape[:2], bool)
+    free = np.ones((len(x), len(y)), bool)
+
+    def near(low: Array, high: Array) -> tuple[slice, slice, Array]:
+        """Returns the slices of the cells in and round a rectangle, and their middles."""
+        rows, columns = (
+            slice(*np.searchsorted(axis, (low[k] - FREE, high[k] + FREE)).tolist()) for k, axis in enumerate((x, y))
+        )
+        return rows, columns, np.stack(np.meshgrid(x[rows], y[columns], indexing="ij"), axis=-1)
+
     for wall in np.reshape(walls, (-1, 2, 2)):
-        free &= wall_distances(points, wall) >= FREE
+        rows, columns, points = near(wall.min(axis=0), wall.max(axis=0))
+        free[rows, columns] &= wall_distances(points, wall) >= FREE
     for a, b, radius in np.reshape(pillars, (-1, 3)).tolist():
-        free &= length(points - np.array([a, b])) >= radius + FREE
+        middle = np.array([a, b])
+        rows, columns, points = near(middle - radius, middle + radius)
+        free[rows, columns] &= length(points - middle) >= radius + FREE
     return np.asarray(label(free, np.ones((3, 3)))[0], np.int64)
 
 

@@ -69,7 +69,7 @@ def _breaking(text: str) -> str:
     """Returns text as HTML that breaks after the separators of paths and names, not inside words."""
     from markupsafe import Markup, escape
 
-    return Markup(re.sub(r"(&[#\w]+;|[/._:=-])", r"\1<wbr>", str(escape(text))))
+    return Markup(re.sub(r"(&[#\w]+;|[/._:=-])(?=\S)", r"\1<wbr>", str(escape(text))))
 
 
 def _environment() -> Environment:
