@@ -191,7 +191,7 @@ def _modules_used(owner: str) -> Iterator[tuple[str, str]]:
             yield str(path), known
             yield from _named(package.words[path], path.parent)
     for name in [*sys.modules]:
-        known_module = _module(name) if (name == "__main__") == (owner == "__main__") else None
+        known_module = _module(name) if name != "__main__" or owner == "__main__" else None
         if known_module is not None:
             yield known_module.path, known_module.hash
             yield from _named(known_module.words, Path(known_module.path).parent)

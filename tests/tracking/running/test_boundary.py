@@ -150,6 +150,17 @@ def test_a_tracker_that_ends_the_process_is_an_error_that_names_it(tmp_path: Pat
     assert re.search(rf"error: mine.py:Mine: gt, frame 1: got .* ended with {ENDS[statement]}", done.stderr)
 
 
+def test_the_end_of_a_worker_names_the_tracker(tmp_path: Path) -> None:
+    line = command(tmp_path, "os._exit(0)", "--workers", "2")
+    for name in "ab":
+        (tmp_path / "data" / name / "gt").mkdir(parents=True)
+        (tmp_path / "data" / name / "gt" / "gt.txt").write_text((tmp_path / "gt.txt").read_text())
+    line[line.index("gt.txt")] = "data"
+    done = subprocess.run(line, cwd=tmp_path, env=ENV, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert re.search(r"error: mine.py:Mine: [ab]: got an item that killed 3 workers, .* exit code 0", done.stderr)
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, -15), (signal.SIGKILL, -9)])
 def test_signals_to_the_command_reach_the_process_of_the_tracker(tmp_path: Path, number: int, code: int) -> None:
     waits = "Path('pid').write_text(str(os.getpid())); __import__('time').sleep(60)"

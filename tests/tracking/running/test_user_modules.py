@@ -151,6 +151,15 @@ def test_compiled_neighbours_are_found_in_their_cache(tmp_path: Path) -> None:
     assert value(f"{tmp_path}/b/other.py:Mine") == "ran\n3\n"
 
 
+def test_a_class_of_a_script_uses_the_script_and_what_it_imports(tmp_path: Path) -> None:
+    write(tmp_path, "import helper, later", "0", helper="x = 1")
+    script = tmp_path / "mine.py"
+    script.write_text(script.read_text() + "from tracking.running.used_files import used\nprint(*used(Mine))\n")
+    env = {"PYTHONPATH": str(Path(tracking.__file__).parents[1])}
+    done = subprocess.run([sys.executable, script], env=env, capture_output=True, text=True, check=True)
+    assert {Path(name).name for name in done.stdout.split()} == {"mine.py", "helper.py", "later.py", "packages"}
+
+
 def test_a_module_of_a_package_that_has_changed_is_refused(tmp_path: Path, monkeypatch) -> None:
     """Python keeps what it has imported; answers of the old code would be stored as those of the new."""
     monkeypatch.syspath_prepend(tmp_path)

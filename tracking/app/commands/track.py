@@ -14,7 +14,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import InputError, counted, printable
+from scenarios.errors import InputError, WorkError, counted, printable
 from sim.types import DetectionMode, Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
@@ -76,7 +76,10 @@ def track(options: TrackOptions) -> CommandResult:
         if min(options.workers, len(sequences)) > 1:
             given = pickle.dumps(options)  # a tracker class and its config cannot be pickled, their names can
             jobs = [(given, folder) for folder in folders]
-            rows = list(over_sequences("track", _track_in_worker, sequences, jobs, source, options.workers))
+            try:
+                rows = list(over_sequences("track", _track_in_worker, sequences, jobs, source, options.workers))
+            except WorkError as error:  # a process that has ended names no tracker
+                raise (error if error.file else error.replaced(file=setup.tracker)) from error.__cause__
         else:
             with setup.limited or nullcontext(), ProgressMeter("track", total_frames(sequences)) as meter:
                 rows = [
