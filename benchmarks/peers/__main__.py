@@ -1,6 +1,6 @@
 """Trackers of other libraries beside `blob`, each with its defaults and tuned by `tune` on the same budget.
 
-    python -m benchmarks peers [simulated] [real] [rates] [speed] [--environments DIR] [--trials 40]
+    python -m benchmarks peers [simulated] [real] [rates] [speed] [--environments DIR] [--trials 30]
         [--seeds 20000:20003] [--data FOLDER] [--chart FILE.svg]
 
 The libraries are installed into DIR (benchmarks/peers/environments.py); one that cannot be is left out, and pip says
@@ -183,7 +183,7 @@ def main() -> None:
     parser = new_parser(__doc__)
     parser.add_argument("part", nargs="*", help=f"{', '.join(PARTS)}; all if absent")
     parser.add_argument("--environments", type=Path, default=DEFAULT, metavar="DIR", help="folder of the libraries")
-    parser.add_argument("--trials", type=int, default=40, help="trials of each search")
+    parser.add_argument("--trials", type=int, default=30, help="trials of each search")
     parser.add_argument("--chart", type=Path, help="picture of `rates`")
     add_seeds(parser, "20000:20003", what="simulated: ")
     add_data(parser)
