@@ -353,12 +353,3 @@ def test_trackers_with_different_inputs_have_an_oracle_each(tmp_path: Path) -> N
     assert made.oracles == {"a": "oracle from points", "b": "oracle from boxes"}
     assert (made.scores("oracle from boxes") == 0.5).all()
     assert {row["oracle"] for row in made.rows() if row["tracker"] == "a"} == {1.0}
-
-
-def test_a_tracker_with_another_label_is_not_played_again(tmp_path: Path) -> None:
-    sweep(tmp_path, [], episodes=40).run()
-    again = sweep(tmp_path, seen := [], episodes=40)
-    again.trackers = {"mine": again.trackers["t"]}
-    again.run()
-    assert not seen
-    assert {row["tracker"] for row in again.rows()} == {"mine", "oracle"}
