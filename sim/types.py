@@ -18,6 +18,7 @@ from sim.arrays import Frozen
 from sim.arrays import Image as Image
 from sim.arrays import Ints as Ints
 from sim.arrays import no_ids as no_ids
+from sim.made_of_people import MadeOfPeople
 from sim.never_arrives import NeverArrives
 
 Plane = Literal["ground", "space", "image"]
@@ -102,7 +103,7 @@ class GroupEvent:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tracks(Frozen):
+class Tracks(MadeOfPeople, Frozen):
     """What one tracker reports for frame `index` (from 1) at time t (s): N people or groups, one row each.
 
     plane: "ground", "space" (m) or "image" (px). unit "person": rows are people, group (N,) is the id of each person's
@@ -129,49 +130,6 @@ class Tracks(Frozen):
     derived: bool = False
     own_events: tuple[str, ...] = ()
     seen: Bools = field(default_factory=lambda: np.zeros(0, bool))
-
-    @classmethod
-    def of_boxes(cls, frame: Frame, id: Any, box: Any, score: Any = (), **more: Any) -> Tracks:
-        """Returns the tracks of people with boxes in the image, in the frame.
-
-        Velocities are unknown, covariances are the identity, and nobody has a group, unless `more` says otherwise.
-
-        Args:
-            frame: The frame that `step` was given.
-            id: Ids (N,) of the people, not below 0 and never used for another person.
-            box: Boxes (N, 4): left, top, width, height in px.
-            score: Scores (N,) in [0, 1], or empty.
-            **more: Further fields of `Tracks`, such as `group` or `seen`.
-
-        Example:
-            return Tracks.of_boxes(frame, [t.id for t in found], [t.ltwh for t in found])
-        """
-        box = np.asarray(box, float).reshape(-1, 4)
-        return cls._of_people(frame, "image", id, box[:, :2] + box[:, 2:] / 2, box=box, score=score, **more)
-
-    @classmethod
-    def of_points(
-        cls, frame: Frame, id: Any, pos: Any, score: Any = (), *, plane: Plane = "ground", **more: Any
-    ) -> Tracks:
-        """Returns the tracks of people at points, in the frame. The other fields are as of `of_boxes`.
-
-        Args:
-            frame: The frame that `step` was given.
-            id: As for `of_boxes`.
-            pos: Positions (N, 2): x, y in m on the ground, or in px in the image; (N, 3) in space, m.
-            score: As for `of_boxes`.
-            plane: In which `pos` lies: "ground", "image" or "space".
-            **more: Further fields of `Tracks`, such as `vel` or `box`.
-        """
-        pos = np.asarray(pos, float).reshape(-1, 3 if plane == "space" else 2)
-        return cls._of_people(frame, plane, id, pos, score=score, **more)
-
-    @classmethod
-    def _of_people(cls, frame: Frame, plane: Plane, id: Any, pos: Array, score: Any, **more: Any) -> Tracks:
-        n, dims = pos.shape
-        moving = {"vel": np.full((n, dims), np.nan), "cov": np.tile(np.eye(2 * dims), (n, 1, 1))}
-        fields = {"group": np.full(n, -1), **moving, "score": np.asarray(score, float), **more}
-        return cls(frame.index, frame.t, plane, "person", np.asarray(id) if n else no_ids(), pos=pos, **fields)
 
     @property
     def measured(self) -> Bools:
