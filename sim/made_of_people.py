@@ -12,6 +12,8 @@ from sim.arrays import Array, no_ids
 class MadeOfPeople:
     """Class methods of `sim.types.Tracks`."""
 
+    __slots__ = ()
+
     @classmethod
     def of_boxes(cls, frame: Any, id: Any, box: Any, score: Any = (), **more: Any) -> Self:
         """Returns the tracks of people with boxes in the image, in the frame.

@@ -484,11 +484,8 @@ class Sequence:
 
 
 class Tracker(Protocol):
-    """The interface of a tracker.
-
-    needs: one or more of "pixels" (pictures), "stereo" (left and right pictures), "boxes" and "points" (detections).
-    The tracker can work with each of these inputs alone.
-    """
+    """The interface of a tracker. needs: one or more of "pixels" (pictures), "stereo" (left and right pictures),
+    "boxes" and "points" (detections). The tracker can work with each of these inputs alone."""
 
     needs: tuple[str, ...]
 
@@ -496,8 +493,6 @@ class Tracker(Protocol):
         """Forgets all state and prepares for a new sequence. seed: for the tracker's random numbers."""
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
-        """Returns this tracker's tracks of `frame`, from this and earlier frames only.
-
-        detections: those of the frame, possibly with zero rows; None if the tracker is given pictures only.
-        """
+        """Returns this tracker's tracks of `frame`, from this and earlier frames only. detections: those of the frame,
+        possibly with zero rows; None if the tracker is given pictures only."""
         ...

@@ -28,7 +28,8 @@ from sim.types import Array, Bools, Context, Detections, Tracks
 FITTING, COMPARED = 3, 12  # rows that end the check, and rows of which hardly any may be wrong
 SHARE = 0.2  # of the rows compared that must fit
 GROUND = 20.0  # m: how far from the detections a person may be
-OVERLAP = 0.05  # least IoU of boxes that show one person
+OVERLAP = 0.05  # least IoU of a box and the box of a body at the position
+GIVEN = 0.25  # least IoU of a box and a detection; .14 if a middle is taken for a corner
 VIEW = 1.0  # widths and heights of the picture by which a person may be outside it
 
 
@@ -118,7 +119,7 @@ def _at_centres(t: Tracks, given: Detections, context: Context) -> Bools | None:
 def _as_given(t: Tracks, given: Detections | None) -> Bools | None:
     if t.box is None or t.unit == "group" or given is None or given.box is None or not len(given.box):
         return None
-    return np.asarray(_iou(t.box[:, None], given.box).max(axis=1) >= OVERLAP)
+    return np.asarray(_iou(t.box[:, None], given.box).max(axis=1) >= GIVEN)
 
 
 def _of_a_person(t: Tracks, context: Context) -> Bools | None:
