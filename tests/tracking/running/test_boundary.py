@@ -58,7 +58,7 @@ def test_the_greatest_numbers_are_stored_and_read(tmp_path: Path) -> None:
     class Far(Stranger):
         def step(self, frame, detections):
             found = super().step(frame, detections)
-            if not len(found.id):
+            if frame.index < 6 or not len(found.id):  # the first answers must fit the detections
                 return found
             end = 10**6
             told = event(start=1, end=end, emitted=None, members=(0,), before=(2**63 - 1,), pos=(-1e6, math.nan))

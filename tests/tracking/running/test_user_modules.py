@@ -163,6 +163,9 @@ def test_a_class_of_a_script_uses_the_script_and_what_it_imports(tmp_path: Path)
 def test_a_module_of_a_package_that_has_changed_is_refused(tmp_path: Path, monkeypatch) -> None:
     """Python keeps what it has imported; answers of the old code would be stored as those of the new."""
     monkeypatch.syspath_prepend(tmp_path)
+    for name in ("wE_mine", "wE_base"):  # they are no longer imported after the test
+        monkeypatch.setitem(sys.modules, name, None)
+        del sys.modules[name]
     write(tmp_path, "from wE_base import x", "x", wE_base="x = 1")
     (tmp_path / "mine.py").rename(tmp_path / "wE_mine.py")
     assert find("wE_mine:Mine").value == 1

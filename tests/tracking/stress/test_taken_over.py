@@ -168,7 +168,11 @@ def test_a_constant_of_the_scorer_and_the_version_of_numpy_in_a_copy(tmp_path: P
     constants = tmp_path / "tracking" / "scoring" / "people_comparison.py"
     constants.write_text(constants.read_text() + "\n# another constant\n")
     assert [taken(), taken()] == [0, 2]
-    other = ("import importlib.metadata as m", "v = m.version", "m.version = lambda n: '0.1' if n == 'numpy' else v(n)")
+    other = (
+        "import importlib.metadata as m",
+        "v = m.version",
+        "m.version = lambda n: '2.0.99' if n == 'numpy' else v(n)",
+    )
     assert [taken(*other), taken(*other), taken()] == [0, 2, 2]
 
 
