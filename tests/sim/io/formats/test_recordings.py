@@ -165,6 +165,13 @@ def test_cvml_of_others_needs_a_frame_rate(tmp_path, objects, what):
     assert (s.fps, s.image_size) == (12, None), what
 
 
+def test_xml_of_others_names_the_form_that_is_read(tmp_path):
+    """As CVAT, Pascal VOC and SUMO write it."""
+    (tmp_path / "a.xml").write_text("<annotations><track><box frame='0'/></track></annotations>")
+    with pytest.raises(InputError, match=r"got <annotations>; .* write them as \.csv, and name the columns"):
+        open_source(tmp_path / "a.xml", fps=25)
+
+
 def test_cvml_without_frames_is_refused(tmp_path):
     """Frames stand right below the root: others, deep in an XML of another program, were read as 0 frames."""
     for body in ("", "<part><frame number='0'/></part>", "<a>" * 50 + "</a>" * 50):
