@@ -75,7 +75,10 @@ class NumericTable:
         crowded = np.bincount(frame, minlength=1)[frame] > DETECTIONS
         self.reject(crowded, f"at most {DETECTIONS} {self.unit}s of one frame", "check that this is the right file")
         far = ~(np.abs(self.values[:, 2:]) <= COORDINATE).all(axis=1)  # also nan
-        self.reject(far, f"numbers within {COORDINATE:g}", CORRECT)
+        offset = (
+            "subtract one position near the people from all, if these are geographic, as UTM; else check the columns"
+        )
+        self.reject(far, f"numbers within {COORDINATE:g}", CORRECT, offset)
 
 
 def read_text(path: Path, limit: int = TEXT_BYTES) -> str:

@@ -42,7 +42,7 @@ def test_units_of_positions(tmp_path, unit, factor, names):
 @pytest.mark.parametrize(("name", "second"), [("t", 1), ("timestamp_ms", 1000)])
 def test_times_in_place_of_frames(tmp_path, name, second):
     """The first is frame 1. The rate is that of the usual step of a person, here 1 s, or given."""
-    rows = [f"{(1.7e9 + t + p / 8) * second:.3f},{p},{t / 10},2" for p in (0, 1) for t in (0, 1, 2, 3, 9)]
+    rows = [f"{(1.7e9 + t + p / 8) * second:.3f},{p},{t / 10},{2 + p}" for p in (0, 1) for t in (0, 1, 2, 3, 9)]
     (tmp_path / "a.csv").write_text("\n".join([f"{name},agent_id,pos_x,pos_y", *rows]))
     for fps, expected in ((None, [1, 1, 2, 2, 3, 3, 4, 4, 10, 10]), (2, [1, 1, 3, 3, 5, 5, 7, 7, 19, 19])):
         (s,) = open_source(tmp_path / "a.csv", fps=fps)
@@ -122,8 +122,33 @@ def test_ids_in_words_are_numbered_and_said(tmp_path, words, ids):
         (found,) = open_source(tmp_path / "a.csv")
     assert found.truth.id.tolist() == ids * 2
     assert found.source["ids"] == dict(zip(ids, words, strict=True))
-    (tmp_path / "a.csv").write_text("t;id;x;y\n1;Anna;0;0\n2;;1;0\n")
-    with pytest.raises(InputError, match="line 3: got no id"):
+
+
+@pytest.mark.parametrize("nothing", ["", "None", "null", "NA"])
+@pytest.mark.parametrize(("what", "row"), [("id", "2,{},3,0,Aa"), ("group", "2,Bert,3,0,{}")])
+@pytest.mark.filterwarnings("ignore:.*(in words are numbered|no two people)")
+def test_words_for_nothing_are_no_ids_and_no_groups(tmp_path, nothing, what, row):
+    text = "t,id,x,y,group\n1,Anna,0,0,Aa\n2,Anna,0,0,Aa\n" + row
+    (tmp_path / "a.csv").write_text(text.format(nothing))
+    with pytest.raises(InputError, match=f"line 4: got no {what}; .*-1 for none"):
+        open_source(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_text(text.format("-1"))
+    assert open_source(tmp_path / "a.csv")[0].length == 2
+
+
+@pytest.mark.filterwarnings("ignore:.*(in words are numbered|not used)")
+def test_rows_of_nobody_are_left_out_and_counted(tmp_path):
+    """SUMO's xml2csv writes a row for each vehicle, too, in columns of its own."""
+    people = [f"{k / 10};ped{id};{x:.2f};{y};walker;;;" for k, id, x, y in WALK]
+    cars = [f"{k / 10};;;;;car7;{30 - k};4.5" for k in range(20)]
+    names = "timestep_time;person_id;person_x;person_y;person_type;vehicle_id;vehicle_x;vehicle_y"
+    (tmp_path / "a.csv").write_text("\n".join([names, cars[0], *people, *cars[1:]]))
+    with pytest.warns(UserWarning, match="a.csv: 20 rows have nobody in columns person_id, person_x, person_y"):
+        (found,) = open_source(tmp_path / "a.csv")
+    assert found.truth.pos == pytest.approx(np.array([w[2:] for w in WALK]))
+    assert (found.truth.id.tolist(), found.fps) == ([7, 8] * 20, 10)
+    (tmp_path / "a.csv").write_text("\n".join([names, *people, "0.7;ped9;;;;;;"]))
+    with pytest.raises(InputError, match="line 42: got ''; expected a number as cell 3"):
         open_source(tmp_path / "a.csv")
 
 
@@ -241,6 +266,24 @@ def test_places_that_are_hardly_metres_on_the_ground_are_warned_of(tmp_path, x, 
     rows = [f"{f},{k},{x * (5 * k + f)},{y * (5 * k - f)}\n" for f in range(1, 5) for k in range(1, 6)]
     with pytest.warns(UserWarning, match=words):
         opened(tmp_path, "frame,id,x,y\n" + "".join(rows)).truth  # noqa: B018
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("km", 1000), ("degrees", 111_000), ("shares", 20)])
+def test_bodies_inside_each_other_are_warned_of(tmp_path, unit, metres):
+    """Two people walk 1 m apart: no two bodies come nearer than 0.15 m. With the unit named all is right."""
+    rows = "".join(f"{k + 1},{id},{x / metres:.9f},{y / metres:.9f}\n" for k, id, x, y in WALK)
+    with pytest.warns(UserWarning, match=f"half are within {1 / metres:.2g} m of another: write metres"):
+        opened(tmp_path, f"frame,id,x,y\n{rows}").truth  # noqa: B018
+    if unit == "km":
+        truth = opened(tmp_path, f"frame,id,x_km,y_km\n{rows}").truth
+        assert truth.pos == pytest.approx(np.array([w[2:] for w in WALK]), abs=1e-5)
+
+
+def test_far_positions_are_read_after_an_offset(tmp_path):
+    rows = "frame,id,x,y\n" + "".join(f"{k + 1},{id},{x + 641e3},{{}}\n" for k, id, x, y in WALK)
+    with pytest.raises(InputError, match=r"subtract one position near the people from all, if .*UTM"):
+        opened(tmp_path, rows.format(*(y + 5471e3 for *_, y in WALK)))
+    assert opened(tmp_path, rows.format(*(y for *_, y in WALK))).truth.pos[0, 1] == WALK[0][3]
 
 
 def test_people_who_run_are_warned_of_where_some_have_no_place(tmp_path):
