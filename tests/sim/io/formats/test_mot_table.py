@@ -124,6 +124,17 @@ def test_ids_in_words_are_numbered_and_said(tmp_path, words, ids):
     assert found.source["ids"] == dict(zip(ids, words, strict=True))
 
 
+@pytest.mark.filterwarnings("ignore:.*not used. t")
+def test_times_that_jump_over_a_frame_name_the_remedy(tmp_path):
+    """10 times per s, of which the second is late by 0.6 of a frame; all rows are kept when they are numbered."""
+    rows = [(k, id, f"{k / 10 + 0.06 * (k == 1):.2f},{id},{x:.1f},{y}") for k, id, x, y in WALK]
+    (tmp_path / "a.csv").write_text("t,id,x,y\n" + "\n".join(row for *_, row in rows))
+    with pytest.raises(InputError, match=r"line 6: got a second time of id 7 in frame 3; .*number the times in order"):
+        open_source(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_text("frame,t,id,x,y\n" + "\n".join(f"{k + 1},{row}" for k, _, row in rows))
+    assert len(open_source(tmp_path / "a.csv", fps=10)[0].truth.id) == len(WALK)
+
+
 @pytest.mark.parametrize("nothing", ["", "None", "null", "NA"])
 @pytest.mark.parametrize(("what", "row"), [("id", "2,{},3,0,Aa"), ("group", "2,Bert,3,0,{}")])
 @pytest.mark.filterwarnings("ignore:.*(in words are numbered|no two people)")
@@ -307,6 +318,7 @@ def test_columns_without_a_name_are_not_used(tmp_path, header, row):
 
 
 UNCLEAR = {
+    "0 1 Pedestrian 0 0 -1 10 20 40 90 0 0 0\n": "line 1: got 'Pedestrian'; .*name the columns in the first line",
     "1;7;10,5;20,5;30,5;40,5\n": "line 1: got '10,5'; expected a number as cell 3; write decimals with a point",
     "1\t7\t10,5\t20,5\t30,5\t40,5\n": "line 1: .* write decimals with a point",
     "<html>\n": "line 1: got columns html",
