@@ -12,7 +12,10 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
+
+import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import FRAME_RATES, SCALES, is_number
@@ -27,7 +30,7 @@ from sim.io.pictures.background_sample import parse_choice
 from sim.io.pictures.picture_folder import SUFFIXES as PICTURES
 from sim.io.store import sequence_folder
 from sim.io.store.seal import is_sequence
-from sim.types import Camera, Sequence
+from sim.types import Array, Camera, Sequence, Truth
 
 KINDS = (
     "a generated sequence or dataset, a MOTChallenge folder or text, trajectories, a text of KITTI, a BIWI folder, "
@@ -36,6 +39,7 @@ KINDS = (
 VIDEOS = f"{KINDS} ({' '.join(video.SUFFIXES)})"
 TEXTS = (".txt", ".csv", ".tsv")
 DEPTH = 3
+CHECKED = 1000  # frames whose boxes are compared with a given camera
 
 
 def open_source(
@@ -88,7 +92,34 @@ def open_source(
     if boxes is not None and len(sequences) > 1:
         got, remedy = f"{len(sequences)} sequences", "give one of them"
         raise InputError(place="--boxes", got=got, expected="one sequence", remedy=remedy)
-    return sequences if boxes is None else [with_boxes(sequences[0], Path(boxes), of_boxes)]
+    if boxes is not None:
+        sequences = [with_boxes(sequences[0], Path(boxes), of_boxes)]
+    return sequences if camera is None else [_with_checked_camera(each) for each in sequences]
+
+
+def _with_checked_camera(sequence: Sequence) -> Sequence:
+    """Returns the sequence, which warns of a camera that does not fit its boxes: those detected, else the labelled."""
+    frames = sequence.without_pictures() if sequence.has_detections else ()
+    found = (frame.detections for frame in islice(frames, CHECKED))
+    detected = [each.box for each in found if each is not None and each.box is not None]
+    load = sequence.load_truth
+    if detected or load is None:
+        _check_camera(sequence, np.concatenate([np.zeros((0, 4)), *detected]))
+        return sequence
+
+    def truth() -> Truth:
+        labels = load()
+        _check_camera(sequence, np.zeros((0, 4)) if labels.box is None else labels.box)
+        return labels
+
+    return replace(sequence, load_truth=truth)
+
+
+def _check_camera(sequence: Sequence, box: Array) -> None:
+    from sim.scene.standing import stature_doubt
+
+    if sequence.camera is not None and (doubt := stature_doubt(box, sequence.camera)):
+        warnings.warn(f"{sequence.source['path']}: {doubt}", stacklevel=2)
 
 
 def _open(path: Path, options: RecordingOptions) -> list[Sequence]:

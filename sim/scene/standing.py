@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.scene.body import BODY, DEPTH_SHARE, HEAD, PERSON_HEIGHT, SHOULDER_SHARE
-from sim.scene.camera import project, seen_ground, standing_share, to_ground
+from sim.scene.camera import foot_points, project, seen_ground, standing_share, to_ground
 from sim.scene.terrain import height_at
 from sim.types import Array, Camera, Scene
 
@@ -23,6 +23,26 @@ LEVELS, HALVINGS, ROUNDS = 65, 40, 4  # of the search for the height of the grou
 # Body and head: height of the centre, squared half axes across, along the heading and up; of a person 1 m tall.
 AXES = [[BODY.across * SHOULDER_SHARE, BODY.along * DEPTH_SHARE, BODY.up], [HEAD.across, HEAD.along, HEAD.up]]
 PARTS = np.column_stack([[BODY.centre, HEAD.centre], np.square(AXES)])
+
+
+STATURES = 1.0, 2.4  # m: half of the people are neither smaller nor taller. The kernel finds heights of 0.5 to 2.5 m.
+SAMPLE = 1000  # boxes by which it is judged
+
+
+def stature_doubt(box: Array, camera: Camera) -> str:
+    """Returns a warning if most people with boxes (R, 4), px, would be too small or too tall by the camera; else ""."""
+    some = box[:: len(box) // SAMPLE + 1]
+    some = some[np.isfinite(foot_points(some, np.zeros(len(some)), camera)).all(axis=1)]
+    if camera.kind == "top" or not len(some):
+        return ""
+    tall, (least, most) = np.median(_standing(some, np.zeros(len(some)), camera)[1]), STATURES
+    if least <= tall <= most:
+        return ""
+    size = f"under {least:g}" if tall < least else f"over {most:g}"
+    return (
+        f"by --camera half of the people are {size} m tall: check its unit, m, its rotation, world to camera, and "
+        "its position, which is no translation"
+    )
 
 
 def standing_points(box: Array, camera: Camera, scene: Scene | None = None) -> Array:

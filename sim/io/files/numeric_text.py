@@ -75,7 +75,10 @@ class NumericTable:
         crowded = np.bincount(frame, minlength=1)[frame] > DETECTIONS
         self.reject(crowded, f"at most {DETECTIONS} {self.unit}s of one frame", "check that this is the right file")
         far = ~(np.abs(self.values[:, 2:]) <= COORDINATE).all(axis=1)  # also nan
-        self.reject(far, f"numbers within {COORDINATE:g}", CORRECT)
+        offset = (
+            "subtract one position near the people from all, if these are geographic, as UTM; else check the columns"
+        )
+        self.reject(far, f"numbers within {COORDINATE:g}", CORRECT, offset)
 
 
 def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
@@ -134,7 +137,7 @@ class TextRows:
             if use is not None and not {len(cells) for cells in rows.cells()} <= {*columns}:
                 raise ValueError("lines of different lengths")
         except ValueError:
-            raise rows._first_bad(fits, use) from None
+            raise rows._first_bad(fits, use, layout) from None
         table = NumericTable(self.file, values, rows.line, layout)
         if width not in columns:
             remedy = layout and f"the columns are {layout}"
@@ -142,7 +145,7 @@ class TextRows:
         table.reject(~np.isfinite(values).all(axis=1), "finite numbers", CORRECT)
         return table
 
-    def _first_bad(self, fits: Container[int], use: list[int] | None) -> InputError:
+    def _first_bad(self, fits: Container[int], use: list[int] | None, layout: str) -> InputError:
         width = len(next(self.cells()))
         for number, line, cells in zip(self.line, self.text, self.cells(), strict=True):
             read = use if use is not None and len(cells) in fits else range(len(cells))
@@ -154,6 +157,9 @@ class TextRows:
                 parts = line.split(";" if ";" in line else None)  # whatever the separator was taken to be
                 comma = bad and any("," in part and is_number_text(part.replace(",", ".")) for part in parts)
                 remedy = "write decimals with a point" if comma else CORRECT
+                # What is wrong from the first row on is another column, and not a cell.
+                if layout and bad and not comma and number == self.line[0]:
+                    remedy += f"; the columns are {layout}"
                 return InputError(file=self.file, place=f"line {number}", got=got, expected=expected, remedy=remedy)
         return InputError(file=self.file, got="unreadable numbers", expected="rows of numbers", remedy="check the file")
 

@@ -16,6 +16,7 @@ Pixel coordinates of both begin at the middle of the first pixel, ours at its co
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -82,16 +83,13 @@ def _rotation(rx: float, ry: float, rz: float) -> Array:
 
 
 SAME = 1e-6  # relative difference allowed between P1 and the left part of P2
-DISTORTION = (
-    "d", "distortion_coefficients", "distCoeffs", "dist_coeffs", "dist_coeff", "dist_coefs", "dist", "distortion",
-    "Distortion_Coefficients",
-)  # fmt: skip
+STRAY = [0, 1, 2, 2], [1, 0, 0, 1]  # elements of K that are 0 without skew
+DISTORTION = re.compile("(?i:d|dist|dist_?coef+s?|.*distortion.*)|[kp][1-6]")  # names of coefficients
 # of each key its shape, and the names that others give it
 KEYS: dict[str, tuple[tuple[int, ...], tuple[str, ...]]] = {
     "image_width": ((), ("width",)), "image_height": ((), ("height",)),
     "rotation": ((3, 3), ()), "position": ((3,), ()),
     "P1": ((3, 4), ()), "P2": ((3, 4), ()), "K": ((3, 3), ("k", "camera_matrix", "cameraMatrix", "Camera_Matrix")),
-    "D": ((), DISTORTION),
 }  # fmt: skip
 
 
@@ -108,12 +106,15 @@ def read_opencv(path: Path) -> Camera:
         size = math.prod(KEYS[key][0])
         if found[key].size != size or not (np.abs(found[key]) <= COORDINATE).all():
             raise _wrong(path, key, f"{found[key].size} numbers", f"{size} within {COORDINATE:g}")
-    if one and found.get("D", np.zeros(1)).any():
+    if one and found["D"].any():
         remedy = "undistort the pictures (cv2.undistort), and give zeros"
         raise _wrong(path, "D", "distortion", "a camera without, or the Tsai XML", remedy)
     value = {key: found[key].reshape(KEYS[key][0]) for key in wanted}
     left = value["K" if one else "P1"]
     right = left if one else value["P2"]
+    if np.abs(left[STRAY]).max() > SAME * abs(left[0, 0]) or left[2, 2] != 1:
+        remedy = "transpose it, if it is MATLAB's; skew is not supported"
+        raise _wrong(path, "K" if one else "P1", f"{left.tolist()}", "fx, 0, cx; 0, fy, cy; 0, 0, 1", remedy)
     fx, fy = float(left[0, 0]), float(left[1, 1])
     apart = np.abs(left - right)
     apart[0, -1] = 0
@@ -144,6 +145,9 @@ def _opencv_numbers(path: Path) -> dict[str, Array]:
             if node is not None:
                 # The numbers of a matrix are read without its stated size, which may be as large as the memory.
                 found[key] = np.array(list(_numbers(node.getNode("data") if node.isMap() else node)))
+        names = storage.root().keys()
+        nodes = [storage.getNode(name) for name in names if DISTORTION.fullmatch(name)]
+        found["D"] = np.array([v for node in nodes for v in _numbers(node.getNode("data") if node.isMap() else node)])
     except (cv2.error, SystemError):
         expected = "a file of cv2.FileStorage in YAML, XML or JSON"
         raise InputError(file=path, got="no OpenCV file", expected=expected, remedy="check --camera") from None
@@ -153,6 +157,8 @@ def _opencv_numbers(path: Path) -> dict[str, Array]:
 
 
 def _numbers(node: Any) -> Iterator[float]:
+    if node.isString():
+        return
     if not node.isSeq():
         yield node.real()
         return

@@ -17,7 +17,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
-from sim.io.files.numeric_text import NumericTable, bounded_number, person_ids, xml_root
+from sim.io.files.numeric_text import NAME_THEM, NumericTable, bounded_number, person_ids, xml_root
 from sim.io.formats.labelled_truth import centres
 from sim.io.formats.mot_table import MotTable
 from sim.io.formats.mot_text import truth_of_table
@@ -36,8 +36,9 @@ def read_xml(path: Path) -> ET.Element:
     """Returns the root of the CAVIAR file (CVML) `path`."""
     root = xml_root(path, "a CAVIAR file (CVML)", "fetch the file again")
     if root.tag != "dataset" or root.find("frame") is None:
+        remedy = f"give another file; if it holds rows of people, write them as .csv, and {NAME_THEM}"
         got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
-        raise InputError(file=path, got=got, expected="<dataset> of CAVIAR (CVML)", remedy="give another file")
+        raise InputError(file=path, got=got, expected="<dataset> of CAVIAR (CVML)", remedy=remedy)
     return root
 
 

@@ -18,8 +18,12 @@ from typing import Any
 
 import numpy as np
 
+from scenarios.limits import COORDINATE
 from sim.truth.merge_split_rules import frames_of
 from sim.types import Array, GroupEvent, Groups, Ints, Truth
+
+NEAR = 0.15  # m: bodies do not come so near, from middle to middle
+SAMPLE, LEAST = 1000, 10  # frames in which neighbours are sought, and rows that are needed for it
 
 SOME = 4  # people who are not all within one metre, on one line along an axis, or in haste
 # m/s: a median speed above it is no crowd's. It is 0.6 to 1.4 in seq_hotel, zara01, mwt1gt, PETS09, TownCentre and
@@ -37,6 +41,11 @@ def warn_of_places(file: Path, truth: Truth) -> None:
     if truth.pos is None or truth.vel is None:
         return
     known = np.isfinite(truth.pos + truth.vel).all(axis=1)
+    near = _distance_of_neighbours(truth.frame[known], truth.pos[known])
+    if near < NEAR:
+        doubt = f"half are within {near:.2g} m of another: write metres, or name the unit, as x_km,y_km"
+        warnings.warn(f"{file}: positions of people: {doubt}", stacklevel=4)
+        return
     if len(np.unique(truth.id[known])) < SOME:
         return
     span, speed = np.ptp(truth.pos[known], axis=0), np.median(np.hypot(*truth.vel[known].T))
@@ -47,6 +56,19 @@ def warn_of_places(file: Path, truth: Truth) -> None:
         doubt = f"all have the same {'xy'[span.argmin()]}: give x and y on the ground, if it is the height"
     if doubt:
         warnings.warn(f"{file}: positions of people: {doubt}", stacklevel=4)
+
+
+def _distance_of_neighbours(frame: Ints, pos: Array) -> float:
+    """Returns the median distance (m) from people to the nearest person of the frame, in at most SAMPLE frames."""
+    from scipy.spatial import cKDTree
+
+    frames = np.unique(frame)
+    if len(frame) < LEAST or len(frames) == len(frame):
+        return np.inf
+    some = np.isin(frame, frames[:: -(-len(frames) // SAMPLE)])
+    # Frames are so far apart that the nearest point is one of the same frame, if it has one.
+    place = np.column_stack([frame[some] * 4 * COORDINATE, pos[some]])
+    return float(np.median(cKDTree(place).query(place, 2)[0][:, 1]))
 
 
 def labelled_truth_fields(

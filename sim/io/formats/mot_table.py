@@ -15,6 +15,7 @@ import re
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 from typing import NoReturn
 
@@ -219,6 +220,7 @@ def read_named(
     out. None: times are not read. px_per_m: pixels per metre of x_px, y_px; None: unknown. Returns the rows, and the
     labels of a column `group`, (N,), -1 for alone; None without that column.
     """
+    text = _with_somebody(text, names)
     word_column, words = _words_for_classes(text, names)
     found = _meanings(text, names, times=frames_at is not None, classes=not words)
     rows, column, is_instant = _columns(text, names, found)
@@ -231,6 +233,7 @@ def read_named(
         seconds, id = column.pop("time"), column.get("id", np.zeros(len(rows.line)))
         seconds = seconds if is_instant else in_seconds(text.file, names[found["time"]], seconds, id)
         column["frame"] = frames_at(seconds, id).astype(float)
+        _reject_jitter(rows, column["frame"], seconds, column.get("id", np.full_like(seconds, -1)))
         rows, column = _kept(rows, column, column["frame"] > 0)
     units = {axis: names[found[axis]].partition("_")[2] for axis in "xy" if axis in column}
     columns, used = _in_order(text, column, units, px_per_m)
@@ -245,6 +248,38 @@ def read_named(
         warnings.warn(f"{text.file}: frames are counted from 0; they are read as frames from 1", stacklevel=4)
     rows = replace(rows, values=np.stack(columns, axis=1))
     return rows, replace(rows, values=column["group"][:, None]).integers(0, "group") if "group" in column else None
+
+
+def _reject_jitter(rows: NumericTable, frame: Column, seconds: Column, id: Column) -> None:
+    """Raises InputError if two times (N,), s, of one id (N,; -1: none) have the same frame (N,; 0: none)."""
+    known = np.flatnonzero((id >= 0) & (frame > 0))
+    order = known[np.lexsort((seconds[known], frame[known], id[known]))]
+    row, before = order[1:], order[:-1]
+    same = (frame[row] == frame[before]) & (id[row] == id[before]) & (seconds[row] != seconds[before])
+    if same.any():
+        k = row[same.argmax()]
+        raise InputError(
+            file=rows.file, place=f"line {rows.line[k]}",
+            got=f"a second time of id {id[k]:.12g} in frame {frame[k]:.0f}",
+            expected="times that vary by less than half a frame",
+            remedy="number the times in order, 1, 2, 3, …, in a column frame, and give --fps",
+        )  # fmt: skip
+
+
+def _with_somebody(text: TextRows, names: list[str]) -> TextRows:
+    """Returns the text without rows that have nothing but a time in the columns that are read; warns of them."""
+    mark = text.separator
+    use = [k for k, name in enumerate(names) if MEANINGS.get(name, "time") not in ("time", "frame")]
+    if mark is None or not use:
+        return text
+    cells = (line.split(mark) if 2 * mark in line else [] for line in text.text)
+    empty = np.array([len(row) == len(names) and not any(row[k].strip('" ') for k in use) for row in cells])
+    if not empty.any() or empty[1:].all():
+        return text
+    warnings.warn(
+        f"{text.file}: {empty.sum()} rows have nobody in columns {', '.join(names[k] for k in use)}", stacklevel=5
+    )
+    return TextRows(text.file, tuple(compress(text.text, ~empty)), text.line[~empty])
 
 
 def _meanings(text: TextRows, names: list[str], times: bool, classes: bool) -> dict[str, int]:

@@ -91,7 +91,8 @@ def require_metres(table: MotTable, fps: float) -> None:
         raise InputError(
             file=table.rows.file, place="columns x, y", got=f"half of the steps faster than {np.median(speed):.3g} m/s",
             expected="positions in m", remedy="if they are in cm, mm or px, name them x_cm,y_cm, x_mm,y_mm or x_px,y_px"
-            f" (with --px-per-m) in the first line, as frame,id,x_cm,y_cm; else correct --fps, here {fps:g}",
+            " (with --px-per-m) in the first line, as frame,id,x_cm,y_cm (in a text of PedPy in its comment, as "
+            f"# id frame x/cm y/cm z/cm); else correct --fps, here {fps:g}",
         )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 TrajNet++ (*.ndjson) has a JSON object a line: {"scene": {…, "fps": 2.5}} or {"track": {"f", "p", "x", "y"}}. ETH and
 UCY texts, as Social GAN and others distribute them, have `frame id x y`, separated by tabs or blanks, at 2.5 per s. In
 both, frames are numbers of video frames in steps, and are counted from 1 as in BIWI. PedPy and JuPedSim texts have
-lines `id frame x y z …` below comments: one states the rate, `# framerate: 8.00`, and one may state cm, as `x/cm`.
+lines `id frame x y z …` below comments: one states the rate, `# framerate: 8.00`, and one may state a unit, as `x/cm`.
 These are positions on the ground in m.
 
 KITTI's labels, or results of a tracker, have 17 cells apart by blanks: frame (from 0), id, type, truncated, occluded,
@@ -32,7 +32,7 @@ from sim.io.formats.mot_table import SECONDS, reject_swapped, table_of_rows
 from sim.io.formats.mot_text import frame_rate, truth_of_table
 from sim.io.formats.options import Classes, RecordingOptions
 from sim.io.recorded_sequence import recorded_sequence
-from sim.types import Bools, Sequence, Truth, Unscored
+from sim.types import LENGTH_UNITS, Bools, Sequence, Truth, Unscored
 
 NDJSON = ".ndjson"
 ETH_FPS = 2.5
@@ -129,8 +129,8 @@ def _read_pedpy(path: Path, fps: float | None) -> People:
     rows = read_rows(path).numbers(range(4, 13), layout="id frame x y z")
     raw = rows.integers(1, "frame")
     words = "_".join(re.findall(r"[^\W_]+", comments.lower())) + "_"
-    centimetres = ("_x_cm_" in words or "_in_cm_" in words) and "_x_m_" not in words
-    pos = rows.values[:, 2:4] * (0.01 if centimetres else 1.0)
+    units = [unit for form in ("x", "in") for unit in LENGTH_UNITS if f"_{form}_{unit}_" in words]
+    pos = rows.values[:, 2:4] * LENGTH_UNITS[units[0] if units else "m"]
     return replace(rows, values=np.column_stack([raw - raw.min(initial=LARGEST) + 1, rows.values[:, 0], pos])), stated
 
 

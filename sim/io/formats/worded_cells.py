@@ -20,6 +20,7 @@ from sim.types import Array
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # s
 UNITS = "s, ms, us or ns"
+NOTHING = ("", "none", "null", "nan", "na", "n/a", "<na>")  # cells of no value, in lower case
 SHOWN = 8  # most ids that a warning lists
 
 
@@ -83,10 +84,11 @@ def numbered(rows: NumericTable, cells: Sequence[str], what: str) -> tuple[Array
     """Returns ids or groups (N,) in place of words, and the number and word of each; warns of it.
 
     ped7 is 7 if each word ends in a number of its own; else words are numbered 1, 2, 3, … as they first appear. -1
-    stays so. Raises InputError for an empty cell. what: "id" or "group".
+    stays so. Raises InputError for one of NOTHING. what: "id" or "group".
     """
-    if not all(cells):
-        place, expected = f"line {rows.line[cells.index('')]}", f"one {what} in each line, or -1 for none"
+    none = [k for k, cell in enumerate(cells) if cell.lower() in NOTHING]
+    if none:
+        place, expected = f"line {rows.line[none[0]]}", f"one {what} in each line, or -1 for none"
         raise InputError(file=rows.file, place=place, got=f"no {what}", expected=expected, remedy="add it")
     words = [word for word in dict.fromkeys(cells) if word != "-1"]
     ends = [int(end[0]) if (end := re.search("[0-9]{1,15}$", word)) else LARGEST for word in words]

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
+from sim.io.source import open_source
 from sim.scene.body import person_boxes
 from sim.scene.camera import project, to_ground
-from sim.scene.standing import standing_points
+from sim.scene.standing import standing_points, stature_doubt
 from sim.scene.terrain import height_at
 from sim.sequence import simulate
-from sim.types import Array, Camera, Scene, Stairs
+from sim.types import Array, Camera, Scene, Stairs, Truth
 from tests.reference_sense import above, pinhole
 
 
@@ -103,3 +106,30 @@ def test_the_lens_bends_place_and_box_alike() -> None:
     moved[:, :2] += shifted - project(ideal, np.column_stack([pos, np.zeros(len(pos))]))[0]
     off = np.hypot(*(standing_points(moved, camera) - pos).T)
     assert np.quantile(off, 0.99) < 0.05
+
+
+@pytest.mark.parametrize("tilt", [5, 15, 45, 75])
+@pytest.mark.parametrize(("wrong", "size"), [(1.0, ""), (0.3048, "under 1 m tall"), (1 / 0.3048, "over 2.4 m tall")])
+def test_a_camera_in_another_unit_makes_people_too_small_or_too_tall(tilt: float, wrong: float, size: str) -> None:
+    """A camera `wrong` times as high sees people `wrong` times as tall."""
+    camera = pinhole(tilt, 20, (1, 2, 6))
+    _, _, _, box = people(camera, 3)
+    doubt = stature_doubt(box, camera.replace(position=wrong * camera.position))
+    assert bool(doubt) == bool(size)
+    assert size in doubt
+
+
+@pytest.mark.parametrize("labelled", [True, False])
+def test_a_translation_in_place_of_the_position_is_warned_of(labelled: bool, tmp_path: Path) -> None:
+    camera = pinhole(40, 20, (1, 2, 6))
+    _, _, _, box = people(camera, 3)
+    rows = [",".join(map(str, (1, k if labelled else -1, *each.tolist(), 1))) for k, each in enumerate(box)]
+    (tmp_path / "a.txt").write_text("\n".join(rows))
+    moved = camera.replace(position=np.abs(camera.rotation @ camera.position) / 2)
+
+    def seen(by: Camera) -> Truth | None:
+        return open_source(tmp_path / "a.txt", fps=10, camera=by)[0].truth
+
+    assert (seen(camera) is not None) == labelled
+    with pytest.warns(UserWarning, match="position, which is no translation"):
+        seen(moved)

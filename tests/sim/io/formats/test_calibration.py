@@ -179,3 +179,22 @@ def test_a_distorted_camera_is_refused(tmp_path):
     )
     with pytest.raises(InputError, match=r"D: got distortion; .*undistort the pictures"):
         read_calibration(tmp_path / "a.yaml")
+
+
+DISTORTED = [{"k1": -0.3, "k2": 0.1}, {"distortion_coeffs": [0.1, 0, 0, 0]}, {"RadialDistortion": [0.1, 0]}]
+
+
+@pytest.mark.parametrize("more", DISTORTED)
+def test_distortion_by_any_name_is_seen(tmp_path, more):
+    straight = {**SIZE, "K": K, **POSE, "distortion_model": "plumb_bob"}
+    with pytest.raises(InputError, match=r"D: got distortion; .*undistort the pictures"):
+        read_calibration(as_json(straight | more)(tmp_path / "a.json"))
+    zeros = {key: np.zeros_like(value).tolist() for key, value in more.items()}
+    assert read_calibration(as_json(straight | zeros)(tmp_path / "a.json")).focal_px == (520, 510)
+
+
+@pytest.mark.parametrize("matrix", [np.reshape(K, (3, 3)).T, np.reshape(K, (3, 3)) + np.diag([30, 0], 1)])
+def test_a_transposed_matrix_and_skew_are_refused(tmp_path, matrix):
+    """MATLAB's IntrinsicMatrix is the transpose: read as K, its centre would be (0, 0)."""
+    with pytest.raises(InputError, match=r"K: got \[\[520.0.*transpose it, if it is MATLAB's"):
+        read_calibration(as_json({**SIZE, "K": matrix.tolist(), **POSE})(tmp_path / "a.json"))

@@ -42,7 +42,7 @@ def test_units_of_positions(tmp_path, unit, factor, names):
 @pytest.mark.parametrize(("name", "second"), [("t", 1), ("timestamp_ms", 1000)])
 def test_times_in_place_of_frames(tmp_path, name, second):
     """The first is frame 1. The rate is that of the usual step of a person, here 1 s, or given."""
-    rows = [f"{(1.7e9 + t + p / 8) * second:.3f},{p},{t / 10},2" for p in (0, 1) for t in (0, 1, 2, 3, 9)]
+    rows = [f"{(1.7e9 + t + p / 8) * second:.3f},{p},{t / 10},{2 + p}" for p in (0, 1) for t in (0, 1, 2, 3, 9)]
     (tmp_path / "a.csv").write_text("\n".join([f"{name},agent_id,pos_x,pos_y", *rows]))
     for fps, expected in ((None, [1, 1, 2, 2, 3, 3, 4, 4, 10, 10]), (2, [1, 1, 3, 3, 5, 5, 7, 7, 19, 19])):
         (s,) = open_source(tmp_path / "a.csv", fps=fps)
@@ -122,8 +122,44 @@ def test_ids_in_words_are_numbered_and_said(tmp_path, words, ids):
         (found,) = open_source(tmp_path / "a.csv")
     assert found.truth.id.tolist() == ids * 2
     assert found.source["ids"] == dict(zip(ids, words, strict=True))
-    (tmp_path / "a.csv").write_text("t;id;x;y\n1;Anna;0;0\n2;;1;0\n")
-    with pytest.raises(InputError, match="line 3: got no id"):
+
+
+@pytest.mark.filterwarnings("ignore:.*not used. t")
+def test_times_that_jump_over_a_frame_name_the_remedy(tmp_path):
+    """10 times per s, of which the second is late by 0.6 of a frame; all rows are kept when they are numbered."""
+    rows = [(k, id, f"{k / 10 + 0.06 * (k == 1):.2f},{id},{x:.1f},{y}") for k, id, x, y in WALK]
+    (tmp_path / "a.csv").write_text("t,id,x,y\n" + "\n".join(row for *_, row in rows))
+    with pytest.raises(InputError, match=r"line 6: got a second time of id 7 in frame 3; .*number the times in order"):
+        open_source(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_text("frame,t,id,x,y\n" + "\n".join(f"{k + 1},{row}" for k, _, row in rows))
+    assert len(open_source(tmp_path / "a.csv", fps=10)[0].truth.id) == len(WALK)
+
+
+@pytest.mark.parametrize("nothing", ["", "None", "null", "NA"])
+@pytest.mark.parametrize(("what", "row"), [("id", "2,{},3,0,Aa"), ("group", "2,Bert,3,0,{}")])
+@pytest.mark.filterwarnings("ignore:.*(in words are numbered|no two people)")
+def test_words_for_nothing_are_no_ids_and_no_groups(tmp_path, nothing, what, row):
+    text = "t,id,x,y,group\n1,Anna,0,0,Aa\n2,Anna,0,0,Aa\n" + row
+    (tmp_path / "a.csv").write_text(text.format(nothing))
+    with pytest.raises(InputError, match=f"line 4: got no {what}; .*-1 for none"):
+        open_source(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_text(text.format("-1"))
+    assert open_source(tmp_path / "a.csv")[0].length == 2
+
+
+@pytest.mark.filterwarnings("ignore:.*(in words are numbered|not used)")
+def test_rows_of_nobody_are_left_out_and_counted(tmp_path):
+    """SUMO's xml2csv writes a row for each vehicle, too, in columns of its own."""
+    people = [f"{k / 10};ped{id};{x:.2f};{y};walker;;;" for k, id, x, y in WALK]
+    cars = [f"{k / 10};;;;;car7;{30 - k};4.5" for k in range(20)]
+    names = "timestep_time;person_id;person_x;person_y;person_type;vehicle_id;vehicle_x;vehicle_y"
+    (tmp_path / "a.csv").write_text("\n".join([names, cars[0], *people, *cars[1:]]))
+    with pytest.warns(UserWarning, match="a.csv: 20 rows have nobody in columns person_id, person_x, person_y"):
+        (found,) = open_source(tmp_path / "a.csv")
+    assert found.truth.pos == pytest.approx(np.array([w[2:] for w in WALK]))
+    assert (found.truth.id.tolist(), found.fps) == ([7, 8] * 20, 10)
+    (tmp_path / "a.csv").write_text("\n".join([names, *people, "0.7;ped9;;;;;;"]))
+    with pytest.raises(InputError, match="line 42: got ''; expected a number as cell 3"):
         open_source(tmp_path / "a.csv")
 
 
@@ -243,6 +279,24 @@ def test_places_that_are_hardly_metres_on_the_ground_are_warned_of(tmp_path, x, 
         opened(tmp_path, "frame,id,x,y\n" + "".join(rows)).truth  # noqa: B018
 
 
+@pytest.mark.parametrize(("unit", "metres"), [("km", 1000), ("degrees", 111_000), ("shares", 20)])
+def test_bodies_inside_each_other_are_warned_of(tmp_path, unit, metres):
+    """Two people walk 1 m apart: no two bodies come nearer than 0.15 m. With the unit named all is right."""
+    rows = "".join(f"{k + 1},{id},{x / metres:.9f},{y / metres:.9f}\n" for k, id, x, y in WALK)
+    with pytest.warns(UserWarning, match=f"half are within {1 / metres:.2g} m of another: write metres"):
+        opened(tmp_path, f"frame,id,x,y\n{rows}").truth  # noqa: B018
+    if unit == "km":
+        truth = opened(tmp_path, f"frame,id,x_km,y_km\n{rows}").truth
+        assert truth.pos == pytest.approx(np.array([w[2:] for w in WALK]), abs=1e-5)
+
+
+def test_far_positions_are_read_after_an_offset(tmp_path):
+    rows = "frame,id,x,y\n" + "".join(f"{k + 1},{id},{x + 641e3},{{}}\n" for k, id, x, y in WALK)
+    with pytest.raises(InputError, match=r"subtract one position near the people from all, if .*UTM"):
+        opened(tmp_path, rows.format(*(y + 5471e3 for *_, y in WALK)))
+    assert opened(tmp_path, rows.format(*(y for *_, y in WALK))).truth.pos[0, 1] == WALK[0][3]
+
+
 def test_people_who_run_are_warned_of_where_some_have_no_place(tmp_path):
     places = {True: "-1,-1,-1", False: "{},{},0"}
     rows = [(f, k, places[(f + k) % 7 == 0].format(f / 2, k)) for f in range(1, 30) for k in range(1, 6)]
@@ -264,6 +318,7 @@ def test_columns_without_a_name_are_not_used(tmp_path, header, row):
 
 
 UNCLEAR = {
+    "0 1 Pedestrian 0 0 -1 10 20 40 90 0 0 0\n": "line 1: got 'Pedestrian'; .*name the columns in the first line",
     "1;7;10,5;20,5;30,5;40,5\n": "line 1: got '10,5'; expected a number as cell 3; write decimals with a point",
     "1\t7\t10,5\t20,5\t30,5\t40,5\n": "line 1: .* write decimals with a point",
     "<html>\n": "line 1: got columns html",

@@ -153,10 +153,11 @@ def test_bad_input_is_one_line(tmp_path, case):
 
 
 UNITS = dict.fromkeys(["X [cm] Y [cm]", "x (cm)", "x_cm y_cm", "x/cm y/cm", "x y, in cm"], 1)
+UNITS |= {"x/mm y/mm z/mm": 0.1, "x_ft y_ft": 30.48}
 
 
 @pytest.mark.parametrize(("words", "factor"), (UNITS | {"x/m y/m; heights in cm, max_x_cm: 9": 100}).items())
-def test_comments_state_centimetres(tmp_path, words, factor):
+def test_comments_state_the_unit(tmp_path, words, factor):
     """Heights and limits in centimetres are no positions in centimetres."""
     truth = opened(tmp_path, "hall.txt", PETRACK.replace("x/cm y/cm z/cm", words)).truth
     assert truth.pos == pytest.approx(factor * np.array([p[2:] for p in PLACES]))

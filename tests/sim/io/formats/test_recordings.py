@@ -109,7 +109,7 @@ def xml(tmp_path, *frames, tag="dataset"):
 def test_a_calibration_puts_cvml_on_the_ground(tmp_path):
     """Labels of others, as Milan's of PETS 2009: as the same boxes in a MOT text. CAVIAR's own show no feet."""
     camera = Camera("pinhole", (96, 64), (90.0, 90.0), (48.0, 32.0), np.array([0.0, 0, 3]), LOOKS_DOWN)
-    box = [(k, id, 20 + k + 9 * id, 20, 6, 18) for k in range(4) for id in (1, 2)]
+    box = [(k, id, 20 + k + 9 * id, 5, 10, 33) for k in range(4) for id in (1, 2)]
     row = '<object id="{}"><box h="{}" w="{}" xc="{}" yc="{}"/></object>'
     frames = [([row.format(i, h, w, x + w / 2, y + h / 2) for f, i, x, y, w, h in box if f == k], []) for k in range(4)]
     (tmp_path / "a.txt").write_text("".join(f"{f + 1},{i},{x},{y},{w},{h},1\n" for f, i, x, y, w, h in box))
@@ -163,6 +163,13 @@ def test_cvml_of_others_needs_a_frame_rate(tmp_path, objects, what):
         open_source(path)
     (s,) = open_source(path, fps=12)
     assert (s.fps, s.image_size) == (12, None), what
+
+
+def test_xml_of_others_names_the_form_that_is_read(tmp_path):
+    """As CVAT, Pascal VOC and SUMO write it."""
+    (tmp_path / "a.xml").write_text("<annotations><track><box frame='0'/></track></annotations>")
+    with pytest.raises(InputError, match=r"got <annotations>; .* write them as \.csv, and name the columns"):
+        open_source(tmp_path / "a.xml", fps=25)
 
 
 def test_cvml_without_frames_is_refused(tmp_path):

@@ -270,7 +270,7 @@ LOW_CAMERA = [f"camera.{setting}" for setting in ("tilt_deg=0", "height=2.5", "p
 
 def test_boxes_above_the_horizon_of_a_camera(tmp_path, capsys):
     camera = simulate(load("merge", LOW_CAMERA), 90001).camera
-    (tmp_path / "walk.txt").write_text("1,1,10,10,20,50\n2,1,11,10,20,50\n1,2,10,350,20,50\n2,2,11,350,20,50\n")
+    (tmp_path / "walk.txt").write_text("1,1,10,10,20,50\n2,1,11,10,20,50\n1,2,10,291,27,109\n2,2,11,291,27,109\n")
     (walk,) = open_source(tmp_path / "walk.txt", fps=10, camera=camera)
     with pytest.raises(InputError, match="no position on the ground, as in 2 of 4 rows") as error:
         group(walk)
