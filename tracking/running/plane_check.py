@@ -46,6 +46,11 @@ class PlaneCheck:
     low: Array = field(default_factory=lambda: np.full(2, np.inf))
     high: Array = field(default_factory=lambda: np.full(2, -np.inf))
 
+    def clear(self) -> None:
+        """Forgets everything, for the start of another sequence."""
+        self.compared = self.fitting = 0
+        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
+
     def check(self, t: Tracks, given: Detections | None, context: Context, tracker: str, sequence: str) -> None:
         """Compares the answer of a frame. Raises WorkError if the answers so far lie elsewhere than they say."""
         if not len(t.id) or self.fitting >= max(FITTING, self.compared / 2):

@@ -98,7 +98,7 @@ def _counted(rows: NumericTable, fps: float | None) -> NumericTable:
     if len(first) < len(rows.line):
         said = f"{len(rows.line) - len(first)} rows stand there twice, as in scenes that overlap; each is read once"
         warnings.warn(f"{rows.file}: {said}", stacklevel=4)
-        rows = replace(rows, values=rows.values[first], line=rows.line[first])
+        rows = rows.keep(first)
     raw, id = rows.integers(0, "frame", SECONDS), rows.integers(1, "id")
     scenes = "if these are scenes with frames or ids of their own, write each into a file of its own"
     rows.reject(repeated_ids(raw, id), "each id once in a frame", scenes, scenes)
