@@ -51,6 +51,11 @@ class Frozen:
         made._settle({name: kinds[name] for name in changes if name in kinds})
         return made
 
+    def keep(self, rows: Any) -> Self:
+        """Returns a copy with only these rows (a mask, or indices in order) of all arrays; empty arrays stay empty."""
+        found = {name: getattr(self, name) for name, (_, ragged) in _array_fields(type(self)).items() if not ragged}  # type: ignore[arg-type]
+        return self.replace(**{name: a[rows] for name, a in found.items() if a is not None and len(a)})
+
     def copy(self) -> Self:
         """Returns a copy that shares no array with this object; the arrays of the copy are read-only."""
         made = object.__new__(type(self))

@@ -18,8 +18,9 @@ from sim.arrays import Frozen
 from sim.arrays import Image as Image
 from sim.arrays import Ints as Ints
 from sim.arrays import no_ids as no_ids
-from sim.made_of_people import MadeOfPeople
-from sim.never_arrives import NeverArrives
+from sim.place import Camera as Camera
+from sim.place import Scene as Scene
+from sim.place import Stairs as Stairs
 
 Plane = Literal["ground", "space", "image"]
 Unit = Literal["person", "group"]
@@ -103,7 +104,7 @@ class GroupEvent:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tracks(MadeOfPeople, Frozen):
+class Tracks(Frozen):
     """What one tracker reports for frame `index` (from 1) at time t (s): N people or groups, one row each.
 
     plane: "ground", "space" (m) or "image" (px). unit "person": rows are people, group (N,) is the id of each person's
@@ -131,79 +132,49 @@ class Tracks(MadeOfPeople, Frozen):
     own_events: tuple[str, ...] = ()
     seen: Bools = field(default_factory=lambda: np.zeros(0, bool))
 
+    @classmethod
+    def of_boxes(cls, frame: Frame, id: Any, box: Any, score: Any = (), **more: Any) -> Tracks:
+        """Returns the tracks of people with boxes in the image, in the frame.
+
+        Velocities are unknown, covariances are the identity, and nobody has a group, unless `more` says otherwise.
+
+        Args:
+            frame: The frame that `step` was given.
+            id: Ids (N,) of the people, not below 0 and never used for another person.
+            box: Boxes (N, 4): left, top, width, height in px.
+            score: Scores (N,) in [0, 1], or empty.
+            **more: Further fields of `Tracks`, such as `group` or `seen`.
+
+        Example:
+            return Tracks.of_boxes(frame, [t.id for t in found], [t.ltwh for t in found])
+        """
+        box = np.asarray(box, float).reshape(-1, 4)
+        return cls.of_points(frame, id, box[:, :2] + box[:, 2:] / 2, score, plane="image", box=box, **more)
+
+    @classmethod
+    def of_points(
+        cls, frame: Frame, id: Any, pos: Any, score: Any = (), *, plane: Plane = "ground", **more: Any
+    ) -> Tracks:
+        """Returns the tracks of people at points, in the frame. The other fields are as of `of_boxes`.
+
+        Args:
+            frame: The frame that `step` was given.
+            id: As for `of_boxes`.
+            pos: Positions (N, 2): x, y in m on the ground, or in px in the image; (N, 3) in space, m.
+            score: As for `of_boxes`.
+            plane: In which `pos` lies: "ground", "image" or "space".
+            **more: Further fields of `Tracks`, such as `vel` or `box`.
+        """
+        pos = np.asarray(pos, float).reshape(-1, 3 if plane == "space" else 2)
+        n, dims = pos.shape
+        more = {"group": np.full(n, -1), "vel": np.full((n, dims), np.nan), **more}
+        more = {"cov": np.tile(np.eye(2 * dims), (n, 1, 1)), "score": np.asarray(score, float), **more}
+        return cls(frame.index, frame.t, plane, "person", np.asarray(id) if n else no_ids(), pos=pos, **more)
+
     @property
     def measured(self) -> Bools:
         """Flags (N,), True for each row measured in this frame: `seen`, or all True if `seen` is empty."""
         return self.seen if len(self.seen) else np.ones(len(self.id), bool)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Stairs(Frozen):
-    """Stairs, all lengths in m: z rises in `steps` steps from 0 at the edge with midpoint foot (2,) to `rise` at the
-    edge with midpoint head (2,), `width` wide; behind the head a plateau of length `landing` has z = rise (0: no
-    plateau)."""
-
-    foot: Array
-    head: Array
-    width: float
-    rise: float
-    steps: int
-    landing: float = 0.0
-
-    @classmethod
-    def of(cls, s: Any) -> Stairs:
-        """Returns Stairs with the values of an object `s` that has attributes of the same names."""
-        return cls(np.array(s.foot, float), np.array(s.head, float), s.width, s.rise, int(s.steps), s.landing)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Scene(Frozen):
-    """The static world, in m: size (2,) x, y, from the origin on; walls (W, 2, 2): segments [x1, y1], [x2, y2]; pillars
-    (P, 3): x, y, radius; doors (D, 2, 2): segments, openings that `walls` leave free; service (S, 2): service points x,
-    y; stairs; wall_height, pillar_height. By default there are no walls, pillars, doors, service points and stairs."""
-
-    size: Array
-    walls: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
-    pillars: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    doors: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
-    service: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    stairs: tuple[Stairs, ...] = ()
-    wall_height: float = 2.5
-    pillar_height: float = 2.5
-
-    @classmethod
-    def of(cls, world: Any, walls: Any, doors: Any) -> Scene:
-        """Returns the Scene of a scenario's world, with these walls and doors in place of the world's own.
-
-        walls, doors: segments x1, y1, x2, y2 in m, one each.
-        """
-        return cls(
-            np.array(world.size, float), np.array(walls, float).reshape(-1, 2, 2),
-            np.array(world.pillars, float).reshape(-1, 3), np.array(doors, float).reshape(-1, 2, 2),
-            np.array(world.service, float).reshape(-1, 2),
-            tuple(map(Stairs.of, world.stairs)), world.wall_height, world.pillar_height,
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Camera(Frozen):
-    """A camera that maps world points X (3,) in m to pixels u, v; sim.scene.camera projects with it.
-
-    kind "pinhole": x_cam = rotation (X - position) = (x right, y down, z forward) in m; u = fx x/z + cx, v = fy y/z +
-    cy with focal_px (fx, fy), centre_px (cx, cy). kind "top": orthographic, looking straight down on `position`, scale
-    px_per_m (nan for "pinhole"). image: (width, height) px. position (3,) m. rotation (3, 3), world to camera. baseline
-    in m: the right camera is at +baseline along camera x; 0 without one. radial: Tsai's lens distortion, 0 for none:
-    ideal coordinates p (1 + radial p'p) for p = ((u - cx)/fx, (v - cy)/fy) of the picture."""
-
-    kind: Literal["pinhole", "top"]
-    image: tuple[int, int]
-    focal_px: tuple[float, float]
-    centre_px: tuple[float, float]
-    position: Array
-    rotation: Array
-    baseline: float = 0.0
-    px_per_m: float = float("nan")
-    radial: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -234,6 +205,28 @@ class Order:
     after: tuple[tuple[int, ...], ...]
     time: float | None = None
     event: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NeverArrives:
+    """A group of a simulated crowd that does not reach its goal, as in gt/never_arrives.json. group: its name in the
+    script. people: ids of its members. pos, goal: their mean place at the end, and the point that they do not reach, x,
+    y in m. no_way: True if walls and pillars leave a body no way; False if the group stood in the last 10 s. obstacle:
+    in words, what is in the straight way."""
+
+    group: str
+    people: tuple[int, ...]
+    pos: tuple[float, float]
+    goal: tuple[float, float]
+    no_way: bool
+    obstacle: str
+
+    @property
+    def words(self) -> str:
+        """The finding in one line."""
+        ways = {True: "a body of 0.4 m has no way", False: "it stood to the end on the way"}
+        places = f"from {list(self.pos)} to its goal {list(self.goal)}"
+        return f"group {self.group} never arrives: {ways[self.no_way]} {places}; in the way: {self.obstacle}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

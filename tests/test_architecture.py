@@ -16,8 +16,9 @@ LINES = 500
 # What scoring may import of ours: people use it alone, on their own arrays.
 SCORING = (
     "scenarios.limits", "tracking.scoring", "tracking.grouping.grouped_tracks", "tracking.grouping.foot_points",
-    "scenarios.errors", "sim.arrays", "sim.types", "sim.truth.group_hulls", "sim.truth.crossing_events",
-    "sim.truth.queue_detection", "sim.geometry.polygons", "sim.scene.camera", "sim.scene.standing", "sim.scene.terrain",
+    "scenarios.errors", "sim.arrays", "sim.types", "sim.place", "sim.truth.group_hulls",
+    "sim.truth.crossing_events", "sim.truth.queue_detection", "sim.geometry.boxes", "sim.geometry.polygons",
+    "sim.scene.camera", "sim.scene.standing", "sim.scene.terrain",
 )  # fmt: skip
 
 

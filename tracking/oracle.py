@@ -22,7 +22,6 @@ import numpy as np
 from sim.types import (
     EVENT_KINDS,
     Array,
-    Bools,
     DetectionMode,
     GroupEvent,
     Groups,
@@ -58,7 +57,7 @@ def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity 
     truth, mode = _truth(sequence), _mode(sequence, given)
     named, known = _named(sequence, given, similarity)
     info = {"tracker": "oracle", "detections": mode, "sensor": given.get("sensor") or {}}
-    people = [_rows(t, t.id >= 0) for t in named]
+    people = [t.keep(t.id >= 0) for t in named]
     tracks = _with_groups_and_events(with_velocities(people, truth.fps), truth)
     return TrackingRun(tracks, {**info, "owners": "known" if known else "matched"})
 
@@ -111,14 +110,6 @@ def _truth(sequence: Sequence) -> Truth:
 
 def _mode(sequence: Sequence, given: Mapping[str, Any]) -> DetectionMode:
     return given.get("detections") or ("file" if sequence.has_detections else "truth")
-
-
-def _rows(t: Tracks, kept: Bools) -> Tracks:
-    box = None if t.box is None else t.box[kept]
-    return t.replace(
-        id=t.id[kept], group=t.group[kept], pos=t.pos[kept], vel=t.vel[kept], cov=t.cov[kept], box=box,
-        score=t.score[kept] if len(t.score) else t.score, seen=t.seen[kept] if len(t.seen) else t.seen,
-    )  # fmt: skip
 
 
 def _visible(truth: Truth, index: int, places: bool) -> Tracks:

@@ -50,10 +50,9 @@ def rank(values: Array, upwards: bool = True) -> Ranking:
     scores = values[:, np.isfinite(values).all(axis=0)]
     runs, count = scores.shape
     less = (scores[:, None] - scores[None]).reshape(runs * runs, count)
-    mean, low, high, sign = compared(less.T, runs * (runs - 1) // 2)
-    square = runs, runs
-    pairs = mean.reshape(square), low.reshape(square), high.reshape(square)
-    return ordered(mean_interval(scores.T), pairs, sign.reshape(square), upwards, count)
+    *ends, sign = compared(less.T, runs * (runs - 1) // 2)
+    mean, low, high = (end.reshape(runs, runs) for end in ends)
+    return ordered(mean_interval(scores.T), (mean, low, high), sign.reshape(runs, runs), upwards, count)
 
 
 def ordered(

@@ -37,12 +37,12 @@ from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE, add_data, add_
 from benchmarks.support.tables import head, number, row, signed
 from scenarios import load
 from scenarios.loading.resolve import resolve
+from sim.geometry.boxes import box_iou
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Frame, Tracks
 from sim.types import Sequence as Recording
 from tracking.config import Config
-from tracking.fitting.detection_matching import box_iou
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
 from tracking.running.run import track

@@ -31,10 +31,9 @@ from sim.crowd.order_execution import OrderExecution, groups_made
 from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, fluctuations, script_placement
 from sim.crowd.stops import Stops
 from sim.elementary import cos, length, sin
-from sim.never_arrives import NeverArrives
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.scene.terrain import flight_rows
-from sim.types import Array, Ints, Motion, Scene, States
+from sim.types import Array, Ints, Motion, NeverArrives, Scene, States
 
 STEP_TIME = 1 / PHYSICS_RATE  # s
 OVERLAP_LEFT = 0.0012600931512018426  # 0.875^50: share of an overlap of bodies that is left after 1 s, 0.875 a step.

@@ -39,10 +39,13 @@ def _error(q, low, size, z, lens, eye, turn, parts, out):  # type: ignore[no-unt
     h = q[TALL]
     for part in range(2):
         centre, across, along, up = parts[part, 0] * h, parts[part, 1], parts[part, 2], parts[part, 3]
+        # A line p'X = 0 through the camera touches the ellipsoid if p'(A - c c')p = 0, where c is its centre and A its
+        # squared half axes, turned. For p = (1, 0, -u) this is a quadratic in u, whose two roots are the edges:
+        # own - 2 both u + below u² = 0.
         x2 = depth + centre * turn[2, 2]
         n2, m2 = hx * turn[2, 0] + hy * turn[2, 1], hy * turn[2, 0] - hx * turn[2, 1]
         below = h * h * (across * m2 * m2 + along * n2 * n2 + up * turn[2, 2] * turn[2, 2]) - x2 * x2
-        if not (x2 > 0.0 and below < 0.0):
+        if not (x2 > 0.0 and below < 0.0):  # not wholly before the camera
             return
         for axis in range(2):
             x = (a if axis == 0 else b) * depth + centre * turn[axis, 2]
@@ -88,7 +91,7 @@ def bodies(low, size, z, lens, eye, turn, parts):  # type: ignore[no-untyped-def
     for r in range(len(low)):
         q[:] = START
         for side in range(2):
-            q[TURN] = -q[TURN]
+            q[TURN] = -q[TURN]  # the second search begins at the mirror image of the first body
             _error(q, low[r], size[r], z[r], lens, eye, turn, parts, error)
             damping = 1e-3
             for _ in range(STEPS):
@@ -105,7 +108,7 @@ def bodies(low, size, z, lens, eye, turn, parts):  # type: ignore[no-untyped-def
                         A[i, j] = J[0, i] * J[0, j] + J[1, i] * J[1, j] + J[2, i] * J[2, j] + J[3, i] * J[3, j]
                     A[i, i] += damping * A[i, i] + 1e-12
                 _solve(A, g)
-                for k in range(4):
+                for k in range(4):  # far from the answer a full step would leave the picture
                     new[k] = q[k] + min(max(g[k], -LARGEST), LARGEST)
                 new[TALL] = min(max(new[TALL], LOWEST), TALLEST)
                 _error(new, low[r], size[r], z[r], lens, eye, turn, parts, tried)

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sim.geometry.boxes import box_intersections
 from sim.types import Array, Bools, Ints
 from tracking.errors.groups import GroupError
 from tracking.errors.people import NOBODY, MatchedPeople, PersonError
@@ -141,9 +142,7 @@ def _hidden_by(rows: Ints, of: Facts) -> str:
     for row in rows.tolist():
         others = of.rows(int(of.frame[row]))
         others = others[(others != row) & (of.box[others, 1] + of.box[others, 3] > of.box[row, 1] + of.box[row, 3])]
-        low = np.maximum(of.box[others, :2], of.box[row, :2])
-        high = np.minimum(of.box[others, :2] + of.box[others, 2:], of.box[row, :2] + of.box[row, 2:])
-        for other, area in zip(others.tolist(), np.prod(np.maximum(high - low, 0), axis=1).tolist(), strict=True):
+        for other, area in zip(others.tolist(), box_intersections(of.box[others], of.box[row]).tolist(), strict=True):
             covered[int(of.id[other])] = covered.get(int(of.id[other]), 0.0) + area
     who = max(covered, key=covered.__getitem__, default=None)
     return f" by person {who}" if who is not None and covered[who] > 0 else ""

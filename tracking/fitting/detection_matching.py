@@ -17,6 +17,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.schema.sensor import BoxNoise
 from sim.detector.box_noise import box_errors, perturb_boxes
+from sim.geometry.boxes import box_iou
 from sim.io.store.truth_files import scores_or_ones
 from sim.scene.visibility import image_size_of_boxes, with_visibility
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth, Unscored
@@ -145,19 +146,6 @@ def _pairs(truth: Truth, frame: Ints, box: Array, usual: Array | None = None) ->
     pairs = compare(FrameRows(truth.frame, truth.id), FrameRows(frame, np.arange(len(frame))), overlap)
     chosen = match(pairs.frame, pairs.i, pairs.j, pairs.s - GATE)
     return pairs.i[chosen], pairs.j[chosen]
-
-
-def box_iou(a: Array, b: Array) -> Array:
-    """Returns the IoU (…) of boxes a (…, 4) and b (…, 4), which are broadcast; 0 where one is nan."""
-    inner = box_intersections(a, b)
-    return np.nan_to_num(inner / (a[..., 2] * a[..., 3] + b[..., 2] * b[..., 3] - inner))
-
-
-def box_intersections(a: Array, b: Array) -> Array:
-    """Returns the common areas (…) of boxes a (…, 4) and b (…, 4), which are broadcast; nan where a box is nan."""
-    low = np.maximum(a[..., :2], b[..., :2])
-    high = np.minimum(a[..., :2] + a[..., 2:], b[..., :2] + b[..., 2:])
-    return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=-1))
 
 
 def _covered(frame: Ints, box: Array, unscored: Unscored | None) -> Bools:

@@ -10,8 +10,9 @@ import numpy as np
 from scenarios.schema.sensor import Sensor
 from sim.detector.box_noise import box_errors
 from sim.detector.sense import sense
+from sim.geometry.boxes import box_iou
 from sim.types import Array, Ints
-from tracking.fitting.detection_matching import MatchedRecording, box_iou, match_detections
+from tracking.fitting.detection_matching import MatchedRecording, match_detections
 from tracking.fitting.error_correlation import pairs_by_lag
 from tracking.fitting.false_alarms import alarm_tracks
 

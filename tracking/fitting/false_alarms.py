@@ -16,8 +16,9 @@ import numpy as np
 
 from scenarios.schema.sensor import FalseAlarms
 from sim.detector.visible_ground import VisibleGround
+from sim.geometry.boxes import box_intersections, box_iou
 from sim.types import Array, Ints
-from tracking.fitting.detection_matching import MatchedRecording, box_intersections, box_iou
+from tracking.fitting.detection_matching import MatchedRecording
 
 LINK = 0.3  # least IoU of two successive detections of one alarm
 PAUSE = 0.5  # s: an alarm that is not detected for longer ends

@@ -50,14 +50,13 @@ def people_as_tracks(truth: Truth) -> list[Tracks]:
     plane: Plane = "image" if truth.pos is None else "ground"
     if truth.pos is not None and truth.box is not None and not np.isfinite(truth.box).all():
         truth = truth.replace(box=None)
-    seen, nobody, found = np.isin(np.arange(truth.length + 1), truth.frame), None, list[Tracks]()
-    for index in range(1, truth.length + 1):
-        if nobody is None or seen[index]:
-            found.append(_tracks(truth.at(index), plane))
-            nobody = found[-1] if not seen[index] else nobody
-        else:  # of a sparse text most frames are empty
-            found.append(nobody.replace(index=index, t=(index - 1) / truth.fps))
-    return found
+    frames, seen = range(1, truth.length + 1), set(truth.frame.tolist())
+    # Most frames of a sparse text are empty: they are copies of the first.
+    nobody = next((_tracks(truth.at(k), plane) for k in frames if k not in seen), None)
+    return [
+        _tracks(truth.at(k), plane) if nobody is None or k in seen else nobody.replace(index=k, t=(k - 1) / truth.fps)
+        for k in frames
+    ]
 
 
 def _tracks(frame: FrameTruth, plane: Plane) -> Tracks:

@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -115,15 +114,14 @@ def as_needed(given: Given, needs: tuple[str, ...], mode: DetectionMode, sequenc
     else:
         pos = standing_points(box, camera, sequence.scene)
     there = np.isfinite(pos).all(axis=1) | ~np.isfinite(box).all(axis=1)  # check_detections names a box that is nan
-    cuts = list(pairwise(np.cumsum([0, *map(len, boxes)]).tolist()))
+    cuts = np.cumsum([*map(len, boxes)], dtype=int)
+    places, kept = np.split(pos, cuts)[:-1], np.split(there, cuts)[:-1]
     found = [
-        d if d is None or (d.box is None and len(d.pos)) else d.replace(
-            plane=plane, pos=pos[a:b][there[a:b]], vel=None, box=box[a:b][there[a:b]],
-            score=d.score[there[a:b]] if len(d.score) else d.score,
-        ) for d, (a, b) in zip(given.detections, cuts, strict=True)
-    ]  # fmt: skip
+        d if d is None or (d.box is None and len(d.pos)) else d.replace(plane=plane, pos=p, vel=None, box=b).keep(rows)
+        for d, p, b, rows in zip(given.detections, places, boxes, kept, strict=True)
+    ]
     owners = given.owners
-    return Given(found, owners and [who[there[a:b]] for who, (a, b) in zip(owners, cuts, strict=True)])
+    return Given(found, owners and [who[rows] for who, rows in zip(owners, kept, strict=True)])
 
 
 def as_frames(detections: Iterable[Detections | None], fps: float) -> tuple[Frame, ...]:
@@ -163,8 +161,7 @@ def from_truth(sequence: Sequence, sensor: Mapping[str, Any], seed: int) -> Give
 def _shuffled(d: Detections, owners: Ints, seed: int) -> tuple[Detections, Ints]:
     # The order of labels would tell who is who.
     order: Ints = rng(seed, "delivery", d.index).permutation(len(d.pos))
-    box = None if d.box is None else d.box[order]
-    return d.replace(pos=d.pos[order], box=box, score=d.score[order]), owners[order]
+    return d.keep(order), owners[order]
 
 
 def perfect(truth: FrameTruth) -> tuple[Detections, Ints]:

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenarios.errors import WorkError
+from sim.geometry.boxes import box_iou
 from sim.scene.body import PERSON_HEIGHT, person_boxes
 from sim.scene.camera import project
 from sim.scene.standing import standing_points
@@ -44,6 +45,11 @@ class PlaneCheck:
     fitting: int = 0
     low: Array = field(default_factory=lambda: np.full(2, np.inf))
     high: Array = field(default_factory=lambda: np.full(2, -np.inf))
+
+    def clear(self) -> None:
+        """Forgets everything, for the start of another sequence."""
+        self.compared = self.fitting = 0
+        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
 
     def check(self, t: Tracks, given: Detections | None, context: Context, tracker: str, sequence: str) -> None:
         """Compares the answer of a frame. Raises WorkError if the answers so far lie elsewhere than they say."""
@@ -119,7 +125,7 @@ def _at_centres(t: Tracks, given: Detections, context: Context) -> Bools | None:
 def _as_given(t: Tracks, given: Detections | None) -> Bools | None:
     if t.box is None or t.unit == "group" or given is None or given.box is None or not len(given.box):
         return None
-    return np.asarray(_iou(t.box[:, None], given.box).max(axis=1) >= GIVEN)
+    return np.asarray(box_iou(t.box[:, None], given.box).max(axis=1) >= GIVEN)
 
 
 def _of_a_person(t: Tracks, context: Context) -> Bools | None:
@@ -134,7 +140,7 @@ def _of_a_person(t: Tracks, context: Context) -> Bools | None:
     xy = t.pos[:, :2]
     z = np.zeros(n) if context.scene is None else height_at(context.scene, xy)
     body = person_boxes(camera, np.column_stack([xy, z]), np.zeros(n), np.full(n, PERSON_HEIGHT))
-    return np.asarray(np.nan_to_num(_iou(t.box, body)) >= OVERLAP)
+    return np.asarray(box_iou(t.box, body) >= OVERLAP)
 
 
 def _in_view(t: Tracks, context: Context) -> Bools | None:
@@ -145,12 +151,6 @@ def _in_view(t: Tracks, context: Context) -> Bools | None:
     size = np.array(context.camera.image)
     with np.errstate(invalid="ignore"):
         return np.asarray(((uv >= -VIEW * size) & (uv <= (1 + VIEW) * size)).all(axis=1))
-
-
-def _iou(a: Array, b: Array) -> Array:
-    low, high = np.maximum(a[..., :2], b[..., :2]), np.minimum(a[..., :2] + a[..., 2:], b[..., :2] + b[..., 2:])
-    common = np.prod(np.maximum(high - low, 0), axis=-1)
-    return np.asarray(common / np.maximum(a[..., 2:].prod(-1) + b[..., 2:].prod(-1) - common, 1e-12))
 
 
 def _words(t: Tracks, row: int) -> str:

@@ -85,7 +85,7 @@ class PreparedTracker:
     def reset(self, seed: int) -> None:
         """Resets the tracker for this sequence and forgets what it has reported."""
         self.history.clear()
-        vars(self.planes).update(vars(PlaneCheck()))
+        self.planes.clear()
         with self._naming("reset()", self.sequence.name):
             self.tracker.reset(self.context, seed)
 

@@ -117,7 +117,8 @@ class RemoteTracker:
 
     def _call(self, method: str, *arguments: Any) -> Any:
         result, self.px_per_m, used = self._host.call(self._number, method, *arguments)
-        used_files.note(tracker_registry.find(self._host.tracker), used) if used else None
+        if used:
+            used_files.note(tracker_registry.find(self._host.tracker), used)
         return result
 
 

@@ -71,9 +71,7 @@ def inside(owner: str) -> Iterator[None]:
     if not owner or _owner:
         yield
         return
-    if _hook not in _hooks:
-        sys.addaudithook(_hook)
-        _hooks.append(_hook)
+    _listen()
     _owner = owner
     try:
         if owner in _folders:
@@ -92,8 +90,12 @@ def inside(owner: str) -> Iterator[None]:
             _opened.clear()
 
 
-_hooks: list[object] = []
 _times = 0
+
+
+@cache
+def _listen() -> None:
+    sys.addaudithook(_hook)  # once, as a hook cannot be removed
 
 
 def _working_folder() -> str:
@@ -158,8 +160,7 @@ def opened() -> int:
 
 def note(tracker: type[Tracker], others: Mapping[str, str]) -> None:
     """Notes what a tracker class has used in another process, as `used` returned it there."""
-    if others:
-        _elsewhere.setdefault(owner_of(tracker.__module__), {}).update(others)
+    _elsewhere.setdefault(owner_of(tracker.__module__), {}).update(others)
 
 
 def changes(stored: Mapping[str, str], folder: str = "") -> list[str]:
@@ -265,7 +266,5 @@ class UsedFiles(dict[str, str]):
         """Adds fingerprints. Warns of those that differ from an earlier episode, and keeps the first."""
         for name, known in more.items():
             if self.setdefault(name, known) != known:
-                text = (
-                    f"{tracker}: {name} has changed while the command ran: run it again, stress and tune with --fresh"
-                )
-                warnings.warn(text, UserWarning, stacklevel=2)
+                text = f"{name} has changed while the command ran: run it again, stress and tune with --fresh"
+                warnings.warn(f"{tracker}: {text}", UserWarning, stacklevel=2)

@@ -65,10 +65,9 @@ def _load_package(file: Path, inside: Callable[[str], AbstractContextManager[Non
         sys.meta_path.insert(0, _Finder)
         sys.meta_path.append(_Neighbours)
     # The same name in every process, for pickles and numba's cache; of a folder, as its files share their caches.
-    digest = hashlib.sha256(str(file.parent).encode()).hexdigest()[:12]
-    name = next(
-        name for name in (f"{PREFIX}{digest}{'x' * k}" for k in range(len(packages) + 1)) if name not in packages
-    )
+    name = PREFIX + hashlib.sha256(str(file.parent).encode()).hexdigest()[:12]
+    while name in packages:
+        name += "x"
     packages[name] = UserPackage(file.parent)
     package = ModuleType(name)
     package.__path__ = [str(file.parent)]
@@ -128,10 +127,8 @@ def strings_of(code: CodeType) -> Iterator[str]:
 
 
 def _spec(name: str, file: Path, places: list[str] | None = None) -> ModuleSpec:
-    kind = ExtensionFileLoader if file.suffix != ".py" else _Loader
-    spec = importlib.util.spec_from_file_location(
-        name, file, loader=kind(name, str(file)), submodule_search_locations=places
-    )
+    loader = (ExtensionFileLoader if file.suffix != ".py" else _Loader)(name, str(file))
+    spec = importlib.util.spec_from_file_location(name, file, loader=loader, submodule_search_locations=places)
     assert spec is not None
     return spec
 
@@ -216,10 +213,8 @@ def _installed(name: str, folder: Path) -> bool:
         spec = importlib.util.find_spec(name) if name and "." not in name else None
     except (ImportError, ValueError):  # it has no spec, such as __main__
         return False
-    places = set() if spec is None else {spec.origin, *(spec.submodule_search_locations or ())}
-    return spec is not None and places.isdisjoint(
-        {str(folder / name), str(folder / f"{name}.py"), str(folder / name / "__init__.py")}
-    )
+    own = {str(folder / name), str(folder / f"{name}.py"), str(folder / name / "__init__.py")}
+    return spec is not None and own.isdisjoint({spec.origin, *(spec.submodule_search_locations or ())})
 
 
 def _import(

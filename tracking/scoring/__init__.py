@@ -4,7 +4,8 @@
 from the name of a score to its value. `pooled` makes the scores of several sequences together of those of each.
 """
 
-from tracking.scoring.evaluation import evaluate, pooled
+from tracking.scoring.evaluation import evaluate
+from tracking.scoring.pooled_scores import pooled
 from tracking.scoring.user_arrays import score_arrays
 
 __all__ = ["evaluate", "pooled", "score_arrays"]

@@ -3,8 +3,6 @@
 This module decides what is compared (which frames, which similarity of people, which surface for groups). It calls the
 modules of the single scores and returns their results under the keys of the catalogue.
 
-Also here: pooled scores of several sequences (`pooled`), as TrackEval's COMBINED row.
-
 Also here: scores of one recording as functions of weights of its frames, for intervals by resampling.
 
 Identities and matchings are those of the whole recording. The weight w(t) of frame t enters every sum: a match, a miss,
@@ -50,7 +48,7 @@ from tracking.scoring.weighted_sums import WeightedScores, mean_of_known, unweig
 PORTION = 100  # Draws that are computed together: bounds memory.
 
 
-__all__ = ["IncomparableError", "MatchedSides", "Scorer", "Scores", "Similarity", "evaluate", "pooled"]
+__all__ = ["IncomparableError", "MatchedSides", "Scorer", "Scores", "Similarity", "evaluate"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,37 +90,6 @@ class Scores(Mapping[str, float]):
 
     def __str__(self) -> str:
         return "\n".join(f"{key:28} {value:.4g}" for key, value in self.items() if not math.isnan(value))
-
-
-COUNTS = ("TP", "FN", "FP", "IDSW", "MT", "PT", "ML", "Frag", "IDTP")  # Scores that add up over sequences.
-
-
-def pooled(scores: Iterable[Scores]) -> dict[str, float]:
-    """Returns HOTA, CLEAR and Identity scores of all sequences together, by key, as TrackEval's COMBINED row.
-
-    Counts add up over the sequences, and the other scores are ratios of such sums. So a sequence weighs by its people,
-    and not as one value of many, as in a mean. No person or track is in two sequences. There is no interval.
-
-    Args:
-        scores: of one tracker on each sequence. Sequences without scores of people are left out.
-
-    Returns:
-        The pooled scores in the order of the catalogue; {} if no sequence has scores of people.
-    """
-    known = [one for one in scores if one.hota is not None]
-    sums = [one.hota for one in known if one.hota is not None]
-    if not sums:
-        return {}
-    found = {key: sum(one[key] for one in known) for key in COUNTS}
-    hits, true, est, right = found["TP"], found["TP"] + found["FN"], found["TP"] + found["FP"], found["IDTP"]
-    similar = sum(one["MOTP"] * one["TP"] for one in known)
-    found |= {key: float(value[0]) for key, value in hota_scores(np.sum(sums, axis=0)[None]).items()}
-    ratios = {
-        "MOTA": (hits - found["FP"] - found["IDSW"], true), "MOTP": (similar, hits),
-        "IDF1": (2 * right, true + est), "IDP": (right, est), "IDR": (right, true),
-    }  # fmt: skip
-    found |= {key: part / whole if whole else 0.0 for key, (part, whole) in ratios.items()}
-    return {key: found[key] for key in CATALOGUE if key in found}
 
 
 def objective(hota: Array, group_f1: Array) -> Array:

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.types import Array, Bools, Truth
+from sim.geometry.boxes import box_intersections
+from sim.types import Bools, Truth
 from tracking.scoring.candidate_pairs import EPS, box_pairs, same_frame
 from tracking.scoring.matching import mapped_people
 from tracking.scoring.people_and_groups import PersonRows
@@ -41,12 +42,6 @@ def left_out(truth: Truth, tracked: PersonRows) -> Bools:
     if unscored.min_height > 0:
         out = box[:, 3] <= unscored.min_height + EPS
     for i, j in same_frame(unscored.frame[region], tracked.rows.frame):
-        out[j[_common(unscored.box[region][i], box[j]) > INSIDE + EPS]] = True
+        inner = box_intersections(unscored.box[region][i], box[j])
+        out[j[inner / (box[j, 2] * box[j, 3]) > INSIDE + EPS]] = True
     return np.where(matched < 0, out, np.append(distractor, False)[matched])
-
-
-def _common(region: Array, box: Array) -> Array:
-    """Returns the share of each box (K, 4) that lies in a region (K, 4), (K,)."""
-    low = np.maximum(region[:, :2], box[:, :2])
-    high = np.minimum(region[:, :2] + region[:, 2:], box[:, :2] + box[:, 2:])
-    return np.asarray(np.prod(np.maximum(high - low, 0.0), axis=1) / np.prod(box[:, 2:], axis=1))

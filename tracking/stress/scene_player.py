@@ -123,6 +123,9 @@ def _traceback(cause: BaseException | None) -> str:
     return "\n".join(text.strip().splitlines()[-TRACE_LINES:])
 
 
+STORED = {"key", "tracker", *Outcome.__dataclass_fields__} - {"used"}  # Keys that each line of a store has.
+
+
 @dataclass
 class Store:
     """The episodes of a sweep in a file, one line each.
@@ -149,9 +152,7 @@ class Store:
                 row = json.loads(line)
             except ValueError:  # the last line of a sweep that was killed
                 continue
-            if not isinstance(row, dict) or not row.keys() >= {"key", "tracker", *Outcome.__dataclass_fields__} - {
-                "used"
-            }:
+            if not isinstance(row, dict) or not row.keys() >= STORED:
                 raise InputError(
                     file=self.path, got=shortened(line, 80), expected="episodes of `flockscope stress`",
                     remedy="move the file away, or choose another --out",

@@ -274,21 +274,15 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
 
 def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> None:
     mine, stored = plan.identity(), study.user_attrs.get(SETTINGS, {})
-    different = [key for key in mine if stored.get(key) != mine[key]]
-    if not different:
-        changed = changes(study.user_attrs.get(USED, {}), _folder(plan))
-        if changed:
-            raise InputError(
-                file=storage, place=f"study {study.study_name}", got=f"trials made before {', '.join(changed)} changed",
-                expected="the tracker as it was", remedy="begin anew with --fresh, or choose another --out or --study",
-            )  # fmt: skip
-    if different:
-        key = different[0]
-        raise InputError(
-            file=storage, place=f"study {study.study_name}", got=f"another search: {', '.join(different)} differ",
-            expected=f"{key} {stored.get(key)}, not {mine[key]}",
-            remedy="begin anew with --fresh, choose another --out or --study, or repeat the command that began it",
-        )  # fmt: skip
+    remedy = "begin anew with --fresh, or choose another --out or --study"
+    if different := [key for key in mine if stored.get(key) != mine[key]]:
+        key, got = different[0], f"another search: {', '.join(different)} differ"
+        expected, remedy = f"{key} {stored.get(key)}, not {mine[key]}", f"{remedy}, or repeat the command that began it"
+    elif changed := changes(study.user_attrs.get(USED, {}), _folder(plan)):
+        got, expected = f"trials made before {', '.join(changed)} changed", "the tracker as it was"
+    else:
+        return
+    raise InputError(file=storage, place=f"study {study.study_name}", got=got, expected=expected, remedy=remedy)
 
 
 def _folder(plan: SearchPlan) -> str:

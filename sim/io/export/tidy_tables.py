@@ -409,10 +409,8 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
             fault = _fault(found[name])
             if not fault:
                 continue
-            got, expected = (
-                f"{text!r}, {fault}",
-                "two ends apart" if option == "--line" else "corners in order round it",
-            )
+            got = f"{text!r}, {fault}"
+            expected = "two ends apart" if option == "--line" else "corners in order round it"
         raise InputError(place=option, got=got, expected=expected, remedy=remedy)
     return found
 

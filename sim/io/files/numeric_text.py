@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Collection, Container, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -36,6 +36,10 @@ class NumericTable:
     unit: str = "line"  # what a row is in the file, for errors
     classes: tuple[str, ...] = ()  # words that the numbers from 0 in the column of classes stand for; (): none
     names: tuple[tuple[int, str], ...] = ()  # number and word of ids that the file has in words; (): none
+
+    def keep(self, rows: Bools | Ints) -> NumericTable:
+        """Returns the table with only these rows: a mask, or indices in order."""
+        return replace(self, values=self.values[rows], line=self.line[rows])
 
     def reject(self, wrong: Bools | np.bool_, expected: str, remedy: str, most: str | None = None) -> None:
         """Raises InputError about the first row where `wrong` (N,) is True. most: the remedy if most rows are wrong."""

@@ -9,7 +9,6 @@ whose frames count the annotated ones from 1.
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -112,7 +111,7 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     rows.require_bounds(frame)
     rows.reject(repeated_ids(frame, id), "each id once in a frame, also where frames are nearer than a step", CORRECT)
     order = np.lexsort((id, frame))
-    return replace(rows, values=rows.values[order], line=rows.line[order]), frame[order], id[order]
+    return rows.keep(order), frame[order], id[order]
 
 
 def _rate(rows: NumericTable, frame: Ints, id: Ints) -> float:

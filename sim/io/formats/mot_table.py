@@ -318,7 +318,7 @@ def _columns(text: TextRows, names: list[str], found: dict[str, int]) -> tuple[N
         rows = read()
     numeric = [meaning for meaning in found if meaning not in worded]
     column: dict[str, Column] = dict(zip(numeric, rows.values.T, strict=False))
-    for meaning in worded.keys() - {"time"}:
+    for meaning in [meaning for meaning in ("id", "group") if meaning in worded]:  # warnings come in this order
         column[meaning], known = numbered(rows, worded[meaning], meaning)
         rows = replace(rows, names=known) if meaning == "id" else rows
     if "time" in worded:

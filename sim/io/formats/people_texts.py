@@ -98,16 +98,15 @@ def _counted(rows: NumericTable, fps: float | None) -> NumericTable:
     if len(first) < len(rows.line):
         said = f"{len(rows.line) - len(first)} rows stand there twice, as in scenes that overlap; each is read once"
         warnings.warn(f"{rows.file}: {said}", stacklevel=4)
-        rows = replace(rows, values=rows.values[first], line=rows.line[first])
+        rows = rows.keep(first)
     raw, id = rows.integers(0, "frame", SECONDS), rows.integers(1, "id")
     scenes = "if these are scenes with frames or ids of their own, write each into a file of its own"
     rows.reject(repeated_ids(raw, id), "each id once in a frame", scenes, scenes)
     steps = np.diff(np.unique(raw))
     step = int(np.median(steps)) if len(steps) else STEPS[0]
     if fps is None and not STEPS[0] <= step <= STEPS[1]:
-        expected = "steps of {} to {}, as of a video of which {:g} frames per second are labelled".format(
-            *STEPS, ETH_FPS
-        )
+        low, high = STEPS
+        expected = f"steps of {low} to {high}, as of a video of which {ETH_FPS:g} frames per second are labelled"
         got, remedy = f"frames in steps of {step}", "give --fps, rows of a person per second"
         raise InputError(file=rows.file, place="--fps", got=got, expected=expected, remedy=remedy)
     return replace(rows, values=np.column_stack([frame_numbers(raw, id), rows.values[:, 1:]]))

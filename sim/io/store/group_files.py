@@ -26,8 +26,7 @@ from scenarios.reading import is_present
 from sim.io.files import tables
 from sim.io.files.numeric_text import is_number_text, read_number, read_rows, read_text, whole_or_number
 from sim.io.files.tables import AXES, EXTENT, Count, FrameNumber, Id, Number, Pair, StoredTable, along, validated
-from sim.never_arrives import NeverArrives
-from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
+from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, NeverArrives, Order
 
 NEAR_COLUMNS = "start,end,a,b"
 NEVER_ARRIVES = "gt/never_arrives.json"
@@ -98,17 +97,8 @@ def read_script(path: Path) -> tuple[Order, ...]:
     return tuple(Order(**order.model_dump()) for order in found)
 
 
-class _NeverArrives(BaseModel):
-    group: str
-    people: tuple[Id, ...]
-    pos: tuple[float, float]
-    goal: tuple[float, float]
-    no_way: bool
-    obstacle: str
-
-
 class _AllNeverArrive(BaseModel):
-    groups: tuple[_NeverArrives, ...]
+    groups: tuple[NeverArrives, ...]
 
 
 def read_never_arrives(folder: Path) -> tuple[NeverArrives, ...]:
@@ -116,8 +106,7 @@ def read_never_arrives(folder: Path) -> tuple[NeverArrives, ...]:
     path = folder / NEVER_ARRIVES
     if not is_present(path):
         return ()
-    found = validated(path, tables.read_document(path), _AllNeverArrive, "restore it").groups
-    return tuple(NeverArrives(**one.model_dump()) for one in found)
+    return validated(path, tables.read_document(path), _AllNeverArrive, "restore it").groups
 
 
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")

@@ -239,10 +239,7 @@ def read_track_text(
         frame = frames_of_times(seconds, begin, fps)
         early = frame < 1
         if len(frame) and (early | (frame > (length or FRAMES))).mean() > 0.5:
-            got, expected = (
-                "{:.15g} to {:.15g} s".format(*np.quantile(seconds, (0, 1))),
-                f"times from {begin:.15g} s on",
-            )
+            got, expected = f"{seconds.min():.15g} to {seconds.max():.15g} s", f"times from {begin:.15g} s on"
             remedy = "give seconds since the first frame, or numbers of frames in a column frame"
             raise InputError(file=path, place="times", got=got, expected=expected, remedy=remedy)
         if early.any():

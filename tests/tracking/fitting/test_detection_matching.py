@@ -13,6 +13,7 @@ from scipy.stats import multivariate_normal
 from scenarios.loading.resolve import load
 from scenarios.schema.sensor import Memory
 from sim.detector.draws import correlated_normals
+from sim.geometry import boxes
 from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth
@@ -48,8 +49,8 @@ SIZE = (640, 480)
 
 def test_overlaps_by_hand() -> None:
     a, b = np.array([[0.0, 0.0, 10.0, 10.0]]), np.array([[5.0, 5.0, 10.0, 10.0], [20.0, 0.0, 5.0, 5.0], [0, 0, 10, 10]])
-    assert matching.box_intersections(a, b).tolist() == [25.0, 0.0, 100.0]
-    assert matching.box_iou(a, b) == pytest.approx(np.array([25 / 175, 0.0, 1.0]))
+    assert boxes.box_intersections(a, b).tolist() == [25.0, 0.0, 100.0]
+    assert boxes.box_iou(a, b) == pytest.approx(np.array([25 / 175, 0.0, 1.0]))
 
 
 def test_hits_misses_and_false_alarms() -> None:

@@ -54,7 +54,7 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
     from scenarios.loading.resolve import load_observation
     from sim.dataset.generate import store_replays
     from sim.dataset.replay import Cut
-    from sim.io.source import open_source
+    from tracking.app.sequence_workers import source_of
 
     seeds = option_parsing.seeds(options.seeds)
     streams, images = option_parsing.pictures(options.streams, options.images)
@@ -62,9 +62,7 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
         raise InputError(place="--duration", got=options.duration, expected="seconds above 0", remedy="correct it")
     settings = option_parsing.scenario_settings(options.settings)
     view = load_observation(options.camera, [*option_parsing.sensor_settings(options.sensor), *settings])
-    recordings = open_source(
-        options.source, fps=options.fps, px_per_m=options.px_per_m, person_class=options.person_class, images=False
-    )
+    recordings = source_of(options, options.source, without="camera").open()
     cut = Cut(options.start, options.duration)
     with ProgressMeter("replay") as meter:
         folders = store_replays(

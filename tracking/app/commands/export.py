@@ -10,13 +10,13 @@ from functools import partial
 from scenarios.errors import InputError, counted
 from sim.io.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
 from sim.io.formats.options import refuse_options
-from sim.io.source import open_source
 from sim.io.store.seal import reject_sealed
 from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.app.command_options import CocoOptions, CsvOptions, KittiOptions, TrajnetOptions, WebdatasetOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
+from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import STATED, StoredTracks, find_tracks, holds_tracks, run_folders
 
 
@@ -90,9 +90,7 @@ def _of_runs(options: TrajnetOptions) -> list[Job]:
 
 
 def _of_sequences(options: TrajnetOptions) -> list[Job]:
-    sequences = open_source(
-        options.source, fps=options.fps, px_per_m=options.px_per_m, person_class=options.person_class, images=False
-    )
+    sequences = source_of(options, options.source).open()
     for sequence in sequences:
         if sequence.load_truth is None:
             file, expected = sequence.source.get("path", options.source), "a run, or people with ids"

@@ -11,7 +11,8 @@ import numpy as np
 
 from scenarios.errors import InputError, counted, printable
 from tracking.scoring.catalogue import ALL, CATALOGUE
-from tracking.scoring.evaluation import Scores, pooled
+from tracking.scoring.evaluation import Scores
+from tracking.scoring.pooled_scores import pooled
 from tracking.stats import FEWEST, LEVEL, score_interval
 
 # The keys that are shown where there is room for one line only.

@@ -49,10 +49,8 @@ def stress(options: StressOptions) -> CommandResult:
         ProgressMeter("stress", options.search or options.episodes) as meter,
         scene_player(options.workers, options.cluster) as play,
     ):
-        sweep, found = (
-            Sweep(plan, trackers, play, Store(options.out / EPISODES, options.fresh), meter.step),
-            None,
-        )
+        sweep = Sweep(plan, trackers, play, Store(options.out / EPISODES, options.fresh), meter.step)
+        found = None
         if options.search is None:
             sweep.run()
         else:
@@ -304,9 +302,8 @@ def _break_words(curve: Mapping[str, Any], limit: float, values: list[float]) ->
     if not curve["mean"][0]:
         return "is 0 or unknown at the easy end: no breaking point"
     if point["at"] is None:
-        return f"does not fall to {level}" + (
-            f" up to {known[-1]:g}, the last known" if known[-1] != values[-1] else ""
-        )
+        last = f" up to {known[-1]:g}, the last known" if known[-1] != values[-1] else ""
+        return f"does not fall to {level}{last}"
     cell = ", two neighbouring values" if point["cell"] else ""
     return f"falls to {level} at {_ends_words(point, cell)}"
 

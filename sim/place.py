@@ -1,0 +1,79 @@
+"""Where a recording was made: the static world, and the camera that sees it. `sim.types` exports these types."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from sim.arrays import Array, Frozen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stairs(Frozen):
+    """Stairs, all lengths in m: z rises in `steps` steps from 0 at the edge with midpoint foot (2,) to `rise` at the
+    edge with midpoint head (2,), `width` wide; behind the head a plateau of length `landing` has z = rise (0: no
+    plateau)."""
+
+    foot: Array
+    head: Array
+    width: float
+    rise: float
+    steps: int
+    landing: float = 0.0
+
+    @classmethod
+    def of(cls, s: Any) -> Stairs:
+        """Returns Stairs with the values of an object `s` that has attributes of the same names."""
+        return cls(np.array(s.foot, float), np.array(s.head, float), s.width, s.rise, int(s.steps), s.landing)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene(Frozen):
+    """The static world, in m: size (2,) x, y, from the origin on; walls (W, 2, 2): segments [x1, y1], [x2, y2]; pillars
+    (P, 3): x, y, radius; doors (D, 2, 2): segments, openings that `walls` leave free; service (S, 2): service points x,
+    y; stairs; wall_height, pillar_height. By default there are no walls, pillars, doors, service points and stairs."""
+
+    size: Array
+    walls: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    pillars: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    doors: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
+    service: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    stairs: tuple[Stairs, ...] = ()
+    wall_height: float = 2.5
+    pillar_height: float = 2.5
+
+    @classmethod
+    def of(cls, world: Any, walls: Any, doors: Any) -> Scene:
+        """Returns the Scene of a scenario's world, with these walls and doors in place of the world's own.
+
+        walls, doors: segments x1, y1, x2, y2 in m, one each.
+        """
+        return cls(
+            np.array(world.size, float), np.array(walls, float).reshape(-1, 2, 2),
+            np.array(world.pillars, float).reshape(-1, 3), np.array(doors, float).reshape(-1, 2, 2),
+            np.array(world.service, float).reshape(-1, 2),
+            tuple(map(Stairs.of, world.stairs)), world.wall_height, world.pillar_height,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera(Frozen):
+    """A camera that maps world points X (3,) in m to pixels u, v; sim.scene.camera projects with it.
+
+    kind "pinhole": x_cam = rotation (X - position) = (x right, y down, z forward) in m; u = fx x/z + cx, v = fy y/z +
+    cy with focal_px (fx, fy), centre_px (cx, cy). kind "top": orthographic, looking straight down on `position`, scale
+    px_per_m (nan for "pinhole"). image: (width, height) px. position (3,) m. rotation (3, 3), world to camera. baseline
+    in m: the right camera is at +baseline along camera x; 0 without one. radial: Tsai's lens distortion, 0 for none:
+    ideal coordinates p (1 + radial p'p) for p = ((u - cx)/fx, (v - cy)/fy) of the picture."""
+
+    kind: Literal["pinhole", "top"]
+    image: tuple[int, int]
+    focal_px: tuple[float, float]
+    centre_px: tuple[float, float]
+    position: Array
+    rotation: Array
+    baseline: float = 0.0
+    px_per_m: float = float("nan")
+    radial: float = 0.0
