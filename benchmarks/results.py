@@ -43,6 +43,7 @@ FOLDER = ROOT / "docs" / "results"
 PACKAGES = ("benchmarks", "scenarios", "sim", "tracking")
 BLOCK = re.compile(r"(<!-- results: (\S+) -->\n).*?(<!-- end -->)", re.DOTALL)
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?")
+OLDER = ", older than the code"  # follows the date of a table that is stale
 INTERVAL = re.compile(r"\[([-+]?[\d.]+), ([-+]?[\d.]+)\]")
 
 
@@ -227,12 +228,14 @@ def shown(page: Path) -> dict[str, str]:
     return {m[2]: m[0] for m in BLOCK.finditer(page.read_text(encoding="utf-8"))}
 
 
-def with_tables(text: str, every: dict[str, Table]) -> str:
-    """Returns the text of a page with its blocks written anew. Raises KeyError if a block names no table."""
+def with_tables(text: str, every: dict[str, Table], mark: bool = False) -> str:
+    """Returns the text of a page with its blocks written anew. mark: adds OLDER to stale tables. Raises KeyError if a
+    block names no table."""
 
     def block(m: re.Match[str]) -> str:
         content = stored(every[m[2]])
-        return f"{m[1]}\n{markdown(content)}\n\n{m[3]}" if content else f"{m[1]}{m[3]}"
+        old = OLDER if mark and content and is_stale(every[m[2]]) else ""
+        return f"{m[1]}\n{markdown(content)}{old}\n\n{m[3]}" if content else f"{m[1]}{m[3]}"
 
     return BLOCK.sub(block, text)
 
@@ -241,7 +244,7 @@ def show(every: dict[str, Table]) -> None:
     """Writes the stored tables into all pages."""
     for page in pages():
         text = page.read_text(encoding="utf-8")
-        if (new := with_tables(text, every)) != text:
+        if (new := with_tables(text, every, mark=True)) != text:
             page.write_text(new, encoding="utf-8")
 
 
