@@ -144,3 +144,18 @@ def test_lists_fill_all_fields() -> None:
     for none in (Tracks.of_boxes(frame, [], []), Tracks.of_points(frame, [], [])):
         assert (none.id.dtype, none.pos.shape, none.cov.shape) == (np.int64, (0, 2), (0, 4, 4))
     assert Tracks.of_points(frame, [1], [[1.0, 2.0, 0.5]], plane="space").vel.shape == (1, 3)
+
+
+def test_a_plane_that_is_wrong_from_a_later_frame_on_ends_the_run(scene: Sequence) -> None:
+    class Later:
+        needs = ("boxes",)
+
+        def reset(self, context: object, seed: int) -> None: ...
+
+        def step(self, frame: Frame, d: Detections) -> Tracks:
+            id = 100 * frame.index + np.arange(len(d.pos))
+            pos = d.pos if frame.index < 15 else centres(d)  # px, said to be metres
+            return Tracks.of_points(frame, id, pos, plane="ground", box=d.box)
+
+    with pytest.raises(WorkError, match=r"frame 20.*expected people in m"):
+        track(Later(), scene, detections="file")
