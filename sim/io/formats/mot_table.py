@@ -181,7 +181,7 @@ MEANINGS = {name: meaning for meaning, names in NAMES.items() for name in names}
 STANFORD = "track_id xmin ymin xmax ymax frame lost occluded generated label"
 
 # further names of a column of classes in words, if PEOPLE are among these: it may hold anything else
-WORD_NAMES = ("label", "name", "class_name")
+WORD_NAMES = ("label", "name", "class_name", "type", "agent_type", "object_type", "object_class")
 
 PEOPLE = ("person", "pedestrian")  # words for the class of people
 

@@ -124,6 +124,14 @@ def test_ids_in_words_are_numbered_and_said(tmp_path, words, ids):
     assert found.source["ids"] == dict(zip(ids, words, strict=True))
 
 
+@pytest.mark.parametrize("name", ["type", "agent_type", "Object_Class", "OBJECT_TYPE"])
+@pytest.mark.filterwarnings("ignore:.*rows of class car")
+def test_classes_in_words_by_the_names_of_others(tmp_path, name):
+    """As of INTERACTION and Argoverse: a car beside pedestrians is nobody."""
+    rows = "".join(f"{k + 1},{id},{x},{y},{'Car' if id == 8 else 'Pedestrian'}\n" for k, id, x, y in WALK)
+    assert set(opened(tmp_path, f"frame,id,x,y,{name}\n{rows}").truth.id) == {7}
+
+
 @pytest.mark.filterwarnings("ignore:.*not used. t")
 def test_times_that_jump_over_a_frame_name_the_remedy(tmp_path):
     """10 times per s, of which the second is late by 0.6 of a frame; all rows are kept when they are numbered."""
