@@ -22,7 +22,6 @@ from benchmarks.support.tables import difference_cell, mean_cell, share, table
 from scenarios.loading.resolve import Entry, resolve
 from sim.types import Array, DetectionMode
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.scoring.catalogue import CATALOGUE
 
 SCENES = ("merge", "split", "cross", "queue", "side-by-side")
 DENSE = ("cross-dense", "pass-by-dense")  # Of the suite `standard`.
@@ -148,7 +147,7 @@ def means(rows: Sequence[Row]) -> list[str]:
 def differences(first: Sequence[Row], second: Sequence[Row]) -> list[str]:
     """Returns cells of the paired differences of the scores DECIDED, first minus second."""
     less = values(first, DECIDED) - values(second, DECIDED)
-    return [difference_cell(less[:, k], key if key in CATALOGUE else "HOTA") for k, key in enumerate(DECIDED)]
+    return [difference_cell(less[:, k], _score(key)) for k, key in enumerate(DECIDED)]
 
 
 def gathered(

@@ -42,7 +42,6 @@ from tracking.papers.stereo import space_group, tracker
 from tracking.papers.stereo.config import StereoConfig
 from tracking.running.run import track
 from tracking.scoring import evaluate
-from tracking.scoring.catalogue import CATALOGUE
 
 Row = dict[str, float]
 DEEPEST, NEAR = 8.0, 1.5  # m
@@ -204,7 +203,7 @@ def _switched_off(
 def _difference(made: Mapping[str, Mapping[str, list[Row]]], name: str, key: str) -> str:
     pairs = [pair for by in made.values() for pair in zip(by[name], by["default"], strict=True)]
     off = np.array([a.get(key, np.nan) - b.get(key, np.nan) for a, b in pairs])
-    return difference_cell(off, key if key in CATALOGUE else "RMSE_pos")
+    return difference_cell(off, key)
 
 
 def _cells(scene: str, rows: list[Row]) -> list[str]:

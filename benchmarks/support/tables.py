@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from math import sqrt
+from dataclasses import replace
+from math import inf, sqrt
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import LEVEL, score_interval
 
 EXACT = 1e-12  # a difference nearer to 0 is due to rounding
+UNBOUNDED = replace(CATALOGUE["RMSE_pos"], low=-inf, high=inf)  # of figures that are no scores: nothing is cut
 INDICATIVE = ", indicative"  # follows intervals of fewer than 6 sequences
 NORMAL = 1.959963984540054  # a standard normal variable lies within +- NORMAL with probability LEVEL
 
@@ -68,7 +70,8 @@ def difference_cell(values: Sequence[float] | Array, score: str = "HOTA") -> str
 
 
 def _ends(values: Sequence[float] | Array, score: str, difference: bool) -> tuple[float, float, float, bool]:
-    found = score_interval(CATALOGUE[score], np.asarray(values, float)[:, None], difference)
+    known = CATALOGUE.get(score, UNBOUNDED)
+    found = score_interval(known, np.asarray(values, float)[:, None], difference)
     mean, low, high = (float(found[end][0]) for end in ("mean", "low", "high"))
     return mean, low, high, bool(found["indicative"][0] and np.isfinite(low))
 
