@@ -151,17 +151,25 @@ def normal_quantile(u: Any) -> Any:
     """Returns the quantile of the standard normal distribution at u, 0 < u < 1 (Wichura 1988, AS 241)."""
     centred = u - 0.5
     near = 0.180625 - centred * centred
-    tail = np.sqrt(-log(np.where(centred < 0.0, u, 1.0 - u)))
     centre = centred * _ratio(CENTRE_TOP, CENTRE_BELOW, near)
-    beyond = np.where(tail <= 5.0, _ratio(TAIL_TOP, TAIL_BELOW, tail - 1.6), _ratio(FAR_TOP, FAR_BELOW, tail - 5.0))
-    return np.where(near >= 0.0, centre, np.where(centred < 0.0, -beyond, beyond))
+    if np.ndim(u) == 0:
+        return centre if near >= 0.0 else float(_tail_quantile(u))
+    far = near < 0.0
+    centre[far] = _tail_quantile(u[far])
+    return centre
 
 
-def _ratio(top: tuple[float, ...], below: tuple[float, ...], x: Array) -> Array:
+def _tail_quantile(u: Any) -> Any:
+    r = np.sqrt(-log(np.minimum(u, 1.0 - u)))
+    beyond = np.where(r <= 5.0, _ratio(TAIL_TOP, TAIL_BELOW, r - 1.6), _ratio(FAR_TOP, FAR_BELOW, r - 5.0))
+    return np.where(u < 0.5, -beyond, beyond)
+
+
+def _ratio(top: tuple[float, ...], below: tuple[float, ...], x: Any) -> Any:
     p, q = 0.0 * x, 0.0 * x
     for a, b in zip(top, below, strict=True):
         p, q = p * x + a, q * x + b
-    return np.asarray(p / q)
+    return p / q
 
 
 def length(v: Array) -> Array:

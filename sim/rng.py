@@ -23,6 +23,7 @@ ROLES = (
     "tracker", "camera", "wind", "label", "delivery",
 )  # fmt: skip
 ROLE = {name: number for number, name in enumerate(ROLES)}
+BELOW_1 = 1.0 - 2.0**-53
 
 
 def rng(seed: int, role: str, *keys: int, repeat: int = 0) -> np.random.Generator:
@@ -42,7 +43,7 @@ def uniforms(r: np.random.Generator, shape: int | tuple[int, ...]) -> Array:
 
 def normals(u: Array) -> Array:
     """Returns the standard normal quantiles at u, of any shape, 0 < u <= 1. At u = 1 the result is finite, too."""
-    return np.asarray(normal_quantile(np.minimum(u, 1.0 - 2.0**-53)))
+    return np.asarray(normal_quantile(np.minimum(u, BELOW_1)))
 
 
 def autoregression(e: Array, keep: Any) -> Array:
@@ -88,14 +89,14 @@ def draw(value: Value, r: np.random.Generator) -> float:
 def _draw_once(value: Distribution, r: np.random.Generator) -> float:
     if value.choice is not None:
         return value.choice[int(r.integers(len(value.choice)))]
-    u = uniforms(r, 1)
+    u = r.random() + 2.0**-54
     if value.normal is not None:
         mean, sd = value.normal
-        return float(mean + sd * normals(u)[0])
+        return float(mean + sd * normal_quantile(min(u, BELOW_1)))
     if value.uniform is not None:
         low, high = value.uniform
-        return float(low + (high - low) * u[0])
+        return low + (high - low) * u
     if value.exponential is not None:
-        return float(-value.exponential * log(u[0]))
+        return float(-value.exponential * log(u))
     assert value.poisson is not None
-    return float(poisson_quantiles(value.poisson, u)[0])
+    return float(poisson_quantiles(value.poisson, np.array([u]))[0])

@@ -108,8 +108,10 @@ class GroupArrays(NamedTuple):
         )  # fmt: skip
 
     def with_room(self, w: int) -> GroupArrays:
-        """Returns arrays with room for at least w waypoints of each group; only route and kind are copies."""
-        room = ((0, 0), (0, max(w - self.kind.shape[1], 0)))
+        """Returns arrays with room for at least w waypoints of each group: these ones, or with longer route and kind."""
+        if w <= self.kind.shape[1]:
+            return self
+        room = ((0, 0), (0, w - self.kind.shape[1]))
         return self._replace(route=np.pad(self.route, (*room, (0, 0))), kind=np.pad(self.kind, room))
 
 

@@ -23,10 +23,10 @@ def scene_of(world: WorldSpec) -> Scene:
 
 
 def wall_distances(point: Array, wall: Array) -> Array:
-    """Returns the distances (...) m of points (..., 2) m from a wall with the two ends `wall` (2, 2) m."""
-    along = wall[1] - wall[0]
-    s = np.clip(dot(point - wall[0], along) / max(float(dot(along, along)), 1e-12), 0, 1)
-    return length(point - wall[0] - s[..., None] * along)
+    """Returns the distances (...) m of points (..., 2) m from walls with the two ends `wall` (..., 2, 2) m."""
+    along, off = wall[..., 1, :] - wall[..., 0, :], point - wall[..., 0, :]
+    s = np.clip(dot(off, along) / np.maximum(dot(along, along), 1e-12), 0, 1)
+    return length(off - s[..., None] * along)
 
 
 def blocked(a: Array, b: Array, walls: Array) -> Bools:
@@ -68,9 +68,9 @@ class Navigator:
         along = self.walls[:, 1] - self.walls[:, 0]
         along = along / length(along)[:, None]
         ends = np.concatenate([self.walls[:, 0] - CLEARANCE * along, self.walls[:, 1] + CLEARANCE * along])
-        free = [min(wall_distances(e, w) for w in self.closed) > 0.9 * CLEARANCE for e in ends]
+        free = (wall_distances(ends[:, None], self.closed) > 0.9 * CLEARANCE).all(axis=1)
         inside = ((ends >= 0) & (ends <= self.size)).all(axis=1)
-        return np.asarray(ends[inside & np.array(free, dtype=bool)])
+        return np.asarray(ends[inside & free])
 
     def _lengths(self, a: Array, b: Array) -> Array:
         d = length(a[:, None] - b[None])

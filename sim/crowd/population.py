@@ -6,8 +6,11 @@ drawn again, for this group alone, until the group has room there.
 
 from __future__ import annotations
 
+import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -60,6 +63,7 @@ STANDING_DISTANCE = 0.3  # m: a group whose goal is no further than this stands
 MIN_SPEED = 0.3  # m/s, of a group
 WANDER_TIME = 1.0  # s, correlation time of the fluctuation of the wanted velocity
 PLACE_TIME = 10.0  # s, correlation time of the fluctuation of the place in the formation
+PORTION = 16384  # random numbers made normal together: they fit into the processor's cache
 
 
 @dataclass(frozen=True)
@@ -77,9 +81,12 @@ class ScriptPlacement:
 
     def vector(self, d: Array) -> Array:
         """Returns a direction (2,) of the script in the world: mirrored if flip is -1, then turned."""
-        d = d * np.array([self.flip, 1.0])
-        c, s = unit(self.turn)
-        return np.array([c * d[0] - s * d[1], s * d[0] + c * d[1]])
+        (x, y), (c, s) = d.tolist(), self._turned
+        return np.array([c * (x * self.flip) - s * y, s * (x * self.flip) + c * y])
+
+    @cached_property
+    def _turned(self) -> list[float]:
+        return list(unit(self.turn).tolist())
 
 
 @dataclass
@@ -160,7 +167,7 @@ def draw_population(scenario: Scenario, scene: Scene, seed: int, repeat: int) ->
     Raises InputError if a group has no free place at its start.
     """
     draws = _Draws(scenario, scene, script_placement(scenario, seed, repeat), seed, repeat)
-    taken: list[Array] = []
+    taken = TakenPlaces()
     groups: list[EnteringGroup] = []
     column = 0
     for k, spec in enumerate(scenario.group):
@@ -171,7 +178,7 @@ def draw_population(scenario: Scenario, scene: Scene, seed: int, repeat: int) ->
             column += len(group.members)
             groups.append(group)
             if group.enter == 0:
-                taken.append(group.pos)
+                taken.add(group.pos)
     return groups
 
 
@@ -201,7 +208,7 @@ def walking_speed(free: list[float], slowdown: float) -> float:
     return max(MIN_SPEED, float(np.mean(free)) - slowdown * (len(free) - 1))
 
 
-def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[int, int], taken: list[Array]) -> None:
+def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[int, int], taken: TakenPlaces) -> None:
     """Sets group.start and group.pos so that the members stand clear; raises InputError if no try finds room."""
     placement = draws.placement
     drawn = spec.scatter != 0.0 or any(isinstance(v, Distribution) for v in spec.start)
@@ -220,7 +227,7 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
         if spec.scatter != 0.0:
             group.pos += scattered(len(group.members), spec.scatter, r)
         together = spec.scatter == 0.0 or _apart(group.pos)
-        if together and is_free(group.pos, draws.scene, taken if group.enter == 0 else []):
+        if together and is_free(group.pos, draws.scene, taken if group.enter == 0 else TakenPlaces()):
             return
     people = counted(len(group.members), "person", "people")
     raise InputError(
@@ -243,14 +250,31 @@ def _apart(pos: Array) -> bool:
     return bool((gap >= 2 * BODY_RADIUS).all())
 
 
-def is_free(pos: Array, scene: Scene, taken: list[Array]) -> bool:
+class TakenPlaces:
+    """Places where nobody else may stand. State: cells: the places in each square of 1 m, by its number along x, y."""
+
+    def __init__(self) -> None:
+        self.cells: defaultdict[tuple[int, int], list[list[float]]] = defaultdict(list)
+
+    def add(self, pos: Array) -> None:
+        """Adds the places pos (n, 2) m."""
+        for place in pos.tolist():
+            self.cells[math.floor(place[0]), math.floor(place[1])].append(place)
+
+    def near(self, pos: Array) -> Array:
+        """Returns the places (K, 2) m in the cells of the points pos (n, 2) m and round them: all within 1 m."""
+        near = {(i + a, j + b) for i, j in np.floor(pos).astype(int).tolist() for a in (-1, 0, 1) for b in (-1, 0, 1)}
+        return np.array([place for cell in near & self.cells.keys() for place in self.cells[cell]]).reshape(-1, 2)
+
+
+def is_free(pos: Array, scene: Scene, taken: TakenPlaces) -> bool:
     """Returns True if all points pos (n, 2) m are far enough from taken places, walls and pillars.
 
-    That is START_GAP (0.55 m) from each point of the arrays in `taken`, and BODY_RADIUS (0.2 m) from walls and pillars.
+    That is START_GAP (0.55 m) from each place in `taken`, and BODY_RADIUS (0.2 m) from walls and pillars.
     """
-    if taken and length(pos[:, None] - np.concatenate(taken)[None]).min() < START_GAP:
+    if length(pos[:, None] - taken.near(pos)[None]).min(initial=np.inf) < START_GAP:
         return False
-    if any(wall_distances(pos, wall).min() < BODY_RADIUS for wall in scene.walls):
+    if wall_distances(pos[:, None], scene.walls).min(initial=np.inf) < BODY_RADIUS:
         return False
     d = length(pos[:, None] - scene.pillars[None, :, :2]) - scene.pillars[None, :, 2]
     return bool((d >= BODY_RADIUS).all())
@@ -266,7 +290,10 @@ def fluctuations(crowd: CrowdSpec, people: Sequence[Person], frames: int, fps: f
     keep = exp(-1 / (fps * np.array([WANDER_TIME, WANDER_TIME, PLACE_TIME, PLACE_TIME])))
     out = np.empty((frames, len(people), 4))
     for p, person in enumerate(people):
-        out[:, p] = normals(uniforms(rng(seed, "gait", *person.key, repeat=repeat), (frames, 4)))
+        out[:, p] = uniforms(rng(seed, "gait", *person.key, repeat=repeat), (frames, 4))
+    numbers = out.reshape(-1)
+    for first in range(0, len(numbers), PORTION):
+        numbers[first : first + PORTION] = normals(numbers[first : first + PORTION])
     scale = np.array([*crowd.velocity_noise, *crowd.place_noise])
     return scale * autoregression(out, keep)
 

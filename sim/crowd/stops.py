@@ -13,7 +13,7 @@ import numpy as np
 from sim.crowd.forces import END
 from sim.crowd.formation import standing, to_world, walking
 from sim.crowd.group_state import GroupState
-from sim.crowd.population import EnteringGroup, PlannedStop, is_free
+from sim.crowd.population import EnteringGroup, PlannedStop, TakenPlaces, is_free
 from sim.elementary import length, unit
 from sim.types import Array, Scene
 
@@ -132,8 +132,9 @@ class Stops:
         others = np.ones(len(state), np.bool_)
         others[columns] = False
         slow = others & (length(state[:, 2:]) < STANDING)
-        taken = [state[slow, :2], *(e.places for other, e in self.visits.items() if other != g)]
-        taken = [places for places in taken if len(places)]
+        taken = TakenPlaces()
+        for places in (state[slow, :2], *(visit.places for other, visit in self.visits.items() if other != g)):
+            taken.add(places)
         ring = unit(2 * np.pi * np.arange(ANGLES) / ANGLES)
         rings = [at + k * RING * ring for k in range(1, RINGS + 1)]
         for middle in np.concatenate([at[None], *rings]):
