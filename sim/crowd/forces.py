@@ -6,7 +6,7 @@ Forces on a person, in the order in which they are computed:
 - sideways with the strides: `sway` there;
 - away from other people, other groups, walls and pillars: `forces_avoidance_kernels`.
 
-`sim.crowd.world.accelerate` adds them up. A body weighs 1 kg, so a force is an acceleration in m/s². The sum of the
+`forces_kernels.accelerate` adds them up. A body weighs 1 kg, so a force is an acceleration in m/s². The sum of the
 avoidance forces and the goal force is capped at MAX_ACCELERATION. If the whole scene is turned or moved, the
 forces turn or move with it. The order of people changes them by rounding only.
 
@@ -83,7 +83,7 @@ MAX_ACCELERATION = 2.2  # m/s²: cap of the sum of all forces
 
 
 class GroupArrays(NamedTuple):
-    """State of G groups and of the ways they walk. The goal kernels update current, heading, arrived and status."""
+    """State of G groups and of the ways they walk. The goal kernels update all from current on but speed and finish."""
 
     route: Array  # (G, W, 2) x, y of each group's waypoints, m
     kind: Ints  # (G, W) PASS, NARROW (door), GATHER or END of each waypoint
@@ -98,6 +98,8 @@ class GroupArrays(NamedTuple):
     # members' fluctuations of place, m.
     arrived: Bools
     status: Array
+    push: Array  # (G, 2) acceleration by which each group avoids other groups, m/s²
+    by_x: Ints  # (G,) indices of the groups, sorted by the x of their members in the last step
 
     @classmethod
     def empty(cls, g: int, w: int) -> GroupArrays:
@@ -105,6 +107,7 @@ class GroupArrays(NamedTuple):
         return cls(
             np.zeros((g, w, 2)), np.zeros((g, w), np.int64), np.zeros(g, np.int64), np.zeros(g, np.int64), np.zeros(g),
             np.tile([1.0, 0.0], (g, 1)), np.zeros(g, np.int64), np.zeros(g, np.bool_), np.zeros((g, 12)),
+            np.zeros((g, 2)), np.arange(g),
         )  # fmt: skip
 
     def with_room(self, w: int) -> GroupArrays:
@@ -142,8 +145,14 @@ class PeopleArrays(NamedTuple):
 
 
 class Obstacles(NamedTuple):
-    """What stands still in the scene, m."""
+    """What stands still in the scene, m. None in place of what the scene has not, so that its forces are not compiled."""
 
-    walls: Array  # (W, 4) x1, y1, x2, y2 of the two ends
+    # (S, 10) rows of `sim.scene.terrain.flight_rows`, and the share of the speed kept on them (0 to 1); None without
+    stairs: Array | None
+    walls: Array | None  # (W, 4) x1, y1, x2, y2 of the two ends; None without walls and pillars
     pillars: Array  # (P, 3) x, y of the middle, radius
-    stairs: Array  # (S, 10) rows of `sim.scene.terrain.flight_rows`, and the share of the speed kept on them (0 to 1)
+
+    @classmethod
+    def of(cls, stairs: Array, walls: Array, pillars: Array) -> Obstacles:
+        """Returns the obstacles of a scene; each of the arrays may be empty."""
+        return cls(stairs if len(stairs) else None, walls if len(walls) + len(pillars) else None, pillars)

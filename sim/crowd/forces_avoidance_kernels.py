@@ -1,7 +1,8 @@
 """Forces that keep people, groups, walls and pillars apart, as numba kernels; numpy twins: tests/reference_steering.py.
 
 `avoid` is the entry. sim.crowd.forces names all columns, slots and units. Neighbours are found through a cell list once
-there are more than BRUTE (48) people. Only pairs that may act on each other go through the formulas.
+there are more than BRUTE (48) people. Only pairs that may act on each other go through the formulas. Indices of inner
+loops are unsigned: of signed ones numba looks each time whether they count from the end.
 """
 
 from __future__ import annotations
@@ -64,28 +65,26 @@ def _power_law(dx, dy, wx, wy, radius, strength):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
-def _avoid_groups(status, push):  # type: ignore[no-untyped-def]
-    """Overwrites push (G, 2) with each group's acceleration from avoiding other groups as discs."""
+def _avoid_groups(status, push, by_x):  # type: ignore[no-untyped-def]
+    """Overwrites push (G, 2) with each group's acceleration from avoiding other groups as discs, and sorts by_x (G,)."""
     push[:] = 0.0
-    live, place = np.empty(len(status), np.int64), np.empty(len(status))
-    m = 0
-    for g in range(len(status)):
-        live[m], place[g] = g, status[g, MEAN_X]
+    sort_by(status[:, MEAN_X].copy(), by_x)
+    live, m = np.empty(len(status), np.int64), 0
+    for g in by_x:
+        live[m] = g
         m += status[g, AVOIDED] > 0.0
-    live = live[:m]
-    sort_by(place, live)
     rows = np.empty((RADIUS + 1, m))  # columns COUNT … RADIUS of `status` as rows, groups sorted by x
     for s in range(m):
         for k in range(RADIUS + 1):
             rows[k, s] = status[live[s], k]
-    found = np.empty(m + 1, np.int64)
+    found = np.empty(m + 1, np.uint32)
     last = 0
     for s in range(m):
-        a = live[s]
+        a = np.uint64(live[s])
         while last < m and rows[MEAN_X, s] - rows[MEAN_X, last] >= -GROUP_RANGE:
             last += 1
         for k in range(_near_discs(rows, s, last, found)):
-            b = live[found[k]]
+            b = np.uint64(live[found[k]])
             dx, dy = status[a, MEAN_X] - status[b, MEAN_X], status[a, MEAN_Y] - status[b, MEAN_Y]
             wx, wy = status[a, MEAN_VX] - status[b, MEAN_VX], status[a, MEAN_VY] - status[b, MEAN_VY]
             size = status[a, RADIUS] + status[b, RADIUS] + 2.0 * PERSON_RADIUS
@@ -105,18 +104,17 @@ def _near_discs(rows, s, last, found):  # type: ignore[no-untyped-def]
     """Writes to `found` the groups s + 1 … last - 1 on collision course with group s; returns how many."""
     count, x, y = rows[COUNT], rows[MEAN_X], rows[MEAN_Y]
     vx, vy, disc = rows[MEAN_VX], rows[MEAN_VY], rows[RADIUS]
-    k = 0
-    for t in range(s + 1, last):
-        # No branches, so that the compiler can use vector instructions.
+    s, m = np.uint64(s), np.uint64(0)
+    for t in range(s + np.uint64(1), np.uint64(last)):
         dx, dy = x[s] - x[t], y[s] - y[t]
-        wx, wy = vx[s] - vx[t], vy[s] - vy[t]
-        size = disc[s] + disc[t] + 2.0 * PERSON_RADIUS
-        cross = dx * wy - dy * wx
-        root = (wx * wx + wy * wy) * size * size - cross * cross
-        found[k] = t
-        near = (dx * dx + dy * dy <= GROUP_RANGE * GROUP_RANGE) & (count[s] + count[t] >= 2.5)
-        k += near & (dx * wx + dy * wy < 0.0) & (root > 1e-12)
-    return k
+        if dx * dx + dy * dy <= GROUP_RANGE * GROUP_RANGE and count[s] + count[t] >= 2.5:
+            wx, wy = vx[s] - vx[t], vy[s] - vy[t]
+            size = disc[s] + disc[t] + 2.0 * PERSON_RADIUS
+            cross = dx * wy - dy * wx
+            root = (wx * wx + wy * wy) * size * size - cross * cross
+            found[m] = t
+            m += np.uint64((dx * wx + dy * wy < 0.0) & (root > 1e-12))
+    return m
 
 
 @njit(cache=True)
@@ -179,14 +177,15 @@ def _cells(state, reach):  # type: ignore[no-untyped-def]
 def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: ignore[no-untyped-def]
     """Appends to found[m:] the people first … last - 1 that may act on person s; returns the new length."""
     x, y, vx, vy = rows[X], rows[Y], rows[VX], rows[VY]
-    for t in range(first, last):
+    for t in range(np.uint64(first), np.uint64(last)):
         dx, dy = x[s] - x[t], y[s] - y[t]
-        wx, wy = vx[s] - vx[t], vy[s] - vy[t]
         d2 = dx * dx + dy * dy
-        cross = dx * wy - dy * wx
-        root = (wx * wx + wy * wy) * radius * radius - cross * cross
-        found[m] = t
-        m += (d2 < reach) & ((d2 < touch) | ((dx * wx + dy * wy < 0.0) & (root > 1e-12)))
+        if d2 < reach:
+            wx, wy = vx[s] - vx[t], vy[s] - vy[t]
+            cross = dx * wy - dy * wx
+            root = (wx * wx + wy * wy) * radius * radius - cross * cross
+            found[m] = t
+            m += np.uint64((d2 < touch) | ((dx * wx + dy * wy < 0.0) & (root > 1e-12)))
     return m
 
 
@@ -202,18 +201,19 @@ def _pairs(state, tag, out):  # type: ignore[no-untyped-def]
     for s in range(n):
         for k in range(4):
             rows[k, s] = state[order[s], k]
-    found = np.empty(n + 1, np.int64)
+    found = np.empty(n + 1, np.uint32)
     for c in range(len(start) - 1):
         left, right = c % nx > 0, c % nx + 1 < nx
         above = c + nx < len(start) - 1
-        for s in range(start[c], start[c + 1]):
-            m = _candidates(rows, s, s + 1, start[c + 1 + right], reach, touch, radius, found, 0)
+        for s in range(np.uint64(start[c]), np.uint64(start[c + 1])):
+            next_one, m = s + np.uint64(1), np.uint64(0)
+            m = _candidates(rows, s, next_one, start[c + 1 + right], reach, touch, radius, found, m)
             if above:
                 first, last = start[c + nx - left], start[c + nx + right + 1]
                 m = _candidates(rows, s, first, last, reach, touch, radius, found, m)
-            i = order[s]
+            i = np.uint64(order[s])
             for k in range(m):
-                j = order[found[k]]
+                j = np.uint64(order[found[k]])
                 dx, dy = state[i, X] - state[j, X], state[i, Y] - state[j, Y]
                 _pair(state, tag, i, j, dx, dy, dx * dx + dy * dy, out)
 
@@ -251,14 +251,13 @@ def _walls(state, walls, pillars, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def avoid(state, tag, status, walls, pillars, push, out):  # type: ignore[no-untyped-def]
+def avoid(state, tag, status, push, by_x, walls, pillars, out):  # type: ignore[no-untyped-def]
     """Adds all avoidance accelerations to out (N, 2), and cuts each sum to MAX_ACCELERATION.
 
-    state (N, 4), tag (N, 4), status (G, 12), walls (W, 4), pillars (P, 3): columns as in `forces`. walls: None if there
-    are neither walls nor pillars, so that nothing of them is compiled. push (G, 2):
-    scratch.
+    state (N, 4), tag (N, 4), status (G, 12), push (G, 2), by_x (G,), walls (W, 4), pillars (P, 3): as in `forces`.
+    walls: None if there are neither walls nor pillars, so that nothing of them is compiled.
     """
-    _avoid_groups(status, push)
+    _avoid_groups(status, push, by_x)
     _pairs(state, tag, out)
     if walls is not None:
         _walls(state, walls, pillars, out)

@@ -1,6 +1,6 @@
 """Forces towards goals, and the sway of strides, as numba kernels: ways of groups, formations, doors, queues, stairs.
 
-`drive` and `sway` are the entries. sim.crowd.forces names all columns, slots and units.
+`drive` and `sway` are the entries; sim.crowd.forces names all columns, slots and units.
 """
 
 from __future__ import annotations

@@ -48,26 +48,6 @@ def run(scenario: Scenario, seed: int, repeat: int = 0) -> Motion:
     return World(scenario, seed, repeat).run()
 
 
-def accelerate(
-    state: Array, people: PeopleArrays, groups: GroupArrays, obstacles: Obstacles, dt: float, push: Array, out: Array,
-) -> bool:  # fmt: skip
-    """Overwrites out (N, 2) with the accelerations of all people, and advances ways and strides by dt (s).
-
-    state (N, 4): x, y, vx, vy, m and m/s. out is in m/s². push (G, 2): working memory, overwritten. Returns True;
-    False, with nothing written, if a state is nan or the sum of its absolute values reaches 1e9.
-    """
-    from sim.crowd.forces_avoidance_kernels import avoid
-    from sim.crowd.forces_goal_kernels import drive, sway
-
-    stairs = obstacles.stairs if len(obstacles.stairs) else None
-    if not drive(state, *people, *groups, stairs, dt, out):
-        return False
-    sway(people.wanted, people.gait, dt, out)
-    walls = obstacles.walls if len(obstacles.walls) + len(obstacles.pillars) else None
-    avoid(people.calm, people.tag, groups.status, walls, obstacles.pillars, push, out)
-    return True
-
-
 class World:
     """The running simulation of one scenario and seed; it can be run once. Column = person id - 1.
 
@@ -88,9 +68,8 @@ class World:
         self.groups = GroupState(self.entering, groups_made(scenario), Navigator(self.scene), slowdown)
         self.orders = OrderExecution(scenario, self.groups, script_placement(scenario, seed, repeat), seed, repeat)
         self.stops = Stops(self.entering, self.groups, self.scene)
-        self.push = np.zeros((len(self.groups.arrays.speed), 2))
         stairs = np.column_stack([flight_rows(self.scene), [spec.slowdown for spec in scenario.world.stairs]])
-        self.obstacles = Obstacles(np.array(self.scene.walls).reshape(-1, 4), np.array(self.scene.pillars), stairs)
+        self.obstacles = Obstacles.of(stairs, np.array(self.scene.walls).reshape(-1, 4), np.array(self.scene.pillars))
         self.space = _space(self.scene)
         self.bodies: dict[int, pymunk.Body] = {}
         self.columns = np.zeros(0, np.int64)
@@ -175,10 +154,12 @@ class World:
             self.between[0] = self.states
         if n == 0:
             return
+        from sim.crowd.forces_kernels import accelerate
+
         noise.take(self.columns, axis=0, out=self.people.noise, mode="clip")
-        out = self.force[:n]
+        given = self.state, *self.people, *self.groups.arrays, *self.obstacles, STEP_TIME, self.force[:n]
         for step in range(1, STEPS + 1):
-            if not accelerate(self.state, self.people, self.groups.arrays, self.obstacles, STEP_TIME, self.push, out):
+            if not accelerate(*given):
                 raise WorkError(
                     file=self.scenario.name, place=f"seed {self.seed}", got="a position or velocity that is not finite",
                     expected="finite motion", remedy="report the scenario and seed as a bug",

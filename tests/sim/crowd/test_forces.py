@@ -20,10 +20,11 @@ from sim.crowd.forces import (
     PeopleArrays,
 )
 from sim.crowd.forces_avoidance_kernels import _avoid_groups, _pairs, _walls
-from sim.crowd.world import accelerate
+from sim.crowd.forces_kernels import accelerate
 from tests.reference_steering import between_groups, between_people, from_things
 
-NOTHING = Obstacles(np.zeros((0, 4)), np.zeros((0, 3)), np.zeros((0, 7)))
+NO_STAIRS, NO_PILLARS = np.zeros((0, 10)), np.zeros((0, 3))
+NOTHING = Obstacles.of(NO_STAIRS, np.zeros((0, 4)), NO_PILLARS)
 
 
 def crowd(n: int, seed: int, side: float = 6.0) -> tuple[np.ndarray, PeopleArrays, GroupArrays]:
@@ -49,8 +50,7 @@ def crowd(n: int, seed: int, side: float = 6.0) -> tuple[np.ndarray, PeopleArray
 
 def forces(state: np.ndarray, people: PeopleArrays, groups: GroupArrays, obstacles: Obstacles = NOTHING) -> np.ndarray:
     out = np.zeros((len(state), 2))
-    push = np.zeros((len(groups.speed), 2))
-    assert accelerate(state, people, groups, obstacles, 0.02, push, out)
+    assert accelerate(state, *people, *groups, *obstacles, 0.02, out)
     return out
 
 
@@ -86,7 +86,7 @@ def test_groups_equal_the_slow_twin(seed: int) -> None:
     now[:, 9] = (count > 0) & (r.random(40) < 0.9)
     now[seed, 3:5] = 0.0
     push = np.ones((40, 2))
-    _avoid_groups(now, push)
+    _avoid_groups(now, push, r.permutation(40))
     np.testing.assert_allclose(push, between_groups(now), atol=1e-9)
     assert np.abs(push).max() > 0.1
 
@@ -106,7 +106,7 @@ def test_turning_and_moving_the_scene_turns_the_forces(seed: int) -> None:
     state, people, groups = crowd(60, seed)
     walls = np.array([[0.0, -1.0, 6.0, -1.0]])
     pillars = np.array([[3.0, 3.0, 0.3]])
-    a = forces(state, people, groups, Obstacles(walls, pillars, np.zeros((0, 7))))
+    a = forces(state, people, groups, Obstacles.of(NO_STAIRS, walls, pillars))
     c, s = np.cos(0.7), np.sin(0.7)
     turn, shift = np.array([[c, -s], [s, c]]), np.array([13.0, -4.0])
     state, people, groups = crowd(60, seed)
@@ -116,7 +116,7 @@ def test_turning_and_moving_the_scene_turns_the_forces(seed: int) -> None:
     groups.heading[:] = groups.heading @ turn.T
     walls = (walls.reshape(-1, 2) @ turn.T + shift).reshape(-1, 4)
     pillars = np.concatenate([pillars[:, :2] @ turn.T + shift, pillars[:, 2:]], axis=1)
-    b = forces(turned, people, groups, Obstacles(walls, pillars, np.zeros((0, 7))))
+    b = forces(turned, people, groups, Obstacles.of(NO_STAIRS, walls, pillars))
     np.testing.assert_allclose(b, a @ turn.T, atol=1e-9)
 
 
@@ -134,5 +134,4 @@ def test_forces_are_capped_and_states_that_are_not_finite_are_noticed() -> None:
     state, people, groups = crowd(100, 1, side=3.0)
     assert np.linalg.norm(forces(state, people, groups), axis=1).max() <= MAX_ACCELERATION + 1e-12
     state[5, 0] = np.nan
-    out, push = np.zeros((100, 2)), np.zeros((len(groups.speed), 2))
-    assert not accelerate(state, people, groups, NOTHING, 0.02, push, out)
+    assert not accelerate(state, *people, *groups, *NOTHING, 0.02, np.zeros((100, 2)))
