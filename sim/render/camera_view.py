@@ -148,6 +148,11 @@ class CameraView:
         return PixelGeometry(depth, kind, place)
 
     @cached_property
+    def places(self) -> Floats:
+        """The places of `geometry` as planes of x, y and z, (3, H, W) m."""
+        return np.ascontiguousarray(np.moveaxis(self.geometry.place, 2, 0))
+
+    @cached_property
     def empty_scene(self) -> EmptyScene:
         """The painted empty scene under steady light, with unmoved plants."""
         from sim.render.empty_scene_kernels import PALETTE, SLAB_WIDTHS, SPREAD, paint_pixels

@@ -224,15 +224,15 @@ def draw_people(rows, seen, shadow, atlas, shade, label, canvas, ids, margin, am
 
 
 @njit(cache=True)
-def _shade_line(place, many, centre, shape, sx, sy, softness, shade):  # type: ignore[no-untyped-def]
-    """Raises shade (many,) to 255 times the share of the sun that one body part takes at places (many, 3) m."""
+def _shade_line(xs, ys, zs, many, centre, shape, sx, sy, softness, shade):  # type: ignore[no-untyped-def]
+    """Raises shade (many,) to 255 times the share of the sun that one body part takes at the places xs, ys, zs, m."""
     f = np.float32
     x, y, z, a, b, c = f(centre[0]), f(centre[1]), f(centre[2]), f(shape[XX]), f(2 * shape[XY]), f(shape[YY])
     slope_x, slope_y, zero, one, most = f(sx), f(sy), f(0.0), f(1.0), f(255.0)
     edge, per = f(1.0 + softness), f(1.0 / max(2 * softness, 1e-6))
     for k in range(many):
-        above = z - place[k, 2]
-        dx, dy = place[k, 0] - x + slope_x * above, place[k, 1] - y + slope_y * above
+        above = z - zs[k]
+        dx, dy = xs[k] - x + slope_x * above, ys[k] - y + slope_y * above
         q = dx * dx * a + dx * dy * b + dy * dy * c
         share = (edge - np.sqrt(max(q, zero))) * per
         share = share if above > zero else zero
@@ -244,7 +244,7 @@ def _shade_line(place, many, centre, shape, sx, sy, softness, shade):  # type: i
 def draw_shadows(rows, place, direct, level, centre, shadows, sun, canvas, margin):  # type: ignore[no-untyped-def]
     """Darkens the canvas where the people of these rows stand before the sun; of several shadows, the darkest counts.
 
-    place (H, W, 3) m, direct (H, W): of the empty scene. level: True if only level ground is in view. centre (N, 2, 3)
+    place (3, H, W) m, direct (H, W): of the empty scene. level: True if only level ground is in view. centre (N, 2, 3)
     m: of the ellipsoids. shadows: PeopleShadows of N people.
     """
     width, colour, shaded = direct.shape[1], canvas.colour, canvas.shaded
@@ -264,7 +264,8 @@ def draw_shadows(rows, place, direct, level, centre, shadows, sun, canvas, margi
             shade[: high - low] = 0.0
             for e in range(2):
                 shape, softness = shadows.shape[i, e], shadows.softness[i, e]
-                _shade_line(place[v, low:], high - low, centre[i, e], shape, sx, sy, softness, shade)
+                xs, ys, zs = place[0, v, low:], place[1, v, low:], place[2, v, low:]
+                _shade_line(xs, ys, zs, high - low, centre[i, e], shape, sx, sy, softness, shade)
             left, right = width, 0
             for u in range(low, high):
                 new, old = int(shade[u - low] + half), int(shaded[v, u])

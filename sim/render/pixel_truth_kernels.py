@@ -38,16 +38,18 @@ def empty_scene_disparities(depth, scale, rays, solids, out):  # type: ignore[no
 
 
 @njit(cache=True)
-def _part_is_before(x, i, e, start, step, row, z):  # type: ignore[no-untyped-def]
-    """Returns True if the right camera's ray at u = x px meets part e of person i before depth z (m)."""
-    a = b = c = 0.0
-    for k in range(3):
-        p, d = start[i, e, k, 0] * x + row[k], step[i, e, k, 0] * x + row[3 + k]
-        a += d * d
-        b += p * d
-        c += p * p
-    root = b * b - a * (c - 1.0)
-    return root >= 0.0 and (-b - np.sqrt(root)) / a < z - SAME
+def _depths_of_part(left, disparity, many, start, step, row, t):  # type: ignore[no-untyped-def]
+    """Sets t (many,) to the depths m at which the right camera sees a part at the left camera's columns from `left` on;
+    inf for a miss. start, step (3, 3): of the part. row (6,): their sums over v and 1."""
+    px, py, pz, dx, dy, dz = start[0, 0], start[1, 0], start[2, 0], step[0, 0], step[1, 0], step[2, 0]
+    px0, py0, pz0, dx0, dy0, dz0 = row[0], row[1], row[2], row[3], row[4], row[5]
+    for k in range(many):
+        x = left + k + 0.5 - disparity[k]
+        p0, p1, p2 = px * x + px0, py * x + py0, pz * x + pz0
+        d0, d1, d2 = dx * x + dx0, dy * x + dy0, dz * x + dz0
+        a, b = d0 * d0 + d1 * d1 + d2 * d2, p0 * d0 + p1 * d1 + p2 * d2
+        root = b * b - a * (p0 * p0 + p1 * p1 + p2 * p2 - 1.0)
+        t[k] = (-b - np.sqrt(root)) / a if root >= 0.0 else np.inf
 
 
 @njit(cache=True)
@@ -76,7 +78,7 @@ def add_people(rows, depth, ids, seen, scale, other, right_depth, rays, solids, 
     scale: px m. right_depth (H, W) m, rays: of the empty scene in the right camera.
     """
     height, width = depth.shape
-    row = np.empty(6)
+    row, t = np.empty(6), np.empty(width)
     _set_people(rows, depth, ids, seen, scale, right_depth, rays, solids, out)
     middle, inverse, start, step = other.outlines.middle, other.outlines.inverse, other.start, other.step
     for i in rows:
@@ -95,10 +97,13 @@ def add_people(rows, depth, ids, seen, scale, other, right_depth, rays, solids, 
                 for k in range(3):
                     row[k] = start[i, e, k, 1] * (v + 0.5) + start[i, e, k, 2]
                     row[3 + k] = step[i, e, k, 1] * (v + 0.5) + step[i, e, k, 2]
-                for u in range(max(int(low), 0), min(int(high + most) + 1, width)):
-                    x = u + 0.5 - out[v, u]  # a nan is in no range
-                    if low <= x <= high and _part_is_before(x, i, e, start, step, row, depth[v, u]):
-                        out[v, u] = np.nan
+                left = max(int(low), 0)
+                many = min(int(high + most) + 1, width) - left
+                _depths_of_part(left, out[v, left:], many, start[i, e], step[i, e], row, t)
+                for k in range(many):
+                    x = left + k + 0.5 - out[v, left + k]  # a nan is in no range
+                    if low <= x <= high and t[k] < depth[v, left + k] - SAME:
+                        out[v, left + k] = np.nan
 
 
 LEFT, RIGHT, TOP, BOTTOM = range(4)  # columns of `edges`

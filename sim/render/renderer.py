@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 
 FRAMES = 16  # frames of a batch
-Seen = tuple[PeopleInView, PeopleShadows | None]  # None if the light casts no shadows
 
 
 def pixel_truth(ids: Ints, rows: Ints, seen: PeopleInView, amodal: Ints, disparity: Array | None) -> PixelTruth:
@@ -84,7 +83,8 @@ class Renderer:
             )  # fmt: skip
         self.motion, self.camera = motion, camera
         self.light, self.picture = light or Light(), picture or Picture()
-        self._first, self._bodies, self._seen = 0, recorded_bodies(motion, 1, 1), dict[CameraView, Seen]()
+        self._first, self._bodies = 0, recorded_bodies(motion, 1, 1)
+        self._seen, self._shadows = dict[CameraView, PeopleInView](), dict[CameraView, PeopleShadows]()
 
     @cached_property
     def illumination(self) -> Illumination:
@@ -154,7 +154,7 @@ class Renderer:
         from sim.render.pixel_truth_kernels import add_people
 
         right, out = self.right_view, self._empty_disparities.copy()
-        (other, _), rows = self._people(right, index)
+        other, rows = self._people(right, index)
         scale = right.camera.focal_px[0] * right.camera.baseline
         depth = right.geometry.depth
         add_people(rows, canvas.depth, ids, seen, scale, other, depth, right.rays, right.solids, out)
@@ -193,17 +193,25 @@ class Renderer:
     def _time(self, index: int) -> float:
         return (index - 1) / self.motion.fps
 
-    def _people(self, view: CameraView, index: int) -> tuple[Seen, Ints]:
+    def _people(self, view: CameraView, index: int) -> tuple[PeopleInView, Ints]:
         """Returns the people of the batch of frame `index` as a view sees them, and the rows of this frame."""
-        first, light = index - (index - 1) % FRAMES, self.illumination
+        first = index - (index - 1) % FRAMES
         if first != self._first:
-            self._first, self._bodies, self._seen = first, recorded_bodies(self.motion, first, first + FRAMES), {}
+            self._first, self._bodies = first, recorded_bodies(self.motion, first, first + FRAMES)
+            self._seen, self._shadows = {}, {}
         if view not in self._seen:
-            self._seen[view] = (
-                people_in_view(self.motion, self._bodies, view.camera, view.rays, view.solids, light.sun),
-                people_shadows(self.motion, self._bodies, view.camera, light, view.level) if light.shadow > 0 else None,
-            )
+            sun = self.illumination.sun
+            self._seen[view] = people_in_view(self.motion, self._bodies, view.camera, view.rays, view.solids, sun)
         return self._seen[view], np.arange(*np.searchsorted(self._bodies.frame, (index, index + 1)))
+
+    def _draw_shadows(self, view: CameraView, seen: PeopleInView, rows: Ints, canvas: FrameCanvas) -> None:
+        from sim.render.people_kernels import draw_shadows
+
+        light = self.illumination
+        if view not in self._shadows:
+            self._shadows[view] = people_shadows(self.motion, self._bodies, view.camera, light, view.level)
+        place, direct, shadows = view.places, view.empty_scene.direct, self._shadows[view]
+        draw_shadows(rows, place, direct, view.level, seen.centre, shadows, light.sun, canvas, self._margin)
 
     def _moved_canvas(self, view: CameraView, index: int) -> FrameCanvas:
         canvas = view.take_canvas()
@@ -217,17 +225,16 @@ class Renderer:
     def _draw(
         self, view: CameraView, index: int, *, shade: bool, label: bool, disparity: bool = False
     ) -> tuple[Image, PixelTruth | None]:
-        from sim.render.people_kernels import draw_people, draw_shadows
+        from sim.render.people_kernels import draw_people
 
-        (seen, shadows), rows = self._people(view, index)
+        seen, rows = self._people(view, index)
         canvas = self._moved_canvas(view, index) if shade else view.take_canvas()
-        if shade and shadows is not None:
-            place, direct, sun = view.geometry.place, view.empty_scene.direct, self.illumination.sun
-            draw_shadows(rows, place, direct, view.level, seen.centre, shadows, sun, canvas, self._margin)
+        shadow = self.illumination.shadow
+        if shade and shadow > 0:
+            self._draw_shadows(view, seen, rows, canvas)
         ids = view.empty_ids() if label else np.zeros((0, 0), np.int64)
         amodal = np.zeros(len(seen.id), np.int64)
         near_first = rows[np.argsort(seen.nearest[rows, 0], kind="stable")]
-        shadow = self.illumination.shadow
         draw_people(near_first, seen, shadow, self._atlas, shade, label, canvas, ids, self._margin, amodal)
         image = self._finish(view, canvas, index) if shade else np.zeros((0, 0, 3), np.uint8)
         truth = None
