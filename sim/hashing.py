@@ -125,6 +125,8 @@ class PixelHash:
 
 def _feed(h: Any, value: Any) -> None:
     match value:
+        case np.ndarray():
+            _array(h, value)
         case None:
             h.update(b"N;")
         case bool() | np.bool_():
@@ -137,10 +139,13 @@ def _feed(h: Any, value: Any) -> None:
             _sized(h, b"s", value.encode("utf-8", "surrogatepass"))
         case bytes():
             _sized(h, b"b", value)
-        case np.ndarray():
-            _array(h, value)
         case tuple() | list():
             h.update(f"t{len(value)};".encode())
+            if len(value) > 1 and all(type(item) is np.ndarray and item.dtype == np.float64 for item in value):
+                known = not np.isnan(np.concatenate([item.ravel() for item in value])).any()  # one look for many hulls
+                for item in value:
+                    _array(h, item, known)
+                return
             for item in value:
                 _feed(h, item)
         case dict():
@@ -149,9 +154,19 @@ def _feed(h: Any, value: Any) -> None:
                 _feed(h, key)
                 _feed(h, value[key])
         case _ if is_dataclass(value) and not isinstance(value, type):
-            _feed(h, {f.name: getattr(value, f.name) for f in fields(value)})
+            names = _field_names(type(value))
+            h.update(f"d{len(names)};".encode())
+            for name, key in names:
+                h.update(key)
+                _feed(h, getattr(value, name))
         case _:
             raise TypeError(f"no canonical form of {type(value).__name__}")
+
+
+@cache
+def _field_names(kind: Any) -> list[tuple[str, bytes]]:
+    """Returns the sorted field names of a dataclass, and the bytes by which each is hashed."""
+    return [(name, f"s{len(name)};{name}".encode()) for name in sorted(f.name for f in fields(kind))]
 
 
 def _sized(h: Any, kind: bytes, content: bytes) -> None:
@@ -159,14 +174,15 @@ def _sized(h: Any, kind: bytes, content: bytes) -> None:
     h.update(content)
 
 
-def _array(h: Any, a: NDArray[Any]) -> None:
+def _array(h: Any, a: NDArray[Any], known: bool = False) -> None:
+    """Hashes an array; known: True if it has no nan."""
     if a.dtype.kind not in "biuf":
         raise TypeError(f"no canonical form of an array of {a.dtype}")
-    if a.dtype.kind == "f" and np.isnan(a).any():
+    if not known and a.dtype.kind == "f" and np.isnan(a).any():
         a = np.where(np.isnan(a), np.array(np.nan, a.dtype), a)
-    little = a.dtype.newbyteorder("<")
-    h.update(f"a{little.str}{a.shape};".encode())
-    h.update(np.ascontiguousarray(a, little).tobytes())
+    if not a.dtype.str.startswith(("<", "|")):
+        a = a.astype(a.dtype.newbyteorder("<"))
+    h.update(f"a{a.dtype.str}{a.shape};".encode() + a.tobytes())
 
 
 LIBRARIES = ("numpy", "scipy", "numba", "pymunk", "pyarrow", "pydantic")
