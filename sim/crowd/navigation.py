@@ -1,7 +1,6 @@
-"""Ways round walls and through doors: the shortest path over wall ends and door middles.
+"""The plan by which people walk: the scene of a scenario, with doors cut out of its walls, and the shortest ways in it.
 
-From a start and a goal it computes the points to walk to. Also turns a scenario's world into the arrays of a Scene,
-with the doors' openings cut out of the walls.
+A way leads from a start over wall ends and door middles to a goal.
 """
 
 from __future__ import annotations

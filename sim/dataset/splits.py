@@ -1,8 +1,4 @@
-"""The splits of the data (train, val, test, fit, demo): which range of seeds belongs to which split.
-
-Also tells recordings and their replays, whose motion is real, from simulated sequences. Nothing may be tuned on real
-motion.
-"""
+"""What may be tuned on: the splits of seeds (train, val, test, fit, demo), and never the motion of real people."""
 
 from __future__ import annotations
 

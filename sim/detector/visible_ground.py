@@ -1,7 +1,6 @@
-"""Where a detector's false alarms can be: the part of an image that shows ground, as a range of u, v in px.
+"""Where people could stand in an image: the range of u, v in px that shows ground, and a person's height in px there.
 
-Also the height in px that a person standing there would have. Both come from the camera, or from the labelled boxes if
-the camera is unknown.
+Both come from the camera, or from the labelled boxes if the camera is unknown. False alarms are drawn by them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,5 @@
-"""The height z = h(x, y) of the ground, m, at points x, y in m: 0 except on stairs and the landings behind them.
-
-Also gives the stairs of a scene as rows of numbers for the compiled ray casting.
-"""
+"""Stairs as ground: the height z = h(x, y), m, which is 0 except on stairs and the landings behind them, and the rows of
+numbers by which kernels know the stairs."""
 
 from __future__ import annotations
 
