@@ -69,7 +69,7 @@ def shared_data() -> Path:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
-        "--write-guides", action="store_true", help="write what the commands of the guides print into them"
+        "--write-guides", action="store_true", help="write what commands print into the guides"
     )
 
 

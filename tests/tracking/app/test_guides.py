@@ -27,7 +27,7 @@ def play(
 ) -> list[str]:
     """Runs the blocks in order and returns the commands that ran. data: also those that read the folder `data`.
 
-    printed_texts: receives what stands in place of each text, which is then not compared.
+    again: receives what stands in place of each text, which is then not compared.
 
     A block whose preceding text says "Save this as" becomes a file. Others: python is a script, text is what the last
     command printed, to the letter but for lines that a line "…" stands for, sh is not run, and lines of a block without
@@ -42,10 +42,10 @@ def play(
             exec(compile(body, "guide", "exec"), {})
         elif kind == "text":
             shown = "\n".join(map(str.rstrip, printed.splitlines()))
-            if printed_texts is None:
+            if again is None:
                 assert shows(body.rstrip("\n"), shown), f"{done[-1]} printed:\n{shown}"
             else:
-                printed_texts.append(printed_again(body, shown) + "\n")
+                again.append(printed_again(body, shown) + "\n")
         elif not kind and (data or "data/" not in body):
             for line in body.splitlines():
                 capsys.readouterr()
@@ -65,7 +65,7 @@ def shows(body: str, printed: str) -> bool:
 
 
 def printed_again(body: str, printed: str) -> str:
-    """Returns the part of a printed text that a body with lines "…" shows, by the most similar lines of each stretch."""
+    """Returns the part of a printed text that a body with lines "…" shows, by the most similar lines."""
     lines, out, start = printed.splitlines(), list[str](), 0
     stretches = [part.splitlines() for part in re.split(r"^…$\n?", body, flags=re.MULTILINE)]
     for k, part in enumerate(stretches):
