@@ -2,14 +2,10 @@
 
 `open_study` opens it as a `SearchStudy`, which gives the next trial to play, stores values, and lists finished trials.
 
-The file of a study serves several processes at once, any of which may be killed at any time. It is Optuna's journal
-with three differences:
-
-- Locks are system locks (fcntl) on bytes of FILE.locks: byte 0 while a trial is chosen, byte 1 while lines are written,
-  byte 2 + n while trial n is played. The system releases the locks of a process that dies, so another process sees that
-  its trial was abandoned, and plays it.
-- An incomplete last line is removed before the next line is written.
-- Lines are not flushed to the disk one by one.
+Several processes may share a journal or an SQLite file, and any of them may be killed at any time. The lock FILE.lock
+is held while a trial is chosen and while lines are written. The lock FILE.trial-N.lock is held while trial N is played.
+The system releases the locks of a process that dies, so another process sees that its trial was abandoned, and plays
+it.
 
 `run_trials` is the loop of a search: one trial (set of parameters) after the other, each played on the training scenes
 until it surely loses. It surely loses if the p-value of a paired test against the best trial, after any scene, is below
@@ -18,8 +14,6 @@ a limit. It then gets an estimate of its value.
 
 from __future__ import annotations
 
-import fcntl
-import json
 import math
 import os
 import re
@@ -28,10 +22,11 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import optuna
+from filelock import FileLock, Timeout
 from optuna.exceptions import UpdateFinishedTrialError
 from optuna.storages import JournalStorage, get_storage
 from optuna.storages.journal import JournalFileBackend
@@ -49,71 +44,51 @@ from tracking.tuning.options import Progress
 from tracking.tuning.sampler import PRUNED, distribution, propose, should_prune, tpe_sampler
 from tracking.tuning.search_plan import SearchPlan
 
-SUFFIX = ".locks"  # What the name of the lock file adds to the name of the journal.
-CHOOSING, WRITING, FIRST_TRIAL = 0, 1, 2  # Bytes of the lock file.
 SQLITE = re.compile(r"sqlite(?:\+\w+)?:///(?!:memory:)([^?]+)(?:\?.*)?")  # URL of a file, which gets locks, too
 HEAD = b'{"op_code":'  # How every journal begins.
 
 
-class TrialLocks:
-    """Locks on single bytes of the file `path`, shared by the processes of a search; the file is created if missing.
+class StudyLocks:
+    """The locks of a study that is stored in `file`, shared by the processes of a search.
 
-    State: the open file; closing it, or the end of the process, releases every lock.
+    State: `study`, the lock of the study, which this process may take again while it holds it; the locks of the trials
+    that this process plays, by number.
     """
 
-    def __init__(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    def __init__(self, file: Path) -> None:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        self.study, self._file, self._trials = FileLock(f"{file}.lock"), file, dict[int, FileLock]()
 
-    def lock(self, byte: int, wait: bool = True) -> bool:
-        """Locks the byte at this offset of the file for this process and returns True. If another process holds the
-        lock, waits for it, or if `wait` is False returns False at once."""
-        try:
-            fcntl.lockf(self._file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB), 1, byte)
-        except OSError:
-            if wait:
-                raise
-            return False
-        return True
+    def take_trial(self, number: int) -> bool:
+        """Locks a trial and returns True; returns False if it is locked already."""
+        lock = FileLock(f"{self._file}.trial-{number}.lock", blocking=False)
+        with suppress(Timeout):
+            lock.acquire()
+            self._trials[number] = lock
+            return True
+        return False
 
-    def release(self, byte: int) -> None:
-        """Releases this process's lock on a byte; does nothing if it holds none."""
-        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, byte)
-
-    @contextmanager
-    def locked(self, byte: int) -> Iterator[None]:
-        """Context manager: waits until the byte is free and holds its lock while the block runs."""
-        self.lock(byte)
-        try:
-            yield
-        finally:
-            self.release(byte)
+    def release_trial(self, number: int) -> None:
+        """Releases the lock of a finished trial and removes its file; does nothing if this process does not hold it."""
+        if number in self._trials:
+            self._trials.pop(number).release()
+            Path(f"{self._file}.trial-{number}.lock").unlink(missing_ok=True)
 
     def close(self) -> None:
-        """Closes the file and so releases every lock."""
-        os.close(self._file)
+        """Releases the locks of all trials, whose files stay for the processes that take these trials over."""
+        for lock in self._trials.values():
+            lock.release()
 
 
-class LockedJournal(JournalFileBackend):
-    """Optuna's journal file at `path`, written under `locks`. Lines survive a killed process but not a power cut."""
-
-    def __init__(self, path: Path, locks: TrialLocks) -> None:
-        self._path, self._locks = path, locks
-        super().__init__(str(path))
-        self.append_logs([])
-
-    def append_logs(self, logs: list[dict[str, Any]]) -> None:
-        """Appends one JSON line per log. Raises ValueError if the file is no journal."""
-        with self._locks.locked(WRITING), open(self._path, "a+b") as file:
-            size = file.tell()
-            file.seek(0)
-            if not HEAD.startswith(file.read(len(HEAD))):
-                raise ValueError("no journal of Optuna")
-            file.seek(max(size - 1, 0))
-            if file.read(1) not in (b"", b"\n"):
-                file.seek(0)
-                file.truncate(file.read().rfind(b"\n") + 1)
-            file.write("".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs).encode())
+def _journal(file: Path, lock: FileLock) -> JournalStorage:
+    """Returns the storage in a journal, without an incomplete last line, which a killed process leaves. Raises
+    ValueError if the file is no journal."""
+    content = file.read_bytes() if file.exists() else b""
+    if not HEAD.startswith(content[: len(HEAD)]):
+        raise ValueError("no journal of Optuna")
+    if content[-1:] not in (b"", b"\n"):
+        os.truncate(file, content.rfind(b"\n") + 1)
+    return JournalStorage(JournalFileBackend(str(file), cast(Any, lock)))
 
 
 SETTINGS = "settings"  # Attribute of a study that holds the identity of its plan.
@@ -131,7 +106,7 @@ class SearchStudy:
     A new study gets the defaults as its first trial. Without a journal file, `locks` is None.
     """
 
-    def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, storage: object = None) -> None:
+    def __init__(self, plan: SearchPlan, study: optuna.Study, locks: StudyLocks | None, storage: object = None) -> None:
         self.plan, self.optuna, self.locks, self._used = plan, study, locks, UsedFiles()
         self._folder = _folder(plan)
         self._space = {p.name: distribution(p) for p in plan.space}
@@ -198,14 +173,14 @@ class SearchStudy:
             return trial
 
     def _lock_trial(self, number: int, without_locks: bool = True) -> bool:
-        return without_locks if self.locks is None else self.locks.lock(FIRST_TRIAL + number, wait=False)
+        return without_locks if self.locks is None else self.locks.take_trial(number)
 
     def tell(self, trial: optuna.Trial, values: Sequence[float] | None) -> None:
         """Stores the values of a trial, one per goal, and releases its lock; None: the parameters are impossible."""
         state = TrialState.PRUNED if values is None else TrialState.COMPLETE
         self.optuna.tell(trial, values, state, skip_if_finished=True)
         if self.locks is not None:
-            self.locks.release(FIRST_TRIAL + trial.number)
+            self.locks.release_trial(trial.number)
 
     def records(self) -> list[TrialRecord]:
         """Returns the finished trials, sorted by number; number 0 is the defaults."""
@@ -235,8 +210,8 @@ class SearchStudy:
             warnings.simplefilter("ignore", UserWarning)
             return dict(get_param_importances(self.optuna, params=names, target=lambda t: sign * t.values[0]))
 
-    def _choosing(self) -> AbstractContextManager[None]:
-        return nullcontext() if self.locks is None else self.locks.locked(CHOOSING)
+    def _choosing(self) -> AbstractContextManager[object]:
+        return nullcontext() if self.locks is None else self.locks.study
 
 
 @contextmanager
@@ -248,12 +223,12 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
     database = SQLITE.fullmatch(url or "")
     locked = Path(database[1]) if database else file
     with quiet_optuna(), ExitStack() as opened:
-        locks = None if locked is None else TrialLocks(locked.with_name(locked.name + SUFFIX))
+        locks = None if locked is None else StudyLocks(locked)
         if locks is not None:
             opened.callback(locks.close)
         try:
-            with nullcontext() if locks is None else locks.locked(CHOOSING):
-                place = JournalStorage(LockedJournal(file, locks)) if file and locks else get_storage(url)
+            with nullcontext() if locks is None else locks.study:
+                place = _journal(file, locks.study) if file and locks else get_storage(url)
                 if plan.options.fresh:
                     with suppress(KeyError):  # there is no such study
                         optuna.delete_study(study_name=name, storage=place)

@@ -19,7 +19,7 @@ from tracking.grouping.link_rule import LinkRule
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.tuning.sampler import distribution
-from tracking.tuning.study import FINISHED, TrialLocks, open_study
+from tracking.tuning.study import FINISHED, StudyLocks, open_study
 
 
 def test_distributions_are_the_declarations(tmp_path):
@@ -127,20 +127,20 @@ def test_another_file_is_left_as_it_is(tmp_path, content):
 def test_a_lock_lives_as_long_as_its_process(tmp_path):
     path = tmp_path / "locks"
     hold = (
-        "import sys; from pathlib import Path; from tracking.tuning.study import TrialLocks\n"
-        "locks = TrialLocks(Path(sys.argv[1])); locks.lock(7); print('held', flush=True); sys.stdin.read()"
+        "import sys; from pathlib import Path; from tracking.tuning.study import StudyLocks\n"
+        "locks = StudyLocks(Path(sys.argv[1])); locks.take_trial(7); print('held', flush=True); sys.stdin.read()"
     )
     other = subprocess.Popen(
         [sys.executable, "-c", hold, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert other.stdout.readline() == "held\n"
-    locks = TrialLocks(path)
-    assert not locks.lock(7, wait=False)
-    assert locks.lock(8, wait=False)
+    locks = StudyLocks(path)
+    assert not locks.take_trial(7)
+    assert locks.take_trial(8)
     other.kill()
     other.communicate()
-    assert locks.lock(7, wait=False)
+    assert locks.take_trial(7)
     locks.close()
 
 
