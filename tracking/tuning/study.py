@@ -14,7 +14,6 @@ a limit. It then gets an estimate of its value.
 
 from __future__ import annotations
 
-import math
 import os
 import re
 import time
@@ -28,6 +27,7 @@ import numpy as np
 import optuna
 from filelock import FileLock, Timeout
 from optuna.exceptions import UpdateFinishedTrialError
+from optuna.samplers import RandomSampler
 from optuna.storages import JournalStorage, get_storage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
@@ -41,7 +41,7 @@ from tracking.running.used_files import UsedFiles, changes, folder_of, relative
 from tracking.stats import mean_of_known
 from tracking.tuning.candidates import STORED, TrialRecord
 from tracking.tuning.options import Progress
-from tracking.tuning.sampler import PRUNED, distribution, propose, should_prune, tpe_sampler
+from tracking.tuning.sampler import PRUNED, distribution, next_params, should_prune
 from tracking.tuning.search_plan import SearchPlan
 
 SQLITE = re.compile(r"sqlite(?:\+\w+)?:///(?!:memory:)([^?]+)(?:\?.*)?")  # URL of a file, which gets locks, too
@@ -93,8 +93,9 @@ def _journal(file: Path, lock: FileLock) -> JournalStorage:
 
 SETTINGS = "settings"  # Attribute of a study that holds the identity of its plan.
 USED = "used"  # Attribute of a study that holds what its tracker has used, as `used_files.used`.
-# Attributes of a trial: why its parameters are impossible; of the first: for each scene why it was left out, or "".
-ERROR, LEFT_OUT = "error", "left out"
+# Attributes of a trial: why its parameters are impossible; the first goal's value of each training scene; of the first
+# trial: for each scene why it was left out, or "".
+ERROR, SCENES, LEFT_OUT = "error", "scenes", "left out"
 
 # States of a finished trial. PRUNED means impossible parameters; one stopped early is COMPLETE with an estimate.
 FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
@@ -156,18 +157,14 @@ class SearchStudy:
             begun = [t for t in trials if t.state in (*FINISHED, TrialState.RUNNING)]
             for t in begun:
                 if t.state == TrialState.RUNNING and self._lock_trial(t.number, take_running):
-                    self.optuna.sampler = tpe_sampler(self.plan, t.number)
                     trial = optuna.Trial(self.optuna, t._trial_id)
                     for name, choices in self._space.items():  # the process may have ended before it had chosen all
-                        # What was drawn alone is drawn again, so that the generator continues from there.
-                        if name in t.params and name not in trial.relative_params:
-                            self.optuna.sampler.sample_independent(self.optuna, t, name, choices)
                         trial._suggest(name, choices)
                     return trial
             if len(begun) >= self.plan.options.trials:
                 return None
             if not any(t.state == TrialState.WAITING for t in trials):
-                propose(self.plan, self.optuna, len(trials))
+                self.optuna.enqueue_trial(next_params(self.plan, self.optuna, len(trials)))
             trial = self.optuna.ask(self._space)
             self._lock_trial(trial.number)
             return trial
@@ -233,7 +230,7 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
                     with suppress(KeyError):  # there is no such study
                         optuna.delete_study(study_name=name, storage=place)
                 study = optuna.create_study(
-                    storage=place, study_name=name, load_if_exists=True,
+                    storage=place, study_name=name, load_if_exists=True, sampler=RandomSampler(),  # draws nothing
                     directions=["maximize" if goal.higher else "minimize" for goal in plan.goals],
                 )  # fmt: skip
         except OSError:
@@ -321,22 +318,17 @@ def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -
         return error
     # Each trial has an order of its own, so that no few scenes decide about all trials.
     order = np.random.default_rng([plan.options.seed, trial.number]).permutation(len(plan.training)).tolist()
-    reported = study.trials()[trial.number].intermediate_values  # by a process that was killed
+    may_stop = trial.number > 0 and len(plan.goals) == 1
     with closing(play([plan.training[k] for k in order], config, plan.needs_every_score)) as results:
         for k, result in zip(order, results, strict=True):
             if isinstance(result, FlockscopeError):
                 return result
             played[k] = result
-            if len(plan.goals) > 1 or math.isnan(goal.of(result)):
-                continue
-            if k not in reported:
-                trial.report(goal.of(result), k)
-            if trial.number == 0 or plan.options.prune == 0 or len(played) == len(order):
-                continue
-            estimate = _estimate_if_losing(study, played)
+            estimate = _estimate_if_losing(study, played) if may_stop and len(played) < len(order) else None
             if estimate is not None:
                 trial.set_user_attr(PRUNED, len(played))
                 return [estimate]
+    trial.set_user_attr(SCENES, [goal.of(played[k]) for k in sorted(played)])
     if trial.number == 0:
         trial.set_user_attr(LEFT_OUT, [played[k].left_out for k in sorted(played)])
     values = [goal.mean([played[k] for k in sorted(played)]) for goal in plan.goals]
@@ -349,12 +341,12 @@ def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -
 
 def _estimate_if_losing(study: SearchStudy, played: dict[int, Episode]) -> float | None:
     """Returns an estimate of the value of a trial that surely loses to the best one by these scenes, else None."""
-    goal = study.plan.goals[0]
-    if not any(t.state == TrialState.COMPLETE for t in study.trials()):
+    goal, complete = study.plan.goals[0], [t for t in study.finished() if t.state == TrialState.COMPLETE]
+    if not complete:
         return None
     best = study.optuna.best_trial
-    both = [(best.intermediate_values[k], goal.of(e)) for k, e in played.items() if k in best.intermediate_values]
-    gains = [goal.gain(theirs, own) for theirs, own in both if own == own]
+    gains = [goal.gain(best.user_attrs[SCENES][k], goal.of(e)) for k, e in played.items()]
+    gains = [gain for gain in gains if gain == gain]
     if best.value is None or not should_prune(gains, study.plan.options.prune):
         return None
     loss = max(-mean_of_known(gains), LEAST_LOSS)
