@@ -22,9 +22,8 @@ EXPECTED = {
     "tuple_type": "a list, see docs/reference/scenario-files.md", "value_error": "{error}",
     "too_short": "a length of at least {min_length}", "too_long": "a length of at most {max_length}",
     "greater_than": "greater than {gt:g}", "greater_than_equal": "greater than or equal to {ge:g}",
-    "less_than": "less than {lt:g}", "less_than_equal": "less than or equal to {le:g}",
+    "less_than_equal": "less than or equal to {le:g}", "union_tag_invalid": "`type`, one of {expected_tags}",
     "union_tag_not_found": "`type`, one of 'merge', 'split', 'queue'",
-    "union_tag_invalid": "`type`, one of {expected_tags}",
 }  # fmt: skip
 
 M = typing.TypeVar("M", bound=BaseModel)

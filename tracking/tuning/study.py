@@ -19,7 +19,7 @@ import re
 import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, cast
 
@@ -49,30 +49,34 @@ HEAD = b'{"op_code":'  # How every journal begins.
 
 
 class StudyLocks:
-    """The locks of a study that is stored in `file`, shared by the processes of a search.
+    """The locks of a study that is stored in `file`, shared by the processes of a search. Without a file (None) nothing
+    is locked.
 
     State: `study`, the lock of the study, which this process may take again while it holds it; the locks of the trials
     that this process plays, by number.
     """
 
-    def __init__(self, file: Path) -> None:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        self.study, self._file, self._trials = FileLock(f"{file}.lock"), file, dict[int, FileLock]()
+    def __init__(self, file: Path | None) -> None:
+        self.study: AbstractContextManager[object] = nullcontext()
+        self.file, self._trials = file, dict[int, FileLock]()
+        if file is not None:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            self.study = FileLock(f"{file}.lock")
 
     def take_trial(self, number: int) -> bool:
-        """Locks a trial and returns True; returns False if it is locked already."""
-        lock = FileLock(f"{self._file}.trial-{number}.lock", blocking=False)
-        with suppress(Timeout):
-            lock.acquire()
-            self._trials[number] = lock
-            return True
-        return False
+        """Locks a trial and returns True; returns False if it is locked already, or without a file."""
+        if self.file is not None:
+            lock = FileLock(f"{self.file}.trial-{number}.lock", blocking=False)
+            with suppress(Timeout):
+                lock.acquire()
+                self._trials[number] = lock
+        return number in self._trials
 
     def release_trial(self, number: int) -> None:
         """Releases the lock of a finished trial and removes its file; does nothing if this process does not hold it."""
         if number in self._trials:
             self._trials.pop(number).release()
-            Path(f"{self._file}.trial-{number}.lock").unlink(missing_ok=True)
+            Path(f"{self.file}.trial-{number}.lock").unlink(missing_ok=True)
 
     def close(self) -> None:
         """Releases the locks of all trials, whose files stay for the processes that take these trials over."""
@@ -80,7 +84,7 @@ class StudyLocks:
             lock.release()
 
 
-def _journal(file: Path, lock: FileLock) -> JournalStorage:
+def _journal(file: Path, lock: object) -> JournalStorage:
     """Returns the storage in a journal, without an incomplete last line, which a killed process leaves. Raises
     ValueError if the file is no journal."""
     content = file.read_bytes() if file.exists() else b""
@@ -104,14 +108,14 @@ FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 class SearchStudy:
     """An open study of a search (Optuna's record of its trials), which several processes can share.
 
-    A new study gets the defaults as its first trial. Without a journal file, `locks` is None.
+    A new study gets the defaults as its first trial.
     """
 
-    def __init__(self, plan: SearchPlan, study: optuna.Study, locks: StudyLocks | None, storage: object = None) -> None:
+    def __init__(self, plan: SearchPlan, study: optuna.Study, locks: StudyLocks, storage: object = None) -> None:
         self.plan, self.optuna, self.locks, self._used = plan, study, locks, UsedFiles()
         self._folder = _folder(plan)
         self._space = {p.name: distribution(p) for p in plan.space}
-        with self._choosing():
+        with self.locks.study:
             if not self.trials() and SETTINGS not in study.user_attrs:
                 study.set_user_attr(SETTINGS, plan.identity())
             _check_identity(plan, study, storage)
@@ -124,7 +128,7 @@ class SearchStudy:
         used = relative(used, self._folder)  # so that the study can be moved with the tracker
         if used.items() <= self._used.items():
             return
-        with self._choosing():
+        with self.locks.study:
             self._used.add(self.plan.tracker_name, used)
             self._used.update(self.optuna.user_attrs.get(USED, {}))
             self.optuna.set_user_attr(USED, dict(self._used))
@@ -152,11 +156,11 @@ class SearchStudy:
         A trial that another process began and abandoned comes first. take_running: True takes running trials for
         abandoned if the study has no locks.
         """
-        with self._choosing():
+        with self.locks.study:
             trials = self.trials()
             begun = [t for t in trials if t.state in (*FINISHED, TrialState.RUNNING)]
             for t in begun:
-                if t.state == TrialState.RUNNING and self._lock_trial(t.number, take_running):
+                if t.state == TrialState.RUNNING and (take_running or self.locks.take_trial(t.number)):
                     trial = optuna.Trial(self.optuna, t._trial_id)
                     for name, choices in self._space.items():  # the process may have ended before it had chosen all
                         trial._suggest(name, choices)
@@ -166,18 +170,14 @@ class SearchStudy:
             if not any(t.state == TrialState.WAITING for t in trials):
                 self.optuna.enqueue_trial(next_params(self.plan, self.optuna, len(trials)))
             trial = self.optuna.ask(self._space)
-            self._lock_trial(trial.number)
+            self.locks.take_trial(trial.number)
             return trial
-
-    def _lock_trial(self, number: int, without_locks: bool = True) -> bool:
-        return without_locks if self.locks is None else self.locks.take_trial(number)
 
     def tell(self, trial: optuna.Trial, values: Sequence[float] | None) -> None:
         """Stores the values of a trial, one per goal, and releases its lock; None: the parameters are impossible."""
         state = TrialState.PRUNED if values is None else TrialState.COMPLETE
         self.optuna.tell(trial, values, state, skip_if_finished=True)
-        if self.locks is not None:
-            self.locks.release_trial(trial.number)
+        self.locks.release_trial(trial.number)
 
     def records(self) -> list[TrialRecord]:
         """Returns the finished trials, sorted by number; number 0 is the defaults."""
@@ -207,9 +207,6 @@ class SearchStudy:
             warnings.simplefilter("ignore", UserWarning)
             return dict(get_param_importances(self.optuna, params=names, target=lambda t: sign * t.values[0]))
 
-    def _choosing(self) -> AbstractContextManager[object]:
-        return nullcontext() if self.locks is None else self.locks.study
-
 
 @contextmanager
 def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Iterator[SearchStudy]:
@@ -218,14 +215,10 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
     url = str(storage) if "://" in str(storage) else None
     file = Path(storage) if storage is not None and url is None else None
     database = SQLITE.fullmatch(url or "")
-    locked = Path(database[1]) if database else file
-    with quiet_optuna(), ExitStack() as opened:
-        locks = None if locked is None else StudyLocks(locked)
-        if locks is not None:
-            opened.callback(locks.close)
+    with quiet_optuna(), closing(StudyLocks(Path(database[1]) if database else file)) as locks:
         try:
-            with nullcontext() if locks is None else locks.study:
-                place = _journal(file, locks.study) if file and locks else get_storage(url)
+            with locks.study:
+                place = get_storage(url) if file is None else _journal(file, locks.study)
                 if plan.options.fresh:
                     with suppress(KeyError):  # there is no such study
                         optuna.delete_study(study_name=name, storage=place)
@@ -290,7 +283,7 @@ def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> No
                 _play_trial(study, trial, play)
         elif len(study.finished()) >= planned and study.trials()[0].state.is_finished():
             return
-        elif study.locks is not None:
+        elif study.locks.file is not None:
             time.sleep(PAUSE)
         else:
             take_running = True
