@@ -19,7 +19,7 @@ from scenarios.errors import InputError
 from scenarios.limits import is_number
 from scenarios.loading.toml_files import did_you_mean, parse, toml_value
 from sim.store.numeric_text import read_number
-from tracking.running.user_code import tracker_failed, user_code
+from tracking.user_code import tracker_failed, user_code
 
 Scale = Literal["linear", "log", "int", "categorical", "vector"]
 Value = float | int | str | bool | tuple[float, ...]

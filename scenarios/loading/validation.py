@@ -4,7 +4,6 @@ one line.
 
 from __future__ import annotations
 
-import re
 import typing
 from typing import Any
 
@@ -15,14 +14,16 @@ from scenarios.limits import COORDINATE, is_number
 from scenarios.loading.toml_files import KeyPath, Table, did_you_mean, place_of
 
 TAGS = {"number", "distribution", "point", "meet"}  # of the discriminators of values, in pydantic's locations
-# our words for those of pydantic's messages
-WORDS = {
-    "^(Input should be |Value error, )": "", "a valid tuple": "a list, see docs/reference/scenario-files.md",
-    "^String should match pattern.*": "a name: a letter, then letters, digits, '_', '.' or '-'",
-    r"a valid dictionary or instance of \w+": "a table",
-    r"^Tuple should have (at \w+ \d+ items?).*": r"\1",
-    "^Unable to extract tag using .*": "`type`, one of 'merge', 'split', 'queue'",
-    "^Input tag .* does not match any of the expected tags:": "`type`, one of",
+# What is expected, by the type of pydantic's error and its context.
+EXPECTED = {
+    "bool_type": "true or false", "int_type": "an integer", "float_type": "a number", "finite_number": "a finite number",
+    "string_type": "a text", "string_pattern_mismatch": "a name: a letter, then letters, digits, '_', '.' or '-'",
+    "model_type": "a table", "model_attributes_type": "a table", "literal_error": "{expected}",
+    "tuple_type": "a list, see docs/reference/scenario-files.md", "value_error": "{error}",
+    "too_short": "a length of at least {min_length}", "too_long": "a length of at most {max_length}",
+    "greater_than": "greater than {gt:g}", "greater_than_equal": "greater than or equal to {ge:g}",
+    "less_than_equal": "less than or equal to {le:g}", "union_tag_invalid": "`type`, one of {expected_tags}",
+    "union_tag_not_found": "`type`, one of 'merge', 'split', 'queue'",
 }  # fmt: skip
 
 M = typing.TypeVar("M", bound=BaseModel)
@@ -72,9 +73,7 @@ def _words(error: Any, path: KeyPath) -> tuple[KeyPath, str, str, str]:
         return path, got, f"at least {path[-1] + 1} numbers", "correct the list"
     if kind == "missing":
         return path, "nothing", f"the key {str(path[-1])!r}", "add it"
-    expected = error["msg"]
-    for theirs, ours in WORDS.items():
-        expected = re.sub(theirs, ours, expected)
+    expected = EXPECTED[kind].format(**ctx) if kind in EXPECTED else error["msg"]
     return path, got, expected, "correct the value"
 
 

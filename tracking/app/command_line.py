@@ -29,7 +29,7 @@ from tracking.app.command_result import INTERRUPTED, CommandResult, print_error,
 from tracking.app.installed_versions import check_installed
 from tracking.app.option_parsing import check_output_folder
 from tracking.keyword_options import signature_parameter
-from tracking.running.user_code import recorded_interrupts
+from tracking.user_code import recorded_interrupts
 
 HELP = {"-h", "--help", "--version"}
 # A folder's labels and detections are read alike: one warning is enough for both.

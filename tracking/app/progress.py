@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from scenarios.errors import printable
-from tracking.running.user_code import raise_if_interrupted
+from tracking.user_code import raise_if_interrupted
 
 if TYPE_CHECKING:
     from rich.progress import Progress

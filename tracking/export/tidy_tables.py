@@ -449,7 +449,9 @@ def crossings(frame: Ints, id: Ints, pos: Array, line: Array, downwards: bool) -
 
 
 def inside(pos: Array, zone: Array) -> Bools:
-    """Returns flags (N,): True for points pos (N, 2) inside the polygon `zone` (K, 2)."""
-    from matplotlib.path import Path as Outline
-
-    return np.asarray(Outline(zone).contains_points(pos[:, :2]))
+    """Returns flags (N,): True for points pos (N, 2) inside the polygon `zone` (K, 2): a ray to the right from there
+    crosses an odd number of its edges."""
+    start, end, point = zone, np.roll(zone, -1, axis=0), pos[:, None, :2]
+    passed = (start[:, 1] > point[..., 1]) != (end[:, 1] > point[..., 1])
+    to_the_right = (cross(end - start, point - start) > 0) == (end[:, 1] > start[:, 1])
+    return np.asarray((passed & to_the_right).sum(axis=1) % 2 == 1)

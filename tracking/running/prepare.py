@@ -37,7 +37,7 @@ from tracking.running.plane_check import PlaneCheck
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracks_check import ReportHistory, check_tracks
 from tracking.running.used_files import inside, owner_of
-from tracking.running.user_code import tracker_failed, user_code
+from tracking.user_code import tracker_failed, user_code
 
 DIAGNOSTICS = JSON_BYTES // 8  # characters; run.json has indented lines
 # A config, parameter values by name, the name of a preset, the path of a TOML file, or None for the defaults.

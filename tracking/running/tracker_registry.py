@@ -15,7 +15,7 @@ from scenarios.loading.toml_files import did_you_mean
 from sim.types import Tracker
 from tracking.config import Config
 from tracking.running import used_files, user_modules
-from tracking.running.user_code import tracker_failed, user_code, what_was_raised
+from tracking.user_code import tracker_failed, user_code, what_was_raised
 
 REGISTRY = {
     "blob": "tracking.papers.blob.tracker:Blob",

@@ -42,21 +42,20 @@ CELLS = 2_000_000  # numbers of matches held at once
 LEAST = 1e-10  # keeps LocA at 1 where nothing is matched
 
 
-def weighted_hota(pairs: Pairs, size: int, by_level: bool = True) -> WeightedScores:
+def weighted_hota(pairs: Pairs, size: int) -> WeightedScores:
     """Returns a function from weights (D, size) to the scores of `hota_scores`, (D,) by key. Arguments as of
     `hota_sums`."""
-    sums = hota_sums(pairs, size, by_level)
+    sums = hota_sums(pairs, size)
     return lambda weights: hota_scores(sums(weights))
 
 
-def hota_sums(pairs: Pairs, size: int, by_level: bool = True) -> Callable[[Array], Array]:
+def hota_sums(pairs: Pairs, size: int) -> Callable[[Array], Array]:
     """Returns a function from weights (D, size) to sums (D, 7, 19) at the thresholds `ALPHAS`, which `hota_scores`
     takes.
 
     The rows are TP, true rows, estimated rows, the sums over matches of AssA, AssRe and AssPr, and the sum of
     similarities. Sums of several sequences add up. One matching serves all thresholds and all weights: in each frame
-    the one with the greatest sum of A(i, j) s(i, j). by_level: True adds similarities up by threshold first, False by
-    frame first; only the last bit of LocA depends on it."""
+    the one with the greatest sum of A(i, j) s(i, j)."""
     true_id, est_id, link = pairs.links
     n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link
     m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
@@ -80,7 +79,7 @@ def hota_sums(pairs: Pairs, size: int, by_level: bool = True) -> Callable[[Array
     def of_part(weights: Array) -> Array:
         n, m = true_rows(weights), est_rows(weights)
         together = _reached(met(weights).reshape(len(weights), len(used), bins))  # (D, U, 19): matches of each link
-        similar = total + (weights - 1) @ near if by_level else weights @ near
+        similar = total + (weights - 1) @ near
         own, other = n[:, true_id, None], m[:, est_id, None]
         ass = [_share(together * together, of).sum(axis=1) for of in (own + other - together, own, other)]
         rows = np.broadcast_arrays(n.sum(axis=1)[:, None], m.sum(axis=1)[:, None], similar)

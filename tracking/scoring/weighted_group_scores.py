@@ -213,7 +213,7 @@ def _weighted_groups(
 
 
 def _group_hota(pairs: Pairs, rows: Array, end: str) -> WeightedScores:
-    hota = weighted_hota(pairs, len(rows), by_level=False)
+    hota = weighted_hota(pairs, len(rows))
 
     def score(weights: Array) -> dict[str, Array]:
         some = weights @ rows > 0

@@ -89,12 +89,14 @@ def _search(options: TuneOptions) -> TuningResult:
 
 
 def require_optuna(place: str) -> None:
-    """Raises InputError if Optuna is missing; place: what needs it."""
+    """Raises InputError if Optuna or filelock is missing; place: what needs them."""
     try:
+        import filelock  # noqa: F401
         import optuna  # noqa: F401
-    except ImportError:
+    except ImportError as error:
         remedy = 'in the folder of the sources: pip install -c constraints.txt -e ".[tune]"'
-        raise InputError(place=place, got="no optuna", expected="the package optuna", remedy=remedy) from None
+        got, expected = f"no {error.name}", "the packages optuna and filelock"
+        raise InputError(place=place, got=got, expected=expected, remedy=remedy) from None
 
 
 def _checked_target(out: Path, candidates: int) -> Path:

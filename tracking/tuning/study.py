@@ -2,14 +2,10 @@
 
 `open_study` opens it as a `SearchStudy`, which gives the next trial to play, stores values, and lists finished trials.
 
-The file of a study serves several processes at once, any of which may be killed at any time. It is Optuna's journal
-with three differences:
-
-- Locks are system locks (fcntl) on bytes of FILE.locks: byte 0 while a trial is chosen, byte 1 while lines are written,
-  byte 2 + n while trial n is played. The system releases the locks of a process that dies, so another process sees that
-  its trial was abandoned, and plays it.
-- An incomplete last line is removed before the next line is written.
-- Lines are not flushed to the disk one by one.
+Several processes may share a journal or an SQLite file, and any of them may be killed at any time. The lock FILE.lock
+is held while a trial is chosen and while lines are written. The lock FILE.trial-N.lock is held while trial N is played.
+The system releases the locks of a process that dies, so another process sees that its trial was abandoned, and plays
+it.
 
 `run_trials` is the loop of a search: one trial (set of parameters) after the other, each played on the training scenes
 until it surely loses. It surely loses if the p-value of a paired test against the best trial, after any scene, is below
@@ -18,21 +14,20 @@ a limit. It then gets an estimate of its value.
 
 from __future__ import annotations
 
-import fcntl
-import json
-import math
 import os
 import re
 import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import optuna
+from filelock import FileLock, Timeout
 from optuna.exceptions import UpdateFinishedTrialError
+from optuna.samplers import RandomSampler
 from optuna.storages import JournalStorage, get_storage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
@@ -46,80 +41,65 @@ from tracking.running.used_files import UsedFiles, changes, folder_of, relative
 from tracking.stats import mean_of_known
 from tracking.tuning.candidates import STORED, TrialRecord
 from tracking.tuning.options import Progress
-from tracking.tuning.sampler import PRUNED, distribution, propose, should_prune, tpe_sampler
+from tracking.tuning.sampler import PRUNED, distribution, next_params, should_prune
 from tracking.tuning.search_plan import SearchPlan
 
-SUFFIX = ".locks"  # What the name of the lock file adds to the name of the journal.
-CHOOSING, WRITING, FIRST_TRIAL = 0, 1, 2  # Bytes of the lock file.
 SQLITE = re.compile(r"sqlite(?:\+\w+)?:///(?!:memory:)([^?]+)(?:\?.*)?")  # URL of a file, which gets locks, too
 HEAD = b'{"op_code":'  # How every journal begins.
 
 
-class TrialLocks:
-    """Locks on single bytes of the file `path`, shared by the processes of a search; the file is created if missing.
+class StudyLocks:
+    """The locks of a study that is stored in `file`, shared by the processes of a search. Without a file (None) nothing
+    is locked.
 
-    State: the open file; closing it, or the end of the process, releases every lock.
+    State: `study`, the lock of the study, which this process may take again while it holds it; the locks of the trials
+    that this process plays, by number.
     """
 
-    def __init__(self, path: Path) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    def __init__(self, file: Path | None) -> None:
+        self.study: AbstractContextManager[object] = nullcontext()
+        self.file, self._trials = file, dict[int, FileLock]()
+        if file is not None:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            self.study = FileLock(f"{file}.lock")
 
-    def lock(self, byte: int, wait: bool = True) -> bool:
-        """Locks the byte at this offset of the file for this process and returns True. If another process holds the
-        lock, waits for it, or if `wait` is False returns False at once."""
-        try:
-            fcntl.lockf(self._file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB), 1, byte)
-        except OSError:
-            if wait:
-                raise
-            return False
-        return True
+    def take_trial(self, number: int) -> bool:
+        """Locks a trial and returns True; returns False if it is locked already, or without a file."""
+        if self.file is not None:
+            lock = FileLock(f"{self.file}.trial-{number}.lock", blocking=False)
+            with suppress(Timeout):
+                lock.acquire()
+                self._trials[number] = lock
+        return number in self._trials
 
-    def release(self, byte: int) -> None:
-        """Releases this process's lock on a byte; does nothing if it holds none."""
-        fcntl.lockf(self._file, fcntl.LOCK_UN, 1, byte)
-
-    @contextmanager
-    def locked(self, byte: int) -> Iterator[None]:
-        """Context manager: waits until the byte is free and holds its lock while the block runs."""
-        self.lock(byte)
-        try:
-            yield
-        finally:
-            self.release(byte)
+    def release_trial(self, number: int) -> None:
+        """Releases the lock of a finished trial and removes its file; does nothing if this process does not hold it."""
+        if number in self._trials:
+            self._trials.pop(number).release()
+            Path(f"{self.file}.trial-{number}.lock").unlink(missing_ok=True)
 
     def close(self) -> None:
-        """Closes the file and so releases every lock."""
-        os.close(self._file)
+        """Releases the locks of all trials, whose files stay for the processes that take these trials over."""
+        for lock in self._trials.values():
+            lock.release()
 
 
-class LockedJournal(JournalFileBackend):
-    """Optuna's journal file at `path`, written under `locks`. Lines survive a killed process but not a power cut."""
-
-    def __init__(self, path: Path, locks: TrialLocks) -> None:
-        self._path, self._locks = path, locks
-        super().__init__(str(path))
-        self.append_logs([])
-
-    def append_logs(self, logs: list[dict[str, Any]]) -> None:
-        """Appends one JSON line per log. Raises ValueError if the file is no journal."""
-        with self._locks.locked(WRITING), open(self._path, "a+b") as file:
-            size = file.tell()
-            file.seek(0)
-            if not HEAD.startswith(file.read(len(HEAD))):
-                raise ValueError("no journal of Optuna")
-            file.seek(max(size - 1, 0))
-            if file.read(1) not in (b"", b"\n"):
-                file.seek(0)
-                file.truncate(file.read().rfind(b"\n") + 1)
-            file.write("".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs).encode())
+def _journal(file: Path, lock: object) -> JournalStorage:
+    """Returns the storage in a journal, without an incomplete last line, which a killed process leaves. Raises
+    ValueError if the file is no journal."""
+    content = file.read_bytes() if file.exists() else b""
+    if not HEAD.startswith(content[: len(HEAD)]):
+        raise ValueError("no journal of Optuna")
+    if content[-1:] not in (b"", b"\n"):
+        os.truncate(file, content.rfind(b"\n") + 1)
+    return JournalStorage(JournalFileBackend(str(file), cast(Any, lock)))
 
 
 SETTINGS = "settings"  # Attribute of a study that holds the identity of its plan.
 USED = "used"  # Attribute of a study that holds what its tracker has used, as `used_files.used`.
-# Attributes of a trial: why its parameters are impossible; of the first: for each scene why it was left out, or "".
-ERROR, LEFT_OUT = "error", "left out"
+# Attributes of a trial: why its parameters are impossible; the first goal's value of each training scene; of the first
+# trial: for each scene why it was left out, or "".
+ERROR, SCENES, LEFT_OUT = "error", "scenes", "left out"
 
 # States of a finished trial. PRUNED means impossible parameters; one stopped early is COMPLETE with an estimate.
 FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
@@ -128,14 +108,14 @@ FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 class SearchStudy:
     """An open study of a search (Optuna's record of its trials), which several processes can share.
 
-    A new study gets the defaults as its first trial. Without a journal file, `locks` is None.
+    A new study gets the defaults as its first trial.
     """
 
-    def __init__(self, plan: SearchPlan, study: optuna.Study, locks: TrialLocks | None, storage: object = None) -> None:
+    def __init__(self, plan: SearchPlan, study: optuna.Study, locks: StudyLocks, storage: object = None) -> None:
         self.plan, self.optuna, self.locks, self._used = plan, study, locks, UsedFiles()
         self._folder = _folder(plan)
         self._space = {p.name: distribution(p) for p in plan.space}
-        with self._choosing():
+        with self.locks.study:
             if not self.trials() and SETTINGS not in study.user_attrs:
                 study.set_user_attr(SETTINGS, plan.identity())
             _check_identity(plan, study, storage)
@@ -148,7 +128,7 @@ class SearchStudy:
         used = relative(used, self._folder)  # so that the study can be moved with the tracker
         if used.items() <= self._used.items():
             return
-        with self._choosing():
+        with self.locks.study:
             self._used.add(self.plan.tracker_name, used)
             self._used.update(self.optuna.user_attrs.get(USED, {}))
             self.optuna.set_user_attr(USED, dict(self._used))
@@ -176,36 +156,28 @@ class SearchStudy:
         A trial that another process began and abandoned comes first. take_running: True takes running trials for
         abandoned if the study has no locks.
         """
-        with self._choosing():
+        with self.locks.study:
             trials = self.trials()
             begun = [t for t in trials if t.state in (*FINISHED, TrialState.RUNNING)]
             for t in begun:
-                if t.state == TrialState.RUNNING and self._lock_trial(t.number, take_running):
-                    self.optuna.sampler = tpe_sampler(self.plan, t.number)
+                if t.state == TrialState.RUNNING and (take_running or self.locks.take_trial(t.number)):
                     trial = optuna.Trial(self.optuna, t._trial_id)
                     for name, choices in self._space.items():  # the process may have ended before it had chosen all
-                        # What was drawn alone is drawn again, so that the generator continues from there.
-                        if name in t.params and name not in trial.relative_params:
-                            self.optuna.sampler.sample_independent(self.optuna, t, name, choices)
                         trial._suggest(name, choices)
                     return trial
             if len(begun) >= self.plan.options.trials:
                 return None
             if not any(t.state == TrialState.WAITING for t in trials):
-                propose(self.plan, self.optuna, len(trials))
+                self.optuna.enqueue_trial(next_params(self.plan, self.optuna, len(trials)))
             trial = self.optuna.ask(self._space)
-            self._lock_trial(trial.number)
+            self.locks.take_trial(trial.number)
             return trial
-
-    def _lock_trial(self, number: int, without_locks: bool = True) -> bool:
-        return without_locks if self.locks is None else self.locks.lock(FIRST_TRIAL + number, wait=False)
 
     def tell(self, trial: optuna.Trial, values: Sequence[float] | None) -> None:
         """Stores the values of a trial, one per goal, and releases its lock; None: the parameters are impossible."""
         state = TrialState.PRUNED if values is None else TrialState.COMPLETE
         self.optuna.tell(trial, values, state, skip_if_finished=True)
-        if self.locks is not None:
-            self.locks.release(FIRST_TRIAL + trial.number)
+        self.locks.release_trial(trial.number)
 
     def records(self) -> list[TrialRecord]:
         """Returns the finished trials, sorted by number; number 0 is the defaults."""
@@ -235,9 +207,6 @@ class SearchStudy:
             warnings.simplefilter("ignore", UserWarning)
             return dict(get_param_importances(self.optuna, params=names, target=lambda t: sign * t.values[0]))
 
-    def _choosing(self) -> AbstractContextManager[None]:
-        return nullcontext() if self.locks is None else self.locks.locked(CHOOSING)
-
 
 @contextmanager
 def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Iterator[SearchStudy]:
@@ -246,19 +215,15 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
     url = str(storage) if "://" in str(storage) else None
     file = Path(storage) if storage is not None and url is None else None
     database = SQLITE.fullmatch(url or "")
-    locked = Path(database[1]) if database else file
-    with quiet_optuna(), ExitStack() as opened:
-        locks = None if locked is None else TrialLocks(locked.with_name(locked.name + SUFFIX))
-        if locks is not None:
-            opened.callback(locks.close)
+    with quiet_optuna(), closing(StudyLocks(Path(database[1]) if database else file)) as locks:
         try:
-            with nullcontext() if locks is None else locks.locked(CHOOSING):
-                place = JournalStorage(LockedJournal(file, locks)) if file and locks else get_storage(url)
+            with locks.study:
+                place = get_storage(url) if file is None else _journal(file, locks.study)
                 if plan.options.fresh:
                     with suppress(KeyError):  # there is no such study
                         optuna.delete_study(study_name=name, storage=place)
                 study = optuna.create_study(
-                    storage=place, study_name=name, load_if_exists=True,
+                    storage=place, study_name=name, load_if_exists=True, sampler=RandomSampler(),  # draws nothing
                     directions=["maximize" if goal.higher else "minimize" for goal in plan.goals],
                 )  # fmt: skip
         except OSError:
@@ -318,7 +283,7 @@ def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> No
                 _play_trial(study, trial, play)
         elif len(study.finished()) >= planned and study.trials()[0].state.is_finished():
             return
-        elif study.locks is not None:
+        elif study.locks.file is not None:
             time.sleep(PAUSE)
         else:
             take_running = True
@@ -346,22 +311,17 @@ def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -
         return error
     # Each trial has an order of its own, so that no few scenes decide about all trials.
     order = np.random.default_rng([plan.options.seed, trial.number]).permutation(len(plan.training)).tolist()
-    reported = study.trials()[trial.number].intermediate_values  # by a process that was killed
+    may_stop = trial.number > 0 and len(plan.goals) == 1
     with closing(play([plan.training[k] for k in order], config, plan.needs_every_score)) as results:
         for k, result in zip(order, results, strict=True):
             if isinstance(result, FlockscopeError):
                 return result
             played[k] = result
-            if len(plan.goals) > 1 or math.isnan(goal.of(result)):
-                continue
-            if k not in reported:
-                trial.report(goal.of(result), k)
-            if trial.number == 0 or plan.options.prune == 0 or len(played) == len(order):
-                continue
-            estimate = _estimate_if_losing(study, played)
+            estimate = _estimate_if_losing(study, played) if may_stop and len(played) < len(order) else None
             if estimate is not None:
                 trial.set_user_attr(PRUNED, len(played))
                 return [estimate]
+    trial.set_user_attr(SCENES, [goal.of(played[k]) for k in sorted(played)])
     if trial.number == 0:
         trial.set_user_attr(LEFT_OUT, [played[k].left_out for k in sorted(played)])
     values = [goal.mean([played[k] for k in sorted(played)]) for goal in plan.goals]
@@ -374,12 +334,12 @@ def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -
 
 def _estimate_if_losing(study: SearchStudy, played: dict[int, Episode]) -> float | None:
     """Returns an estimate of the value of a trial that surely loses to the best one by these scenes, else None."""
-    goal = study.plan.goals[0]
-    if not any(t.state == TrialState.COMPLETE for t in study.trials()):
+    goal, complete = study.plan.goals[0], [t for t in study.finished() if t.state == TrialState.COMPLETE]
+    if not complete:
         return None
     best = study.optuna.best_trial
-    both = [(best.intermediate_values[k], goal.of(e)) for k, e in played.items() if k in best.intermediate_values]
-    gains = [goal.gain(theirs, own) for theirs, own in both if own == own]
+    gains = [goal.gain(best.user_attrs[SCENES][k], goal.of(e)) for k, e in played.items()]
+    gains = [gain for gain in gains if gain == gain]
     if best.value is None or not should_prune(gains, study.plan.options.prune):
         return None
     loss = max(-mean_of_known(gains), LEAST_LOSS)

@@ -132,7 +132,8 @@ REFUSED = [
     ("event.m1.type=mrge", "", "'mrge'", "'merge'", ""), ("event.m1.goal=mete", "", "'mete'", "'meet'", ""),
     ("event.m1.when={time=1, after='x'}", "", "after", "exactly one of time", ""),
     ("event.m1.groups=['a']", "", "['a']", "at least 2", ""), ("group.a.id='1 2'", "", "'1 2'", "a name", ""),
-    ("schema=2", "", "2", "1", ""),
+    ("schema=2", "", "2", "1", ""), ("mirror=3", "", "3", "true or false", ""), ("world=3", "", "3", "a table", ""),
+    ("world.size=[1, 2, 3]", "", "[1, 2, 3]", "at most 2", ""), ("camera.tilt_deg=200", "", "200", "equal to 90", ""),
 ]  # fmt: skip
 
 

@@ -257,7 +257,7 @@ def test_interrupted_and_full_disk_while_writing(name, error, code, as_json, pla
     assert run(words(COMMANDS[name][0], place) + ["--json"] * as_json) == code
     monkeypatch.undo()
     check_output(capsys, code, as_json)
-    left = {"tune": ["toy.journal", "toy.journal.locks"], "stress": ["episodes.jsonl"]}.get(name.split()[0], [])
+    left = {"tune": ["toy.journal", "toy.journal.lock"], "stress": ["episodes.jsonl"]}.get(name.split()[0], [])
     assert sorted(p.name for p in place.out.rglob("*")) == left
 
 

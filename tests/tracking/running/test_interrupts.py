@@ -6,7 +6,7 @@ import pytest
 
 from tests.tracking.running.test_user_code import command
 from tracking.app.cli import run
-from tracking.running.user_code import raise_if_interrupted, recorded_interrupts
+from tracking.user_code import raise_if_interrupted, recorded_interrupts
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")

@@ -14,7 +14,7 @@ from tests.tracking.running.test_run import Stranger
 from tracking.app.cli import run
 from tracking.config import Config, param
 from tracking.running.run import track
-from tracking.running.user_code import recorded_interrupts
+from tracking.user_code import recorded_interrupts
 
 ABRUPT = [SystemExit(0), SystemExit("done"), GeneratorExit(), BaseException("what"), StopIteration(), ValueError("no")]
 

@@ -74,7 +74,7 @@ def test_a_search_waits_for_its_defaults(tmp_path):
         study.ask()
         for value in (0.1, 0.2, 0.3):
             study.tell(study.ask(), [value])
-        own = SearchStudy(toy_plan(tmp_path, trials=3, **wanted), study.optuna, None)
+        own = SearchStudy(toy_plan(tmp_path, trials=3, **wanted), study.optuna, study.locks)
         run_trials(own, Game(), lambda *now: None)
         assert own.left_out() == [""] * 12
         assert own.records()[0].params == own.plan.defaults
