@@ -111,8 +111,9 @@ class Rollout:
         self.opened: OpenedSource = open_source(self.source, streams)
         self.truth: Truth = self.opened.truth
         self.prepared = prepare(
-            self.tracker, self.sequence, params=self.config, detections=self.detections, seed=self.tracker_seed
-        )
+            self.tracker, self.sequence, params=self.config, detections=self.detections, seed=self.tracker_seed,
+            inputs=self.opened.input_frames,
+        )  # fmt: skip
         self.tracks: list[Tracks] = []
         start = time.perf_counter()
         self.prepared.reset(self.tracker_seed)

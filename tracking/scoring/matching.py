@@ -36,8 +36,8 @@ def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
     occurs in one frame only. weight (K,): above 0.
     """
     chosen, left = _settle(i, j, weight, strict=False)
-    for part, *table in _tables(frame, i, j, left):
-        chosen[part] = _solve(*table, weight[part])
+    for part, row, column, shape in _tables(frame, i, j, left):
+        chosen[part] = _solve(row, column, shape, weight[part])
     return chosen
 
 
@@ -45,8 +45,8 @@ def match_as_table(pairs: Pairs, weight: Array) -> Bools:
     """Returns which of the pairs are matched, (K,) bool: as `match`, but with ties broken as TrackEval does. weight
     (K,): above 0."""
     chosen, left = _settle(pairs.i, pairs.j, weight, strict=True)
-    for part, *table in _tables(pairs.frame, pairs.i, pairs.j, left):
-        found = _only_matching(*table, weight[part])
+    for part, row, column, shape in _tables(pairs.frame, pairs.i, pairs.j, left):
+        found = _only_matching(row, column, shape, weight[part])
         if found is None:
             whole = slice(*np.searchsorted(pairs.frame, (pairs.frame[part[0]], pairs.frame[part[0]] + 1)))
             chosen[whole] = solve_frame(pairs, whole, weight[whole])

@@ -103,7 +103,8 @@ def play_oracle(task: OracleTask, opened: OpenedSource) -> Outcome:
     frames = () if mode == "image" else sequence.without_pictures()
     kind = input_kind(task.tracker.needs, mode, sequence, frames)
     try:
-        scores = opened.scorer.evaluate(oracle(sequence, {"detections": mode, "input": kind}))
+        given = {"detections": mode, "input": kind}
+        scores = opened.scorer.evaluate(oracle(sequence, given, inputs=opened.input_frames, scorer=opened.scorer))
     except FlockscopeError as error:
         return _outcome(error)
     return Outcome({key: value for key, value in scores.items() if value == value}, frames=sequence.length or 0)
