@@ -24,11 +24,11 @@ from scenarios.schema.scenario import ObservationSpec
 from sim.clock import check_stride
 from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
 from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
-from sim.io.files.atomic import PARTIAL, lock_folder, remove_partials, write_file
-from sim.io.files.own_files import is_side_file, output_path, output_paths
-from sim.io.store import sequence_folder
-from sim.io.store.group_files import read_never_arrives
-from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
+from sim.store import sequence_folder
+from sim.store.atomic import PARTIAL, lock_folder, remove_partials, write_file
+from sim.store.group_files import read_never_arrives
+from sim.store.own_files import is_side_file, output_path, output_paths
+from sim.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
 from sim.streams import check_streams
 from sim.types import Camera, Sequence
 from sim.workers.pool import WorkerOptions, start_workers

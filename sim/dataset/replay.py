@@ -31,10 +31,10 @@ from scenarios.schema.values import Model, NonNegative, Positive
 from sim.crowd.heading import facings, headings
 from sim.dataset.splits import is_real
 from sim.hashing import canonical_hash
-from sim.io.formats.labelled_truth import centres
 from sim.rng import draw, rng
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.sequence import observe
+from sim.truth.labelled_truth import centres
 from sim.types import Array, Bools, Camera, Ints, Motion, Scene, Sequence, Truth
 
 TIMES = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)  # s, candidates for tau
@@ -226,7 +226,7 @@ def replay(
         InputError: The source has no labelled people or no way to the ground, the cut is outside it, or people leave
             the camera's view.
     """
-    from sim.io.source import open_source
+    from tracking.recordings.source import open_source
 
     if not isinstance(source, Sequence):
         found = open_source(source, images=False)
@@ -303,7 +303,7 @@ def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None)
 
 
 def _calibrated(calibration: Camera | str | Path | None, source: Sequence) -> Camera | None:
-    from sim.io.formats.calibration import read_calibration, scaled_to_image
+    from tracking.recordings.calibration import read_calibration, scaled_to_image
 
     if calibration is None or isinstance(calibration, Camera):
         return calibration

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from sim.io.formats.labelled_truth import RUN, chords
+from sim.truth.labelled_truth import RUN, chords
 from sim.types import Tracks
 
 

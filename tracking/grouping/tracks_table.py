@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.labelled_truth import chords
+from sim.truth.labelled_truth import chords
 from sim.truth.motion_rows import MotionRows
 from sim.types import Array, Bools, Ints, Tracks
 

@@ -12,10 +12,10 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load, load_observation
 from scenarios.schema.scenario import ObservationSpec
 from sim.dataset.replay import Cut, replay
-from sim.io.formats.biwi import open_folder
 from sim.sequence import simulate
 from sim.types import Sequence
 from tests.recordings import mot_folder
+from tracking.recordings.biwi import open_folder
 
 
 @pytest.fixture

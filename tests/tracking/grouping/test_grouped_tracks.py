@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
-from sim.io.formats.labelled_truth import labelled_truth_fields
 from sim.sequence import simulate
+from sim.truth.labelled_truth import labelled_truth_fields
 from sim.types import GroupEvent, Groups, Tracks
 from tests.reference_sense import paced
 from tracking.grouping.grouped_tracks import derive, events_at_end, with_groups

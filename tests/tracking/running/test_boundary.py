@@ -18,7 +18,7 @@ import pytest
 
 import tracking
 from scenarios.errors import WorkError
-from sim.io.store.track_files import read_tracks, write_tracks
+from sim.store.track_files import read_tracks, write_tracks
 from sim.types import Groups
 from tests.tracking.running.test_run import Stranger, source
 from tests.tracking.running.test_tracks_check import SQUARE, answer, event, group

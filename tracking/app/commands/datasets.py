@@ -33,8 +33,8 @@ def generate(options: GenerateOptions) -> CommandResult:
 
 def validate(options: ValidateOptions) -> CommandResult:
     """Checks a generated sequence or dataset, or stored tracks; changes nothing."""
-    from sim.io.store.validate import content_hash
-    from sim.io.store.validate import validate as check
+    from sim.store.validate import content_hash
+    from sim.store.validate import validate as check
 
     folder = options.folder
     problems = check(folder)

@@ -1,0 +1,270 @@
+"""Keeps opened sequences between episodes on the same sources, so that motions, truths and detections are computed
+once.
+
+The memory is bounded by the bytes of the arrays that they hold.
+
+Also here: the sequences that episodes are played on: scenarios with seeds, stored or real recordings, sequences in
+memory.
+
+`sources` turns the names, files or sequences that a user gives into `Source`s; `Source.open` makes or reads one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
+
+from scenarios.errors import InputError
+from sim.types import DetectionMode, Frame, Motion, Sequence, Truth
+
+if TYPE_CHECKING:
+    from scenarios.loading.resolve import Entry
+    from tracking.running.prepare import InputFrames
+    from tracking.scoring.evaluation import Scorer
+
+T = TypeVar("T")
+SourceSpec = str | Path | Sequence | Iterable["str | Path | Sequence | Source"]
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """One sequence to play on: a scenario entry with its seed, a path, or a Sequence in memory (exactly one of these).
+
+    A source with a Sequence in memory cannot be pickled.
+    """
+
+    name: str  # of the scenario or sequence
+    seed: int = 0  # of the simulation, or stated by the recording, else 0
+    entry: Entry | None = field(default=None, repr=False)
+    path: str = ""
+    sequence: Sequence | None = field(default=None, repr=False)
+
+    @cached_property
+    def key(self) -> tuple[object, ...]:
+        """A tuple that is equal for two sources exactly if they are of the same sequence. It is computed once."""
+        if self.entry is not None:
+            content = self.entry.scenario.model_dump_json()
+            return self.name, self.seed, self.entry.repeat, hashlib.sha256(content.encode()).hexdigest()
+        return (str(Path(self.path).resolve()),) if self.path else (id(self.sequence),)
+
+    @property
+    def simulated(self) -> bool:
+        """True if the sequence is simulated from a scenario, False if it is stored or in memory."""
+        return self.entry is not None
+
+    @cached_property
+    def people_key(self) -> tuple[object, ...]:
+        """A tuple that is equal for two sources exactly if they have the same people in motion, seen from one place."""
+        if self.entry is None:
+            return self.key
+        people = self.entry.scenario.model_dump_json(exclude={"sensor", "light", "picture"})
+        return self.name, self.seed, self.entry.repeat, people
+
+    def open(self, streams: Iterable[str] = (), motion: Motion | None = None) -> Sequence:
+        """Returns the sequence: simulated, read from its path, or the one in memory. streams: the pictures to draw or
+        read, some of "left", "right" and "background"; a stored sequence is read with pictures if "left" is among them.
+        motion: of the simulated people; None simulates it.
+        """
+        if self.sequence is not None:
+            return self.sequence
+        if self.entry is not None:
+            from sim.sequence import observe
+
+            return observe(self.entry.scenario, motion or self.motion(), streams=streams)
+        from tracking.recordings.source import open_source
+
+        return open_source(self.path, images="left" in streams)[0]
+
+    def motion(self) -> Motion:
+        """Returns the motion of the people of a simulated source."""
+        from sim.crowd.world import run
+
+        assert self.entry is not None, "only a scenario is simulated"
+        return run(self.entry.scenario, self.seed, self.entry.repeat)
+
+
+def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: Iterable[str] = ()) -> tuple[Source, ...]:
+    """Returns the sources that `what` stands for; each scenario or suite entry gives one source per seed, in order.
+
+    If a name is both in the catalogue and a folder, the catalogue is used.
+
+    Args:
+        what: The name of a suite or scenario, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a
+            list of these.
+        seeds: Seeds with which scenarios are simulated; they have no effect on other sources.
+        set: Settings "key=value" of the scenarios.
+
+    Raises:
+        InputError: A name is unknown, a file or setting is wrong, there is no source, or there are settings but no
+            scenario.
+    """
+    if isinstance(what, str | Path | Sequence | Source):
+        what = (what,)
+    if not isinstance(seeds, Iterable):
+        remedy = f"write for example range({seeds})"
+        raise InputError(place="seeds", got=repr(seeds), expected="a range or a list of numbers", remedy=remedy)
+    if isinstance(set, str):
+        raise InputError(place="set", got=repr(set), expected='a list of "key=value"', remedy=f"write [{set!r}]")
+    numbers, settings = tuple(seeds), tuple(set)
+    found = tuple(source for item in what for source in _sources_of(item, numbers, settings))
+    if not found:
+        raise InputError(place="sources", got="none", expected="at least one", remedy="give a suite, or seeds")
+    if settings and not any(source.simulated for source in found):
+        got, remedy = ", ".join(settings), "leave the settings out"
+        raise InputError(place="set", got=got, expected="none for recordings", remedy=remedy)
+    return found
+
+
+def _sources_of(
+    item: str | Path | Sequence | Source, seeds: tuple[int, ...], settings: tuple[str, ...]
+) -> list[Source]:
+    if isinstance(item, Source):
+        return [item]
+    if isinstance(item, Sequence):
+        return [Source(item.name, int(item.source.get("seed", 0)), sequence=item)]
+    from scenarios.loading.resolve import is_catalogued, resolve
+
+    text = str(item)
+    if not is_catalogued(text) and Path(item).exists():
+        return _stored(Path(item))
+    return [Source(e.name, seed, entry=e) for e in resolve(text, settings) for seed in seeds]
+
+
+def _stored(path: Path) -> list[Source]:
+    from tracking.recordings.source import open_source
+
+    found = open_source(path, images=False)
+    return [Source(s.name, int(s.source.get("seed", 0)), path=str(s.source.get("path", path))) for s in found]
+
+
+DEFAULT_LIMIT = 256 * 2**20  # Bytes that a SourceCache keeps by default.
+
+
+class Kept:
+    """Values that are computed once and then kept. State: the values, and their bytes when these were last counted."""
+
+    def __init__(self) -> None:
+        self._values: list[object] = []
+        self._counted = (0, 0)  # number of values, bytes
+
+    def add(self, value: T) -> T:
+        """Keeps a value and returns it."""
+        self._values.append(value)
+        return value
+
+    def once(self, compute: Callable[[], T]) -> Callable[[], T]:
+        """Returns a function that returns what `compute` returns; it calls `compute` once."""
+        return cache(lambda: self.add(compute()))
+
+    @property
+    def bytes(self) -> int:
+        """Number of bytes that the values take, measured by pickling them."""
+        if len(self._values) != self._counted[0]:
+            arrays: list[pickle.PickleBuffer] = []
+            packed = pickle.dumps(self._values, protocol=5, buffer_callback=arrays.append)
+            self._counted = len(self._values), len(packed) + sum(array.raw().nbytes for array in arrays)
+        return self._counted[1]
+
+
+class SourcePeople:
+    """What sources of one `people_key` have in common: the motion, the truth and its scorer, kept after their first
+    use. motion: None if it is not simulated. load_truth: None without labels."""
+
+    def __init__(self, source: Source) -> None:
+        self.kept = Kept()
+        self.motion = self.kept.add(source.motion()) if source.simulated else None
+        self.load_truth: Callable[[], Truth] | None = None
+        self._scorer: Scorer | None = None
+
+    def scorer(self, truth: Truth) -> Scorer:
+        """Returns the `Scorer` of the truth, which is that of every such source."""
+        from tracking.scoring.evaluation import Scorer
+
+        if self._scorer is None:
+            self._scorer = self.kept.add(Scorer(truth))
+        return self._scorer
+
+
+class OpenedSource:
+    """A source whose sequence is open; its detections, truth and background are kept after their first use. streams:
+    the pictures that are drawn if the source is simulated, some of "left", "right" and "background". people: of another
+    source with the same people_key."""
+
+    def __init__(self, source: Source, streams: tuple[str, ...] = (), people: SourcePeople | None = None) -> None:
+        self.source, self.people, self.kept = source, people or SourcePeople(source), Kept()
+        found = source.open(streams, self.people.motion)
+        if self.people.load_truth is None and found.load_truth is not None:
+            self.people.load_truth = self.people.kept.once(found.load_truth)
+        background = found.load_background and self.kept.once(found.load_background)
+        self._opened = opened = replace(found, load_truth=self.people.load_truth, load_background=background)
+        frames_once = self.kept.once(lambda: tuple(opened.without_pictures()))
+
+        def frames_without_pictures() -> Iterator[Frame]:
+            return iter(frames_once())
+
+        pictures = opened.has_images or opened.has_right
+        frames = opened.frames if pictures else frames_without_pictures
+        self.sequence = replace(opened, bare=frames_without_pictures, frames=frames)
+        self._inputs: dict[tuple[object, ...], InputFrames] = {}
+
+    @cached_property
+    def truth(self) -> Truth:
+        """The truth (labels) of the sequence. Raises InputError if it has no labels or they cannot be read."""
+        truth = self._opened.truth
+        if truth is None:
+            remedy = "give a sequence with labels: there is nothing to score by"
+            raise InputError(file=self.source.name, got="no labels", expected="a truth", remedy=remedy)
+        return truth
+
+    @property
+    def scorer(self) -> Scorer:
+        """A `Scorer` of the sequence's truth, built on first use. Raises InputError without labels."""
+        return self.people.scorer(self.truth)
+
+    def input_frames(self, mode: DetectionMode, needs: tuple[str, ...], seed: int) -> InputFrames:
+        """Returns what `tracking.running.prepare.input_frames` does, made on first use."""
+        from tracking.running.prepare import input_frames
+
+        key = (mode, "boxes" in needs, "points" in needs, seed if mode == "truth" else 0)
+        if key not in self._inputs:
+            self._inputs[key] = self.kept.add(input_frames(mode, needs, self.sequence, {}, seed, owned=True))
+        return self._inputs[key]
+
+
+class SourceCache:
+    """Opened sources, kept for reuse; the least recently used source is dropped first. len() gives their number.
+
+    limit: number of bytes that all kept sources may take together. It is checked when a new source is opened, before
+    that one is added; the source in use is kept whatever its size.
+    """
+
+    def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
+        self.limit = limit
+        self._opened: OrderedDict[tuple[object, ...], OpenedSource] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._opened)
+
+    @property
+    def bytes(self) -> int:
+        """Number of bytes that all kept sources take, 0 without sources."""
+        people = {id(opened.people): opened.people.kept for opened in self._opened.values()}
+        return sum(opened.kept.bytes for opened in self._opened.values()) + sum(kept.bytes for kept in people.values())
+
+    def open(self, source: Source, streams: tuple[str, ...] = ()) -> OpenedSource:
+        """Returns the opened source: the kept one if it was opened with the same `streams`, else a new one."""
+        key = (*source.key, streams)
+        if key not in self._opened:
+            while self._opened and self.bytes > self.limit:
+                self._opened.popitem(last=False)
+            others = (opened for opened in self._opened.values() if opened.source.people_key == source.people_key)
+            other = next(others, None)
+            self._opened[key] = OpenedSource(source, streams, None if other is None else other.people)
+        self._opened.move_to_end(key)
+        return self._opened[key]
