@@ -81,7 +81,7 @@ def test_trackers_and_detectors_see_neither_truth_nor_scores():
     hidden = (
         "tracking.scoring", "tracking.running.detection_mode", "tracking.app", "sim.truth.label",
         "sim.truth.merge_split_events", "sim.truth.group_hulls", "sim.truth.crossing_events",
-        "sim.truth.queue_detection", "sim.io", "sim.sequence",
+        "sim.truth.queue_detection", "sim.store", "sim.sequence", "tracking.recordings", "tracking.export",
     )  # fmt: skip
     assert offences(names, *hidden) == []
     assert offences(names, *(f"sim.types.{word}" for word in TRUTH)) == []

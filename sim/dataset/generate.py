@@ -294,13 +294,13 @@ def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
 
 def store_replays(
     sources: Iterable[Sequence], view: ObservationSpec, seeds: range, out: str | Path, *, cut: Cut = WHOLE,
-    calibration: Camera | str | Path | None = None, streams: Iterable[str] = ("left",), images: str = "jpg",
+    calibration: Camera | None = None, streams: Iterable[str] = ("left",), images: str = "jpg",
     progress: Progress | None = None,
 ) -> list[Path]:  # fmt: skip
     """Stores a replay of every source with every seed in folders named as by `generate`; returns the folders.
 
     view: camera, sensor, light and picture, with the frame rate. cut: the part of each recording to replay.
-    calibration: camera, or its file, of recordings that have boxes but no ground positions; None if not needed; an
+    calibration: camera of recordings that have boxes but no ground positions; None if not needed; an
     error for others. streams, images, progress: as for `generate`.
 
     The first error is raised and ends the work; replays stored before it are kept. Recordings of real motion need seeds

@@ -11,6 +11,7 @@ is called, never where it is written. `file_name` turns any label into a name in
 
 from __future__ import annotations
 
+import os.path
 import re
 import struct
 import zlib
@@ -154,3 +155,9 @@ def output_paths(folder: str | Path, labels: Iterable[str], ending: str = "", so
         seen[key] = label
         paths.append(path)
     return paths
+
+
+def split_and_name(folder: Path) -> str:
+    """Returns <split>/<name>, the last two parts of a sequence folder's absolute path."""
+    # ".." is resolved and links are not: the way to a folder does not change its name.
+    return "/".join(Path(os.path.abspath(folder)).parts[-2:])

@@ -15,10 +15,9 @@ from sim import hashing
 from sim.store import seal
 from sim.store.atomic import PARTIAL
 from sim.store.group_files import read_never_arrives
-from sim.store.own_files import is_side_file
+from sim.store.own_files import is_side_file, split_and_name
 from sim.store.seal import is_run, read_run, run_problems
-from sim.store.track_files import read_tracks
-from tracking.recordings.source import generated_folders, split_and_name
+from sim.store.track_files import read_run as read_run_tracks
 
 
 def validate(folder: str | Path) -> list[FlockscopeError]:
@@ -53,7 +52,9 @@ def _inside(root: Path, kind: Callable[[Path], bool]) -> list[Path]:
 
 def content_hash(folder: str | Path) -> str:
     """Returns the SHA-256 of a generated dataset or sequence, from the hashes in its manifests."""
-    folders = generated_folders(Path(folder))
+    folders = _inside(Path(folder), seal.is_sequence)
+    if not folders:
+        raise _problem(Path(folder), "no sequences", "a generated sequence or dataset", "give what `generate` made")
     return hashing.dataset_hash({split_and_name(p): seal.read_manifest(p)["content_hash"] for p in folders})
 
 
@@ -71,7 +72,7 @@ def _faults(folder: Path) -> Iterator[FlockscopeError]:
         problems = list(run_problems(folder, read_run(folder)))
         yield from problems
         if not problems:
-            read_tracks(folder)
+            read_run_tracks(folder)
     except FlockscopeError as error:
         yield error
 

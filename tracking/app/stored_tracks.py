@@ -26,12 +26,12 @@ from sim.store.seal import (
     run_folder,
     tracked_hash,
 )  # fmt: skip
-from sim.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.recordings.mot_table import size_doubt
 from tracking.recordings.mot_text import frame_rate
 from tracking.recordings.options import BoxScale, refuse_options
 from tracking.recordings.source import holds_sequences
+from tracking.recordings.track_texts import read_checked_tracks
 from tracking.running.run import TrackingRun
 
 DEPTH = 3  # Tracks are looked for in this many levels of folders below the path.

@@ -20,13 +20,13 @@ from sim import hashing
 from sim.dataset.splits import split_of
 from sim.scene.visibility import image_size_of_boxes
 from sim.store.atomic import write_file
-from sim.store.own_files import GENERATOR, output_paths
+from sim.store.own_files import GENERATOR, output_paths, split_and_name
 from sim.store.seal import read_whole_manifest, reject_sealed
 from sim.store.tables import json_text
 from sim.streams import file_name
 from sim.types import Array, Bools, Sequence, Truth
 from tracking.recordings.mot_folder import left_pictures
-from tracking.recordings.source import open_source, split_and_name
+from tracking.recordings.source import open_source
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
 

@@ -21,9 +21,10 @@ from scenarios.errors import InputError
 from sim.pictures.stored_pictures import StoredPictures
 from sim.store.atomic import write_file
 from sim.store.camera_files import read_camera
+from sim.store.own_files import split_and_name
 from sim.store.seal import read_whole_manifest, reject_sealed
 from sim.types import Camera
-from tracking.recordings.source import generated_folders, split_and_name
+from tracking.recordings.source import generated_folders
 
 FOLDERS = {"left": "image_2", "right": "image_3", "disparity": "disp_noc_0"}
 

@@ -37,7 +37,7 @@ from sim.store.atomic import write_file
 from sim.store.numeric_text import number_or_nan
 from sim.store.own_files import refuse_foreign_file
 from sim.store.tables import parquet_bytes
-from sim.truth.labelled_truth import differentiate
+from sim.truth.velocities import differentiate
 from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
 
 if TYPE_CHECKING:

@@ -21,9 +21,9 @@ from sim import hashing
 from sim.pictures.stored_pictures import StoredPictures
 from sim.store import tables
 from sim.store.atomic import lock_folder, remove_partials, staged_path, write_file
-from sim.store.own_files import is_side_file
+from sim.store.own_files import is_side_file, split_and_name
 from sim.store.seal import MANIFEST, read_whole_manifest
-from tracking.recordings.source import generated_folders, split_and_name
+from tracking.recordings.source import generated_folders
 
 BLOCK = 512  # bytes: a tar holds whole blocks
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}

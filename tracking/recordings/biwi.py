@@ -19,8 +19,9 @@ from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.store.numeric_text import CORRECT, NumericTable, person_ids, read_rows
 from sim.store.recorded_sequence import recorded_sequence
-from sim.truth.labelled_truth import differentiate, warn_of_places, with_labels
+from sim.truth.velocities import differentiate
 from sim.types import Ints, Sequence, Truth
+from tracking.recordings.labelled_truth import warn_of_places, with_labels
 from tracking.recordings.options import NO_OPTIONS, RecordingOptions
 
 FPS = 2.5

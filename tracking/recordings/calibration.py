@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -168,7 +167,6 @@ def _numbers(node: Any) -> Iterator[float]:
 
 PERSON, SMALLEST_PERSON = 1.7, 2.0  # a person's height, m, and the least px that it must have in the picture
 WIDEST, WIDEST_SHARE = 2.0, 0.25  # m, and share of the height: a longer baseline is not in metres
-SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios of calibration and recording
 
 
 def read_calibration(path: Path) -> Camera:
@@ -201,22 +199,3 @@ def _reader(path: Path) -> Callable[[Path], Camera]:
     if isinstance(document, dict) and document.keys().isdisjoint(OWN):
         raise _wrong(path, "", f"the keys {', '.join(document)}"[:100], FORMS, "write its numbers as a camera.json")
     return read_camera
-
-
-def scaled_to_image(
-    camera: Camera, image: tuple[int, int] | None, path: Path, aspect: Fraction = Fraction(1)
-) -> Camera:
-    """Returns the camera scaled to pictures of `image` (width, height) px; unchanged for None or the same size.
-
-    aspect: width / height of a stored pixel. Raises InputError if the pictures have another shape than the calibration.
-    """
-    if image is None or image == camera.image:
-        return camera
-    x, y = image[0] / camera.image[0], image[1] / camera.image[1]
-    # It may be calibrated with the stored pixels or with square ones.
-    if all(abs(x / y / ratio - 1) > SHAPE_TOLERANCE for ratio in (1.0, float(aspect))):
-        got, expected = "a calibration for {}×{} px".format(*camera.image), "one for {}×{} px, or of that shape"
-        raise _wrong(path, "--camera", got, expected.format(*image), "give this recording's calibration")
-    (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
-    scale = float(camera.px_per_m * np.sqrt(x * y))
-    return camera.replace(image=image, focal_px=(fx * x, fy * y), centre_px=(cx * x, cy * y), px_per_m=scale)

@@ -17,10 +17,10 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
+from sim.geometry.boxes import centres
 from sim.scene.camera import scale_of_all_boxes, scale_of_first_boxes
 from sim.store.numeric_text import NAME_THEM, NumericTable, bounded_number, person_ids, xml_root
 from sim.store.recorded_sequence import recorded_sequence
-from sim.truth.labelled_truth import centres
 from sim.types import Sequence, Truth
 from tracking.recordings.mot_table import MotTable
 from tracking.recordings.mot_text import truth_of_table

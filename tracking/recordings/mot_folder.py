@@ -18,11 +18,11 @@ from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
 from sim.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
+from sim.scene.camera import scaled_to_image
 from sim.store.numeric_text import bounded_number, read_text
 from sim.store.recorded_sequence import Pictures, recorded_sequence
 from sim.types import Image, Ints, Sequence, Truth
 from tracking.recordings import mot_text
-from tracking.recordings.calibration import scaled_to_image
 from tracking.recordings.mot_table import read_table, size_doubt
 from tracking.recordings.options import NO_OPTIONS, RecordingOptions
 

@@ -27,12 +27,14 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
+from sim.geometry.boxes import centres
 from sim.scene.camera import scale_of_all_boxes
 from sim.store.numeric_text import LARGEST
 from sim.store.recorded_sequence import recorded_sequence
-from sim.truth.labelled_truth import centres, differentiate, warn_of_places, with_labels
+from sim.truth.velocities import differentiate
 from sim.types import Array, Bools, Detections, Ints, Plane, Sequence, Truth, Unscored
 from tracking.recordings.biwi import labels_of
+from tracking.recordings.labelled_truth import warn_of_places, with_labels
 from tracking.recordings.mot_table import GROUND_COLUMNS, PEOPLE, MotTable, corner_doubt, read_table, require_pixels
 from tracking.recordings.options import NO_OPTIONS, RATES, BoxOptions, Classes, RecordingOptions
 from tracking.recordings.worded_cells import usual_step

@@ -174,12 +174,6 @@ def generated_folders(path: Path) -> list[Path]:
     return found
 
 
-def split_and_name(folder: Path) -> str:
-    """Returns <split>/<name>, the last two parts of a sequence folder's absolute path."""
-    # ".." is resolved and links are not: the way to a folder does not change its name.
-    return "/".join(Path(os.path.abspath(folder)).parts[-2:])
-
-
 def _open_one(path: Path, options: RecordingOptions) -> Sequence:
     path = path.parent if path.name == "obsmat.txt" else path
     kind, suffix = _kind(path), path.suffix.lower()

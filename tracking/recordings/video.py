@@ -17,9 +17,9 @@ from scenarios.errors import InputError
 from sim.pictures import video_files
 from sim.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.pictures.picture_folder import fill_gaps, require_size, size_of
+from sim.scene.camera import scaled_to_image
 from sim.store.recorded_sequence import recorded_sequence
 from sim.types import Array, Bools, Image, Sequence
-from tracking.recordings.calibration import scaled_to_image
 from tracking.recordings.options import NO_OPTIONS, RATES, RecordingOptions
 
 SUFFIXES = (

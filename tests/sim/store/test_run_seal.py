@@ -15,12 +15,13 @@ import pytest
 from scenarios.errors import InputError
 from sim.store.seal import NAMES, check_run, read_run, with_hash
 from sim.store.tables import json_document
-from sim.store.track_files import read_tracks, tracks_files, write_tracks
+from sim.store.track_files import tracks_files, write_tracks
 from sim.store.validate import validate
 from tests.made_up import make_tracks, same
 from tests.processes import python
 from tests.sealing import seal_again
 from tracking.app.stored_tracks import find_tracks
+from tracking.recordings.track_texts import read_tracks
 
 PAIRS = bytes(range(256))
 INFO = {"tracker": "blob", "config": {"a": 1.5e-7}, "seed": 0, "sequence": "s", "fps": 10.0}

@@ -5,10 +5,11 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.scene.body import PERSON_HEIGHT
-from sim.store.track_files import WIDTH, read_tracks, tracks_files, upright_boxes, write_tracks
+from sim.store.track_files import WIDTH, tracks_files, upright_boxes, write_tracks
 from sim.types import Camera
 from tests.made_up import make_tracks, same
 from tests.sealing import seal_again
+from tracking.recordings.track_texts import read_tracks
 
 # Level, at (0, 0, 1.7), looking along +y: x right, z down, y forward.
 LEVEL = Camera(

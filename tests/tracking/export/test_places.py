@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.sim.io.export.test_tidy_tables import rows, walk
 
 from scenarios.errors import InputError
+from tests.tracking.export.test_tidy_tables import rows, walk
 from tracking.export.tidy_tables import crossings, inside, parse_places, run_tables
 
 DOOR = np.array([[0.0, 0.0], [2.0, 0.0]])  # who looks from its first to its second corner has +y on the left

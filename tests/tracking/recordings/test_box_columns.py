@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.store.track_files import read_track_text
 from tracking.recordings.options import parse_box_scale
 from tracking.recordings.source import open_source
+from tracking.recordings.track_texts import read_track_text
 
 FRAMES, PEOPLE = 12, 4
 

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.scene.camera import project
+from sim.scene.camera import project, scaled_to_image
 from sim.store.camera_files import camera_document, read_camera
 from tests.made_up import same
-from tracking.recordings.calibration import read_calibration, read_tsai, scaled_to_image
+from tracking.recordings.calibration import read_calibration, read_tsai
 from tracking.recordings.source import open_source
 
 XML = """<?xml version="1.0" encoding="UTF-8"?>

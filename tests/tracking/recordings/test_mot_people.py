@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.store.track_files import read_checked_tracks, read_tracks
 from tests.recordings import mot_folder
 from tracking.recordings.source import open_source
+from tracking.recordings.track_texts import read_checked_tracks, read_tracks
 
 BOX = "10,10,20,50"
 

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.store.track_files import read_track_text
 from tracking.app.stored_tracks import find_tracks
 from tracking.grouping.known_people import people_as_tracks
 from tracking.recordings.source import open_source
+from tracking.recordings.track_texts import read_track_text
 
 
 def opened(tmp_path, text):

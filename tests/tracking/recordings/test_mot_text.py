@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.truth.labelled_truth import chords, differentiate
+from sim.truth.velocities import chords, differentiate
 from tests.recordings import mot_folder
 from tracking.recordings import mot_text
 from tracking.recordings.mot_table import read_table

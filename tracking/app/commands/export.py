@@ -9,7 +9,6 @@ from functools import partial
 
 from scenarios.errors import InputError, counted
 from sim.store.seal import reject_sealed
-from sim.store.track_files import read_checked_tracks
 from sim.types import Sequence
 from tracking.app.command_options import CocoOptions, CsvOptions, KittiOptions, TrajnetOptions, WebdatasetOptions
 from tracking.app.command_result import CommandResult
@@ -18,6 +17,7 @@ from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import STATED, StoredTracks, find_tracks, holds_tracks, run_folders
 from tracking.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
 from tracking.recordings.options import refuse_options
+from tracking.recordings.track_texts import read_checked_tracks
 
 
 def export_coco(options: CocoOptions) -> CommandResult:

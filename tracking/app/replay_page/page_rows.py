@@ -18,8 +18,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.geometry.boxes import centres
 from sim.store.track_files import flatten
-from sim.truth.labelled_truth import centres
 from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
 
 

@@ -15,7 +15,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.store.seal import NAMES, check_run
 from sim.store.tables import plain
-from sim.store.track_files import read_tracks, write_tracks
+from sim.store.track_files import write_tracks
 from sim.types import Tracks
 from tests.recordings import mot_folder
 from tests.refusals import answer, refused
@@ -25,6 +25,7 @@ from tracking import group
 from tracking.app.cli import run
 from tracking.app.commands.group import lasting
 from tracking.recordings.source import open_source
+from tracking.recordings.track_texts import read_tracks
 
 FPS = 10.0
 Place = Callable[[float], tuple[float, float]]

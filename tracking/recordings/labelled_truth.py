@@ -2,11 +2,6 @@
 
 A label says who belongs together. When such people form a group, and their events, are measured from the motion. The
 rules are in metres, so a recording in px is divided by its px_per_m and the result multiplied by it.
-
-Computes velocities from positions by differences over a window of time (default 0.5 s).
-
-`differentiate` is for labels, and looks half the window ahead. `chords` is for tracks, and looks back only. The unit is
-that of the positions per second.
 """
 
 from __future__ import annotations
@@ -19,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from scenarios.limits import COORDINATE
-from sim.truth.merge_split_rules import frames_of
+from sim.geometry.boxes import centres
+from sim.truth.velocities import CHORD, differentiate
 from sim.types import Array, GroupEvent, Groups, Ints, Truth
 
 NEAR = 0.15  # m: bodies do not come so near, from middle to middle
@@ -29,11 +25,6 @@ SOME = 4  # people who are not all within one metre, on one line along an axis, 
 # m/s: a median speed above it is no crowd's. It is 0.6 to 1.4 in seq_hotel, zara01, mwt1gt, PETS09, TownCentre and
 # TUD-Campus.
 RUN = 3.0
-
-
-def centres(box: Array) -> Array:
-    """Returns the middles (R, 2) of boxes (R, 4) left, top, width, height."""
-    return np.asarray(box[:, :2] + box[:, 2:] / 2)
 
 
 def warn_of_places(file: Path, truth: Truth) -> None:
@@ -145,42 +136,3 @@ def scale_groups(groups: Groups, factor: float) -> Groups:
         return groups
     hull, extent = tuple(h * factor for h in groups.hull), groups.extent * factor**2
     return groups.replace(pos=groups.pos * factor, vel=groups.vel * factor, extent=extent, hull=hull)
-
-
-WINDOW = 0.5  # s, length of the time window
-# s, that of labelled boxes: they rest for some frames and then jump by pixels, which shorter windows pick up
-CHORD = 1.0
-
-
-def differentiate(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:
-    """Returns the velocity of each row (R, D), in the unit of `pos` per s: a difference over a centred window.
-
-    frame, id (R,), pos (R, D): rows in any order, each id once in a frame. window: s. The velocity is 0 if an id
-    has only one row in the window, nan if a position used is nan.
-    """
-    half = max(1, round(window * fps / 2))
-    return _chords(frame, id, pos, fps, half, half, 0.0)
-
-
-def chords(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:
-    """Returns the velocity of each row (R, D): displacement since the id's earliest row in the last `window` s, over
-    time.
-
-    frame, id (R,), pos (R, D): rows in any order, each id once in a frame. nan without an earlier row within the
-    window.
-    """
-    return _chords(frame, id, pos, fps, frames_of(window, fps), 0, np.nan)
-
-
-def _chords(frame: Ints, id: Ints, pos: Array, fps: float, back: int, ahead: int, alone: float) -> Array:
-    """Returns the velocities from the id's first to its last row within `back` and `ahead` frames of each row."""
-    order = np.lexsort((frame, id))
-    f, rank = frame[order], np.unique(id[order], return_inverse=True)[1]
-    # Keys of two people are further apart than a window, so one search serves all.
-    key = rank * (int(f.max(initial=0)) + back + ahead + 2) + f
-    first, last = np.searchsorted(key, key - back), np.searchsorted(key, key + ahead, side="right") - 1
-    steps = f[last] - f[first]
-    chord = (pos[order][last] - pos[order][first]) * fps / np.maximum(steps, 1)[:, None]
-    out = np.empty_like(pos)
-    out[order] = np.where(steps[:, None] > 0, chord, alone)
-    return out
