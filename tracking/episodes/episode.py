@@ -169,7 +169,7 @@ class Rollout:
         known, source = self.prepared.context, self.prepared.input
         tracks, _ = completed(
             self.tracks, known.fps, self.prepared.px_per_m(self.tracks), camera=known.camera, scene=known.scene,
-            source=source, image_size=known.image_size, all_events=every,
+            source=source, image_size=known.image_size, objective=not every,
         )  # fmt: skip
         try:
             run = TrackingRun(tracks, {"input": source})
