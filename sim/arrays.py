@@ -45,7 +45,7 @@ class Frozen:
         """Returns an object with these values of all fields, in order. Arrays must be read-only and have the declared
         number type: this is not checked."""
         made = object.__new__(cls)
-        for name, value in zip(_names(cls), values, strict=True):
+        for name, value in zip(_names(cls), values, strict=True):  # type: ignore[arg-type]
             object.__setattr__(made, name, value)
         return made
 

@@ -68,9 +68,7 @@ def shared_data() -> Path:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption(
-        "--write-guides", action="store_true", help="write what commands print into the guides"
-    )
+    parser.addoption("--write-guides", action="store_true", help="write what commands print into the guides")
 
 
 def pytest_collection_finish() -> None:
