@@ -201,7 +201,7 @@ print(sum(name.partition(".")[0] in ("scenarios", "sim", "tracking") for name in
 
 
 def loops(args: argparse.Namespace) -> int:
-    run = GenerateRun(["merge"], "0:24", more=["--set", "duration=4"], env=ONE_THREAD)
+    run = GenerateRun(["crowd"], "0:24", more=["--set", "duration=4"], env=ONE_THREAD)
     one, two = (np.min([way_cost(replace(run, workers=n), n) for _ in range(args.rounds)], axis=0) for n in (1, 2))
     loaded = subprocess.run([sys.executable, "-c", SHORTEST], capture_output=True, text=True, check=True).stdout
     rows = (

@@ -25,6 +25,7 @@ from sim.types import DetectionMode, Frame, Motion, Sequence, Truth
 
 if TYPE_CHECKING:
     from scenarios.loading.resolve import Entry
+    from scenarios.loading.toml_files import Setting
     from tracking.running.prepare import InputFrames
     from tracking.scoring.evaluation import Scorer
 
@@ -89,7 +90,9 @@ class Source:
         return run(self.entry.scenario, self.seed, self.entry.repeat)
 
 
-def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: Iterable[str] = ()) -> tuple[Source, ...]:
+def sources(
+    what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: Iterable[str | Setting] = ()
+) -> tuple[Source, ...]:
     """Returns the sources that `what` stands for; each scenario or suite entry gives one source per seed, in order.
 
     If a name is both in the catalogue and a folder, the catalogue is used.
@@ -98,7 +101,7 @@ def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: It
         what: The name of a suite or scenario, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a
             list of these.
         seeds: Seeds with which scenarios are simulated; they have no effect on other sources.
-        set: Settings "key=value" of the scenarios.
+        set: Settings of the scenarios, as of `scenarios.load`.
 
     Raises:
         InputError: A name is unknown, a file or setting is wrong, there is no source, or there are settings but no
@@ -116,13 +119,13 @@ def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: It
     if not found:
         raise InputError(place="sources", got="none", expected="at least one", remedy="give a suite, or seeds")
     if settings and not any(source.simulated for source in found):
-        got, remedy = ", ".join(settings), "leave the settings out"
+        got, remedy = ", ".join(map(str, settings)), "leave the settings out"
         raise InputError(place="set", got=got, expected="none for recordings", remedy=remedy)
     return found
 
 
 def _sources_of(
-    item: str | Path | Sequence | Source, seeds: tuple[int, ...], settings: tuple[str, ...]
+    item: str | Path | Sequence | Source, seeds: tuple[int, ...], settings: tuple[str | Setting, ...]
 ) -> list[Source]:
     if isinstance(item, Source):
         return [item]
