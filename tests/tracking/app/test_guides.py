@@ -22,9 +22,7 @@ BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 SAVED = re.compile(r"Save this as `([^`]+)`")
 
 
-def play(
-    text: str, data: bool, capsys: pytest.CaptureFixture[str], printed_texts: list[str] | None = None
-) -> list[str]:
+def play(text: str, data: bool, capsys: pytest.CaptureFixture[str], again: list[str] | None = None) -> list[str]:
     """Runs the blocks in order and returns the commands that ran. data: also those that read the folder `data`.
 
     again: receives what stands in place of each text, which is then not compared.
